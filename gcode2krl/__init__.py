@@ -1,0 +1,48 @@
+"""G-code in, a verified KUKA KRL program out, with the truth about what the robot will do.
+
+The names below are the public Python interface; they are imported on first use, so that
+``import gcode2krl`` stays quick.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "load_cell": "gcode2krl.cell",
+    "Cell": "gcode2krl.cell",
+    "read_gcode": "gcode2krl.gcode",
+    "set_targets": "gcode2krl.predict",
+    "solve_joints": "gcode2krl.predict",
+    "write_krl": "gcode2krl.krl",
+    "verify_krl": "gcode2krl.krl",
+    "Gcode2KrlError": "gcode2krl.errors",
+    "Issue": "gcode2krl.errors",
+}
+__all__ = [
+    "Cell",
+    "Gcode2KrlError",
+    "Issue",
+    "__version__",
+    "load_cell",
+    "read_gcode",
+    "set_targets",
+    "solve_joints",
+    "verify_krl",
+    "write_krl",
+]
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell, load_cell
+    from gcode2krl.errors import Gcode2KrlError, Issue
+    from gcode2krl.gcode import read_gcode
+    from gcode2krl.krl import verify_krl, write_krl
+    from gcode2krl.predict import set_targets, solve_joints
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its room on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'gcode2krl' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

@@ -1,0 +1,72 @@
+"""What the commands print: findings, progress on a terminal, JSON."""
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from gcode2krl.errors import Issue
+
+MOST_FINDINGS = 20
+
+
+class Console:
+    """Findings and progress go to standard error, results to standard output."""
+
+    def __init__(self, quiet: bool = False, as_json: bool = False) -> None:
+        self.quiet, self.as_json = quiet, as_json
+
+    def findings(self, issues: Iterable[Issue], source: str, notes: bool = True) -> None:
+        """Print one line a finding, at most 20, then the count; errors first."""
+        order = {"error": 0, "warning": 1, "note": 2}
+        shown = [issue for issue in issues if notes or issue.severity != "note"]
+        shown.sort(key=lambda issue: order[issue.severity])
+        for issue in shown[:MOST_FINDINGS]:
+            colour = {"error": "red", "warning": "yellow", "note": "cyan"}[issue.severity]
+            line = issue.text(source)
+            click.echo(line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1), err=True)
+        if len(shown) > MOST_FINDINGS:
+            click.echo(f"… and {len(shown) - MOST_FINDINGS} more findings", err=True)
+
+    def failed(self, message: str, code: int) -> int:
+        """Print one error line and return the exit code."""
+        click.echo(f"{click.style('error:', fg='red')} {message}", err=True)
+        return code
+
+    def say(self, text: str) -> None:
+        """Print a line of the result for a person."""
+        if not self.quiet and not self.as_json:
+            click.echo(text)
+
+    def hint(self, text: str) -> None:
+        """Print a passing remark on standard error."""
+        if not self.quiet:
+            click.echo(text, err=True)
+
+    def json(self, result: dict[str, Any]) -> None:
+        """Print the one JSON object of a command."""
+        click.echo(json.dumps(result, indent=2, allow_nan=False))
+
+    @contextmanager
+    def progress(self, what: str, total: int | None) -> Iterator[Callable[[int], None]]:
+        """Show a progress bar on a terminal; yields the function that advances it."""
+        if self.quiet or self.as_json or not sys.stderr.isatty():
+            yield lambda amount: None
+            return
+        from rich.console import Console as RichConsole
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=RichConsole(stderr=True), transient=True) as bar:
+            task = bar.add_task(what, total=total)
+            yield lambda amount: bar.advance(task, amount)
+
+
+def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
+    """Return findings as the objects of the JSON contract."""
+    return [
+        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.remedy} for i in issues
+    ]

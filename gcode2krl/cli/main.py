@@ -1,0 +1,73 @@
+"""Entry point ``gcode2krl``: the commands, the default command, and how errors leave the program."""
+
+import sys
+from importlib import import_module
+from typing import Any
+
+import click
+
+from gcode2krl import __version__
+from gcode2krl.cli.console import Console
+from gcode2krl.errors import Gcode2KrlError
+
+_COMMANDS = {"translate": "translate", "verify": "verify", "models": "models"}
+_OWN_OPTIONS = ("-h", "--help", "--version")
+
+
+class _Commands(click.Group):
+    """Commands imported on use; anything else is a part to translate."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        command: click.Command = import_module(f"gcode2krl.cli.{_COMMANDS[cmd_name]}").command
+        return command
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in _COMMANDS and args[0] not in _OWN_OPTIONS:
+            args = ["translate", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
+@click.version_option(__version__, prog_name="gcode2krl")
+def commands() -> None:
+    """G-code in, a verified KUKA KRL program out.
+
+    `gcode2krl part.nc -o part.src` translates; `gcode2krl COMMAND --help` tells more. The program and what
+    it writes are not safety functions.
+    """
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line and leave with the exit code of the contract: 0 done, 1 refused, 2 not understood."""
+    sys.exit(_run(args))
+
+
+def _run(args: list[str] | None) -> int:
+    console = Console()
+    try:
+        result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False)
+        return int(result) if isinstance(result, int) else 0
+    except Gcode2KrlError as error:
+        console.findings(error.issues, error.source)
+        return error.exit_code
+    except click.exceptions.Abort:
+        return console.failed("stopped", 130)
+    except click.ClickException as error:
+        return console.failed(f"{error.format_message()} -> `gcode2krl --help` lists the options", 2)
+    except BrokenPipeError:
+        return 2
+    except (MemoryError, RecursionError) as error:
+        return console.failed(f"not enough memory for this input ({type(error).__name__})", 2)
+    except Exception as error:  # a defect of ours: one line for the user, the rest on request
+        if "-v" in (args or sys.argv) or "--verbose" in (args or sys.argv):
+            raise
+        return console.failed(f"internal error, please report it: {type(error).__name__}: {error} -> run again with -v for details", 2)
+
+
+if __name__ == "__main__":
+    main()

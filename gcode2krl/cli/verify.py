@@ -1,0 +1,43 @@
+"""``gcode2krl verify part.src part.nc``."""
+
+import click
+
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part
+from gcode2krl.errors import Gcode2KrlError
+
+
+@click.command("verify")
+@click.argument("program", metavar="PART.src")
+@click.argument("part", metavar="PART.nc")
+@common_options
+@gcode_options
+def command(
+    program: str, part: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    tolerance: float | None, chord_tolerance: float, block_delete: bool,
+) -> int:  # fmt: skip
+    """Read a KRL program back and compare it with its G-code.
+
+    Use the cell and the tolerances the program was made with. Exit code 1 where it differs.
+    """
+    console = Console(quiet, as_json)
+    try:
+        from gcode2krl.krl import verify_krl
+
+        cell = read_cell(cell_path)
+        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        report = verify_krl(program, toolpath, cell, tolerance)
+    except Gcode2KrlError as error:
+        if not as_json:
+            raise
+        console.json({"verify": {"max_deviation_mm": None}, "issues": issue_dicts(error.issues)})
+        console.findings(error.issues, error.source)
+        return error.exit_code
+    if as_json:
+        console.json({"verify": report.as_dict(), "issues": issue_dicts(report.issues)})
+    else:
+        console.findings(report.issues, program)
+        state = "agrees with" if report.ok else "DIFFERS from"
+        console.say(f"{program} {state} {part}: {report.motions} motions of {report.intended}")
+        console.say(f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, {report.max_speed_difference_mm_min:.2f} mm/min")
+    return 0 if report.ok else 1

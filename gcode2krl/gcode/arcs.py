@@ -1,0 +1,56 @@
+"""Arcs: centre from I, J, K or R, and the chords that replace them.
+
+Everything is in the arc's own axes: (u, v) span the plane, w is the axis of a helix. The planes are the
+right-handed pairs of RS274/NGC: G17 X Y (Z), G18 Z X (Y), G19 Y Z (X).
+"""
+
+import math
+
+from numba import njit
+
+from gcode2krl.gcode import findings as f
+
+RADIUS_TOLERANCE_MM = 0.01
+
+
+@njit(cache=True)
+def centre_from_radius(u0, v0, u1, v1, radius, ccw):  # type: ignore[no-untyped-def]
+    """Return (finding, u, v) of the centre of an arc given by R; a negative R takes the longer way."""
+    du, dv = u1 - u0, v1 - v0
+    chord = math.hypot(du, dv)
+    if chord < 1e-9:
+        return f.ARC_R_FULL_CIRCLE, 0.0, 0.0
+    r = abs(radius)
+    height_squared = r * r - 0.25 * chord * chord
+    if height_squared < 0.0:
+        if 0.5 * chord - r > RADIUS_TOLERANCE_MM:
+            return f.ARC_RADIUS_TOO_SMALL, 0.0, 0.0
+        height_squared = 0.0
+    height = math.sqrt(height_squared)
+    if (radius < 0) == ccw:  # centre on the right of the chord for a long ccw or a short cw arc
+        height = -height
+    return f.OK, 0.5 * (u0 + u1) - height * dv / chord, 0.5 * (v0 + v1) + height * du / chord
+
+
+@njit(cache=True)
+def sweep_angle(u0, v0, u1, v1, cu, cv, ccw, turns):  # type: ignore[no-untyped-def]
+    """Return (start angle, signed sweep) in rad; equal ends are a full circle, P adds whole turns."""
+    start = math.atan2(v0 - cv, u0 - cu)
+    end = math.atan2(v1 - cv, u1 - cu)
+    sweep = end - start if ccw else start - end
+    full = 2.0 * math.pi
+    while sweep <= 1e-9:
+        sweep += full
+    while sweep > full + 1e-9:
+        sweep -= full
+    sweep += full * (turns - 1)
+    return start, (sweep if ccw else -sweep)
+
+
+@njit(cache=True)
+def chord_count(radius, sweep, tolerance_mm):  # type: ignore[no-untyped-def]
+    """Return how many equal chords keep within ``tolerance_mm`` of an arc: error = r·(1 - cos(step/2))."""
+    step = 0.5 * math.pi
+    if tolerance_mm < radius:
+        step = min(step, 2.0 * math.acos(1.0 - tolerance_mm / radius))
+    return max(1, int(math.ceil(abs(sweep) / step - 1e-9)))

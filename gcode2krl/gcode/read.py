@@ -1,0 +1,318 @@
+"""``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode.findings import make_issue
+from gcode2krl.gcode.state import (
+    EVENT_COOLANT,
+    EVENT_M,
+    EVENT_SPINDLE,
+    EVENT_TOOL,
+    WORK_OFFSETS,
+    initial_state,
+)
+from gcode2krl.gcode.words import LINE_LIMIT, Words, scan
+from gcode2krl.tables import Event, Toolpath
+
+CHORD_TOLERANCE_MM = 0.01
+_PIECE_BYTES = 8_000_000
+_MOST_ISSUES = 1000
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_INCH_DECIMALS = 4
+_INCH_EXTENT_MM = 60.0
+
+Progress = Callable[[int], None]
+
+
+def read_gcode(
+    path: str | Path,
+    cell: Cell | None = None,
+    *,
+    dialect: str = "linuxcnc",
+    tools: str | Path | None = None,
+    chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
+    block_delete: bool = False,
+    progress: Progress | None = None,
+) -> Toolpath:
+    """Read a G-code file into a `Toolpath`.
+
+    Parameters
+    ----------
+    path : the file, UTF-8 or Latin-1, any line ends.
+    cell : gives tool lengths and work offsets; without it (and without ``tools``) every length is 0.
+    dialect : only ``linuxcnc`` so far.
+    tools : a LinuxCNC ``tool.tbl`` in mm, used instead of the cell's tools.
+    chord_tolerance_mm : largest distance between an arc and the chords that replace it.
+    block_delete : skip lines that begin with ``/``.
+    progress : called with the number of bytes read.
+
+    Raises
+    ------
+    NotUnderstoodError
+        With every finding (line, remedy), where a line cannot be understood.
+
+    Notes
+    -----
+    Positions are the tool tip in the frame in which work offsets are stated, in mm. Source of meaning:
+    LinuxCNC's RS274/NGC.
+    """
+    name = str(path)
+    try:
+        with Path(path).open("rb") as stream:
+            return read_stream(
+                stream, name, cell,
+                dialect=dialect, tools=tools, chord_tolerance_mm=chord_tolerance_mm,
+                block_delete=block_delete, progress=progress,
+            )  # fmt: skip
+    except OSError as error:
+        raise input_error("file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name) from None
+
+
+def read_stream(
+    stream: BinaryIO,
+    name: str,
+    cell: Cell | None = None,
+    *,
+    dialect: str = "linuxcnc",
+    tools: str | Path | None = None,
+    chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
+    block_delete: bool = False,
+    progress: Progress | None = None,
+) -> Toolpath:
+    """Read G-code from an open binary stream; see `read_gcode`."""
+    if dialect != "linuxcnc":
+        raise input_error("dialect-unknown", f"dialect {dialect!r}; allowed: linuxcnc", source=name)
+    if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
+        raise input_error("option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name)
+    lengths = tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
+    offsets, offset_known = _work_offsets(cell)
+    interpreter = _Interpreter(name, chord_tolerance_mm, block_delete, offsets, offset_known, lengths)
+    head = b""
+    for first_line, text in _pieces(stream, name):
+        head = head or text[:4000].tobytes()
+        interpreter.feed(scan(text, first_line), text)
+        if progress is not None:
+            progress(len(text))
+        if interpreter.ended:
+            interpreter.check_rest(text, first_line)
+            break
+    return interpreter.finish(head)
+
+
+def _work_offsets(cell: Cell | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
+    for name, frame in (cell.work_offsets if cell is not None else {}).items():
+        if frame.a_deg or frame.b_deg or frame.c_deg:
+            raise input_error("cell-key", f"work_offsets.{name}: found a rotation, allowed: x_mm, y_mm, z_mm")
+        index = WORK_OFFSETS.index(name)
+        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm
+        known[index] = True
+    return offsets, known
+
+
+def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Yield (first line, whole lines as uint8) with bounded memory, whatever the file holds."""
+    line, rest, first = 1, b"", True
+    while True:
+        block = stream.read(_PIECE_BYTES)
+        if first:
+            first = False
+            block = block.removeprefix(_BYTE_ORDER_MARK)
+            if not block.strip():
+                raise input_error("empty", "the file is empty", "export the program again", source=name)
+            _reject_binary(block, name)
+        text = rest + block
+        end = len(text) if not block else text.rfind(b"\n") + 1
+        if end == 0 or len(text) - end > LINE_LIMIT:
+            place = line + text.count(b"\n")
+            raise input_error("line-too-long", f"the line is longer than {LINE_LIMIT} characters", "is this a G-code file?", line=place, source=name)
+        if end:
+            whole = np.frombuffer(text, dtype=np.uint8, count=end)
+            yield line, whole
+            line += text.count(b"\n", 0, end)
+        rest = text[end:]
+        if not block:
+            return
+
+
+def _reject_binary(block: bytes, name: str) -> None:
+    if b"\x00" in block[:65536]:
+        remedy = "unpack or export the program as text" if block[:2] == b"\x1f\x8b" else "export the program as text"
+        raise input_error("binary-file", "this is not a text file", remedy, source=name)
+
+
+class _Buffers(NamedTuple):
+    rows: NDArray[np.void]
+    events: NDArray[np.void]
+
+
+class _Interpreter:
+    """Runs the compiled interpreter over pieces of words and collects what it writes."""
+
+    def __init__(
+        self,
+        name: str,
+        chord_tolerance_mm: float,
+        block_delete: bool,
+        offsets: NDArray[np.float64],
+        offset_known: NDArray[np.bool_],
+        tool_length: NDArray[np.float64],
+    ) -> None:
+        self.name = name
+        self.state = initial_state()
+        self.counts = np.zeros(4, dtype=np.int64)
+        self.buffers = _Buffers(np.zeros(4096, dtype=machine.ROW), np.zeros(256, dtype=machine.EVENT))
+        self.found = np.zeros(_MOST_ISSUES, dtype=machine.FOUND)
+        self.options = np.array([chord_tolerance_mm, float(block_delete)])
+        self.offsets, self.offset_known, self.tool_length = offsets, offset_known, tool_length
+        self.messages: list[str] = []
+        self.most_decimals = 0
+        self.rest_line = 0
+        self._start_row()
+
+    @property
+    def ended(self) -> bool:
+        return bool(self.state["ended"][0])
+
+    def _start_row(self) -> None:
+        row = self.buffers.rows[0]
+        row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
+        row["rapid"], row["line"] = 1, 0
+        self.counts[0] = 1
+
+    def feed(self, words: Words, text: NDArray[np.uint8]) -> None:
+        """Execute a piece of words."""
+        columns = (words.letter, words.value, words.extra, words.line)
+        self.counts[3] = 0
+        self.most_decimals = max(self.most_decimals, words.most_decimals)
+        first_message = len(self.messages)
+        words.value[words.letter == ord("(")] += first_message
+        self.messages += [_decode(text[a:b]) for a, b in words.message_span]
+        self._reserve(len(words.line) and int(words.line[-1] - words.line[0]) + 1)
+        at = 0
+        while True:
+            at = machine.run(
+                columns, at, self.state, *self.buffers[:1], self.counts, self.buffers.events, self.found,
+                self.options, self.offsets, self.offset_known, self.tool_length,
+            )  # fmt: skip
+            if at >= len(words.letter) or self.ended:
+                return
+            self._reserve(len(self.buffers.rows))
+
+    def _reserve(self, rows: int) -> None:
+        """Make room for about so many more rows, and for events."""
+        have = self.buffers
+        free = len(have.rows) - self.counts[0]
+        wanted_rows = have.rows if free >= rows + 8 else _grown(have.rows, int(self.counts[0]) + rows + 4096)
+        full = self.counts[1] + 64 > len(have.events)
+        wanted_events = _grown(have.events, 2 * len(have.events)) if full else have.events
+        self.buffers = _Buffers(wanted_rows, wanted_events)
+
+    def check_rest(self, text: NDArray[np.uint8], first_line: int) -> None:
+        """Remember the first line of code behind the program's end, so that it is reported."""
+        lines = text.tobytes().splitlines()
+        behind = int(self.state["end_line"][0]) - first_line + 1
+        for number, line in enumerate(lines[behind:], start=first_line + behind):
+            if line.strip() not in (b"", b"%", b"\x1a"):
+                self.rest_line = number
+                return
+
+    def finish(self, head: bytes) -> Toolpath:
+        """Raise the errors that were found, or return the table."""
+        found = [make_issue(int(r["number"]), int(r["line"]), float(r["a"]), float(r["b"])) for r in self.found[: min(self.counts[2], _MOST_ISSUES)]]
+        errors = [issue for issue in found if issue.severity == "error"]
+        unseen = int(self.counts[2]) - _MOST_ISSUES
+        if errors:
+            if unseen > 0:
+                errors.append(Issue("error", "more", 0, f"{unseen} more findings"))
+            raise NotUnderstoodError(errors, self.name)
+        issues = [*found, *self._whole_program_issues(head)]
+        return self._toolpath(tuple(issues))
+
+    def _whole_program_issues(self, head: bytes) -> Iterator[Issue]:
+        state = self.state[0]
+        if not state["ended"]:
+            yield Issue("warning", "no-program-end", 0, "the program ends without M2, M30 or %", "is the file complete?")
+        if self.rest_line:
+            yield Issue("warning", "after-end", self.rest_line, "lines behind the program's end are not read", "remove them or the early M2/M30/%")
+        if not state["unit_named"]:
+            yield self._unit_issue()
+        elif state["unit_mm"] == 1.0 and _says_inch(head):
+            yield Issue("warning", "unit-doubtful", 0, "a comment at the top speaks of inches, the program says G21 (mm)", "check the post's unit")
+
+    def _unit_issue(self) -> Issue:
+        small = self.state["largest_mm"][0] < _INCH_EXTENT_MM
+        if small and self.most_decimals >= _INCH_DECIMALS:
+            return Issue("warning", "unit-doubtful", 0, "no G20 or G21, and the numbers look like inches (four decimals, small); read as mm", "write G20 or G21 at the start")
+        return Issue("warning", "unit-unnamed", 0, "no G20 or G21; read as mm", "write G21 at the start")
+
+    def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
+        rows = self.buffers.rows[: self.counts[0]]
+        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(rows), 3))
+        return Toolpath(
+            position_mm=np.stack([rows["x"], rows["y"], rows["z"]], axis=1),
+            axis=axis,
+            rapid=rows["rapid"].astype(np.bool_),
+            feed_mm_s=rows["feed"].copy(),
+            spindle_rad_s=rows["spindle"].copy(),
+            tool=rows["tool"].copy(),
+            exact_stop=rows["exact_stop"].astype(np.bool_),
+            tolerance_mm=rows["tolerance"].copy(),
+            dwell_s=rows["dwell"].copy(),
+            source_line=rows["line"].copy(),
+            arc=rows["arc"].copy(),
+            machine=rows["machine"].astype(np.bool_),
+            known=np.stack([rows["known_x"], rows["known_y"], rows["known_z"]], axis=1).astype(np.bool_),
+            length_offset_mm=rows["length_offset"].copy(),
+            events=(*self._events(), *self._stopped_by_end()),
+            issues=issues,
+            source=self.name,
+        )
+
+    def _stopped_by_end(self) -> Iterator[Event]:
+        """The program's end stops spindle and coolant (RS274/NGC, M2 and M30)."""
+        state, row = self.state[0], int(self.counts[0]) - 1
+        line = int(state["end_line"])
+        if state["direction"]:
+            yield Event(row, "spindle", {"rpm": 0.0, "m": 5, "line": line, "by_end": True})
+        if state["mist"] or state["flood"]:
+            yield Event(row, "coolant", {"mist": False, "flood": False, "m": 9, "line": line, "by_end": True})
+
+    def _events(self) -> Iterator[Event]:
+        for event in self.buffers.events[: self.counts[1]]:
+            row, kind, a, b, line = int(event["row"]), int(event["kind"]), float(event["a"]), float(event["b"]), int(event["line"])
+            if kind == EVENT_TOOL:
+                yield Event(row, "tool", {"tool": int(a), "line": line})
+            elif kind == EVENT_SPINDLE:
+                yield Event(row, "spindle", {"rpm": a, "m": int(b), "line": line})
+            elif kind == EVENT_COOLANT:
+                yield Event(row, "coolant", {"mist": bool(int(b) & 1), "flood": bool(int(b) & 2), "m": int(a), "line": line})
+            elif kind == EVENT_M:
+                values = {"m": int(a), "text": "", "line": line}
+                yield Event(row, "message", values if np.isnan(b) else {**values, "p": b})
+            else:
+                yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
+
+
+def _grown(array: NDArray[np.void], size: int) -> NDArray[np.void]:
+    larger = np.zeros(max(size, len(array) * 3 // 2), dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
+
+
+def _decode(span: NDArray[np.uint8]) -> str:
+    text = span.tobytes().decode("utf-8", errors="replace").strip()
+    return text[3:].lstrip(" ,").strip()
+
+
+def _says_inch(head: bytes) -> bool:
+    comments = [line.lower() for line in head.splitlines() if line.lstrip()[:1] in (b"(", b";")]
+    return any(b"inch" in line and b"mm" not in line for line in comments)

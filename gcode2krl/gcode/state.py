@@ -1,0 +1,103 @@
+"""The modal state of the interpreter, and which G-code belongs to which modal group.
+
+The state is one numpy record, so that compiled code can read and write it and a run can stop and go on
+between pieces of a file. All lengths in it are mm; the position is the tool tip in the part frame.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+CANCELLED = -1
+"""Motion mode after G80 and before the first motion code."""
+
+STATE = np.dtype(
+    [
+        ("x", "f8"),
+        ("y", "f8"),
+        ("z", "f8"),
+        ("known_x", "i1"),
+        ("known_y", "i1"),
+        ("known_z", "i1"),
+        ("unit_mm", "f8"),  # mm per programmed unit
+        ("absolute", "i1"),
+        ("arc_absolute", "i1"),
+        ("plane", "i4"),  # 17, 18, 19
+        ("motion", "i4"),  # 0, 1, 2, 3 or CANCELLED
+        ("feed_mode", "i4"),  # 93, 94, 95
+        ("feed", "f8"),  # mm/min, mm/rev; 0 = none yet
+        ("rpm", "f8"),
+        ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
+        ("tool", "i4"),
+        ("selected_tool", "i4"),  # -1 = none yet
+        ("length_offset", "f8"),  # NaN = G49
+        ("exact_stop", "i1"),
+        ("tolerance", "f8"),  # NaN = none
+        ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
+        ("home_28", "f8", 3),  # machine coordinates, mm
+        ("home_30", "f8", 3),
+        ("arcs", "i4"),
+        ("dwell_open", "i1"),
+        ("mist", "i1"),
+        ("flood", "i1"),
+        ("ended", "i1"),
+        ("end_line", "i4"),
+        ("tape_marks", "i4"),
+        ("unit_named", "i1"),
+        ("blocks", "i8"),
+        ("largest_mm", "f8"),
+    ]
+)
+
+
+def initial_state() -> NDArray[np.void]:
+    """Return the state (1,) at the start of a program: mm, absolute, G17, G94, G54, no motion mode."""
+    state = np.zeros(1, dtype=STATE)
+    state["unit_mm"] = 1.0
+    state["absolute"] = 1
+    state["plane"] = 17
+    state["motion"] = CANCELLED
+    state["feed_mode"] = 94
+    state["selected_tool"] = -1
+    state["length_offset"] = np.nan
+    state["tolerance"] = np.nan
+    return state
+
+
+UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2
+
+
+def _group_table() -> NDArray[np.int8]:
+    groups: dict[int, tuple[float, ...]] = {
+        0: (4, 28, 28.1, 30, 30.1, 53),
+        1: (0, 1, 2, 3, 80),
+        2: (17, 18, 19),
+        3: (90, 91),
+        4: (90.1, 91.1),
+        5: (93, 94, 95),
+        6: (20, 21),
+        7: (40,),
+        8: (43, 49),
+        9: (98, 99),
+        10: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
+        11: (61, 61.1, 64),
+    }
+    unsupported = (
+        *(5, 5.1, 5.2, 5.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1, 43.1, 43.2),
+        *(43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89),
+        *(92, 92.1, 92.2, 92.3, 96, 97),
+    )
+    table = np.full(1000, UNKNOWN_GROUP, dtype=np.int8)
+    for group, codes in groups.items():
+        for code in codes:
+            table[round(code * 10)] = group
+    for code in unsupported:
+        table[round(code * 10)] = UNSUPPORTED_GROUP
+    return table
+
+
+GROUP_OF_G = _group_table()
+"""Modal group of a G-code given as ten times its number, (1000,)."""
+GROUPS = 12
+WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+EVENT_KINDS = ("tool", "spindle", "coolant", "message", "m", "message_text")
+EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5

@@ -1,0 +1,44 @@
+"""Tool lengths for G43: from a LinuxCNC ``tool.tbl`` in mm, or from the cell."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import input_error
+
+_WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)", re.IGNORECASE)
+_LARGEST_TOOL = 99999
+
+
+def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
+    """Return length by tool number (t,) in mm from a ``tool.tbl``; NaN where a tool is not declared."""
+    try:
+        text = Path(path).read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(path)) from None
+    lengths: dict[int, float] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = {letter.upper(): float(value) for letter, value in _WORD.findall(line.split(";")[0])}
+        if not words:
+            continue
+        tool = words.get("T", -1.0)
+        if not tool.is_integer() or not 0 <= tool <= _LARGEST_TOOL:
+            raise input_error("tool-table", "no tool number T", "each line is T… P… Z… D…", line=number, source=str(path))
+        lengths[int(tool)] = words.get("Z", 0.0)
+    return _by_number(lengths)
+
+
+def lengths_from_cell(cell: Cell | None) -> NDArray[np.float64]:
+    """Return length by tool number (t,) in mm from a cell; NaN where a tool is not declared."""
+    tools = cell.tool if cell is not None else {}
+    return _by_number({number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None})
+
+
+def _by_number(lengths: dict[int, float]) -> NDArray[np.float64]:
+    table = np.full(max(lengths, default=0) + 1, np.nan)
+    for number, length in lengths.items():
+        table[number] = length
+    return table

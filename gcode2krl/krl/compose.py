@@ -1,0 +1,215 @@
+"""Targets to the text of a KRL program: head, guard, motions, events, subprograms."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import __version__
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.krl import statements as st
+from gcode2krl.krl.number_text import fixed, motion_lines
+from gcode2krl.tables import Joints, Targets
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M
+
+Floats = NDArray[np.float64]
+NEWLINE = b"\r\n"
+DECLARATIONS = """DECL KRLMSG_T GK_MSG
+DECL KRLMSGPAR_T GK_PAR[3]
+DECL KRLMSGOPT_T GK_OPT
+DECL INT GK_HANDLE"""
+MESSAGE_SETUP = """GK_PAR[1]={PAR_TYPE #EMPTY}
+GK_PAR[2]={PAR_TYPE #EMPTY}
+GK_PAR[3]={PAR_TYPE #EMPTY}
+GK_OPT={VL_STOP TRUE,CLEAR_P_RESET TRUE,CLEAR_P_SAW FALSE,LOG_TO_DB FALSE}"""
+FRAME_DECLARATIONS = """DECL FRAME GK_INV
+DECL FRAME GK_DIFF"""
+EXT_BAS = "EXT BAS (BAS_COMMAND :IN,REAL :IN )"
+_T_GRID_RAD = 1e-4 / DEG_PER_RAD
+_LOOK_BACK = 0.2
+"""Share of a subprogram within which a standstill is preferred as its end."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the text is laid out; what the header must say of the options."""
+
+    guard: bool = True
+    split: Literal["defs", "files"] = "defs"
+    single_file: bool = False
+    """Declarations inside the .src, no .dat (standard output)."""
+    options: str = ""
+    allowed: tuple[str, ...] = ()
+
+
+def compose(targets: Targets, joints: Joints, cell: Cell, name: str, layout: Layout) -> dict[str, bytes]:
+    """Return file name → bytes of the program ``name``: ``.src``, ``.dat`` and, split, ``name_001.src`` …"""
+    writer = _Composer(targets, joints, cell, name, layout)
+    return writer.files()
+
+
+class _Composer:
+    def __init__(self, targets: Targets, joints: Joints, cell: Cell, name: str, layout: Layout) -> None:
+        self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
+        self.position, self.abc_deg = written_poses(targets, cell)
+        self.speed_m_s = targets.speed_mm_s / MM_PER_M
+        self.state = np.array([-1.0, -1.0, 0.0])
+        self.events: dict[int, list[str]] = {}
+        for event in targets.events:
+            self.events.setdefault(event.row, []).append(st.event_statements(event, cell))
+        self.guarded_pose = False
+
+    def files(self) -> dict[str, bytes]:
+        """Compose the main program and its subprograms."""
+        most = self.cell.program.max_lines
+        count = len(self.targets)
+        body: list[bytes] = []
+        subprograms: list[tuple[str, bytes]] = []
+        if count <= most and self.layout.split == "defs":
+            body.append(self._motions(0, count))
+        else:
+            for start, end, whole in self._chunks(most):
+                if not whole:
+                    body.append(self._motions(start, end))
+                    continue
+                part = f"{self.name[:20]}_{len(subprograms) + 1:03d}"
+                body.append(_text(f"{part}( )"))
+                self.state[:] = -1.0, -1.0, 0.0  # each part says its speed and CDIS again
+                subprograms.append((part, self._motions(start, end)))
+                self.state[:] = -1.0, -1.0, 0.0
+        main = self._head(subprograms) + b"".join(body) + self._foot()
+        return self._assemble(main, subprograms)
+
+    def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
+        """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program."""
+        chunks: list[tuple[int, int, bool]] = []
+        start, count = 0, len(self.targets)
+        while start < count:
+            if self.targets.ptp[start]:
+                chunks.append((start, start + 1, False))
+                start += 1
+                continue
+            following = np.flatnonzero(self.targets.ptp[start:])
+            end = start + int(following[0]) if len(following) else count
+            if end - start > most:
+                end = start + most
+                standing = np.flatnonzero(self.targets.cdis_mm[end - int(most * _LOOK_BACK) : end] == 0)
+                if len(standing):
+                    end = end - int(most * _LOOK_BACK) + int(standing[-1]) + 1
+            chunks.append((start, end, True))
+            start = end
+        return chunks
+
+    def _motions(self, start: int, end: int) -> bytes:
+        """Motions of rows start..end with their waits and events."""
+        ptp, wait = self.targets.ptp, self.targets.wait_s
+        special = np.zeros(end - start, dtype=bool)
+        special |= ptp[start:end] | (wait[start:end] > 0)
+        special[[row - start for row in self.events if start <= row < end]] = True
+        pieces: list[bytes] = []
+        at = start
+        for row in [*(np.flatnonzero(special) + start), end]:
+            stop = min(row + 1, end) if row < end and not ptp[row] else row
+            if stop > at:
+                pieces.append(self._lines(at, stop))
+            if row < end:
+                pieces.append(self._around(row))
+                at = row + 1
+            else:
+                at = end
+        return b"".join(pieces)
+
+    def _lines(self, start: int, end: int) -> bytes:
+        rows = slice(start, end)
+        return motion_lines(
+            self.position[rows], self.abc_deg[rows], self.speed_m_s[rows], self.targets.cdis_mm[rows],
+            self.targets.source_line[rows], self.state, self.cell.program.comment_every,
+        )  # fmt: skip
+
+    def _around(self, row: int) -> bytes:
+        """What stands at a special row: its PTP, then dwell and events."""
+        lines: list[str] = []
+        targets = self.targets
+        if targets.ptp[row]:
+            lines.append(self._ptp(row))
+            if not targets.home[row] and self.layout.guard and not self.guarded_pose:
+                self.guarded_pose = True
+                q_deg = self.joints.q_rad[row] * DEG_PER_RAD
+                lines.append(st.environment().get_template("pose_guard.j2").render(q_deg=q_deg))
+        if targets.wait_s[row] > 0:
+            lines.append(f"WAIT SEC {fixed(targets.wait_s[row], 3)}")
+        lines += self.events.get(row, [])
+        return _text("\n".join(lines))
+
+    def _ptp(self, row: int) -> str:
+        if self.targets.home[row]:
+            return f"PTP {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
+        values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
+        pose = ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True))
+        turn = sum(1 << k for k, angle in enumerate(self.joints.q_rad[row]) if np.rint(angle / _T_GRID_RAD) < 0)
+        return f"PTP {{{pose},S {int(self.joints.status[row])},T {turn}}}"
+
+    def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
+        tools = sorted({int(number) for number in np.unique(self.targets.tool)})
+        checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
+        declarations = [EXT_BAS] if self.layout.single_file else []
+        if self.layout.split == "files":
+            declarations += [f"EXT {name}( )" for name, _ in subprograms]
+        declarations.append(DECLARATIONS)
+        if checks:
+            declarations.append(FRAME_DECLARATIONS)
+        text = st.environment().get_template("head.src.j2").render(
+            source=st.ascii_text(_file_name(self.targets.source), 40), name=self.name, version=__version__, cell=self.cell,
+            motions=len(self.targets), options=st.ascii_text(self.layout.options, 200), allowed=self.layout.allowed,
+            guard=self.layout.guard, frame_checks=checks, declarations="\n".join(declarations), message_setup=MESSAGE_SETUP,
+            base=st.base_statement(self.cell), tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
+        )  # fmt: skip
+        return _text(text) + _text(st.render(self.cell.program.prologue, self.cell))
+
+    def _foot(self) -> bytes:
+        return _text(st.render(self.cell.program.epilogue, self.cell)) + _text("END")
+
+    def _assemble(self, main: bytes, subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
+        defs = [(name, _subprogram(name, text)) for name, text in subprograms]
+        files = {}
+        if self.layout.split == "files":
+            head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
+            files = {f"{name}.src": head + text for name, text in defs}
+            defs = []
+        files = {f"{self.name}.src": main + b"".join(NEWLINE + text for _, text in defs), **files}
+        if not self.layout.single_file:
+            data = st.environment().get_template("data.dat.j2")
+            source = st.ascii_text(_file_name(self.targets.source), 40)
+            files[f"{self.name}.dat"] = _text(data.render(source=source, name=self.name))
+        return files
+
+
+def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
+    """Return positions (p, 3) in mm and A, B, C (p, 3) in degrees in the controller's tool axes."""
+    rotation = targets.rotation
+    abc_deg = np.empty((len(targets), 3))
+    for number in np.unique(targets.tool):
+        rows = targets.tool == number
+        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
+        chosen = rotation[rows]
+        first = chosen[:1] if (chosen == chosen[0]).all() else chosen
+        abc_deg[rows] = fr.abc_from_rotation(fr.rotation_from_quaternion(first) @ turn) * DEG_PER_RAD
+    return targets.position_mm, abc_deg
+
+
+def _subprogram(name: str, motions: bytes) -> bytes:
+    needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
+    return _text(f"DEF {name}( )\n{needed}") + motions + _text("END")
+
+
+def _text(text: str) -> bytes:
+    """Encode text with the controller's line ends; blank lines are dropped."""
+    lines = [line.rstrip() for line in re.split(r"\r?\n", text)]
+    return b"".join(line.encode("ascii", "replace") + NEWLINE for line in lines if line)
+
+
+def _file_name(source: str) -> str:
+    return re.split(r"[\\/]", source)[-1]

@@ -1,0 +1,120 @@
+"""Targets to KRL motion lines: a compiled formatter that writes the same bytes on any processor.
+
+Values are first rounded to 1e-9 and then, as integers, to their decimals (half away from zero), so no
+floating-point formatting is involved.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+BYTES_PER_TARGET = 240
+
+
+def motion_lines(
+    position_mm: Floats,
+    abc_deg: Floats,
+    speed_m_s: Floats,
+    cdis_mm: Floats,
+    source_line: NDArray[np.int32],
+    state: Floats,
+    comment_every: int,
+) -> bytes:
+    """Return the KRL text (CRLF) of a run of LIN motions.
+
+    Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
+    only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
+    last comment; it is updated.
+    """
+    buffer = np.empty(BYTES_PER_TARGET * len(position_mm), dtype=np.uint8)
+    size = _lines(position_mm, abc_deg, speed_m_s, cdis_mm, source_line, state, comment_every, buffer)
+    return buffer[:size].tobytes()
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Return one number with fixed decimals, by the same rule."""
+    buffer = np.empty(40, dtype=np.uint8)
+    size = _fixed(buffer, 0, float(value), decimals)
+    return buffer[:size].tobytes().decode("ascii")
+
+
+@njit(cache=True)
+def _fixed(buffer, at, value, decimals):  # type: ignore[no-untyped-def]
+    nano = np.int64(np.rint(abs(value) * 1e9))
+    unit = 1
+    for _ in range(9 - decimals):
+        unit *= 10
+    scaled = (nano + unit // 2) // unit
+    if value < 0 and scaled > 0:
+        buffer[at] = 45
+        at += 1
+    ten = 1
+    for _ in range(decimals):
+        ten *= 10
+    whole = scaled // ten
+    rest = scaled % ten
+    at = _integer(buffer, at, whole)
+    if decimals > 0:
+        buffer[at] = 46
+        at += 1
+        for _ in range(decimals):
+            ten //= 10
+            buffer[at] = 48 + rest // ten % 10
+            at += 1
+    return at
+
+
+@njit(cache=True)
+def _integer(buffer, at, value):  # type: ignore[no-untyped-def]
+    digits = 1
+    power = 10
+    while power <= value:
+        power *= 10
+        digits += 1
+    for k in range(digits):
+        buffer[at + digits - 1 - k] = 48 + value % 10
+        value //= 10
+    return at + digits
+
+
+@njit(cache=True)
+def _put(buffer, at, text):  # type: ignore[no-untyped-def]
+    for k in range(len(text)):
+        buffer[at + k] = text[k]
+    return at + len(text)
+
+
+_LIN, _BLEND, _EXACT = (np.frombuffer(t, dtype=np.uint8).copy() for t in (b"LIN {X ", b"} C_DIS\r\n", b"}\r\n"))
+_VEL, _CDIS, _LINE = (np.frombuffer(t, dtype=np.uint8).copy() for t in (b"$VEL.CP=", b"$APO.CDIS=", b"; line "))
+_KEYS = np.frombuffer(b",Y ,Z ,A ,B ,C ", dtype=np.uint8).reshape(5, 3).copy()
+_CRLF = np.frombuffer(b"\r\n", dtype=np.uint8).copy()
+
+
+@njit(cache=True)
+def _lines(position, abc, speed, cdis, source_line, state, comment_every, buffer):  # type: ignore[no-untyped-def]
+    at = 0
+    for i in range(len(position)):
+        state[2] += 1
+        if comment_every > 0 and state[2] >= comment_every and source_line[i] > 0:
+            at = _put(buffer, at, _LINE)
+            at = _integer(buffer, at, source_line[i])
+            at = _put(buffer, at, _CRLF)
+            state[2] = 0
+        if speed[i] != state[0]:
+            state[0] = speed[i]
+            at = _put(buffer, at, _VEL)
+            at = _fixed(buffer, at, speed[i], 7)
+            at = _put(buffer, at, _CRLF)
+        if cdis[i] > 0 and cdis[i] != state[1]:
+            state[1] = cdis[i]
+            at = _put(buffer, at, _CDIS)
+            at = _fixed(buffer, at, cdis[i], 3)
+            at = _put(buffer, at, _CRLF)
+        at = _put(buffer, at, _LIN)
+        at = _fixed(buffer, at, position[i, 0], 3)
+        for k in range(5):
+            at = _put(buffer, at, _KEYS[k])
+            at = _fixed(buffer, at, position[i, k + 1], 3) if k < 2 else _fixed(buffer, at, abc[i, k - 2], 4)
+        at = _put(buffer, at, _BLEND if cdis[i] > 0 else _EXACT)
+    return at

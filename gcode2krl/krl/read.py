@@ -1,0 +1,239 @@
+"""KRL in: reads the subset that is written, in the order in which the controller would execute it."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.krl import scan as sc
+from gcode2krl.units import MM_PER_M
+
+Floats = NDArray[np.float64]
+_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
+_CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
+_DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|GLOBAL|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
+_EXTERNAL = re.compile(r"^\s*EXT\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
+_LONGEST_LINE = 471
+
+
+class Statement(NamedTuple):
+    """A statement that is no motion, and where it stands."""
+
+    motion: int
+    """Number of motions before it."""
+    text: str
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class KrlProgram:
+    """A KRL program as executed: a row per motion, and the statements in between."""
+
+    name: str
+    position_mm: Floats
+    """(p, 3), NaN where a component is missing."""
+    abc_deg: Floats
+    """(p, 3)"""
+    status_turn: Floats
+    """(p, 2) S and T, NaN where absent."""
+    q_deg: Floats
+    """(p, 6) joint targets, NaN on Cartesian motions."""
+    ptp: NDArray[np.bool_]
+    speed_mm_s: Floats
+    cdis_mm: Floats
+    wait_s: Floats
+    line: NDArray[np.int32]
+    file: tuple[str, ...]
+    """Names of the files; ``file_of`` (p,) points into it."""
+    file_of: NDArray[np.int32]
+    statements: tuple[Statement, ...]
+    issues: tuple[Issue, ...] = ()
+    guard: bool = True
+    texts: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def read_krl(path: str | Path) -> KrlProgram:
+    """Read a ``.src`` and the ``.src`` files beside it that it calls.
+
+    Raises `NotUnderstoodError` where a file cannot be read.
+    """
+    main = Path(path)
+    texts = {main.name: _read_bytes(main)}
+    beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
+    for name in _EXTERNAL.findall(texts[main.name].decode("ascii", "replace")):
+        file = beside.get(name.upper())
+        if file is not None and file.name not in texts:
+            texts[file.name] = _read_bytes(file)
+    return read_texts(texts, main.name)
+
+
+def _read_bytes(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
+
+
+def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
+    """Read a program from file name → bytes; ``main`` names the main file."""
+    sources = [name for name in texts if name.lower().endswith(".src")]
+    sources.sort(key=lambda name: name != main)
+    return _Reader({name: texts[name] for name in sources}, main).read()
+
+
+class _Block(NamedTuple):
+    file: int
+    start: int
+    end: int
+
+
+class _Reader:
+    def __init__(self, texts: Mapping[str, bytes], main: str) -> None:
+        self.texts, self.main = texts, main
+        self.names = tuple(texts)
+        self.scanned = [sc.scan_krl(text) for text in texts.values()]
+        self.issues: list[Issue] = []
+        self.blocks: dict[str, _Block] = {}
+        self.order: list[str] = []
+        for index in range(len(self.names)):
+            self._find_blocks(index)
+
+    def read(self) -> KrlProgram:
+        for index, name in enumerate(self.names):
+            self._text_rules(index, name)
+        if not self.order:
+            raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
+        main_name = self.order[0]
+        runs = list(self._execute(main_name, 0))
+        if not runs:
+            runs = [_Block(0, 0, 0)]
+        kind = np.concatenate([self.scanned[f].kind[a:b] for f, a, b in runs])
+        line = np.concatenate([self.scanned[f].line[a:b] for f, a, b in runs])
+        value = np.concatenate([self.scanned[f].value[a:b] for f, a, b in runs])
+        blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
+        file_of = np.concatenate([np.full(b - a, f, dtype=np.int32) for f, a, b in runs])
+        where = np.concatenate([np.arange(a, b) for _, a, b in runs])
+        motion = (kind == sc.LIN) | (kind == sc.PTP)
+        for row in np.flatnonzero(blend == sc.MALFORMED)[:20]:
+            self._issue("krl-malformed", int(line[row]), f"cannot read {self._statement(int(file_of[row]), int(where[row]))!r}", int(file_of[row]))
+        before = np.cumsum(motion)
+        statements = tuple(
+            Statement(int(before[row]), self._statement(int(file_of[row]), int(where[row])), self.names[file_of[row]], int(line[row]))
+            for row in np.flatnonzero((kind == sc.OTHER) | (kind == sc.WAIT_SEC))
+        )
+        rows = np.flatnonzero(motion)
+        speed = _in_force(np.where(kind == sc.VEL_CP, value[:, 0], np.nan))[rows] * MM_PER_M
+        cdis = np.where(blend[rows] == 1, _in_force(np.where(kind == sc.APO_CDIS, value[:, 0], np.nan))[rows], 0.0)
+        ptp = kind[rows] == sc.PTP
+        guard = b"(--no-guard)" not in b"".join(text[:6000] for text in self.texts.values())
+        return KrlProgram(
+            name=main_name,
+            position_mm=value[rows, 0:3],
+            abc_deg=value[rows, 3:6],
+            status_turn=value[rows, 6:8],
+            q_deg=value[rows, 8:14],
+            ptp=ptp,
+            speed_mm_s=np.where(ptp, np.nan, speed),
+            cdis_mm=cdis,
+            wait_s=_waits(kind, value, rows),
+            line=line[rows],
+            file=self.names,
+            file_of=file_of[rows],
+            statements=statements,
+            issues=tuple(self.issues),
+            guard=guard,
+            texts=self.texts,
+        )
+
+    def _statement(self, file: int, row: int) -> str:
+        a, b = self.scanned[file].span[row]
+        text = self.texts[self.names[file]][a:b].decode("ascii", "replace")
+        return text.split(" ;")[0].strip() if '"' not in text else text.strip()
+
+    def _issue(self, code: str, line: int, message: str, file: int = 0, remedy: str = "") -> None:
+        name = self.names[file]
+        self.issues.append(Issue("error", code, line, f"{name}: {message}" if name != self.main else message, remedy))
+
+    def _find_blocks(self, file: int) -> None:
+        scanned = self.scanned[file]
+        name, start = "", 0
+        for row in np.flatnonzero(scanned.kind == sc.OTHER):
+            text = self._statement(file, int(row))
+            found = _DEF.match(text)
+            if found:
+                if name:
+                    self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} has no END", file)
+                name, start = found.group(1).upper(), int(row) + 1
+            elif text.upper() == "END":
+                if not name:
+                    self._issue("krl-structure", int(scanned.line[row]), "END without DEF", file)
+                    continue
+                if name in self.blocks:
+                    self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
+                self.blocks.setdefault(name, _Block(file, start, int(row)))
+                self.order.append(name)
+                name = ""
+        if name:
+            self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
+            self.blocks.setdefault(name, _Block(file, start, len(scanned.kind)))
+            self.order.append(name)
+
+    def _execute(self, name: str, depth: int) -> Iterator[_Block]:
+        """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
+        file, start, end = self.blocks[name]
+        scanned = self.scanned[file]
+        at = start
+        for row in np.flatnonzero(scanned.kind[start:end] == sc.OTHER) + start:
+            text = self._statement(file, int(row))
+            call = _CALL.match(text)
+            if _DECLARATION.match(text):
+                yield _Block(file, at, int(row))
+                at = int(row) + 1
+            elif call and call.group(1).upper() in self.blocks:
+                yield _Block(file, at, int(row))
+                at = int(row) + 1
+                if depth > 20:
+                    self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
+                    return
+                yield from self._execute(call.group(1).upper(), depth + 1)
+        yield _Block(file, at, end)
+
+    def _text_rules(self, file: int, name: str) -> None:
+        """Rules of the text itself: ASCII, line length, folds and loops closed."""
+        text = self.texts[name]
+        try:
+            text.decode("ascii")
+        except UnicodeDecodeError as error:
+            self._issue("krl-not-ascii", text.count(b"\n", 0, error.start) + 1, "a character that is not ASCII", file)
+        if len(text) > _LONGEST_LINE:
+            data = np.frombuffer(text, dtype=np.uint8)
+            ends = np.concatenate([[-1], np.flatnonzero(data == 10), [len(data)]])
+            for row in np.flatnonzero(np.diff(ends) > _LONGEST_LINE + 2)[:5]:
+                self._issue("krl-line-too-long", int(row) + 1, f"more than {_LONGEST_LINE} characters", file)
+        if text.upper().count(b";FOLD") != text.upper().count(b";ENDFOLD"):
+            self._issue("krl-structure", 0, ";FOLD and ;ENDFOLD do not match", file)
+        words = [self._statement(file, int(row)).split("(")[0].split() for row in np.flatnonzero(self.scanned[file].kind == sc.OTHER)]
+        first = [word[0].upper() for word in words if word]
+        for begin, close in (("WHILE", "ENDWHILE"), ("IF", "ENDIF"), ("FOR", "ENDFOR"), ("LOOP", "ENDLOOP")):
+            if first.count(begin) != first.count(close):
+                self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
+
+
+def _in_force(values: Floats) -> Floats:
+    """Fill NaN with the last value before it."""
+    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
+    return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
+
+
+def _waits(kind: NDArray[np.int8], value: Floats, rows: NDArray[np.int64]) -> Floats:
+    """Return the dwell that stands right behind each motion."""
+    behind = np.minimum(rows + 1, len(kind) - 1)
+    direct = (kind[behind] == sc.WAIT_SEC) & (rows + 1 < len(kind))
+    return np.where(direct, np.nan_to_num(value[behind, 0]), 0.0)
+

@@ -1,0 +1,193 @@
+"""KRL text to columns: a compiled scanner for the motion lines, everything else by its line.
+
+It knows nothing of the writer: it reads any spacing, any order of components, upper and lower case.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER = 0, 1, 2, 3, 4, 5
+KEYS = ("X", "Y", "Z", "A", "B", "C", "S", "T", "A1", "A2", "A3", "A4", "A5", "A6")
+MALFORMED = -1
+
+
+class Scanned(NamedTuple):
+    """A row per statement."""
+
+    kind: NDArray[np.int8]
+    line: NDArray[np.int32]
+    span: NDArray[np.int64]
+    """(k, 2) first and last byte of the statement."""
+    value: NDArray[np.float64]
+    """(k, 14) components by `KEYS`, NaN where absent; a lone number stands in column 0."""
+    blend: NDArray[np.int8]
+    """(k,) 1 for ``C_DIS``, 0 for an exact motion, -1 where the line is malformed."""
+
+
+def scan_krl(text: bytes) -> Scanned:
+    """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
+    data = np.frombuffer(text, dtype=np.uint8)
+    most = int(np.count_nonzero(data == 10)) + 2
+    kind, blend = np.empty(most, dtype=np.int8), np.empty(most, dtype=np.int8)
+    line, span = np.empty(most, dtype=np.int32), np.empty((most, 2), dtype=np.int64)
+    value = np.empty((most, len(KEYS)))
+    count = _scan(data, kind, line, span, value, blend)
+    return Scanned(kind[:count], line[:count], span[:count], value[:count], blend[:count])
+
+
+_LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
+    np.frombuffer(word, dtype=np.uint8).copy() for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT SEC", b"C_DIS")
+)
+
+
+@njit(cache=True)
+def _starts(data, at, end, word):  # type: ignore[no-untyped-def]
+    if at + len(word) > end:
+        return False
+    for k in range(len(word)):
+        c = data[at + k]
+        if c >= 97 and c <= 122:
+            c -= 32
+        if c != word[k]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _blank(data, at, end):  # type: ignore[no-untyped-def]
+    while at < end and (data[at] == 32 or data[at] == 9):
+        at += 1
+    return at
+
+
+@njit(cache=True)
+def _number(data, at, end):  # type: ignore[no-untyped-def]
+    """Return (position behind the number, value); NaN where there is none."""
+    sign = 1.0
+    if at < end and (data[at] == 45 or data[at] == 43):
+        if data[at] == 45:
+            sign = -1.0
+        at += 1
+    mantissa = 0.0
+    scale = 1.0
+    digits = 0
+    point = False
+    while at < end:
+        c = data[at]
+        if c >= 48 and c <= 57:
+            mantissa = mantissa * 10.0 + (c - 48)
+            if point:
+                scale *= 10.0
+            digits += 1
+        elif c == 46 and not point:
+            point = True
+        else:
+            break
+        at += 1
+    if digits == 0 or digits > 15:
+        return at, np.nan
+    return at, sign * mantissa / scale
+
+
+@njit(cache=True)
+def _components(data, at, end, value):  # type: ignore[no-untyped-def]
+    """Read ``{X 1.0,Y 2.0,…}`` into value; return the position behind the brace, -1 where malformed."""
+    if at >= end or data[at] != 123:
+        return -1
+    at += 1
+    while True:
+        at = _blank(data, at, end)
+        if at >= end:
+            return -1
+        letter = data[at] - 32 if data[at] >= 97 else data[at]
+        at += 1
+        column = -1
+        if letter >= 88 and letter <= 90:
+            column = letter - 88
+        elif letter >= 65 and letter <= 67:
+            column = 3 + letter - 65
+            if letter == 65 and at < end and data[at] >= 49 and data[at] <= 54:
+                column = 8 + data[at] - 49
+                at += 1
+        elif letter == 83:
+            column = 6
+        elif letter == 84:
+            column = 7
+        if column < 0 or at >= end or (data[at] != 32 and data[at] != 9):
+            return -1
+        at = _blank(data, at, end)
+        at, number = _number(data, at, end)
+        if np.isnan(number) or not np.isnan(value[column]):
+            return -1
+        value[column] = number
+        at = _blank(data, at, end)
+        if at < end and data[at] == 44:
+            at += 1
+        elif at < end and data[at] == 125:
+            return at + 1
+        else:
+            return -1
+
+
+@njit(cache=True)
+def _scan(data, kind, line, span, value, blend):  # type: ignore[no-untyped-def]
+    n = len(data)
+    at = 0
+    number = 0
+    count = 0
+    while at < n:
+        number += 1
+        end = at
+        while end < n and data[end] != 10:
+            end += 1
+        begin = _blank(data, at, end)
+        at = end + 1
+        while end > begin and (data[end - 1] == 13 or data[end - 1] == 32 or data[end - 1] == 9):
+            end -= 1
+        if begin == end or data[begin] == 59 or data[begin] == 38:
+            continue
+        kind[count], blend[count], line[count] = OTHER, 0, number
+        span[count, 0], span[count, 1] = begin, end
+        value[count, :] = np.nan
+        motion = -1
+        if _starts(data, begin, end, _LIN_WORD):
+            motion = LIN
+        elif _starts(data, begin, end, _PTP_WORD):
+            motion = PTP
+        if motion >= 0:
+            kind[count] = motion
+            behind = _components(data, _blank(data, begin + 3, end), end, value[count])
+            if behind < 0:
+                blend[count] = MALFORMED
+            else:
+                behind = _blank(data, behind, end)
+                if _starts(data, behind, end, _BLEND_WORD):
+                    blend[count] = 1
+                    behind = _blank(data, behind + 5, end)
+                if behind < end and data[behind] != 59:
+                    blend[count] = MALFORMED
+        else:
+            setting = -1
+            behind = begin
+            if _starts(data, begin, end, _VEL_WORD):
+                setting, behind = VEL_CP, begin + 7
+            elif _starts(data, begin, end, _CDIS_WORD):
+                setting, behind = APO_CDIS, begin + 9
+            elif _starts(data, begin, end, _WAIT_WORD):
+                setting, behind = WAIT_SEC, begin + 8
+            if setting >= 0:
+                kind[count] = setting
+                behind = _blank(data, behind, end)
+                if setting != WAIT_SEC:
+                    if behind >= end or data[behind] != 61:
+                        blend[count] = MALFORMED
+                    behind = _blank(data, behind + 1, end)
+                behind, value[count, 0] = _number(data, behind, end)
+                behind = _blank(data, behind, end)
+                if np.isnan(value[count, 0]) or (behind < end and data[behind] != 59):
+                    blend[count] = MALFORMED
+        count += 1
+    return count

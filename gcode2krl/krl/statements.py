@@ -1,0 +1,119 @@
+"""Single KRL statements: frames, joint targets, tool and base, M-codes from the cell's templates."""
+
+import re
+from functools import lru_cache
+from typing import Any
+
+import jinja2
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.krl.number_text import fixed
+from gcode2krl.tables import Event
+from gcode2krl.units import DEG_PER_RAD
+
+Floats = NDArray[np.float64]
+_MESSAGE_CHARACTERS = 70
+
+
+def frame_text(matrix: Floats) -> str:
+    """Return a transform (4, 4) as a KRL frame, mm and degrees."""
+    abc = fr.abc_from_rotation(matrix[:3, :3]) * DEG_PER_RAD
+    values = [*(fixed(v, 3) for v in matrix[:3, 3]), *(fixed(v, 4) for v in abc)]
+    return "{" + ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True)) + "}"
+
+
+def axes_text(q_deg: Floats) -> str:
+    """Return joint angles (6,) in degrees as a KRL axis target."""
+    return "{" + ",".join(f"A{k} {fixed(angle, 4)}" for k, angle in enumerate(q_deg, start=1)) + "}"
+
+
+def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
+    """Return text that may stand in a KRL string or comment: printable ASCII, no quotes or braces."""
+    return re.sub(r'[^ !#$%&\'()*+,\-./0-9:;<=>?@A-Z\[\]^_a-z~]', "?", text)[:most]
+
+
+def base_statement(cell: Cell) -> str:
+    """Return the statement that sets ``$BASE``."""
+    number = cell.frames.base_data
+    return f"BAS (#BASE,{number} )" if number is not None else f"$BASE={frame_text(cell.base_matrix())}"
+
+
+def tool_statements(cell: Cell, number: int) -> str:
+    """Return the statements that set ``$TOOL`` and ``$LOAD`` for a tool."""
+    tool = cell.tool[number]
+    if tool.tool_data is not None:
+        return f"BAS (#TOOL,{tool.tool_data} )"
+    load = cell.load
+    centre = f"CM {{X {fixed(load.x_mm, 3)},Y {fixed(load.y_mm, 3)},Z {fixed(load.z_mm, 3)},A 0.0,B 0.0,C 0.0}}"
+    inertia = f"J {{X {fixed(load.jx_kgm2, 4)},Y {fixed(load.jy_kgm2, 4)},Z {fixed(load.jz_kgm2, 4)}}}"
+    return f"$TOOL={frame_text(written_tool(cell, number))}\n$LOAD={{M {fixed(load.mass_kg, 3)},{centre},{inertia}}}"
+
+
+def written_tool(cell: Cell, number: int) -> Floats:
+    """Return the tool frame (4, 4) as the controller has it, in its own axes."""
+    return cell.tool_matrix(number) @ fr.invert(controller_axes(cell.tool[number].axis or "+z"))
+
+
+def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
+    """Return what the guard compares: frames set by number, with the inverse of what they should be."""
+    checks = []
+    if cell.frames.base_data is not None:
+        checks.append({"variable": f"BASE_DATA[{cell.frames.base_data}]", "inverse": frame_text(fr.invert(cell.base_matrix()))})
+    for number in tools:
+        data = cell.tool[number].tool_data
+        if data is not None:
+            checks.append({"variable": f"TOOL_DATA[{data}]", "inverse": frame_text(fr.invert(written_tool(cell, number)))})
+    return checks
+
+
+def event_statements(event: Event, cell: Cell) -> str:
+    """Return the KRL of an event, from the cell's templates; a note where it was released without one."""
+    line = event.values["line"]
+    if event.kind == "tool":
+        number = event.values["tool"]
+        text = render(cell.tool_change, cell, tool=number, line=line)
+        frame = tool_statements(cell, number) if number in cell.tool else ""
+        return f"; line {line}: M6 T{number}\n{text}\n{frame}"
+    code = event.values["m"]
+    if code < 0:
+        message = ascii_text(event.values["text"])
+        return (
+            f'; line {line}: message\nGK_MSG={{MODUL[] "GCODE2KRL",NR 9,MSG_TXT[] "{message}"}}\n'
+            "GK_HANDLE=SET_KRLMSG(#NOTIFY,GK_MSG,GK_PAR[],GK_OPT)"
+        )
+    template = cell.m_code.get(f"M{code}")
+    if template is None:
+        return f"; line {line}: M{code} HAS NO KRL IN THE CELL AND WAS RELEASED BY HAND"
+    rpm = abs(event.values.get("rpm", 0.0))
+    text = render(template, cell, rpm=rpm, m=code, p=event.values.get("p"), text=event.values.get("text", ""), line=line)
+    return f"; line {line}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
+
+
+def render(template: str, cell: Cell, **values: Any) -> str:
+    """Render a template of the cell; raises `RefusedError` where it cannot be."""
+    try:
+        return _template(template).render(cell=cell, spindle=cell.spindle, **values).strip("\n")
+    except (jinja2.TemplateError, TypeError, ValueError, ZeroDivisionError) as error:
+        brief = " ".join(template.split())[:40]
+        raise RefusedError(Issue("error", "template", 0, f"template {brief!r} of the cell: {error}", "correct it in the cell file")) from None
+
+
+@lru_cache(maxsize=64)
+def _template(text: str) -> jinja2.Template:
+    return environment().from_string(text)
+
+
+@lru_cache(maxsize=1)
+def environment() -> jinja2.Environment:
+    """Return the Jinja2 environment of all KRL templates; an unknown name is an error."""
+    loader = jinja2.PackageLoader("gcode2krl.krl", "templates")
+    made = jinja2.Environment(
+        loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False
+    )
+    made.filters["decimals"] = lambda value, count: fixed(float(value), int(count))
+    made.filters["krl_text"] = ascii_text
+    return made

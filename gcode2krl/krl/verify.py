@@ -1,0 +1,232 @@
+"""Verify: the program read back against what it should say, and against the controller's rules."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl import predict
+from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.errors import Issue
+from gcode2krl.krl.compose import Layout, compose
+from gcode2krl.krl.names import name_problem
+from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
+from gcode2krl.tables import Joints, Targets, Toolpath
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M, RAD_PER_DEG, S_PER_MIN
+
+Floats = NDArray[np.float64]
+POSITION_LIMIT_MM = 0.002
+ROTATION_LIMIT_DEG = 0.001
+SPEED_LIMIT_MM_S = 0.1 / S_PER_MIN
+JOINT_LIMIT_DEG = 0.001
+CDIS_LIMIT_MM = 0.0006
+WAIT_LIMIT_S = 0.0006
+_MOST_PER_CHECK = 20
+_FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
+_KNOWN_WORDS = frozenset(
+    "BAS HALT WAIT IF THEN ELSE ENDIF WHILE ENDWHILE FOR ENDFOR LOOP ENDLOOP REPEAT UNTIL SWITCH CASE DEFAULT ENDSWITCH "
+    "RETURN PULSE INTERRUPT GLOBAL TRIGGER CONTINUE".split()
+)
+_MOTION_WORDS = frozenset("CIRC SPLINE ENDSPLINE SLIN SPTP SCIRC LIN_REL PTP_REL CIRC_REL SPL".split())
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """Outcome of a verification.
+
+    ``max_deviation_mm`` and ``max_rotation_deg`` are NaN where the motions cannot be paired.
+    """
+
+    max_deviation_mm: float
+    max_rotation_deg: float
+    max_speed_difference_mm_min: float
+    motions: int
+    intended: int
+    worst: tuple[dict[str, Any], ...] = ()
+    issues: tuple[Issue, ...] = field(default=())
+
+    @property
+    def ok(self) -> bool:
+        """True where no finding is an error."""
+        return not any(issue.severity == "error" for issue in self.issues)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object that ``--json`` prints; what is not a number is null."""
+        return {
+            "max_deviation_mm": _number(self.max_deviation_mm),
+            "max_rotation_deg": _number(self.max_rotation_deg),
+            "max_speed_difference_mm_min": _number(self.max_speed_difference_mm_min),
+            "motions": self.motions,
+            "intended": self.intended,
+            "ok": self.ok,
+            "worst": list(self.worst),
+        }
+
+
+def verify_krl(path: str | Path, toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> VerifyReport:
+    """Read a program back and compare it with what the G-code and the cell ask for.
+
+    ``tolerance_mm`` must be the one the program was made with. Raises `NotUnderstoodError` where a file
+    cannot be read or the G-code has no motion.
+    """
+    program = read_krl(path)
+    targets = predict.set_targets(toolpath, cell, tolerance_mm)
+    joints = predict.solve_joints(targets, cell)
+    layout = Layout(guard=program.guard)
+    expected = compose(targets, joints, cell, program.name, layout)
+    intended = read_texts(expected, f"{program.name}.src")
+    return compare(program, targets, joints, cell, intended.statements)
+
+
+def compare(
+    program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, statements: tuple[Statement, ...] | None = None
+) -> VerifyReport:
+    """Compare a program as read with the intended targets; with ``statements``, also what stands between motions."""
+    issues = list(program.issues)
+    issues += _rules(program, cell)
+    if len(program.ptp) != len(targets):
+        issues.append(Issue("error", "verify-count", _first_difference(program, targets), f"{len(program.ptp)} motions read, {len(targets)} intended", "translate again"))
+    count = min(len(program.ptp), len(targets))
+    deviation, rotation_deg, speed = _differences(program, targets, joints, cell, count)
+    issues += _difference_issues(program, targets, joints, count, deviation, rotation_deg, speed)
+    if statements is not None:
+        issues += _statement_issues(program.statements, statements)
+    order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
+    worst = tuple(
+        {"line": int(program.line[row]), "gcode_line": int(targets.source_line[row]), "deviation_mm": _number(float(deviation[row]))}
+        for row in order
+    )
+    return VerifyReport(
+        max_deviation_mm=_largest(deviation),
+        max_rotation_deg=_largest(rotation_deg),
+        max_speed_difference_mm_min=_largest(speed) * S_PER_MIN,
+        motions=len(program.ptp),
+        intended=len(targets),
+        worst=worst,
+        issues=tuple(issues),
+    )
+
+
+def _differences(program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int) -> tuple[Floats, Floats, Floats]:
+    """Return position (mm), rotation (deg) and speed (mm/s) differences per motion; PTP HOME by its joints."""
+    home = targets.home[:count]
+    deviation = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
+    rotation = np.zeros(count)
+    for number in np.unique(targets.tool[:count]):
+        rows = np.flatnonzero(targets.tool[:count] == number)
+        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
+        read = fr.rotation_from_abc(program.abc_deg[rows] * RAD_PER_DEG) @ turn
+        rotation[rows] = fr.angle_between(fr.quaternion_from_rotation(np.nan_to_num(read)), targets.rotation[rows]) * DEG_PER_RAD
+    rotation[np.isnan(program.abc_deg[:count]).any(axis=1)] = np.nan
+    joint_deg = np.abs(program.q_deg[:count] - joints.q_rad[:count] * DEG_PER_RAD).max(axis=1)
+    good_home = home & (joint_deg <= JOINT_LIMIT_DEG)
+    deviation[good_home], rotation[good_home] = 0.0, 0.0
+    speed = np.where(targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count]))
+    return deviation, rotation, speed
+
+
+def _difference_issues(
+    program: KrlProgram, targets: Targets, joints: Joints, count: int, deviation: Floats, rotation_deg: Floats, speed: Floats
+) -> list[Issue]:
+    cdis = np.abs(program.cdis_mm[:count] - targets.cdis_mm[:count])
+    wait = np.abs(program.wait_s[:count] - targets.wait_s[:count])
+    other_kind = program.ptp[:count] != targets.ptp[:count]
+    pose = targets.ptp[:count] & ~targets.home[:count]
+    status = pose & (program.status_turn[:count, 0] != joints.status[:count])
+    checks = (
+        ("verify-motion", other_kind, "PTP and LIN exchanged", None),
+        ("verify-position", ~(deviation <= POSITION_LIMIT_MM), "{:.4f} mm off", deviation),
+        ("verify-rotation", ~(rotation_deg <= ROTATION_LIMIT_DEG), "{:.4f} deg off", rotation_deg),
+        ("verify-speed", ~(speed <= SPEED_LIMIT_MM_S), "speed {:.3f} mm/s off", speed),
+        ("verify-cdis", ~(cdis <= CDIS_LIMIT_MM), "approximation {:.3f} mm off", cdis),
+        ("verify-wait", ~(wait <= WAIT_LIMIT_S), "dwell {:.3f} s off", wait),
+        ("verify-status", status, "status S differs from the predicted branch", None),
+    )
+    issues = []
+    for code, wrong, sentence, amount in checks:
+        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK]:
+            text = sentence.format(amount[row]) if amount is not None else sentence
+            gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
+            issues.append(Issue("error", code, int(program.line[row]), text + gcode, "translate again"))
+    return issues
+
+
+def _statement_issues(read: tuple[Statement, ...], intended: tuple[Statement, ...]) -> list[Issue]:
+    """Compare what stands between the motions: settings, guard, outputs, waits, calls."""
+    found = [(s.motion, _normal(s.text)) for s in read]
+    wanted = [(s.motion, _normal(s.text)) for s in intended]
+    if found == wanted:
+        return []
+    at = next((k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b), min(len(found), len(wanted)))
+    line = read[at].line if at < len(read) else (read[-1].line if read else 0)
+    have = read[at].text if at < len(read) else "nothing"
+    want = intended[at].text if at < len(intended) else "nothing"
+    return [Issue("error", "verify-statement", line, f"found {have[:60]!r}, intended {want[:60]!r}", "translate again, with the cell it was made with")]
+
+
+def _rules(program: KrlProgram, cell: Cell) -> list[Issue]:
+    """Rules that a controller would enforce."""
+    issues = []
+    problem = name_problem(program.name)
+    if problem:
+        issues.append(Issue("error", "krl-name", 0, f"program name {program.name!r}: {problem}"))
+    if len(program.ptp) == 0:
+        return [*issues, Issue("error", "krl-no-motion", 0, "the program has no motion")]
+    if not program.ptp[0]:
+        issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
+    cartesian = np.isnan(program.q_deg).all(axis=1)
+    incomplete = cartesian & (np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1))
+    incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
+    incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
+    for row in np.flatnonzero(incomplete)[:_MOST_PER_CHECK]:
+        issues.append(Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component"))
+    speed = program.speed_mm_s / MM_PER_M
+    for row in np.flatnonzero(~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6))))[:_MOST_PER_CHECK]:
+        issues.append(Issue("error", "krl-velocity", int(program.line[row]), f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}"))
+    issues += _statement_rules(program, cell)
+    return issues
+
+
+def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
+    issues = []
+    known = _KNOWN_WORDS | {external.split("(")[0].strip().upper() for external in cell.program.externals}
+    starts = 0
+    for statement in program.statements:
+        word = _FIRST_WORD.match(statement.text)
+        first = word.group(0).upper() if word else statement.text[:10]
+        rest = statement.text[len(first) :].lstrip()
+        if "#INITMOV" in statement.text.upper():
+            starts += 1
+        if first in _MOTION_WORDS:
+            issues.append(Issue("error", "krl-motion-unknown", statement.line, f"{first} is a motion this program does not write"))
+        elif rest.startswith("(") and first not in known:
+            issues.append(Issue("error", "krl-call-undeclared", statement.line, f"{first} is called but not declared", "add it to [program] externals of the cell"))
+        elif not (first.startswith("$") or first in known or rest[:1] in ("=", ".", "[", "(")):
+            issues.append(Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}"))
+    if starts != 1:
+        issues.append(Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once"))
+    return issues[:_MOST_PER_CHECK]
+
+
+def _first_difference(program: KrlProgram, targets: Targets) -> int:
+    """Return the .src line at which the motions begin to differ."""
+    count = min(len(program.ptp), len(targets))
+    off = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
+    rows = np.flatnonzero(~(off <= POSITION_LIMIT_MM) & ~targets.home[:count])
+    return int(program.line[rows[0]]) if len(rows) else int(program.line[-1]) if len(program.line) else 0
+
+
+def _normal(text: str) -> str:
+    return re.sub(r"\s+", "", text).upper()
+
+
+def _largest(values: Floats) -> float:
+    return float("nan") if np.isnan(values).any() else float(values.max(initial=0.0))
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else value

@@ -1,0 +1,116 @@
+"""``write_krl``: Targets to files, checked, read back and verified before anything is written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from gcode2krl import predict
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.krl.compose import Layout, compose
+from gcode2krl.krl.files import write_together
+from gcode2krl.krl.names import name_problem, suggested_name
+from gcode2krl.krl.read import read_texts
+from gcode2krl.krl.release import released
+from gcode2krl.krl.verify import VerifyReport, compare
+from gcode2krl.tables import Targets
+from gcode2krl.units import BYTES_PER_MB
+
+
+@dataclass(frozen=True)
+class WrittenProgram:
+    """What `write_krl` wrote."""
+
+    name: str
+    files: tuple[Path, ...]
+    texts: dict[str, bytes]
+    """File name → bytes."""
+    report: VerifyReport
+    issues: tuple[Issue, ...]
+
+
+def write_krl(
+    targets: Targets,
+    path: str | Path | None,
+    cell: Cell,
+    *,
+    name: str | None = None,
+    allow: Sequence[str] = (),
+    guard: bool = True,
+    split: Literal["defs", "files"] = "defs",
+    options: str = "",
+    strict: bool = False,
+) -> WrittenProgram:
+    """Write a KRL program: ``.src`` and ``.dat`` (and parts), all together or not at all.
+
+    Parameters
+    ----------
+    targets : from `set_targets`; errors among its ``issues`` refuse the program.
+    path : the ``.src``; None composes and verifies without writing (everything in one ``.src`` text).
+    name : program name; default: the file's stem.
+    allow : findings released by hand, ``CODE:LINE``; the header lists them.
+    guard : compare frames, robot and inputs before the first motion.
+    split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
+    options : words for the header.
+    strict : warnings refuse the program too.
+
+    Raises
+    ------
+    RefusedError
+        Where a finding forbids the program, or its own verification does.
+    NotUnderstoodError
+        Where the output cannot be written or a name or release is wrong.
+    """
+    file = Path(path) if path is not None else None
+    program_name, issues = _program_name(file, name)
+    issues = list(released([*issues, *targets.issues], allow, strict))
+    joints = predict.solve_joints(targets, cell)
+    layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow))
+    texts = compose(targets, joints, cell, program_name, layout)
+    issues += released(_size_issues(texts, targets, cell), (), strict)
+    report = compare(read_texts(texts, f"{program_name}.src"), targets, joints, cell)
+    if not report.ok:
+        raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
+    written: dict[Path, bytes] = {}
+    if file is not None:
+        written = {_place(file, part, program_name): text for part, text in texts.items()}
+        write_together(written)
+    return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues))
+
+
+def _place(file: Path, part: str, program_name: str) -> Path:
+    if part == f"{program_name}.src":
+        return file
+    return file.with_suffix(".dat") if part == f"{program_name}.dat" else file.with_name(part)
+
+
+def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]]:
+    """Return the program's name and what there is to say about it."""
+    if name is not None:
+        problem = name_problem(name) if name else "is empty"
+        if problem:
+            raise input_error("krl-name", f"--name {name!r}: {problem}", "at most 24 of A-Z, 0-9, _; not starting with a digit")
+        return name.upper(), []
+    stem = file.stem if file is not None else "PART"
+    good = suggested_name(stem)
+    if good == stem.upper():
+        return good, []
+    remedy = f"name the output {good}.src, or give --name"
+    return good, [Issue("warning", "krl-name", 0, f"{stem!r} is no KRL program name; the program is called {good}", remedy)]
+
+
+def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
+    size_mb = sum(len(text) for text in texts.values()) / BYTES_PER_MB
+    motions = int(np.count_nonzero(~targets.ptp))
+    if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
+        return []
+    return [
+        Issue(
+            "warning", "program-large", 0,
+            f"{size_mb:.1f} MB, {motions} LIN: more than controllers are known to hold ({cell.program.warn_size_mb:g} MB, {cell.program.memory_moves} LIN)",
+            "use --split files, a larger arc chord tolerance, or split the job in the CAM",
+        )
+    ]  # fmt: skip

@@ -1,0 +1,66 @@
+"""CDIS at each corner: from a tolerance where one is asked for, else the cell's.
+
+The controller leaves the line at d before a corner and joins the next d after it on a parabola; the corner
+is then off by d·cos(alpha/2)/2 (Bigliardi et al. 2022, eq. 1-3; alpha = interior angle, d at most half of
+the shorter line). Hence d = 2·tolerance/cos(alpha/2), rounded down to a level.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
+"""The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
+
+_REVERSAL_COS = math.cos(math.radians(0.5))
+
+
+def corner_cdis(
+    position_mm: NDArray[np.float64], tolerance_mm: NDArray[np.float64], cdis_mm: float, exact: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return CDIS (p,) in mm at the end of each motion.
+
+    ``tolerance_mm`` (p,) is NaN where none is asked for: there ``cdis_mm`` holds. ``exact`` (p,) forces 0.
+    A reversal (interior angle below 1°) is an exact stop.
+    """
+    result = np.empty(len(position_mm))
+    _corner_cdis(position_mm, tolerance_mm, cdis_mm, exact, LEVELS_MM, result)
+    return result
+
+
+@njit(cache=True)
+def _corner_cdis(position, tolerance, cdis, exact, levels, result):  # type: ignore[no-untyped-def]
+    count = len(position)
+    current = 0.0
+    for i in range(count):
+        result[i] = 0.0
+        if exact[i] or i == 0 or i == count - 1:
+            continue
+        dot, before, after = 0.0, 0.0, 0.0
+        for k in range(3):
+            a = position[i, k] - position[i - 1, k]
+            b = position[i + 1, k] - position[i, k]
+            dot += a * b
+            before += a * a
+            after += b * b
+        if before == 0.0 or after == 0.0:
+            result[i] = current if current > 0.0 else cdis
+            continue
+        cos_turn = min(1.0, max(-1.0, dot / math.sqrt(before * after)))  # alpha = 180° - turn
+        if cos_turn < -_REVERSAL_COS:
+            continue
+        if math.isnan(tolerance[i]):
+            result[i] = cdis
+            continue
+        cos_half = math.sqrt(max(0.0, 0.5 * (1.0 - cos_turn)))  # cos(alpha/2)
+        largest = levels[-1] if cos_half < 1e-12 else 2.0 * tolerance[i] / cos_half
+        half_line = 0.5 * math.sqrt(min(before, after))
+        level = 0.0
+        for value in levels:  # the largest that is allowed, but none beyond what half the line can use
+            if value <= largest * (1.0 + 1e-12) and level < half_line:
+                level = value
+        keeps = current <= largest and current > 0.0 and current >= min(level, half_line)
+        current = current if keeps else level
+        result[i] = current

@@ -1,0 +1,83 @@
+"""The free turn about the tool axis: a mill is symmetric, so the robot may choose it.
+
+``auto`` keeps away from joint limits and singularities. One angle for the whole program where one is good
+enough (the smoothest choice); otherwise an angle that changes slowly along the path, found by dynamic
+programming over a grid.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.units import RAD_PER_DEG
+
+Floats = NDArray[np.float64]
+Quality = Callable[[NDArray[np.int64], float], Floats]
+
+GRID_RAD = 5.0 * RAD_PER_DEG
+GOOD_ENOUGH = 0.3
+"""Quality (1 = 30° from limits and singularities) at which a constant angle is taken."""
+STEP_MM = 25.0
+"""Path over which a changing angle may move by one step of the grid."""
+_CHANGE_COST = 0.05
+_SAMPLES = 400
+
+
+def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
+    """Return the spin in rad: one number, or (p,) where no constant angle will do.
+
+    ``quality(rows, spin)`` gives (len(rows), branches): how far the worst of limits and singularities is,
+    1 = 30° and more, 0 = at it, negative = impossible; the branch must be one for the whole program.
+    """
+    rows = np.unique(np.linspace(0, len(position_mm) - 1, min(_SAMPLES, len(position_mm))).astype(np.int64))
+    extremes = [op(position_mm[:, k]) for k in range(3) for op in (np.argmin, np.argmax)]
+    rows = np.unique(np.concatenate([rows, extremes]))
+    spins = np.arange(-np.pi, np.pi - 1e-9, GRID_RAD)
+    spins = spins[np.argsort(np.abs(spins), kind="stable")]  # the smallest turn wins a tie
+    table = np.stack([quality(rows, float(spin)) for spin in spins])  # (spins, rows, branches)
+    worst = np.minimum(table.min(axis=1).max(axis=1), GOOD_ENOUGH + 0.1)
+    best = int(np.argmax(np.round(worst, 2)))
+    if worst[best] >= GOOD_ENOUGH or len(rows) < 3:
+        return float(spins[best])
+    changing = _changing(position_mm, rows, spins, table)
+    return float(spins[best]) if changing is None else changing
+
+
+def _changing(position_mm: Floats, rows: NDArray[np.int64], spins: Floats, table: Floats) -> Floats | None:
+    """Dynamic programming along the path, per branch; None where it is no better than a constant."""
+    order = np.argsort(spins)
+    spins, table = spins[order], table[order]
+    path = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm, axis=0), axis=1))])
+    allowed = np.maximum(1, ((path[rows[1:]] - path[rows[:-1]]) / STEP_MM).astype(int))
+    best_cost, best_track = np.inf, None
+    for branch in range(table.shape[2]):
+        cost_here = np.where(table[:, :, branch] > 0, 1.0 - np.minimum(table[:, :, branch], 1.0), 1e3)
+        cost, track = _cheapest_track(cost_here, allowed)
+        if cost < best_cost:
+            best_cost, best_track = cost, track
+    constant_cost = np.where(table > 0, 1.0 - np.minimum(table, 1.0), 1e3).sum(axis=1).min()
+    if best_track is None or best_cost >= constant_cost:
+        return None
+    return np.interp(path, path[rows], spins[best_track])
+
+
+def _cheapest_track(cost_here: Floats, allowed: NDArray[np.int64]) -> tuple[float, NDArray[np.int64]]:
+    """Return (cost, grid index per sample) of the cheapest way through the grid (spins, samples).
+
+    No wrap at ±180°: a full turn about the tool would wind up A6.
+    """
+    size, samples = cost_here.shape
+    distance = np.abs(np.arange(size)[:, None] - np.arange(size)[None, :])
+    total = cost_here[:, 0].copy()
+    came_from = np.zeros((samples, size), dtype=np.int64)
+    for k in range(1, samples):
+        step = np.where(distance <= allowed[k - 1], _CHANGE_COST * distance, np.inf)
+        through = total[None, :] + step
+        came_from[k] = np.argmin(through, axis=1)
+        total = through[np.arange(size), came_from[k]] + cost_here[:, k]
+    track = np.empty(samples, dtype=np.int64)
+    track[-1] = int(np.argmin(total))
+    for k in range(samples - 1, 0, -1):
+        track[k - 1] = came_from[k, track[k]]
+    return float(total.min()), track

@@ -1,0 +1,315 @@
+"""Toolpath to Targets: HOME, approach, the moves themselves, retracts, tool changes, HOME.
+
+The robot is either at HOME, standing above the work on the clearance plane, or on the path. Only rows
+whose X, Y and Z have all been programmed are positions; machine moves become retracts.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.program.blending import corner_cdis
+from gcode2krl.program.checks import check_toolpath
+from gcode2krl.program.orientation import tool_rotation
+from gcode2krl.tables import Event, Targets, Toolpath
+from gcode2krl.units import MM_PER_M
+
+Floats = NDArray[np.float64]
+HomePose = Callable[[int], tuple[Floats, Floats]]
+SpinOf = Callable[[Floats, Floats, NDArray[np.int32]], Floats | float]
+GRID_MM = 1e-3
+"""Decimals of the KRL text: rows that print as the same point are one target."""
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def plan_targets(
+    toolpath: Toolpath, cell: Cell, home_pose: HomePose, spin_of: SpinOf, tolerance_mm: float | None = None
+) -> Targets:
+    """Return the motions of the KRL program.
+
+    Parameters
+    ----------
+    home_pose : tool number → tip position (3,) in mm and quaternion (4,) of HOME in ``$BASE``.
+    spin_of : positions (p, 3), axes (p, 3), tools (p,) → spin about the axis in rad, a number or (p,).
+    tolerance_mm : blend tolerance; below ``G64 P``, above the cell's own.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the program has no motion.
+    """
+    plan = _Plan(toolpath, cell, home_pose)
+    plan.walk()
+    return plan.targets(spin_of, tolerance_mm)
+
+
+@dataclass
+class _Columns:
+    """Growing columns of the plan; each append is a run of rows."""
+
+    position: list[Floats] = field(default_factory=list)
+    axis: list[Floats] = field(default_factory=list)
+    move: list[NDArray[np.int32]] = field(default_factory=list)
+    tool: list[NDArray[np.int32]] = field(default_factory=list)
+    kind: list[NDArray[np.int8]] = field(default_factory=list)
+    count: int = 0
+
+    def append(self, position: Floats, axis: Floats, move: NDArray[np.int32], tool: int, kind: int) -> None:
+        size = len(position)
+        self.position.append(position)
+        self.axis.append(axis)
+        self.move.append(move)
+        self.tool.append(np.full(size, tool, dtype=np.int32))
+        self.kind.append(np.full(size, kind, dtype=np.int8))
+        self.count += size
+
+
+_LIN, _PTP, _HOME = 0, 1, 2
+
+
+class _Plan:
+    def __init__(self, toolpath: Toolpath, cell: Cell, home_pose: HomePose) -> None:
+        self.toolpath, self.cell, self.home_pose = toolpath, cell, home_pose
+        self.clearance = cell.clearance_z_mm if cell.clearance_z_mm is not None else _highest(toolpath)
+        self.columns = _Columns()
+        self.place: Literal["home", "clearance", "path"] = "home"
+        self.here = np.zeros(3)
+        self.axis = toolpath.axis[0]
+        self.tool = self._frame_tool(0)
+        self.tool_events: dict[int, int] = {}  # index of toolpath.events → target
+
+    def _frame_tool(self, number: int) -> int:
+        """Return the tool whose frame moves: an unknown or unnamed tool moves as the mounted one."""
+        if number in self.cell.tool:
+            return number
+        mounted = self.cell.mounted_tool
+        return mounted if mounted in self.cell.tool and mounted is not None else min(self.cell.tool)
+
+    # --- the walk -------------------------------------------------------------------------------------
+
+    def walk(self) -> None:
+        """Go through the rows once: runs of plain moves at a time, everything else one by one."""
+        toolpath = self.toolpath
+        plain = toolpath.known.all(axis=1) & ~toolpath.machine
+        plain[0] = False
+        if not (plain & np.concatenate([[False], np.ones(len(plain) - 1, dtype=bool)])).any():
+            raise input_error("no-motion", "the program has no move to a programmed position", "program X, Y and Z", source=toolpath.source)
+        changes = [(event.row, index) for index, event in enumerate(toolpath.events) if event.kind == "tool"]
+        stops = sorted({0, len(toolpath), *np.flatnonzero(np.diff(plain)) + 1, *(row + 1 for row, _ in changes)})
+        first_tool = next((toolpath.events[index].values["tool"] for row, index in changes if row == 0), 0)
+        self.tool = self._frame_tool(first_tool)
+        self._home(-1)
+        for start, end in zip(stops, stops[1:], strict=False):
+            for row, index in changes:
+                if row == start - 1:
+                    self._change_tool(index)
+            if plain[start]:
+                self._run(start, end)
+            else:
+                for row in range(max(start, 1), end):
+                    self._special(row)
+        for row, index in changes:
+            if row == len(toolpath) - 1 and index not in self.tool_events:
+                self._change_tool(index)
+        self._leave()
+
+    def _add(self, position: Floats, move: int, kind: int = _LIN) -> None:
+        moves = np.array([move], dtype=np.int32)
+        self.columns.append(np.array([position]), self.axis[None, :], moves, self.tool, kind)
+        self.here = np.array(position)
+
+    def _home(self, move: int) -> None:
+        self._add(self.home_pose(self.tool)[0], move, _HOME)
+        self.place = "home"
+
+    def _above(self, position: Floats) -> Floats:
+        return np.array([position[0], position[1], max(position[2], self.clearance)])
+
+    def _retract(self, move: int) -> None:
+        """From the path straight up to the clearance plane."""
+        if self.place == "path":
+            if self.here[2] < self.clearance:
+                self._add(self._above(self.here), move)
+            self.place = "clearance"
+
+    def _run(self, start: int, end: int) -> None:
+        """A run of plain rows, approached over the clearance plane where the robot is not on the path."""
+        rows = slice(start, end)
+        position = self.toolpath.position_mm[rows]
+        self.axis = self.toolpath.axis[start]
+        above = self._above(position[0])
+        if self.place == "home":
+            self._add(above, -1, _PTP)
+        elif self.place == "clearance" and not np.array_equal(above, self.here):
+            self._add(above, -1)
+        moves = np.arange(start, end, dtype=np.int32)
+        self.columns.append(position, self.toolpath.axis[rows], moves, self.tool, _LIN)
+        self.here, self.axis, self.place = position[-1], self.toolpath.axis[end - 1], "path"
+
+    def _special(self, row: int) -> None:
+        """A machine move, or a row of which not every axis is a programmed position."""
+        toolpath = self.toolpath
+        known = toolpath.known[row]
+        self._retract(row if toolpath.machine[row] else -1)
+        if self.place == "home":
+            return
+        if toolpath.machine[row]:
+            if not (known[0] or known[1]):
+                self._home(row)
+        elif known[0] and known[1] and toolpath.rapid[row]:
+            self._add(np.array([*toolpath.position_mm[row, :2], self.clearance]), row)
+
+    def _change_tool(self, index: int) -> None:
+        """Stand on the clearance plane, high enough for the longer of the two tools, and change."""
+        if index in self.tool_events:
+            return
+        new = self._frame_tool(self.toolpath.events[index].values["tool"])
+        if self.columns.count > 1:
+            self._retract(-1)
+            longer_mm = self._length(new) - self._length(self.tool)
+            if self.place == "clearance" and longer_mm > 0:
+                self._add(self.here + longer_mm * _UP, -1)
+            self.here = self.here - longer_mm * _UP
+        self.tool_events[index] = self.columns.count - 1
+        self.tool = new
+
+    def _length(self, number: int) -> float:
+        return self.cell.tool[number].length_mm or self.cell.frames.tool_length_mm
+
+    def _leave(self) -> None:
+        self._retract(-1)
+        if self.place != "home":
+            self._home(-1)
+
+    # --- the table ------------------------------------------------------------------------------------
+
+    def targets(self, spin_of: SpinOf, tolerance_mm: float | None) -> Targets:
+        """Assemble the table from what was planned."""
+        toolpath, columns = self.toolpath, self.columns
+        position = np.concatenate(columns.position)
+        move = np.concatenate(columns.move)
+        kind = np.concatenate(columns.kind)
+        axis = self._axes()
+        tool = np.concatenate(columns.tool)
+        keep = _distinct(position, axis, kind)
+        kept_index = np.cumsum(keep) - 1
+        position, axis, move, kind, tool = position[keep], _rows(axis, keep), move[keep], kind[keep], tool[keep]
+        rotation = self._rotations(position, axis, tool, kind, spin_of)
+        wait = np.zeros(len(position))
+        stand = _StandingAt(np.concatenate(columns.move), kept_index)
+        events = self._place_events(stand, kept_index)
+        for row in np.flatnonzero(toolpath.dwell_s > 0):
+            wait[stand.at(int(row))] += toolpath.dwell_s[row]
+        rapid = np.where(move >= 0, toolpath.rapid[move] | toolpath.machine[move], True)
+        speed = np.where(rapid, self.cell.controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[np.maximum(move, 0)])
+        speed[kind != _LIN] = np.nan
+        exact = self._exact_stops(move, kind, rapid, wait, events)
+        return Targets(
+            position_mm=position,
+            rotation=rotation,
+            ptp=kind != _LIN,
+            home=kind == _HOME,
+            speed_mm_s=speed,
+            cdis_mm=corner_cdis(position, self._tolerances(move, tolerance_mm), self.cell.controller.cdis_mm, exact),
+            wait_s=wait,
+            move=move,
+            source_line=np.where(move >= 0, toolpath.source_line[move], 0),
+            tool=tool,
+            events=events,
+            issues=(*toolpath.issues, *check_toolpath(toolpath, self.cell), *self._notes()),
+            source=toolpath.source,
+        )
+
+    def _axes(self) -> Floats:
+        if self.toolpath.axis.strides[0] == 0:
+            return np.broadcast_to(self.toolpath.axis[0], (self.columns.count, 3))
+        return np.concatenate(self.columns.axis)
+
+    def _rotations(
+        self, position: Floats, axis: Floats, tool: NDArray[np.int32], kind: NDArray[np.int8], spin_of: SpinOf
+    ) -> Floats:
+        planned = kind != _HOME
+        spin = spin_of(position[planned], _rows(axis, planned), tool[planned])
+        rotation = np.empty((len(position), 4))
+        rotation[planned] = tool_rotation(_rows(axis, planned), spin)
+        for row in np.flatnonzero(~planned):
+            position[row], rotation[row] = self.home_pose(int(tool[row]))
+        return rotation
+
+    def _place_events(self, stand: "_StandingAt", kept_index: NDArray[np.int64]) -> tuple[Event, ...]:
+        placed: list[Event] = []
+        earliest = 0
+        for index, event in enumerate(self.toolpath.events):
+            if index in self.tool_events:
+                target = int(kept_index[self.tool_events[index]])
+            elif event.values.get("by_end"):
+                target = int(kept_index[-1])  # at HOME, not while the mill is still in the work
+            else:
+                target = stand.at(event.row)
+            earliest = max(earliest, target)
+            placed.append(Event(earliest, event.kind, event.values))
+        return tuple(placed)
+
+    def _exact_stops(
+        self, move: NDArray[np.int32], kind: NDArray[np.int8], rapid: NDArray[np.bool_], wait: Floats, events: tuple[Event, ...]
+    ) -> NDArray[np.bool_]:
+        exact = (kind != _LIN) | (wait > 0)
+        exact |= (move >= 0) & self.toolpath.exact_stop[move]
+        exact[:-1] |= (rapid[:-1] != rapid[1:]) | (kind[1:] != _LIN)
+        exact[[event.row for event in events]] = True
+        exact[-1] = True
+        return exact
+
+    def _tolerances(self, move: NDArray[np.int32], tolerance_mm: float | None) -> Floats:
+        """Precedence: ``G64 P``, then the one asked for, then the cell's."""
+        own = self.cell.controller.tolerance_mm
+        below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+        programmed = np.where(move >= 0, self.toolpath.tolerance_mm[move], np.nan)
+        result: Floats = np.where(np.isnan(programmed), below, programmed)
+        return result
+
+    def _notes(self) -> list[Issue]:
+        if self.cell.verified is not None:
+            return []
+        return [Issue("note", "cell-not-verified", 0, "the cell has not been confirmed by a person; the program begins with a HALT", "`gcode2krl models check` lists what to confirm")]
+
+
+class _StandingAt:
+    """Finds the target at which the tool stands after a row of the Toolpath."""
+
+    def __init__(self, move: NDArray[np.int32], kept_index: NDArray[np.int64]) -> None:
+        self.moved = np.flatnonzero(move >= 0)
+        self.rows = move[self.moved]
+        self.kept_index = kept_index
+
+    def at(self, row: int) -> int:
+        index = int(np.searchsorted(self.rows, row, side="right")) - 1
+        return int(self.kept_index[self.moved[index]]) if index >= 0 else 0
+
+
+def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Mark the rows that print as another point than the row before, or are PTP."""
+    grid = np.rint(position / GRID_MM)
+    different = np.ones(len(position), dtype=bool)
+    different[1:] = (grid[1:] != grid[:-1]).any(axis=1)
+    if axis.strides[0] != 0:
+        different[1:] |= (axis[1:] != axis[:-1]).any(axis=1)
+    return different | (kind != _LIN)
+
+
+def _rows(values: Floats, keep: NDArray[np.bool_]) -> Floats:
+    """Select rows; a broadcast constant stays one."""
+    if values.strides[0] == 0:
+        return np.broadcast_to(values[0], (int(np.count_nonzero(keep)), *values.shape[1:]))
+    return values[keep]
+
+
+def _highest(toolpath: Toolpath) -> float:
+    known = toolpath.known.all(axis=1)
+    return float(toolpath.position_mm[known, 2].max()) if known.any() else 0.0

@@ -1,0 +1,222 @@
+"""Closed-form inverse kinematics of the arm of `kinematics`: all eight branches, or one along a path.
+
+The index of a branch is KUKA's status S: bit 0 overhead, bit 1 elbow (A3 >= phi), bit 2 wrist (A5 < 0).
+The wrist centre splits the problem (Pieper 1968): A1 from the direction to it, A2 and A3 from a planar
+triangle by the law of cosines, A4 to A6 from the rotation that is left. All angles come from atan2, and A6
+from what A4 leaves over, so a pose next to a singularity is met as exactly as any other.
+"""
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from gcode2krl.robot.kinematics import FloatArray, read_only
+
+STRETCH_TOLERANCE = 1e-12
+"""How far cos(A3 - phi) may exceed 1 by rounding; less than 1e-8 mm beyond the stretched arm."""
+
+AXIS_1_TOLERANCE_MM = 1e-9
+"""A wrist centre as close as this to axis 1 leaves A1 free."""
+
+WRIST_TOLERANCE = 1e-9
+"""Below this |sin A5| axes 4 and 6 are one: A4 is free, A5 is exactly 0 or pi, A6 takes the rest."""
+
+
+def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: npt.ArrayLike) -> FloatArray:
+    """Return every set of angles that puts the flange into the given poses.
+
+    Joint limits are not looked at. Where axes 4 and 6 are one, A4 is 0 and both wrist branches are equal;
+    where the wrist centre lies on axis 1, A1 is 0.
+
+    Parameters
+    ----------
+    position_mm : (n, 3)
+        Origin of the flange in the robot root.
+    rotation : (n, 3, 3)
+        Its axes as columns, orthonormal and right-handed; this is not checked.
+    geometry : (6,)
+        a1, a2, c1, c2, c3, c4 in mm; see `kinematics`.
+
+    Returns
+    -------
+    q_rad : (n, 8, 6)
+        A1 to A6 in (-pi, pi] by branch, which is the status S; NaN where a branch does not reach the pose.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape.
+    """
+    position = read_only("position_mm", position_mm, -1, 3)
+    axes = read_only("rotation", rotation, len(position), 3, 3)
+    q_rad = np.empty((len(position), 8, 6))
+    _all_rows(position, axes, read_only("geometry", geometry, 6), q_rad)
+    return q_rad
+
+
+def one_branch(
+    position_mm: npt.ArrayLike,
+    rotation: npt.ArrayLike,
+    geometry: npt.ArrayLike,
+    branch: int,
+    q_reference_rad: npt.ArrayLike,
+) -> FloatArray:
+    """Return the angles of one branch along a path, without jumps of a full turn.
+
+    Each angle is the turn nearest to that of the row before, in the first row to the reference, so A4 and A6
+    wind beyond 180 degrees where the path does. Where axes 4 and 6 are one, A4 stays as it was and A6 takes
+    the rest; where the wrist centre lies on axis 1, A1 stays. A row out of reach is NaN and the next row
+    follows the last one that was reached. Joint limits are not looked at.
+
+    Parameters
+    ----------
+    position_mm : (n, 3)
+        Origin of the flange in the robot root, row after row along the path.
+    rotation : (n, 3, 3)
+        Its axes as columns, orthonormal and right-handed; this is not checked.
+    geometry : (6,)
+        a1, a2, c1, c2, c3, c4 in mm; see `kinematics`.
+    branch : int
+        0 to 7, the status S.
+    q_reference_rad : (6,)
+        The angles before the first row.
+
+    Returns
+    -------
+    q_rad : (n, 6)
+        A1 to A6 with the controller's signs and zero.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape, the branch is none, or the reference is not finite.
+    """
+    if branch not in range(8):
+        raise ValueError(f"branch is {branch}, not 0 to 7")
+    reference = read_only("q_reference_rad", q_reference_rad, 6)
+    if not np.isfinite(reference).all():
+        raise ValueError("q_reference_rad is not finite")
+    position = read_only("position_mm", position_mm, -1, 3)
+    axes = read_only("rotation", rotation, len(position), 3, 3)
+    q_rad = np.empty((len(position), 6))
+    _path_rows(position, axes, read_only("geometry", geometry, 6), int(branch), reference, q_rad)
+    return q_rad
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _all_rows(position_mm: FloatArray, rotation: FloatArray, geometry: FloatArray, q_rad: FloatArray) -> None:
+    for i in range(position_mm.shape[0]):
+        for arm in range(4):
+            q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm, rotation, i, geometry, arm, 0.0)
+            for branch in (arm, arm + 4):
+                q4, q5, q6 = _wrist(rotation, i, cos_1, sin_1, cos_23, sin_23, branch, 0.0)
+                q = (q1, q2, q3, q4, q5, q6)
+                for j in range(6):
+                    q_rad[i, branch, j] = _main_value(q[j])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _path_rows(
+    position_mm: FloatArray,
+    rotation: FloatArray,
+    geometry: FloatArray,
+    branch: int,
+    q_reference_rad: FloatArray,
+    q_rad: FloatArray,
+) -> None:
+    before = np.empty(6)
+    for j in range(6):
+        before[j] = q_reference_rad[j]
+    for i in range(position_mm.shape[0]):
+        q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm, rotation, i, geometry, branch, before[0])
+        q4, q5, q6 = _wrist(rotation, i, cos_1, sin_1, cos_23, sin_23, branch, before[3])
+        q = (q1, q2, q3, q4, q5, q6)
+        reached = not math.isnan(q6)  # NaN as soon as any part of the pose is
+        for j in range(6):
+            if reached:
+                before[j] = q[j] + 2.0 * math.pi * np.floor((before[j] - q[j]) / (2.0 * math.pi) + 0.5)
+            q_rad[i, j] = before[j] if reached else math.nan
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _arm(
+    position_mm: FloatArray, rotation: FloatArray, i: int, geometry: FloatArray, branch: int, q1_before: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return A1, A2, A3, cos A1, sin A1, cos(A2 + A3), sin(A2 + A3), all NaN where out of reach."""
+    a1, a2, c1, c2, c3, c4 = geometry
+    x = position_mm[i, 0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
+    y = position_mm[i, 1] - c4 * rotation[i, 1, 2]
+    radius = math.sqrt(x * x + y * y)
+    if branch & 1:  # overhead: axis 1 turns its back on the wrist centre
+        x, y, radius = -x, -y, -radius
+    if abs(radius) > AXIS_1_TOLERANCE_MM:
+        q1, cos_1, sin_1 = -math.atan2(y, x), x / abs(radius), -y / abs(radius)
+    else:
+        q1, cos_1, sin_1 = q1_before, math.cos(q1_before), math.sin(q1_before)
+
+    # triangle of upper arm, forearm and the line from axis 2 to the wrist centre; angles count downwards
+    along = radius - a1
+    down = c1 - (position_mm[i, 2] - c4 * rotation[i, 2, 2])
+    forearm_2 = c3 * c3 + a2 * a2
+    forearm = math.sqrt(forearm_2)
+    distance_2 = along * along + down * down
+    cos_elbow = (distance_2 - c2 * c2 - forearm_2) / (2.0 * c2 * forearm)
+    if not abs(cos_elbow) <= 1.0 + STRETCH_TOLERANCE:  # NaN input too
+        return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+    sin_elbow = math.sqrt(max((1.0 - cos_elbow) * (1.0 + cos_elbow), 0.0))
+    if not branch & 2:
+        sin_elbow = -sin_elbow
+    q3 = math.atan2(sin_elbow, cos_elbow) - math.atan2(a2, c3)
+    reach_along, reach_down = c2 + forearm * cos_elbow, forearm * sin_elbow
+    cos_2 = (along * reach_along + down * reach_down) / distance_2
+    sin_2 = (down * reach_along - along * reach_down) / distance_2
+    cos_3 = (cos_elbow * c3 + sin_elbow * a2) / forearm
+    sin_3 = (sin_elbow * c3 - cos_elbow * a2) / forearm
+    cos_23, sin_23 = cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3
+    return q1, math.atan2(sin_2, cos_2), q3, cos_1, sin_1, cos_23, sin_23
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _wrist(
+    rotation: FloatArray,
+    i: int,
+    cos_1: float,
+    sin_1: float,
+    cos_23: float,
+    sin_23: float,
+    branch: int,
+    q4_before: float,
+) -> tuple[float, float, float]:
+    """Return A4, A5, A6 from Rx(-A4) Ry(A5) Rx(-A6) = m, the flange's axes z, y, -x seen from the forearm."""
+    y_x, y_y = sin_1, cos_1  # the forearm's y; its z is (z_x, z_y, cos_23)
+    z_x, z_y = cos_1 * sin_23, -sin_1 * sin_23
+    m_00 = (cos_1 * rotation[i, 0, 2] - sin_1 * rotation[i, 1, 2]) * cos_23 - sin_23 * rotation[i, 2, 2]
+    m_10 = y_x * rotation[i, 0, 2] + y_y * rotation[i, 1, 2]
+    m_20 = z_x * rotation[i, 0, 2] + z_y * rotation[i, 1, 2] + cos_23 * rotation[i, 2, 2]
+    m_11 = y_x * rotation[i, 0, 1] + y_y * rotation[i, 1, 1]
+    m_21 = z_x * rotation[i, 0, 1] + z_y * rotation[i, 1, 1] + cos_23 * rotation[i, 2, 1]
+    m_12 = -y_x * rotation[i, 0, 0] - y_y * rotation[i, 1, 0]
+    m_22 = -z_x * rotation[i, 0, 0] - z_y * rotation[i, 1, 0] - cos_23 * rotation[i, 2, 0]
+    sin_5 = math.sqrt(m_10 * m_10 + m_20 * m_20)
+    if sin_5 < WRIST_TOLERANCE:
+        q4, q5 = q4_before, math.atan2(0.0, m_00)
+        cos_4, sin_4 = math.cos(q4_before), math.sin(q4_before)
+    else:
+        if branch & 4:
+            sin_5 = -sin_5
+        cos_4, sin_4 = -m_20 / sin_5, -m_10 / sin_5
+        q4, q5 = math.atan2(sin_4, cos_4), math.atan2(sin_5, m_00)
+    # rows 1 and 2 of Rx(A4) m = Ry(A5) Rx(-A6): exact for the A4 taken, at the singularity too
+    return q4, q5, math.atan2(cos_4 * m_12 - sin_4 * m_22, cos_4 * m_11 - sin_4 * m_21)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _main_value(angle_rad: float) -> float:
+    """Return the same direction in (-pi, pi], for an angle less than a turn away from it."""
+    if angle_rad > math.pi:
+        return angle_rad - 2.0 * math.pi
+    if angle_rad <= -math.pi:
+        return angle_rad + 2.0 * math.pi
+    return angle_rad

@@ -1,0 +1,247 @@
+"""Joints along a chain of LIN motions: one branch, the right turns, and what stands in the way.
+
+The controller keeps its configuration on LIN, so the branch is chosen once, for the whole program. Between
+two targets the line is sampled, because a limit or a singularity may lie on the way.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue
+from gcode2krl.robot.inverse_kinematics import one_branch
+from gcode2krl.robot.jacobian import smallest_singular_value
+from gcode2krl.robot.kinematics import status_turn
+from gcode2krl.robot.poses import flange_frames
+from gcode2krl.tables import Joints, Targets
+from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, RAD_PER_REV
+
+Floats = NDArray[np.float64]
+
+STEP_MM, STEP_RAD = 10.0, 2.0 * RAD_PER_DEG
+"""Largest step between the samples of a line that are checked."""
+WRIST_ZONE_RAD = 5.0 * RAD_PER_DEG
+"""|A5| below which an excessive joint speed is called a wrist singularity."""
+WEAK_SIGMA = 0.03
+"""Smallest singular value below which an excessive joint speed is called a singularity of the arm."""
+_TRIAL_SAMPLES = 2000
+_MOST_PER_CHECK = 20
+_ANGLE_GRID_RAD = 1e-9
+
+
+@dataclass(frozen=True)
+class Line:
+    """Samples along the LIN motions: everything that is checked, target rows among them."""
+
+    position_mm: Floats
+    rotation: Floats
+    tool: NDArray[np.int32]
+    target: NDArray[np.int64]
+    """(m,) the target each sample leads to."""
+    duration_s: Floats
+    """(m,) time from the sample before, NaN at the start of a chain."""
+    is_target: NDArray[np.bool_]
+
+
+def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
+    """Return joints at each target (p) and the findings along the lines between them.
+
+    Joint speeds are NaN (they belong to a Motion). A target out of reach has NaN angles.
+    """
+    line = sample_lines(targets)
+    q_line = _best_branch(line, targets, cell)
+    q = np.full((len(targets), 6), np.nan)
+    q[line.target[line.is_target]] = q_line[line.is_target]
+    q[targets.home] = cell.home_q_rad()
+    tool_position = np.array([cell.tool_matrix(n)[:3, 3] for n in np.unique(targets.tool)])
+    sigma = np.empty(len(q))
+    for index, number in enumerate(np.unique(targets.tool)):
+        rows = targets.tool == number
+        sigma[rows] = smallest_singular_value(q[rows], cell.robot.geometry.array(), tool_position[index])
+    status, turn = status_turn(np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, cell.robot.geometry.array())
+    joints = Joints(
+        q_rad=q,
+        qd_rad_s=np.full_like(q, np.nan),
+        limit_margin_rad=_limit_margin(q, cell),
+        sigma_min=sigma,
+        status=status,
+        turn=turn,
+    )
+    return joints, joint_findings(line, q_line, targets, cell)
+
+
+def sample_lines(targets: Targets) -> Line:
+    """Sample the straight lines between targets; a PTP target starts a new chain."""
+    position, rotation = targets.position_mm, targets.rotation
+    count = len(targets)
+    length = np.zeros(count)
+    length[1:] = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    angle = np.zeros(count)
+    if not (rotation == rotation[0]).all():
+        angle[1:] = fr.angle_between(rotation[1:], rotation[:-1])
+    steps = np.maximum(1, np.ceil(np.maximum(length / STEP_MM, angle / STEP_RAD))).astype(np.int64)
+    steps[targets.ptp] = 1
+    steps[targets.home] = 0
+    target = np.repeat(np.arange(count), steps)
+    last = np.cumsum(steps)
+    part = (np.arange(len(target)) - (last - steps)[target] + 1) / steps[target]
+    before = np.maximum(target - 1, 0)
+    start = np.where(targets.ptp[target], target, before)
+    points = position[start] + (position[target] - position[start]) * part[:, None]
+    turned = rotation[target]
+    partial = np.flatnonzero((angle[target] > 0) & (part < 1))
+    if len(partial):
+        turned = np.array(turned)
+        turned[partial] = _between(rotation[start[partial]], rotation[target[partial]], part[partial])
+    speed = targets.speed_mm_s[target]
+    duration = np.where(targets.ptp[target], np.nan, np.maximum(length[target], 1e-9) / speed / steps[target])
+    return Line(points, turned, targets.tool[target], target, duration, part == 1.0)
+
+
+def _between(a: Floats, b: Floats, part: Floats) -> Floats:
+    """Spherical interpolation of quaternions (n, 4)."""
+    b = np.where(np.sum(a * b, axis=1, keepdims=True) < 0, -b, b)
+    half = np.arccos(np.clip(np.sum(a * b, axis=1), -1.0, 1.0))
+    sine = np.sin(half)
+    small = sine < 1e-9
+    safe = np.where(small, 1.0, sine)
+    wa = np.where(small, 1 - part, np.sin((1 - part) * half) / safe)
+    wb = np.where(small, part, np.sin(part * half) / safe)
+    mixed = wa[:, None] * a + wb[:, None] * b
+    result: Floats = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+    return result
+
+
+def _best_branch(line: Line, targets: Targets, cell: Cell) -> Floats:
+    """Return the joints (m, 6) of the branch and turns that keep the whole program within the limits.
+
+    Among branches that do, the one whose weakest point (limits, wrist) is not poor and whose start lies
+    nearest to HOME. A trial on a thinned line picks the branch, the full line gets only that one.
+    """
+    position, rotation = flange_frames(line.position_mm, line.rotation, line.tool, cell)
+    chain = np.isnan(line.duration_s)
+    stride = max(1, len(position) // _TRIAL_SAMPLES)
+    thin = np.unique(np.concatenate([np.arange(0, len(position), stride), np.flatnonzero(chain), [len(position) - 1]]))
+    scored = []
+    for branch in range(8):
+        q = _chains(position[thin], rotation[thin], chain[thin], branch, cell.home_q_rad(), cell)
+        turns = _turns(q, cell)
+        scored.append((_cost(q + turns, cell), branch, turns))
+    _, branch, turns = min(scored, key=lambda entry: (entry[0], entry[1]))
+    return _chains(position, rotation, chain, branch, cell.home_q_rad(), cell) + turns
+
+
+def _chains(
+    position: Floats, rotation: Floats, chain: NDArray[np.bool_], branch: int, reference: Floats, cell: Cell
+) -> Floats:
+    """Solve each chain (from PTP to PTP) with one branch, starting from the reference."""
+    starts = [*np.flatnonzero(chain), len(position)]
+    geometry = cell.robot.geometry.array()
+    pieces = [
+        one_branch(position[a:b], rotation[a:b], geometry, branch, reference)
+        for a, b in zip(starts, starts[1:], strict=False)
+    ]
+    return np.concatenate(pieces) if pieces else np.empty((0, 6))
+
+
+def limits_rad(cell: Cell) -> Floats:
+    """Return the joint limits (6, 2); without known limits, infinite ones."""
+    pairs = cell.robot.limits.q_deg
+    if pairs is None:
+        return np.array([[-np.inf, np.inf]] * 6)
+    return np.array(pairs) * RAD_PER_DEG
+
+
+def _limit_margin(q: Floats, cell: Cell) -> Floats:
+    limits = limits_rad(cell)
+    margin: Floats = np.minimum(q - limits[:, 0], limits[:, 1] - q).min(axis=1)
+    return margin
+
+
+def _turns(q: Floats, cell: Cell) -> Floats:
+    """Return the whole turns (6,) in rad that bring each joint's range best into its limits."""
+    limits = limits_rad(cell)
+    if np.isnan(q).all() or np.isinf(limits).any():
+        return np.zeros(6)
+    low, high = np.nanmin(q, axis=0), np.nanmax(q, axis=0)
+    candidates = RAD_PER_REV * np.array([0.0, -1.0, 1.0])
+    margin = np.minimum(low + candidates[:, None] - limits[:, 0], limits[:, 1] - high - candidates[:, None])
+    fits_already = margin[0] >= 0
+    best = np.where(fits_already, 0, np.argmax(margin, axis=0))
+    return candidates[best]
+
+
+def _cost(q: Floats, cell: Cell) -> tuple[float, float]:
+    """Return (share of samples that cannot be, distance of the start from HOME plus poverty of the wrist)."""
+    if len(q) == 0:
+        return 0.0, 0.0
+    bad = np.isnan(q).any(axis=1) | (_limit_margin(q, cell) < 0)
+    start = np.abs(q[0] - cell.home_q_rad()).sum()
+    wrist = np.nanmin(np.abs(np.sin(q[:, 4]))) if not np.isnan(q).all() else 0.0
+    poor = max(0.0, np.sin(WRIST_ZONE_RAD) - wrist) / np.sin(WRIST_ZONE_RAD)
+    return float(bad.mean()), float(np.nan_to_num(start, nan=1e3) + 10.0 * poor)
+
+
+def joint_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> tuple[Issue, ...]:
+    """Return what stands in the robot's way along the sampled lines: reach, limits, singularities, speeds."""
+    findings: list[Issue] = []
+    source_line = targets.source_line[line.target]
+    if cell.robot.limits.q_deg is None:
+        findings.append(Issue("error", "limits-unknown", 0, f"the joint limits of {cell.robot.model} are not known", "give [robot.limits] q_deg in the cell, from the data sheet"))
+    home = _limit_margin(cell.home_q_rad()[None, :], cell)[0]
+    if home < 0:
+        findings.append(Issue("error", "home-limit", 0, f"HOME is {-home * DEG_PER_RAD:.2f} deg beyond a joint limit", "correct [home] q_deg in the cell"))
+    unreached = np.isnan(q).any(axis=1)
+    for sample in _stretches(unreached):
+        x, y, z = line.position_mm[sample]
+        findings.append(Issue("error", "out-of-reach", int(source_line[sample]), f"X {x:.3f} Y {y:.3f} Z {z:.3f} is out of reach", "move the part nearer ([frames] base), or check the unit"))
+    limits = limits_rad(cell)
+    for joint in range(6):
+        angle = q[:, joint]
+        for sample in _stretches((angle < limits[joint, 0]) | (angle > limits[joint, 1])):
+            low, high = limits[joint] * DEG_PER_RAD
+            findings.append(Issue("error", "joint-limit", int(source_line[sample]), f"A{joint + 1} at {angle[sample] * DEG_PER_RAD:.2f} deg, allowed {low:g}..{high:g}", "move the part, turn the tool about its axis ([frames] spin), or use spin = \"auto\""))
+    findings += _speed_findings(line, q, source_line, cell)
+    return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * _MOST_PER_CHECK])
+
+
+def _speed_findings(line: Line, q: Floats, source_line: NDArray[np.int32], cell: Cell) -> list[Issue]:
+    """Joint speeds on straight lines at the programmed speed: singularities, and plain slow joints."""
+    findings: list[Issue] = []
+    if cell.robot.speeds.qd_deg_s is None:
+        return [Issue("warning", "joint-speeds-unknown", 0, f"the joint speeds of {cell.robot.model} are not known; singularities are judged by |A5| alone", "give [robot.speeds] qd_deg_s in the cell"), *_wrist_findings(line, q, source_line)]
+    most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
+    speed = np.zeros_like(q)
+    speed[1:] = np.abs(np.diff(q, axis=0)) / line.duration_s[1:, None]
+    load = np.nan_to_num(speed / most).max(axis=1, initial=0.0) if len(q) else np.zeros(0)
+    fast = load > 1.0 + 1e-6
+    for sample in _stretches(fast):
+        joint = int(np.argmax(speed[sample] / most))
+        near = slice(max(0, sample - 1), sample + 2)
+        wrist = np.abs(np.sin(q[near, 4])).min() < np.sin(WRIST_ZONE_RAD)
+        tip = cell.tool_matrix(int(line.tool[sample]))[:3, 3]
+        arm = smallest_singular_value(q[near], cell.robot.geometry.array(), tip).min() < WEAK_SIGMA
+        number = f"A{joint + 1} would need {speed[sample, joint] * DEG_PER_RAD:.0f} deg/s of {most[joint] * DEG_PER_RAD:.0f}"
+        where = int(source_line[sample])
+        if wrist or arm:
+            what = "wrist singularity (A5 near 0)" if wrist else "singularity of the arm"
+            findings.append(Issue("error", "singularity", where, f"{what}: {number}", "turn the tool about its axis ([frames] spin or \"auto\"), or move the part"))
+        else:
+            findings.append(Issue("warning", "joint-speed", where, f"{number}: slower than programmed here", "lower F, or move the part"))
+    return findings
+
+
+def _wrist_findings(line: Line, q: Floats, source_line: NDArray[np.int32]) -> list[Issue]:
+    near = np.abs(np.sin(q[:, 4])) < np.sin(WRIST_ZONE_RAD)
+    return [
+        Issue("error", "singularity", int(source_line[sample]), f"wrist singularity: A5 at {q[sample, 4] * DEG_PER_RAD:.2f} deg", "turn the tool about its axis ([frames] spin or \"auto\"), or move the part")
+        for sample in _stretches(near)
+    ]  # fmt: skip
+
+
+def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
+    starts = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
+    return [int(sample) for sample in starts[:_MOST_PER_CHECK]]

@@ -1,0 +1,151 @@
+"""Forward kinematics of a KUKA six-axis arm with an ortho-parallel base and a spherical wrist.
+
+The geometry is one array (6,), ``[a1, a2, c1, c2, c3, c4]`` in mm, named as in Brandstötter, Angerer and
+Hofbaur, "An analytical solution of the inverse kinematics problem of industrial serial manipulators with an
+ortho-parallel basis and a spherical wrist" (2014); their lateral offset b is zero on every robot here. With
+angles in the controller's signs and zero the flange, seen from the robot root, is::
+
+    T = Rz(-A1) Tr(a1,0,c1) Ry(A2) Tr(c2,0,0) Ry(A3) Tr(c3,0,-a2)     wrist centre, forearm along x
+        Rx(-A4) Ry(A5) Rx(-A6) Tr(c4,0,0) Ry(90 deg)                  flange, z pointing out of it    (eq. 1)
+"""
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+def read_only(name: str, values: npt.ArrayLike, *shape: int) -> FloatArray:
+    """Return a contiguous, read-only float64 view or copy of ``values``, its shape checked.
+
+    A kernel that always sees this one array type is compiled once, whatever table its input came from.
+
+    Parameters
+    ----------
+    name : str
+        What the error calls the array.
+    values : array_like
+        The numbers.
+    *shape : int
+        The wanted shape, -1 for any length.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another one.
+    """
+    array = np.ascontiguousarray(values, dtype=np.float64).view()
+    lengths = zip(array.shape, shape, strict=False)
+    if array.ndim != len(shape) or any(length not in (-1, found) for found, length in lengths):
+        wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
+        raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
+    array.flags.writeable = False
+    return array
+
+
+def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return where the flange is, eq. 1.
+
+    Parameters
+    ----------
+    q_rad : (n, 6)
+        A1 to A6 with the controller's signs and zero; any number of turns.
+    geometry : (6,)
+        a1, a2, c1, c2, c3, c4 in mm.
+
+    Returns
+    -------
+    position_mm : (n, 3)
+        Origin of the flange in the robot root.
+    rotation : (n, 3, 3)
+        Its columns are the flange's x, y and z along the axes of the robot root.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape.
+    """
+    q = read_only("q_rad", q_rad, -1, 6)
+    position_mm = np.empty((len(q), 3))
+    rotation = np.empty((len(q), 3, 3))
+    _flange_rows(q, read_only("geometry", geometry, 6), position_mm, rotation)
+    return position_mm, rotation
+
+
+def status_turn(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[IntArray, IntArray]:
+    """Return status S and turn T, the two integers with which KRL makes a pose name one set of angles.
+
+    Status: bit 0, the wrist centre is behind axis 1 (overhead); bit 1, A3 >= phi, where phi = -atan2(a2, c3)
+    is the stretched elbow; bit 2, A5 < 0. A3 and A5 count by the half circle they lie in, which is the plain
+    comparison anywhere within the limits of a real arm. Turn: bit i is set where A(i+1) < 0.
+
+    Parameters
+    ----------
+    q_rad : (n, 6)
+        A1 to A6 with the controller's signs and zero.
+    geometry : (6,)
+        a1, a2, c1, c2, c3, c4 in mm.
+
+    Returns
+    -------
+    status : (n,)
+        0 to 7, the branch index of `all_branches`.
+    turn : (n,)
+        0 to 63.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape.
+    """
+    q = read_only("q_rad", q_rad, -1, 6)
+    a1_mm, a2_mm, _, c2_mm, c3_mm, _ = read_only("geometry", geometry, 6)
+    elbow_rad = q[:, 2] + math.atan2(a2_mm, c3_mm)
+    forearm_mm = math.hypot(a2_mm, c3_mm)
+    radius_mm = a1_mm + c2_mm * np.cos(q[:, 1]) + forearm_mm * np.cos(q[:, 1] + elbow_rad)
+    overhead = radius_mm < 0.0
+    bent_down = _wrapped(elbow_rad) >= 0.0
+    flipped = _wrapped(q[:, 4]) < 0.0
+    status = overhead + 2 * bent_down + 4 * flipped
+    turn = (q < 0.0) @ (1 << np.arange(6))
+    return status.astype(np.int64), turn.astype(np.int64)
+
+
+def _wrapped(angle_rad: FloatArray) -> FloatArray:
+    """Return the same directions in (-pi, pi]; what already lies there is not touched by rounding."""
+    turns = np.ceil((angle_rad - math.pi) / (2.0 * math.pi))
+    wrapped: FloatArray = angle_rad - 2.0 * math.pi * turns
+    return wrapped
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _flange_rows(q: FloatArray, geometry: FloatArray, position_mm: FloatArray, rotation: FloatArray) -> None:
+    a1, a2, c1, c2, c3, c4 = geometry
+    for i in range(q.shape[0]):
+        cos_1, sin_1 = math.cos(q[i, 0]), math.sin(q[i, 0])
+        cos_2, sin_2 = math.cos(q[i, 1]), math.sin(q[i, 1])
+        cos_23, sin_23 = math.cos(q[i, 1] + q[i, 2]), math.sin(q[i, 1] + q[i, 2])
+        cos_4, sin_4 = math.cos(q[i, 3]), math.sin(q[i, 3])
+        cos_5, sin_5 = math.cos(q[i, 4]), math.sin(q[i, 4])
+        cos_6, sin_6 = math.cos(q[i, 5]), math.sin(q[i, 5])
+        # columns of Rx(-A4) Ry(A5) Rx(-A6) Ry(90 deg): the flange's axes along those of the forearm
+        flange = (
+            (-sin_5 * cos_6, -cos_4 * sin_6 - sin_4 * cos_5 * cos_6, sin_4 * sin_6 - cos_4 * cos_5 * cos_6),
+            (-sin_5 * sin_6, cos_4 * cos_6 - sin_4 * cos_5 * sin_6, -sin_4 * cos_6 - cos_4 * cos_5 * sin_6),
+            (cos_5, -sin_4 * sin_5, -cos_4 * sin_5),
+        )
+        for column in range(3):
+            x, y, z = flange[column]
+            along = cos_23 * x + sin_23 * z  # the arm's plane, then Rz(-A1)
+            rotation[i, 0, column] = cos_1 * along + sin_1 * y
+            rotation[i, 1, column] = -sin_1 * along + cos_1 * y
+            rotation[i, 2, column] = -sin_23 * x + cos_23 * z
+        radius = a1 + c2 * cos_2 + c3 * cos_23 - a2 * sin_23
+        height = c1 - c2 * sin_2 - c3 * sin_23 - a2 * cos_23
+        position_mm[i, 0] = cos_1 * radius + c4 * rotation[i, 0, 2]
+        position_mm[i, 1] = -sin_1 * radius + c4 * rotation[i, 1, 2]
+        position_mm[i, 2] = height + c4 * rotation[i, 2, 2]

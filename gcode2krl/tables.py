@@ -1,0 +1,142 @@
+"""The column tables that pass between the stages, and their one shape check.
+
+A table is a frozen dataclass of numpy columns, rows first, read-only once built. A stage makes a new
+table; it never changes another's.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from gcode2krl.errors import Issue
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+class Event(NamedTuple):
+    """Something other than motion that happens while the tool stands at ``row``, after its move.
+
+    ``kind`` is ``tool`` (values: ``tool``), ``spindle`` (``rpm``, signed, 0 = off), ``coolant`` (``mist``,
+    ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have ``m``,
+    the M number (-1 for a mere text), and every event has ``line``; ``by_end`` marks what the program's end
+    does without a word of its own.
+    """
+
+    row: int
+    kind: str
+    values: dict[str, Any]
+
+
+def _column(dtype: DTypeLike, *tail: int) -> Any:
+    """Declare a column of the given dtype and trailing shape."""
+    return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Base of all tables: checks and freezes the columns."""
+
+    issues: tuple[Issue, ...] = ()
+
+    def __post_init__(self) -> None:
+        rows = -1
+        for spec in fields(self):
+            if "tail" not in spec.metadata:
+                continue
+            values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"]).view()
+            rows = len(values) if rows < 0 else rows
+            if values.shape != (rows, *spec.metadata["tail"]):
+                wanted = (rows, *spec.metadata["tail"])
+                raise ValueError(f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}")
+            values.flags.writeable = False
+            object.__setattr__(self, spec.name, values)
+
+    def __len__(self) -> int:
+        for spec in fields(self):
+            if "tail" in spec.metadata:
+                return len(getattr(self, spec.name))
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Toolpath(Table):
+    """What the G-code says: a row per straight move, row 0 the start point."""
+
+    position_mm: Floats = _column(np.float64, 3)
+    """(n, 3) tool tip in the frame in which work offsets are stated (``$BASE``)."""
+    axis: Floats = _column(np.float64, 3)
+    """(n, 3) unit vector from tip to holder."""
+    rapid: Bools = _column(np.bool_)
+    feed_mm_s: Floats = _column(np.float64)
+    """(n,) programmed speed, inf on rapids."""
+    spindle_rad_s: Floats = _column(np.float64)
+    """(n,) positive for M3."""
+    tool: Ints = _column(np.int32)
+    """(n,) tool in the spindle during the row; 0 = none named so far."""
+    exact_stop: Bools = _column(np.bool_)
+    tolerance_mm: Floats = _column(np.float64)
+    """(n,) blend tolerance of ``G64 P``, NaN = none."""
+    dwell_s: Floats = _column(np.float64)
+    source_line: Ints = _column(np.int32)
+    """(n,) 1-based line of the file."""
+    arc: Ints = _column(np.int32)
+    """(n,) number of the arc this row is a chord of, or -1."""
+    machine: Bools = _column(np.bool_)
+    """(n,) rows from G28, G30 and G53."""
+    known: Bools = _column(np.bool_, 3)
+    """(n, 3) True where the axis has been programmed in the part frame since the start, the last machine
+    move of that axis or (Z) the last change of tool length offset. Only rows that are all True are
+    positions a robot may be sent to."""
+    length_offset_mm: Floats = _column(np.float64)
+    """(n,) tool length offset in force (G43), NaN = none (G49)."""
+    events: tuple[Event, ...] = ()
+    source: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Targets(Table):
+    """What the KRL program says: a row per motion; planned, written and read back as this one table."""
+
+    position_mm: Floats = _column(np.float64, 3)
+    """(p, 3) tool tip in ``$BASE``."""
+    rotation: Floats = _column(np.float64, 4)
+    """(p, 4) quaternion x, y, z, w of the tool frame in ``$BASE``; z points from tip to holder."""
+    ptp: Bools = _column(np.bool_)
+    home: Bools = _column(np.bool_)
+    """(p,) True for PTP HOME, which is written as joint angles."""
+    speed_mm_s: Floats = _column(np.float64)
+    """(p,) path speed, NaN on PTP."""
+    cdis_mm: Floats = _column(np.float64)
+    """(p,) approximation distance at the end of this motion, 0 = exact stop."""
+    wait_s: Floats = _column(np.float64)
+    """(p,) dwell at the target."""
+    move: Ints = _column(np.int32)
+    """(p,) row of Toolpath, -1 = added (HOME, approach, final retract)."""
+    source_line: Ints = _column(np.int32)
+    """(p,) line of the G-code, 0 = added."""
+    tool: Ints = _column(np.int32)
+    """(p,) tool number whose frame moves."""
+    events: tuple[Event, ...] = ()
+    source: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joints(Table):
+    """Joint angles along a Motion or at Targets."""
+
+    q_rad: Floats = _column(np.float64, 6)
+    """(m, 6) KUKA signs and zero; NaN where out of reach."""
+    qd_rad_s: Floats = _column(np.float64, 6)
+    """(m, 6) joint speeds; NaN for Targets."""
+    limit_margin_rad: Floats = _column(np.float64)
+    """(m,) distance to the nearest joint limit, negative beyond it."""
+    sigma_min: Floats = _column(np.float64)
+    """(m,) smallest singular value of the Jacobian (translations per metre)."""
+    status: Ints = _column(np.int32)
+    """(m,) KUKA's S bits."""
+    turn: Ints = _column(np.int32)
+    """(m,) KUKA's T bits."""

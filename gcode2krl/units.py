@@ -1,0 +1,11 @@
+"""Every conversion factor of the project; inside, lengths are mm, times s, angles rad, forces N."""
+
+import math
+
+MM_PER_INCH = 25.4
+MM_PER_M = 1000.0
+S_PER_MIN = 60.0
+RAD_PER_DEG = math.pi / 180.0
+DEG_PER_RAD = 180.0 / math.pi
+RAD_PER_REV = 2.0 * math.pi
+BYTES_PER_MB = 1_000_000
