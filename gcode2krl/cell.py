@@ -78,7 +78,9 @@ class Limits(Provenance):
 
     @field_validator("q_deg")
     @classmethod
-    def _ordered(cls, pairs: tuple[tuple[float, float], ...] | None) -> tuple[tuple[float, float], ...] | None:
+    def _ordered(
+        cls, pairs: tuple[tuple[float, float], ...] | None
+    ) -> tuple[tuple[float, float], ...] | None:
         for number, (low, high) in enumerate(pairs or (), start=1):
             if low >= high:
                 raise ValueError(f"A{number}: low {low} is not below high {high}")
@@ -295,7 +297,9 @@ class Cell(_Section):
     mounted_tool: int | None = None
     """The tool in the spindle when the program starts without a T word."""
     frames: Frames
-    work_offsets: dict[Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Frame] = {}
+    work_offsets: dict[
+        Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Frame
+    ] = {}
     home: Home
     clearance: Clearance
     material: Material | None = None
@@ -340,7 +344,14 @@ def controller_axes(axis: Axis) -> NDArray[np.float64]:
 
     ``T_controller = T_inner · Q⁻¹``; Q maps z onto the controller's ``axis``.
     """
-    turns = {"+z": (0, 0, 0), "-z": (0, 0, 180), "+x": (0, 90, 0), "-x": (0, -90, 0), "+y": (0, 0, -90), "-y": (0, 0, 90)}
+    turns = {
+        "+z": (0, 0, 0),
+        "-z": (0, 0, 180),
+        "+x": (0, 90, 0),
+        "-x": (0, -90, 0),
+        "+y": (0, 0, -90),
+        "-y": (0, 0, 90),
+    }
     return fr.transform([0.0, 0.0, 0.0], np.round(fr.rotation_from_abc(np.array(turns[axis]) * RAD_PER_DEG)))
 
 
@@ -398,12 +409,22 @@ def _fill_in(section: Any, kind: str, beside: Path | None) -> Any:
 
 def _validation_issues(error: ValidationError) -> Iterator[Issue]:
     for detail in error.errors(include_url=False):
-        steps = [str(step) for step in detail["loc"] if not str(step).startswith(("literal[", "constrained-", "function-", "float", "tuple"))]
+        steps = [
+            str(step)
+            for step in detail["loc"]
+            if not str(step).startswith(("literal[", "constrained-", "function-", "float", "tuple"))
+        ]
         found = "nothing" if detail["type"] == "missing" else _brief(detail["input"])
         allowed = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
         if detail["type"] == "extra_forbidden":
             allowed = "no such key"
-        yield Issue("error", "cell-key", 0, f"{'.'.join(steps)}: found {found}, allowed: {allowed}", "`gcode2krl models schema` lists the keys")
+        yield Issue(
+            "error",
+            "cell-key",
+            0,
+            f"{'.'.join(steps)}: found {found}, allowed: {allowed}",
+            "`gcode2krl models schema` lists the keys",
+        )
 
 
 def _brief(value: Any) -> str:

@@ -52,6 +52,8 @@ class RefusedError(Gcode2KrlError):
     exit_code = 1
 
 
-def input_error(code: str, message: str, remedy: str = "", *, line: int = 0, source: str = "") -> NotUnderstoodError:
+def input_error(
+    code: str, message: str, remedy: str = "", *, line: int = 0, source: str = ""
+) -> NotUnderstoodError:
     """Return a `NotUnderstoodError` with one finding."""
     return NotUnderstoodError(Issue("error", code, line, message, remedy), source)

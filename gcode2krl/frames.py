@@ -73,7 +73,7 @@ def quaternion_from_rotation(rotation: ArrayLike) -> Floats:
 
 
 def transform(position_mm: ArrayLike, rotation: ArrayLike) -> Floats:
-    """Return the homogeneous transform (..., 4, 4) of a position (..., 3) in mm and a rotation (..., 3, 3)."""
+    """Return the homogeneous transform (..., 4, 4) of position (..., 3) in mm and rotation (..., 3, 3)."""
     position, r = np.asarray(position_mm, dtype=float), np.asarray(rotation, dtype=float)
     t = np.zeros((*np.broadcast_shapes(position.shape[:-1], r.shape[:-2]), 4, 4))
     t[..., :3, :3], t[..., :3, 3], t[..., 3, 3] = r, position, 1.0

@@ -33,7 +33,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise input_error("not-toml", str(error), "see docs/cell.md for the format", source=str(path)) from None
+        raise input_error(
+            "not-toml", str(error), "see docs/cell.md for the format", source=str(path)
+        ) from None
 
 
 def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, Any]:

@@ -21,9 +21,9 @@ class Event(NamedTuple):
     """Something other than motion that happens while the tool stands at ``row``, after its move.
 
     ``kind`` is ``tool`` (values: ``tool``), ``spindle`` (``rpm``, signed, 0 = off), ``coolant`` (``mist``,
-    ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have ``m``,
-    the M number (-1 for a mere text), and every event has ``line``; ``by_end`` marks what the program's end
-    does without a word of its own.
+    ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have
+    ``m``, the M number (-1 for a mere text), and every event has ``line``; ``by_end`` marks what the
+    program's end does without a word of its own.
     """
 
     row: int
@@ -51,7 +51,9 @@ class Table:
             rows = len(values) if rows < 0 else rows
             if values.shape != (rows, *spec.metadata["tail"]):
                 wanted = (rows, *spec.metadata["tail"])
-                raise ValueError(f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}")
+                raise ValueError(
+                    f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}"
+                )
             values.flags.writeable = False
             object.__setattr__(self, spec.name, values)
 
@@ -95,6 +97,11 @@ class Toolpath(Table):
     """(n,) tool length offset in force (G43), NaN = none (G49)."""
     events: tuple[Event, ...] = ()
     source: str = ""
+
+    def is_position(self) -> Bools:
+        """Return (n,) True where X, Y and Z are all known: a point a robot may be sent to."""
+        result: Bools = np.logical_and.reduce(self.known, axis=1)
+        return result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

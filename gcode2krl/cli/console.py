@@ -27,7 +27,9 @@ class Console:
         for issue in shown[:MOST_FINDINGS]:
             colour = {"error": "red", "warning": "yellow", "note": "cyan"}[issue.severity]
             line = issue.text(source)
-            click.echo(line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1), err=True)
+            click.echo(
+                line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1), err=True
+            )
         if len(shown) > MOST_FINDINGS:
             click.echo(f"… and {len(shown) - MOST_FINDINGS} more findings", err=True)
 
@@ -68,5 +70,6 @@ class Console:
 def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
     """Return findings as the objects of the JSON contract."""
     return [
-        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.remedy} for i in issues
+        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.remedy}
+        for i in issues
     ]

@@ -43,7 +43,7 @@ def commands() -> None:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the command line and leave with the exit code of the contract: 0 done, 1 refused, 2 not understood."""
+    """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     sys.exit(_run(args))
 
 
@@ -66,7 +66,10 @@ def _run(args: list[str] | None) -> int:
     except Exception as error:  # a defect of ours: one line for the user, the rest on request
         if "-v" in (args or sys.argv) or "--verbose" in (args or sys.argv):
             raise
-        return console.failed(f"internal error, please report it: {type(error).__name__}: {error} -> run again with -v for details", 2)
+        return console.failed(
+            f"internal error, please report it: {type(error).__name__}: {error} -> -v shows the details",
+            2,
+        )
 
 
 if __name__ == "__main__":

@@ -66,13 +66,21 @@ def check(cell_path: str | None, as_json: bool) -> int:
         return error.exit_code
     confirm = list(_to_confirm(cell))
     if as_json:
-        console.json({"valid": True, "verified": cell.verified is not None, "confirm": [dict(zip(("what", "value", "sure"), row, strict=True)) for row in confirm]})
+        console.json(
+            {
+                "valid": True,
+                "verified": cell.verified is not None,
+                "confirm": [dict(zip(("what", "value", "sure"), row, strict=True)) for row in confirm],
+            }
+        )
         return 0
     console.say(f"{cell_path or 'the default cell'}: valid")
     if cell.verified:
         console.say(f"verified by {cell.verified.by} on {cell.verified.date}")
     else:
-        console.say("NOT VERIFIED: programs begin with a HALT. Confirm each line at the cell, then add to the cell file:")
+        console.say(
+            "NOT VERIFIED: programs begin with a HALT. Confirm each line at the cell, then add to its file:"
+        )
         console.say('  verified = { by = "your name", date = "YYYY-MM-DD" }')
     width = max(len(what) for what, _, _ in confirm)
     for what, value, sure in confirm:
@@ -88,16 +96,41 @@ def _to_confirm(cell: Cell) -> Iterator[tuple[str, str, str]]:
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
     yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s"), robot.speeds.sure
     yield "$BASE", _frame(cell.frames.base) + _number("BASE_DATA", cell.frames.base_data), cell.frames.sure
-    yield "$TOOL (reference tool)", f"{_frame(cell.frames.tool)}, length {cell.frames.tool_length_mm:g} mm", cell.frames.sure
+    yield (
+        "$TOOL (reference tool)",
+        f"{_frame(cell.frames.tool)}, length {cell.frames.tool_length_mm:g} mm",
+        cell.frames.sure,
+    )
     for number, tool in sorted(cell.tool.items()):
         length = f"{tool.length_mm:g} mm" if tool.length_mm is not None else "no length"
-        yield f"tool T{number}", f"{tool.model or tool.kind} D{tool.diameter_mm:g} {length}{_number('TOOL_DATA', tool.tool_data)}", tool.sure
-    yield "$LOAD", f"{cell.load.mass_kg:g} kg at X {cell.load.x_mm:g} Y {cell.load.y_mm:g} Z {cell.load.z_mm:g}", cell.load.sure
+        yield (
+            f"tool T{number}",
+            f"{tool.model or tool.kind} D{tool.diameter_mm:g} {length}{_number('TOOL_DATA', tool.tool_data)}",
+            tool.sure,
+        )
+    yield (
+        "$LOAD",
+        f"{cell.load.mass_kg:g} kg at X {cell.load.x_mm:g} Y {cell.load.y_mm:g} Z {cell.load.z_mm:g}",
+        cell.load.sure,
+    )
     yield "HOME", _list(cell.home.q_deg, "deg"), "assumption"
-    yield "clearance plane", f"Z {cell.clearance.z_mm} mm in $BASE, free of obstacles all the way", "assumption"
+    yield (
+        "clearance plane",
+        f"Z {cell.clearance.z_mm} mm in $BASE, free of obstacles all the way",
+        "assumption",
+    )
     spindle = cell.spindle
-    yield "spindle", f"$OUT[{spindle.run_cw_output}] cw, $OUT[{spindle.run_ccw_output}] ccw, $ANOUT[{spindle.speed_analog_output}] = rpm/{spindle.max_rpm:g}", spindle.sure
-    ready = f"$IN[{spindle.at_speed_input}]" if spindle.at_speed_input else f"none, {spindle.start_s:g} s are waited"
+    yield (
+        "spindle",
+        f"$OUT[{spindle.run_cw_output}] cw, $OUT[{spindle.run_ccw_output}] ccw, "
+        f"$ANOUT[{spindle.speed_analog_output}] = rpm/{spindle.max_rpm:g}",
+        spindle.sure,
+    )
+    ready = (
+        f"$IN[{spindle.at_speed_input}]"
+        if spindle.at_speed_input
+        else f"none, {spindle.start_s:g} s are waited"
+    )
     yield "spindle at speed", ready, spindle.sure
     yield "coolant", f"$OUT[{spindle.flood_output}] flood, $OUT[{spindle.mist_output}] mist", spindle.sure
     for item in cell.guard_inputs:
@@ -106,7 +139,8 @@ def _to_confirm(cell: Cell) -> Iterator[tuple[str, str, str]]:
 
 
 def _frame(frame: Any) -> str:
-    return f"X {frame.x_mm:g} Y {frame.y_mm:g} Z {frame.z_mm:g} A {frame.a_deg:g} B {frame.b_deg:g} C {frame.c_deg:g}"
+    place = f"X {frame.x_mm:g} Y {frame.y_mm:g} Z {frame.z_mm:g}"
+    return f"{place} A {frame.a_deg:g} B {frame.b_deg:g} C {frame.c_deg:g}"
 
 
 def _number(name: str, number: int | None) -> str:
@@ -114,7 +148,11 @@ def _number(name: str, number: int | None) -> str:
 
 
 def _pairs(pairs: tuple[tuple[float, float], ...] | None) -> str:
-    return "unknown: translation refuses" if pairs is None else ", ".join(f"{a:g}..{b:g}" for a, b in pairs) + " deg"
+    return (
+        "unknown: translation refuses"
+        if pairs is None
+        else ", ".join(f"{a:g}..{b:g}" for a, b in pairs) + " deg"
+    )
 
 
 def _list(values: tuple[float, ...] | None, unit: str) -> str:

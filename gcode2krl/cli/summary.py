@@ -10,31 +10,39 @@ from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
-def summary_lines(part: str, toolpath: Toolpath, targets: Targets, joints: Joints, written: WrittenProgram, cell: Cell) -> Iterator[str]:
+def summary_lines(
+    part: str, toolpath: Toolpath, targets: Targets, joints: Joints, written: WrittenProgram, cell: Cell
+) -> Iterator[str]:
     """Yield the lines of the summary."""
     size_mb = sum(len(text) for text in written.texts.values()) / BYTES_PER_MB
-    yield f"{part} -> {', '.join(str(file) for file in written.files)} ({size_mb:.2f} MB)"
-    yield f"  program   {written.name}: {len(toolpath) - 1} moves, {len(targets)} motions, G-code lines {_span(targets.source_line[targets.source_line > 0], 0)}"
+    report = written.report
     lin = ~targets.ptp
-    steps = np.zeros(len(targets))
-    steps[1:] = np.linalg.norm(np.diff(targets.position_mm, axis=0), axis=1)
+    steps_m = np.zeros(len(targets))
+    steps_m[1:] = np.linalg.norm(np.diff(targets.position_mm, axis=0), axis=1) / MM_PER_M
     rapid = lin & (targets.speed_mm_s == cell.controller.rapid_m_s * MM_PER_M)
     feed = lin & ~rapid
-    yield f"  path      {steps[feed].sum() / MM_PER_M:.3f} m at feed, {steps[rapid].sum() / MM_PER_M:.3f} m rapid"
-    if feed.any():
-        yield f"  feed      {_span(targets.speed_mm_s[feed] * S_PER_MIN, 0)} mm/min"
-    x, y, z = (targets.position_mm[feed | rapid, k] for k in range(3))
-    yield f"  extent    X {_span(x, 1)}, Y {_span(y, 1)}, Z {_span(z, 1)} mm in $BASE"
-    tools = [f"T{n} {cell.tool[n].model}".rstrip() for n in np.unique(targets.tool).tolist()]
-    yield f"  tools     {', '.join(tools)}"
     blended = targets.cdis_mm > 0
-    yield f"  corners   {np.count_nonzero(blended)} blended, CDIS {_span(targets.cdis_mm[blended], 3)} mm; {np.count_nonzero(lin & ~blended)} exact stops"
-    angle = np.degrees(joints.q_rad[~targets.home])
-    nearest = joints.limit_margin_rad[~targets.home].min() * DEG_PER_RAD
-    yield f"  robot     {cell.robot.model}, S={joints.status[~targets.home][0]}, nearest joint limit {nearest:.1f} deg, |A5| at least {np.abs(angle[:, 4]).min():.1f} deg"
-    report = written.report
-    yield f"  read back {report.motions} motions: {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, {report.max_speed_difference_mm_min:.2f} mm/min off: verified"
-    yield "  not computed: time, corner error, forces, deflection; not checked: collision, material removal"
+    away = ~targets.home
+    lines = _span(targets.source_line[targets.source_line > 0], 0)
+    x, y, z = (_span(targets.position_mm[lin, k], 1) for k in range(3))
+    tools = [f"T{n} {cell.tool[n].model}".rstrip() for n in np.unique(targets.tool[lin]).tolist()]
+    wrist_deg = np.degrees(np.abs(joints.q_rad[away, 4]).min())
+    limit_deg = joints.limit_margin_rad[away].min() * DEG_PER_RAD
+    read_back = f"{report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg"
+    speed_off = report.max_speed_difference_mm_min
+
+    yield f"{part} -> {', '.join(str(file) for file in written.files)} ({size_mb:.2f} MB)"
+    yield f"  program    {written.name}: {len(toolpath) - 1} moves, {len(targets)} motions, lines {lines}"
+    yield f"  path       {steps_m[feed].sum():.3f} m at feed, {steps_m[rapid].sum():.3f} m rapid"
+    yield f"  feed       {_span(targets.speed_mm_s[feed] * S_PER_MIN, 0)} mm/min"
+    yield f"  extent     X {x}, Y {y}, Z {z} mm in $BASE"
+    yield f"  tools      {', '.join(tools)}"
+    yield f"  blending   {np.count_nonzero(blended)} corners, CDIS {_span(targets.cdis_mm[blended], 3)} mm"
+    yield f"  standstill {np.count_nonzero(lin & ~blended)} exact stops, {targets.wait_s.sum():.1f} s dwell"
+    yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
+    yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
+    yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
+    yield "  not known  time, corner error, forces, deflection; collision and material are not checked"
 
 
 def _span(values: "np.ndarray[tuple[int], np.dtype[np.float64 | np.int32]]", decimals: int) -> str:

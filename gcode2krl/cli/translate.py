@@ -1,6 +1,6 @@
 """``gcode2krl translate part.nc -o part.src``, the default command."""
 
-from dataclasses import replace
+import sys
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,20 +15,29 @@ from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 @click.command("translate")
 @click.argument("part")
-@click.option("-o", "--output", metavar="PART.src", help="Output; default: beside the input. - is standard output.")
+@click.option(
+    "-o", "--output", metavar="PART.src", help="Output; default: beside the input. - is standard output."
+)
 @common_options
 @gcode_options
 @click.option("--name", help="Program name; default: the output's name.")
 @click.option("--allow", multiple=True, metavar="CODE:LINE", help="Release one finding; may be repeated.")
 @click.option("--strict", is_flag=True, help="Warnings refuse the program too.")
 @click.option("--no-guard", is_flag=True, help="Leave out the checks at the program's start.")
-@click.option("--split", type=click.Choice(["defs", "files"]), default="defs", show_default=True, help="Parts of a long program.")
+@click.option(
+    "--split",
+    type=click.Choice(["defs", "files"]),
+    default="defs",
+    show_default=True,
+    help="Parts of a long program.",
+)
 @click.option("--max-lines", type=click.IntRange(100), help="Motions in a part; default: the cell's.")
 @click.option("--comment-every", type=click.IntRange(0), help="A G-code line number every so many motions.")
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool, name: str | None, allow: tuple[str, ...],
-    strict: bool, no_guard: bool, split: Literal["defs", "files"], max_lines: int | None, comment_every: int | None,
+    tolerance: float | None, chord_tolerance: float, block_delete: bool,
+    name: str | None, allow: tuple[str, ...], strict: bool, no_guard: bool,
+    split: Literal["defs", "files"], max_lines: int | None, comment_every: int | None,
 ) -> int:  # fmt: skip
     """Translate G-code into a KRL program, verify it, and say what it is.
 
@@ -44,10 +53,25 @@ def command(
         from gcode2krl import predict
         from gcode2krl.krl import write_krl
 
-        options = _words(tolerance=tolerance, chord_tolerance=chord_tolerance, block_delete=block_delete, spin=cell.frames.spin)
+        options = _words(
+            tolerance=tolerance,
+            chord_tolerance=chord_tolerance,
+            block_delete=block_delete,
+            spin=cell.frames.spin,
+        )
         with console.progress("planning, writing, verifying", None):
             targets = predict.set_targets(toolpath, cell, tolerance)
-            written = write_krl(targets, file, cell, name=name, allow=allow, guard=not no_guard, split=split, options=options, strict=strict)
+            written = write_krl(
+                targets,
+                file,
+                cell,
+                name=name,
+                allow=allow,
+                guard=not no_guard,
+                split=split,
+                options=options,
+                strict=strict,
+            )
     except Gcode2KrlError as error:
         if not as_json:
             raise _from_part(error, part) from None
@@ -55,7 +79,8 @@ def command(
         console.findings(error.issues, error.source or part)
         return error.exit_code
     if output == STANDARD:
-        click.get_binary_stream("stdout").write(written.texts[f"{written.name}.src"])
+        sys.stdout.buffer.write(written.texts[f"{written.name}.src"])
+        sys.stdout.buffer.flush()
         console.findings(written.issues, part)
         return 0
     if as_json:
@@ -83,22 +108,36 @@ def _output_file(part: str, output: str | None, cell_path: str | None) -> Path |
         raise input_error("option-value", "standard input needs an output", "give -o part.src, or -o -")
     file = Path(output) if output is not None else Path(part).with_suffix(".src")
     if file.suffix.lower() != ".src":
-        raise input_error("option-value", f"the output {file.name!r} does not end in .src", "name it part.src")
+        raise input_error(
+            "option-value", f"the output {file.name!r} does not end in .src", "name it part.src"
+        )
     require_other(file, part, *([cell_path] if cell_path else []))
     return file
 
 
 def _with_options(cell: Cell, max_lines: int | None, comment_every: int | None) -> Cell:
     given = {"max_lines": max_lines, "comment_every": comment_every}
-    program = cell.program.model_copy(update={key: value for key, value in given.items() if value is not None})
+    program = cell.program.model_copy(
+        update={key: value for key, value in given.items() if value is not None}
+    )
     return cell.model_copy(update={"program": program})
 
 
 def _words(**options: Any) -> str:
-    return " ".join(f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in options.items() if value not in (None, False))
+    return " ".join(
+        f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}"
+        for key, value in options.items()
+        if value not in (None, False)
+    )
 
 
-def _result(files: tuple[Path, ...], issues: tuple[Issue, ...], toolpath: Any, targets: Any, verify: dict[str, Any] | None) -> dict[str, Any]:
+def _result(
+    files: tuple[Path, ...],
+    issues: tuple[Issue, ...],
+    toolpath: Any,
+    targets: Any,
+    verify: dict[str, Any] | None,
+) -> dict[str, Any]:
     """Return the object of the contract; a figure whose stage did not run is null."""
     return {
         "files": [str(file) for file in files],

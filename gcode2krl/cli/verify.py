@@ -39,5 +39,8 @@ def command(
         console.findings(report.issues, program)
         state = "agrees with" if report.ok else "DIFFERS from"
         console.say(f"{program} {state} {part}: {report.motions} motions of {report.intended}")
-        console.say(f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, {report.max_speed_difference_mm_min:.2f} mm/min")
+        console.say(
+            f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, "
+            f"{report.max_speed_difference_mm_min:.2f} mm/min"
+        )
     return 0 if report.ok else 1

@@ -68,56 +68,194 @@ class Finding(NamedTuple):
     OFFSET_UNKNOWN,
     N_NOT_FIRST,
     TOO_MANY_M,
-) = range(48)
+    DWELL_WITH_ARC,
+    BAD_LINE_NUMBER,
+) = range(50)
 
 FINDINGS: dict[int, Finding] = {
-    BAD_CHARACTER: Finding("error", "bad-character", "character {char} has no meaning here", "remove it, or put it in a comment ( )"),
-    NO_NUMBER: Finding("error", "no-number", "{word} is not followed by a number", "write the number, or remove the letter"),
-    NUMBER_TOO_LONG: Finding("error", "number-too-long", "the number after {word} has too many digits", "write at most 15 digits"),
+    BAD_CHARACTER: Finding(
+        "error",
+        "bad-character",
+        "character {char} has no meaning here",
+        "remove it, or put it in a comment ( )",
+    ),
+    NO_NUMBER: Finding(
+        "error", "no-number", "{word} is not followed by a number", "write the number, or remove the letter"
+    ),
+    NUMBER_TOO_LONG: Finding(
+        "error", "number-too-long", "the number after {word} has too many digits", "write at most 15 digits"
+    ),
     COMMENT_OPEN: Finding("error", "comment-open", "the comment is not closed", "add )"),
     COMMENT_NESTED: Finding("error", "comment-nested", "a comment inside a comment", "remove the inner ("),
-    EXPRESSION: Finding("error", "expression", "parameters and expressions (#, [ ], =) are not read yet", "let the CAM post write plain numbers"),
-    O_WORD: Finding("error", "o-word", "O-words (subprograms, loops, program numbers) are not read yet", "expand subprograms in the post; remove a mere program number"),
-    LINE_TOO_LONG: Finding("error", "line-too-long", "the line is longer than {a:.0f} characters", "break the line; is this a G-code file?"),
+    EXPRESSION: Finding(
+        "error",
+        "expression",
+        "parameters and expressions (#, [ ], =) are not read yet",
+        "let the CAM post write plain numbers",
+    ),
+    O_WORD: Finding(
+        "error",
+        "o-word",
+        "O-words (subprograms, loops, program numbers) are not read yet",
+        "expand subprograms in the post; remove a mere program number",
+    ),
+    LINE_TOO_LONG: Finding(
+        "error",
+        "line-too-long",
+        "the line is longer than {a:.0f} characters",
+        "break the line; is this a G-code file?",
+    ),
     UNKNOWN_LETTER: Finding("error", "unknown-letter", "{word} is not a word of this dialect", "remove it"),
-    ROTARY_WORD: Finding("error", "rotary-axis", "{word} is a rotary or secondary axis and the cell declares no machine", "only X, Y, Z programs are read; rotary axes need a [machine] in the cell, which this version does not read yet"),
+    ROTARY_WORD: Finding(
+        "error",
+        "rotary-axis",
+        "{word} is a rotary or secondary axis and the cell declares no machine",
+        "only X, Y, Z are read; rotary axes need a [machine] in the cell, which this version does not know",
+    ),
     REPEATED_WORD: Finding("error", "repeated-word", "{word} stands twice in the block", "keep one"),
-    SAME_GROUP_G: Finding("error", "same-group", "G{g} and G{h} exclude each other in one block", "write them in separate blocks"),
-    SAME_GROUP_M: Finding("error", "same-group", "M{g} and M{h} exclude each other in one block", "write them in separate blocks"),
-    UNKNOWN_G: Finding("error", "unknown-g", "G{g} is not a G-code of this dialect", "check the dialect of the post"),
+    SAME_GROUP_G: Finding(
+        "error",
+        "same-group",
+        "G{g} and G{h} exclude each other in one block",
+        "write them in separate blocks",
+    ),
+    SAME_GROUP_M: Finding(
+        "error",
+        "same-group",
+        "M{g} and M{h} exclude each other in one block",
+        "write them in separate blocks",
+    ),
+    UNKNOWN_G: Finding(
+        "error", "unknown-g", "G{g} is not a G-code of this dialect", "check the dialect of the post"
+    ),
     UNSUPPORTED_G: Finding("error", "unsupported-g", "G{g}: {reason}", "{remedy}"),
     UNSUPPORTED_M: Finding("error", "unsupported-m", "M{g}: {reason}", "{remedy}"),
     BAD_M: Finding("error", "bad-m", "M{a:g} is not a whole number from 0 to 9999", "check the line"),
-    NO_FEED: Finding("error", "no-feed", "feed move without a feed", "program F before the first G1, G2 or G3"),
+    NO_FEED: Finding(
+        "error", "no-feed", "feed move without a feed", "program F before the first G1, G2 or G3"
+    ),
     NEGATIVE_FEED: Finding("error", "negative-feed", "F{a:g} is negative", "feeds are positive"),
-    NO_INVERSE_TIME: Finding("error", "no-inverse-time-feed", "feed move without F under G93", "inverse time needs F in every feed block"),
-    FEED_PER_REV_STOPPED: Finding("error", "feed-per-rev-stopped", "feed per revolution (G95) with the spindle speed at zero", "program S and M3 first"),
-    NO_MOTION_MODE: Finding("error", "no-motion-mode", "axis words without G0, G1, G2 or G3", "program a motion mode"),
-    TWO_AXIS_CODES: Finding("error", "two-axis-codes", "G{g} and G{h} both claim the axis words of this block", "write them in separate blocks"),
-    UNUSED_WORD: Finding("error", "unused-word", "nothing in this block uses {word}", "remove it, or add the code it belongs to"),
-    ARC_NO_CENTRE: Finding("error", "arc-no-centre", "G{g} without I, J, K or R", "give the centre or the radius"),
-    ARC_BOTH_FORMATS: Finding("error", "arc-both-formats", "the arc has R and a centre (I, J, K)", "keep one of them"),
-    ARC_RADIUS_MISMATCH: Finding("error", "arc-radius-mismatch", "arc: radius {a:.4f} mm at the start and {b:.4f} mm at the end differ by more than 0.01 mm", "check I, J, K, the plane (G17-G19), G90.1/G91.1 and the post's decimals"),
-    ARC_RADIUS_TOO_SMALL: Finding("error", "arc-radius-too-small", "arc: R {a:.4f} mm is too small, the end point is {b:.4f} mm away", "R must be at least half that distance"),
-    ARC_R_FULL_CIRCLE: Finding("error", "arc-r-full-circle", "an arc given by R ends where it starts", "give a full circle by its centre (I, J, K)"),
+    NO_INVERSE_TIME: Finding(
+        "error",
+        "no-inverse-time-feed",
+        "feed move without F under G93",
+        "inverse time needs F in every feed block",
+    ),
+    FEED_PER_REV_STOPPED: Finding(
+        "error",
+        "feed-per-rev-stopped",
+        "feed per revolution (G95) with the spindle speed at zero",
+        "program S and M3 first",
+    ),
+    NO_MOTION_MODE: Finding(
+        "error", "no-motion-mode", "axis words without G0, G1, G2 or G3", "program a motion mode"
+    ),
+    TWO_AXIS_CODES: Finding(
+        "error",
+        "two-axis-codes",
+        "G{g} and G{h} both claim the axis words of this block",
+        "write them in separate blocks",
+    ),
+    UNUSED_WORD: Finding(
+        "error",
+        "unused-word",
+        "nothing in this block uses {word}",
+        "remove it, or add the code it belongs to",
+    ),
+    ARC_NO_CENTRE: Finding(
+        "error", "arc-no-centre", "G{g} without I, J, K or R", "give the centre or the radius"
+    ),
+    ARC_BOTH_FORMATS: Finding(
+        "error", "arc-both-formats", "the arc has R and a centre (I, J, K)", "keep one of them"
+    ),
+    ARC_RADIUS_MISMATCH: Finding(
+        "error",
+        "arc-radius-mismatch",
+        "arc: radius {a:.4f} mm at the start and {b:.4f} mm at the end differ by more than 0.01 mm",
+        "check I, J, K, the plane (G17-G19), G90.1/G91.1 and the post's decimals",
+    ),
+    ARC_RADIUS_TOO_SMALL: Finding(
+        "error",
+        "arc-radius-too-small",
+        "arc: R {a:.4f} mm is too small, the end point is {b:.4f} mm away",
+        "R must be at least half that distance",
+    ),
+    ARC_R_FULL_CIRCLE: Finding(
+        "error",
+        "arc-r-full-circle",
+        "an arc given by R ends where it starts",
+        "give a full circle by its centre (I, J, K)",
+    ),
     ARC_ZERO_RADIUS: Finding("error", "arc-zero-radius", "the arc has radius zero", "check I, J, K and R"),
-    ARC_WRONG_OFFSET: Finding("error", "arc-wrong-offset", "{word} is not in the plane of this arc", "check the plane (G17: I J, G18: I K, G19: J K)"),
+    ARC_WRONG_OFFSET: Finding(
+        "error",
+        "arc-wrong-offset",
+        "{word} is not in the plane of this arc",
+        "check the plane (G17: I J, G18: I K, G19: J K)",
+    ),
     ARC_TURNS: Finding("error", "arc-turns", "P{a:g} turns: not a whole number from 1 to 1000", "check P"),
-    ARC_NEEDS_OFFSETS: Finding("error", "arc-needs-offsets", "G90.1 needs both centre words of the plane", "give both, or switch to G91.1"),
+    ARC_NEEDS_OFFSETS: Finding(
+        "error",
+        "arc-needs-offsets",
+        "G90.1 needs both centre words of the plane",
+        "give both, or switch to G91.1",
+    ),
     DWELL_NO_P: Finding("error", "dwell-no-p", "G4 without P", "give the dwell in seconds, G4 P0.5"),
-    DWELL_NEGATIVE: Finding("error", "dwell-negative", "G4 P{a:g} is negative", "a dwell is zero or more seconds"),
-    TOOL_NOT_SELECTED: Finding("error", "tool-not-selected", "M6 without a T before it", "program T with or before M6"),
-    BAD_INTEGER: Finding("error", "bad-integer", "{word} must be a whole number from 0 to 99999", "check the word"),
-    G53_NEEDS_RAPID_OR_FEED: Finding("error", "g53-motion", "G53 works with G0 and G1 only", "write G53 G0 or G53 G1"),
+    DWELL_NEGATIVE: Finding(
+        "error", "dwell-negative", "G4 P{a:g} is negative", "a dwell is zero or more seconds"
+    ),
+    TOOL_NOT_SELECTED: Finding(
+        "error", "tool-not-selected", "M6 without a T before it", "program T with or before M6"
+    ),
+    BAD_INTEGER: Finding(
+        "error", "bad-integer", "{word} must be a whole number from 0 to 99999", "check the word"
+    ),
+    G53_NEEDS_RAPID_OR_FEED: Finding(
+        "error", "g53-motion", "G53 works with G0 and G1 and axis words only", "write G53 G0 Z0"
+    ),
     G53_INCREMENTAL: Finding("error", "g53-incremental", "G53 under G91", "switch to G90 first"),
-    NEGATIVE_TOLERANCE: Finding("error", "negative-tolerance", "G64 P{a:g} is negative", "a tolerance is zero or more"),
-    NEGATIVE_SPEED: Finding("error", "negative-speed", "S{a:g} is negative", "use M4 for the other direction"),
-    TOO_FAR: Finding("error", "too-far", "a coordinate of {a:g} mm is beyond 1000 m", "check the number and the unit"),
-    TOOL_UNDECLARED: Finding("warning", "tool-undeclared", "tool {a:.0f} is not declared; its length is taken as 0", "add [tool.{a:.0f}] with length_mm to the cell"),
-    H_DIFFERS: Finding("warning", "h-differs", "H{a:.0f} while tool {b:.0f} is in the spindle", "use the H of the tool, or G43 without H"),
-    OFFSET_UNKNOWN: Finding("warning", "work-offset-unknown", "G{g} is selected but its offset is not known; taken as zero", "add it to [work_offsets] of the cell"),
-    N_NOT_FIRST: Finding("error", "n-not-first", "a line number N inside a block", "N stands at the start of the line"),
-    TOO_MANY_M: Finding("error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"),
+    NEGATIVE_TOLERANCE: Finding(
+        "error", "negative-tolerance", "G64 P{a:g} is negative", "a tolerance is zero or more"
+    ),
+    NEGATIVE_SPEED: Finding(
+        "error", "negative-speed", "S{a:g} is negative", "use M4 for the other direction"
+    ),
+    TOO_FAR: Finding(
+        "error", "too-far", "a coordinate of {a:g} mm is beyond 1000 m", "check the number and the unit"
+    ),
+    TOOL_UNDECLARED: Finding(
+        "warning",
+        "tool-undeclared",
+        "tool {a:.0f} is not declared; its length is taken as 0",
+        "add [tool.{a:.0f}] with length_mm to the cell",
+    ),
+    H_DIFFERS: Finding(
+        "warning",
+        "h-differs",
+        "H{a:.0f} while tool {b:.0f} is in the spindle",
+        "use the H of the tool, or G43 without H",
+    ),
+    OFFSET_UNKNOWN: Finding(
+        "warning",
+        "work-offset-unknown",
+        "G{g} is selected but its offset is not known; taken as zero",
+        "add it to [work_offsets] of the cell",
+    ),
+    N_NOT_FIRST: Finding(
+        "error", "n-not-first", "a line number N inside a block", "N stands at the start of the line"
+    ),
+    DWELL_WITH_ARC: Finding(
+        "error",
+        "two-uses",
+        "G4 and an arc share one block, so P would mean two things",
+        "write them in separate blocks",
+    ),
+    BAD_LINE_NUMBER: Finding(
+        "error", "bad-line-number", "N is followed by a negative number", "line numbers are positive"
+    ),
+    TOO_MANY_M: Finding(
+        "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
+    ),
 }
 
 _LATER = "comes with the full language"
@@ -128,7 +266,10 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     100: (f"setting offsets in the program {_LATER}", "put the offsets into [work_offsets] of the cell"),
     330: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     380: ("probing is not a motion this program can make", "probe on the controller"),
-    410: (f"cutter radius compensation {_LATER}", "let the CAM compensate the radius (computer compensation)"),
+    410: (
+        f"cutter radius compensation {_LATER}",
+        "let the CAM compensate the radius (computer compensation)",
+    ),
     430: (f"dynamic tool offsets {_LATER}", "use G43 H"),
     520: (f"local offsets {_LATER}", "let the post write final coordinates"),
     700: ("lathe cycle", "this is a milling translator"),
@@ -165,7 +306,13 @@ def make_issue(number: int, line: int, a: float, b: float) -> Issue:
         "reason": reason,
         "remedy": remedy,
     }
-    return Issue(finding.severity, finding.code, line, finding.sentence.format(**values), finding.remedy.format(**values))
+    return Issue(
+        finding.severity,
+        finding.code,
+        line,
+        finding.sentence.format(**values),
+        finding.remedy.format(**values),
+    )
 
 
 def _nearest_below(reasons: dict[int, tuple[str, str]], number: int) -> tuple[str, str]:

@@ -10,7 +10,13 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.gcode import findings as f
-from gcode2krl.gcode.arcs import RADIUS_TOLERANCE_MM, centre_from_radius, chord_count, sweep_angle
+from gcode2krl.gcode.arcs import (
+    RADIUS_TOLERANCE_MM,
+    SMALLEST_RADIUS_MM,
+    centre_from_radius,
+    chord_count,
+    sweep_angle,
+)
 from gcode2krl.gcode.state import (
     CANCELLED,
     EVENT_COOLANT,
@@ -50,18 +56,19 @@ FOUND = np.dtype([("number", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8")])
 
 ROWS_PER_BLOCK, EVENTS_PER_BLOCK = 4, 16
 _FAR_MM = 1e6
+_SLOWEST = 0.1  # units/min, LinuxCNC's floor under inverse time
 _A, _D, _F, _H, _I, _J, _K, _L, _P, _Q, _R, _S, _T, _X, _Y, _Z = (ord(c) - 65 for c in "ADFHIJKLPQRSTXYZ")
 _OTHER_AXES = tuple(ord(c) - 65 for c in "ABCUVWE")
 
 
 @njit(cache=True)
-def run(words, start, state, rows, counts, events, found, options, offsets, offset_known, tool_length):  # type: ignore[no-untyped-def]
+def run(words, start, state, rows, counts, events, found, options, offsets, offset_known, tool_length):
     """Execute blocks from word ``start`` on; return the word at which to go on.
 
     ``words`` = (letter, value, extra, line); ``counts`` (4,) = rows, events, findings, marks used so far;
     ``options`` (2,) = chord tolerance in mm, block delete. Stops early where a buffer is nearly full.
     """
-    letter, value, extra, line = words
+    letter, line = words[0], words[3]
     s = state[0]
     has = np.zeros(26, dtype=np.bool_)
     word = np.zeros(26)
@@ -82,7 +89,22 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
         if not _gather(words, i, j, s, counts, events, found, options, has, word, g_in_group, m_codes):
             i = j
             continue
-        done = _block(line[i], s, rows, counts, events, found, options, offsets, offset_known, tool_length, has, word, g_in_group, m_codes)
+        done = _block(
+            line[i],
+            s,
+            rows,
+            counts,
+            events,
+            found,
+            options,
+            offsets,
+            offset_known,
+            tool_length,
+            has,
+            word,
+            g_in_group,
+            m_codes,
+        )
         if not done:  # an arc needs more rows than are left: as if the block had not begun
             state[0] = before[0]
             counts[:] = used_before
@@ -93,7 +115,7 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
 
 
 @njit(cache=True)
-def _report(found, counts, number, line, a, b):  # type: ignore[no-untyped-def]
+def _report(found, counts, number, line, a, b):
     warning = number == f.TOOL_UNDECLARED or number == f.H_DIFFERS or number == f.OFFSET_UNKNOWN
     room = len(found) // 2 if warning else len(found)  # warnings never crowd out an error
     if counts[2] < room:
@@ -103,15 +125,15 @@ def _report(found, counts, number, line, a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _event(s, events, counts, kind, line, a, b):  # type: ignore[no-untyped-def]
+def _event(s, events, counts, kind, line, a, b):
     row = events[counts[1]]
     row.row, row.kind, row.line, row.a, row.b = counts[0] - 1, kind, line, a, b
     counts[1] += 1
 
 
 @njit(cache=True)
-def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_group, m_codes):  # type: ignore[no-untyped-def]
-    """Sort the words of one block into ``has``/``word``, G-codes by group, M-codes; False to skip the block."""
+def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_group, m_codes):
+    """Sort the words of a block into ``has``/``word``, G-codes by group, M-codes; False: skip the block."""
     letter, value, extra, line = words
     at = line[i]
     has[:] = False
@@ -126,6 +148,9 @@ def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_grou
             if options[1] != 0.0:
                 return False
         elif c == 37:  # %
+            if j - i > 1:
+                _report(found, counts, f.BAD_CHARACTER, at, c, 0.0)
+                return False
             s.tape_marks += 1
             if s.tape_marks == 2 or (s.tape_marks == 1 and s.blocks > 0):
                 s.ended = 1
@@ -139,8 +164,13 @@ def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_grou
             _report(found, counts, int(value[k]), at, what, 0.0)
             good = False
         elif c == 71:  # G
-            code = int(round(value[k] * 10))
-            if code < 0 or code > 999 or abs(value[k] * 10 - code) > 1e-6 or GROUP_OF_G[code] == UNKNOWN_GROUP:
+            code = round(value[k] * 10)
+            if (
+                code < 0
+                or code > 999
+                or abs(value[k] * 10 - code) > 1e-6
+                or GROUP_OF_G[code] == UNKNOWN_GROUP
+            ):
                 _report(found, counts, f.UNKNOWN_G, at, value[k] * 10, 0.0)
                 good = False
             elif GROUP_OF_G[code] == UNSUPPORTED_GROUP:
@@ -158,11 +188,17 @@ def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_grou
                     g_in_group[group] = code
             used = True
         elif c == 77:  # M
-            code = int(round(value[k]))
+            code = round(value[k])
             if abs(value[k] - code) > 1e-6 or code < 0 or code > 9999:
                 _report(found, counts, f.BAD_M, at, value[k], 0.0)
                 good = False
-            elif code == 19 or (code >= 48 and code <= 53) or (code >= 60 and code <= 73) or code == 98 or code == 99:
+            elif (
+                code == 19
+                or (code >= 48 and code <= 53)
+                or (code >= 60 and code <= 73)
+                or code == 98
+                or code == 99
+            ):
                 _report(found, counts, f.UNSUPPORTED_M, at, code * 10, 0.0)
                 good = False
             elif m_count == 4:
@@ -192,7 +228,7 @@ def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_grou
 
 
 @njit(cache=True)
-def _m_group(code):  # type: ignore[no-untyped-def]
+def _m_group(code):
     if code == 0 or code == 1 or code == 2 or code == 30:
         return 4
     if code == 6:
@@ -205,7 +241,7 @@ def _m_group(code):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _whole(value):  # type: ignore[no-untyped-def]
+def _whole(value):
     """Return a whole number 0…99999, or -1."""
     nearest = round(value)
     if abs(value - nearest) > 1e-6 or nearest < 0 or nearest > 99999:
@@ -214,12 +250,12 @@ def _whole(value):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _length_of(tool, tool_length):  # type: ignore[no-untyped-def]
+def _length_of(tool, tool_length):
     return tool_length[tool] if tool >= 0 and tool < len(tool_length) else np.nan
 
 
 @njit(cache=True)
-def _emit(s, rows, counts, line, feed, rapid, machine, arc):  # type: ignore[no-untyped-def]
+def _emit(s, rows, counts, line, feed, rapid, machine, arc):
     """Append a row that ends at the state's position."""
     row = rows[counts[0]]
     row.x, row.y, row.z = s.x, s.y, s.z
@@ -239,14 +275,14 @@ def _emit(s, rows, counts, line, feed, rapid, machine, arc):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _feed_speed(s, has, word, length_mm):  # type: ignore[no-untyped-def]
+def _feed_speed(s, has, word, length_mm):
     """Return (finding, speed in mm/s) of a feed move of the given whole length."""
     if s.feed_mode == 93:
         if not has[_F]:
             return f.NO_INVERSE_TIME, 0.0
         if word[_F] <= 0.0:
             return f.NO_FEED, 0.0
-        return f.OK, length_mm * word[_F] / 60.0
+        return f.OK, max(length_mm * word[_F], _SLOWEST * s.unit_mm) / 60.0
     if s.feed <= 0.0:
         return f.NO_FEED, 0.0
     if s.feed_mode == 95:
@@ -257,13 +293,11 @@ def _feed_speed(s, has, word, length_mm):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _settings(line, s, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):  # type: ignore[no-untyped-def]
+def _settings(line, s, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):
     """Everything of a block before its motion; return False where the block is wrong."""
     if g[5] >= 0:
-        mode = g[5] // 10
-        if mode != s.feed_mode:
-            s.feed_mode = mode
-            s.feed = 0.0  # a feed of another kind does not carry over
+        s.feed_mode = g[5] // 10
+        s.feed = 0.0  # as LinuxCNC: naming a feed mode drops the feed, even the same mode
     if has[_F]:
         used[_F] = True
         if word[_F] < 0.0:
@@ -360,7 +394,7 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
 
 
 @njit(cache=True)
-def _set_length_offset(s, length):  # type: ignore[no-untyped-def]
+def _set_length_offset(s, length):
     """G43/G49: the machine stands still, so the tip's coordinate moves by the difference."""
     old = 0.0 if math.isnan(s.length_offset) else s.length_offset
     new = 0.0 if math.isnan(length) else length
@@ -371,7 +405,9 @@ def _set_length_offset(s, length):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _block(line, s, rows, counts, events, found, options, offsets, offset_known, tool_length, has, word, g, m_codes):  # type: ignore[no-untyped-def]
+def _block(
+    line, s, rows, counts, events, found, options, offsets, offset_known, tool_length, has, word, g, m_codes
+):
     """Execute one block; return False only where the row buffer is too small for it."""
     used = np.zeros(26, dtype=np.bool_)
     if not _settings(line, s, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):
@@ -403,7 +439,14 @@ def _block(line, s, rows, counts, events, found, options, offsets, offset_known,
         s.motion = CANCELLED if g[1] == 800 else g[1] // 10
     motion = s.motion
     arc_words = has[_I] or has[_J] or has[_K] or has[_R]
-    moving = axes or ((motion == 2 or motion == 3) and (g[1] == 20 or g[1] == 30) and arc_words)
+    named = g[1] >= 0 and g[1] != 800 and special != 280 and special != 300
+    moving = axes or (named and (motion <= 1 or arc_words))
+    if special == 530 and (not moving or motion == CANCELLED):
+        _report(found, counts, f.G53_NEEDS_RAPID_OR_FEED, line, 0.0, 0.0)
+        return True
+    if special == 40 and moving and motion > 1:
+        _report(found, counts, f.DWELL_WITH_ARC, line, 0.0, 0.0)
+        return True
     if moving:
         used[_X], used[_Y], used[_Z] = True, True, True
         if motion == CANCELLED:
@@ -440,7 +483,7 @@ def _block(line, s, rows, counts, events, found, options, offsets, offset_known,
 
 
 @njit(cache=True)
-def _target(s, offsets, has, word):  # type: ignore[no-untyped-def]
+def _target(s, offsets, has, word):
     """Return the tip position the axis words ask for; axes not named stay."""
     x, y, z = s.x, s.y, s.z
     base_x, base_y, base_z = offsets[s.work_offset]
@@ -454,7 +497,7 @@ def _target(s, offsets, has, word):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _learn(s, has):  # type: ignore[no-untyped-def]
+def _learn(s, has):
     """Note which axes have been programmed: in absolute mode always, else if they were known before."""
     if s.absolute:
         s.known_x |= has[_X]
@@ -463,12 +506,11 @@ def _learn(s, has):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _machine_home(line, s, rows, counts, offsets, has, word, code):  # type: ignore[no-untyped-def]
+def _machine_home(line, s, rows, counts, offsets, has, word, code):
     """G28/G30: by way of the programmed point, then the named axes (or all) to the machine's home."""
     any_axis = has[_X] or has[_Y] or has[_Z]
-    if any_axis:
-        s.x, s.y, s.z = _target(s, offsets, has, word)
-        _emit(s, rows, counts, line, np.inf, 1, 1, -1)
+    s.x, s.y, s.z = _target(s, offsets, has, word)
+    _emit(s, rows, counts, line, np.inf, 1, 1, -1)
     home = s.home_28 if code == 280 else s.home_30
     offset = 0.0 if math.isnan(s.length_offset) else s.length_offset
     if has[_X] or not any_axis:
@@ -484,7 +526,7 @@ def _machine_home(line, s, rows, counts, offsets, has, word, code):  # type: ign
 
 
 @njit(cache=True)
-def _straight(line, s, rows, counts, found, offsets, has, word, motion, machine):  # type: ignore[no-untyped-def]
+def _straight(line, s, rows, counts, found, offsets, has, word, motion, machine):
     """G0 and G1, also under G53."""
     if machine:
         offset = 0.0 if math.isnan(s.length_offset) else s.length_offset
@@ -510,7 +552,7 @@ def _straight(line, s, rows, counts, found, offsets, has, word, motion, machine)
 
 
 @njit(cache=True)
-def _arc(line, s, rows, counts, found, options, offsets, has, word, motion):  # type: ignore[no-untyped-def]
+def _arc(line, s, rows, counts, found, options, offsets, has, word, motion):
     """G2 and G3 as chords; return False where the row buffer is too small."""
     ccw = motion == 3
     g10 = motion * 10
@@ -556,7 +598,7 @@ def _arc(line, s, rows, counts, found, options, offsets, has, word, motion):  # 
             return True
     r0 = math.hypot(u0 - cu, v0 - cv)
     r1 = math.hypot(u1 - cu, v1 - cv)
-    if r0 < 1e-9 or r1 < 1e-9:
+    if r0 < SMALLEST_RADIUS_MM or r1 < SMALLEST_RADIUS_MM:
         _report(found, counts, f.ARC_ZERO_RADIUS, line, 0.0, 0.0)
         return True
     if abs(r0 - r1) > RADIUS_TOLERANCE_MM:

@@ -73,7 +73,9 @@ def read_gcode(
                 block_delete=block_delete, progress=progress,
             )  # fmt: skip
     except OSError as error:
-        raise input_error("file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name) from None
+        raise input_error(
+            "file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name
+        ) from None
 
 
 def read_stream(
@@ -91,8 +93,12 @@ def read_stream(
     if dialect != "linuxcnc":
         raise input_error("dialect-unknown", f"dialect {dialect!r}; allowed: linuxcnc", source=name)
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
-        raise input_error("option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name)
-    lengths = tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
+        raise input_error(
+            "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
+        )
+    lengths = (
+        tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
+    )
     offsets, offset_known = _work_offsets(cell)
     interpreter = _Interpreter(name, chord_tolerance_mm, block_delete, offsets, offset_known, lengths)
     head = b""
@@ -133,7 +139,13 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
         end = len(text) if not block else text.rfind(b"\n") + 1
         if end == 0 or len(text) - end > LINE_LIMIT:
             place = line + text.count(b"\n")
-            raise input_error("line-too-long", f"the line is longer than {LINE_LIMIT} characters", "is this a G-code file?", line=place, source=name)
+            raise input_error(
+                "line-too-long",
+                f"the line is longer than {LINE_LIMIT} characters",
+                "is this a G-code file?",
+                line=place,
+                source=name,
+            )
         if end:
             whole = np.frombuffer(text, dtype=np.uint8, count=end)
             yield line, whole
@@ -145,7 +157,11 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
 
 def _reject_binary(block: bytes, name: str) -> None:
     if b"\x00" in block[:65536]:
-        remedy = "unpack or export the program as text" if block[:2] == b"\x1f\x8b" else "export the program as text"
+        remedy = (
+            "unpack or export the program as text"
+            if block[:2] == b"\x1f\x8b"
+            else "export the program as text"
+        )
         raise input_error("binary-file", "this is not a text file", remedy, source=name)
 
 
@@ -227,7 +243,10 @@ class _Interpreter:
 
     def finish(self, head: bytes) -> Toolpath:
         """Raise the errors that were found, or return the table."""
-        found = [make_issue(int(r["number"]), int(r["line"]), float(r["a"]), float(r["b"])) for r in self.found[: min(self.counts[2], _MOST_ISSUES)]]
+        found = [
+            make_issue(int(r["number"]), int(r["line"]), float(r["a"]), float(r["b"]))
+            for r in self.found[: min(self.counts[2], _MOST_ISSUES)]
+        ]
         errors = [issue for issue in found if issue.severity == "error"]
         unseen = int(self.counts[2]) - _MOST_ISSUES
         if errors:
@@ -240,18 +259,42 @@ class _Interpreter:
     def _whole_program_issues(self, head: bytes) -> Iterator[Issue]:
         state = self.state[0]
         if not state["ended"]:
-            yield Issue("warning", "no-program-end", 0, "the program ends without M2, M30 or %", "is the file complete?")
+            yield Issue(
+                "warning",
+                "no-program-end",
+                0,
+                "the program ends without M2, M30 or %",
+                "is the file complete?",
+            )
         if self.rest_line:
-            yield Issue("warning", "after-end", self.rest_line, "lines behind the program's end are not read", "remove them or the early M2/M30/%")
+            yield Issue(
+                "warning",
+                "after-end",
+                self.rest_line,
+                "lines behind the program's end are not read",
+                "remove them or the early M2/M30/%",
+            )
         if not state["unit_named"]:
             yield self._unit_issue()
         elif state["unit_mm"] == 1.0 and _says_inch(head):
-            yield Issue("warning", "unit-doubtful", 0, "a comment at the top speaks of inches, the program says G21 (mm)", "check the post's unit")
+            yield Issue(
+                "warning",
+                "unit-doubtful",
+                0,
+                "a comment at the top speaks of inches, the program says G21 (mm)",
+                "check the post's unit",
+            )
 
     def _unit_issue(self) -> Issue:
         small = self.state["largest_mm"][0] < _INCH_EXTENT_MM
         if small and self.most_decimals >= _INCH_DECIMALS:
-            return Issue("warning", "unit-doubtful", 0, "no G20 or G21, and the numbers look like inches (four decimals, small); read as mm", "write G20 or G21 at the start")
+            return Issue(
+                "warning",
+                "unit-doubtful",
+                0,
+                "no G20 or G21, and the numbers look like inches (four decimals, small); read as mm",
+                "write G20 or G21 at the start",
+            )
         return Issue("warning", "unit-unnamed", 0, "no G20 or G21; read as mm", "write G21 at the start")
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
@@ -288,13 +331,23 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         for event in self.buffers.events[: self.counts[1]]:
-            row, kind, a, b, line = int(event["row"]), int(event["kind"]), float(event["a"]), float(event["b"]), int(event["line"])
+            row, kind, a, b, line = (
+                int(event["row"]),
+                int(event["kind"]),
+                float(event["a"]),
+                float(event["b"]),
+                int(event["line"]),
+            )
             if kind == EVENT_TOOL:
                 yield Event(row, "tool", {"tool": int(a), "line": line})
             elif kind == EVENT_SPINDLE:
                 yield Event(row, "spindle", {"rpm": a, "m": int(b), "line": line})
             elif kind == EVENT_COOLANT:
-                yield Event(row, "coolant", {"mist": bool(int(b) & 1), "flood": bool(int(b) & 2), "m": int(a), "line": line})
+                yield Event(
+                    row,
+                    "coolant",
+                    {"mist": bool(int(b) & 1), "flood": bool(int(b) & 2), "m": int(a), "line": line},
+                )
             elif kind == EVENT_M:
                 values = {"m": int(a), "text": "", "line": line}
                 yield Event(row, "message", values if np.isnan(b) else {**values, "p": b})

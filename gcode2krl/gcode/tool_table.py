@@ -26,7 +26,9 @@ def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
             continue
         tool = words.get("T", -1.0)
         if not tool.is_integer() or not 0 <= tool <= _LARGEST_TOOL:
-            raise input_error("tool-table", "no tool number T", "each line is T… P… Z… D…", line=number, source=str(path))
+            raise input_error(
+                "tool-table", "no tool number T", "each line is T… P… Z… D…", line=number, source=str(path)
+            )
         lengths[int(tool)] = words.get("Z", 0.0)
     return _by_number(lengths)
 
@@ -34,7 +36,9 @@ def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
 def lengths_from_cell(cell: Cell | None) -> NDArray[np.float64]:
     """Return length by tool number (t,) in mm from a cell; NaN where a tool is not declared."""
     tools = cell.tool if cell is not None else {}
-    return _by_number({number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None})
+    return _by_number(
+        {number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None}
+    )
 
 
 def _by_number(lengths: dict[int, float]) -> NDArray[np.float64]:

@@ -45,7 +45,7 @@ def scan(text: NDArray[np.uint8], first_line: int) -> Words:
 
 
 @njit(cache=True)
-def _is_message(text, i, end):  # type: ignore[no-untyped-def]
+def _is_message(text, i, end):
     """Tell whether a comment's content begins with MSG, as ``(MSG, …)`` does."""
     while i < end and (text[i] == 32 or text[i] == 9):
         i += 1
@@ -55,7 +55,7 @@ def _is_message(text, i, end):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan(text, first_line, letters, values, lines, extras, spans):  # type: ignore[no-untyped-def]
+def _scan(text, first_line, letters, values, lines, extras, spans):
     n = len(text)
     i = 0
     count = 0
@@ -67,7 +67,7 @@ def _scan(text, first_line, letters, values, lines, extras, spans):  # type: ign
     words_in_line = 0
     while i < n:
         c = text[i]
-        if c == _SPACE or c == _TAB or c == _RETURN or c == _END_OF_TAPE:
+        if c in (_SPACE, _TAB, _RETURN, _END_OF_TAPE):
             i += 1
             continue
         if c == _NEWLINE:
@@ -111,9 +111,6 @@ def _scan(text, first_line, letters, values, lines, extras, spans):  # type: ign
             letters[count], values[count], lines[count] = c, 0.0, line
             count += 1
             i += 1
-            if c == 37:
-                while i < n and text[i] != _NEWLINE:
-                    i += 1
             continue
         elif upper >= 65 and upper <= 90:
             i += 1
@@ -157,10 +154,18 @@ def _scan(text, first_line, letters, values, lines, extras, spans):  # type: ign
             elif error != 0:
                 found = float(upper)
             elif upper == 79:
+                while i < n and (text[i] == _SPACE or text[i] == _TAB or text[i] == _RETURN):
+                    i += 1
+                alone = i >= n or text[i] == _NEWLINE or text[i] == 40 or text[i] == 59
+                if words_in_line == 0 and alone and not point and sign > 0:
+                    words_in_line += 1  # a program number, O1001, says nothing about motion
+                    continue
                 error = f.O_WORD
             elif upper == 78:  # N: line number, no word
                 if words_in_line > 0:
                     error = f.N_NOT_FIRST
+                elif sign < 0:
+                    error = f.BAD_LINE_NUMBER
                 else:
                     words_in_line += 1
                     continue

@@ -54,6 +54,7 @@ def compose(targets: Targets, joints: Joints, cell: Cell, name: str, layout: Lay
 class _Composer:
     def __init__(self, targets: Targets, joints: Joints, cell: Cell, name: str, layout: Layout) -> None:
         self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
+        self.source = st.ascii_text(_file_name(targets.source), 40)
         self.position, self.abc_deg = written_poses(targets, cell)
         self.speed_m_s = targets.speed_mm_s / MM_PER_M
         self.state = np.array([-1.0, -1.0, 0.0])
@@ -149,7 +150,9 @@ class _Composer:
             return f"PTP {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
         values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
         pose = ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True))
-        turn = sum(1 << k for k, angle in enumerate(self.joints.q_rad[row]) if np.rint(angle / _T_GRID_RAD) < 0)
+        turn = sum(
+            1 << k for k, angle in enumerate(self.joints.q_rad[row]) if np.rint(angle / _T_GRID_RAD) < 0
+        )
         return f"PTP {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
     def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
@@ -161,12 +164,22 @@ class _Composer:
         declarations.append(DECLARATIONS)
         if checks:
             declarations.append(FRAME_DECLARATIONS)
-        text = st.environment().get_template("head.src.j2").render(
-            source=st.ascii_text(_file_name(self.targets.source), 40), name=self.name, version=__version__, cell=self.cell,
-            motions=len(self.targets), options=st.ascii_text(self.layout.options, 200), allowed=self.layout.allowed,
-            guard=self.layout.guard, frame_checks=checks, declarations="\n".join(declarations), message_setup=MESSAGE_SETUP,
-            base=st.base_statement(self.cell), tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
-        )  # fmt: skip
+        template = st.environment().get_template("head.src.j2")
+        text = template.render(
+            source=self.source,
+            name=self.name,
+            version=__version__,
+            cell=self.cell,
+            motions=len(self.targets),
+            options=st.ascii_text(self.layout.options, 200),
+            allowed=self.layout.allowed,
+            guard=self.layout.guard,
+            frame_checks=checks,
+            declarations="\n".join(declarations),
+            message_setup=MESSAGE_SETUP,
+            base=st.base_statement(self.cell),
+            tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
+        )
         return _text(text) + _text(st.render(self.cell.program.prologue, self.cell))
 
     def _foot(self) -> bytes:
@@ -182,8 +195,7 @@ class _Composer:
         files = {f"{self.name}.src": main + b"".join(NEWLINE + text for _, text in defs), **files}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
-            source = st.ascii_text(_file_name(self.targets.source), 40)
-            files[f"{self.name}.dat"] = _text(data.render(source=source, name=self.name))
+            files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
         return files
 
 

@@ -31,7 +31,9 @@ def write_together(files: Mapping[Path, bytes]) -> None:
 
 def unwritable(target: Path, why: str) -> NotUnderstoodError:
     """Return the error for an output that cannot be written."""
-    return input_error("output-unwritable", f"cannot write: {why}", "check folder, rights and space", source=str(target))
+    return input_error(
+        "output-unwritable", f"cannot write: {why}", "check folder, rights and space", source=str(target)
+    )
 
 
 def _write_beside(target: Path, content: bytes) -> Path:

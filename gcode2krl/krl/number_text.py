@@ -40,7 +40,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 @njit(cache=True)
-def _fixed(buffer, at, value, decimals):  # type: ignore[no-untyped-def]
+def _fixed(buffer, at, value, decimals):
     nano = np.int64(np.rint(abs(value) * 1e9))
     unit = 1
     for _ in range(9 - decimals):
@@ -66,7 +66,7 @@ def _fixed(buffer, at, value, decimals):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _integer(buffer, at, value):  # type: ignore[no-untyped-def]
+def _integer(buffer, at, value):
     digits = 1
     power = 10
     while power <= value:
@@ -79,20 +79,24 @@ def _integer(buffer, at, value):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _put(buffer, at, text):  # type: ignore[no-untyped-def]
+def _put(buffer, at, text):
     for k in range(len(text)):
         buffer[at + k] = text[k]
     return at + len(text)
 
 
-_LIN, _BLEND, _EXACT = (np.frombuffer(t, dtype=np.uint8).copy() for t in (b"LIN {X ", b"} C_DIS\r\n", b"}\r\n"))
-_VEL, _CDIS, _LINE = (np.frombuffer(t, dtype=np.uint8).copy() for t in (b"$VEL.CP=", b"$APO.CDIS=", b"; line "))
+_LIN, _BLEND, _EXACT = (
+    np.frombuffer(t, dtype=np.uint8).copy() for t in (b"LIN {X ", b"} C_DIS\r\n", b"}\r\n")
+)
+_VEL, _CDIS, _LINE = (
+    np.frombuffer(t, dtype=np.uint8).copy() for t in (b"$VEL.CP=", b"$APO.CDIS=", b"; line ")
+)
 _KEYS = np.frombuffer(b",Y ,Z ,A ,B ,C ", dtype=np.uint8).reshape(5, 3).copy()
 _CRLF = np.frombuffer(b"\r\n", dtype=np.uint8).copy()
 
 
 @njit(cache=True)
-def _lines(position, abc, speed, cdis, source_line, state, comment_every, buffer):  # type: ignore[no-untyped-def]
+def _lines(position, abc, speed, cdis, source_line, state, comment_every, buffer):
     at = 0
     for i in range(len(position)):
         state[2] += 1

@@ -121,15 +121,27 @@ class _Reader:
         where = np.concatenate([np.arange(a, b) for _, a, b in runs])
         motion = (kind == sc.LIN) | (kind == sc.PTP)
         for row in np.flatnonzero(blend == sc.MALFORMED)[:20]:
-            self._issue("krl-malformed", int(line[row]), f"cannot read {self._statement(int(file_of[row]), int(where[row]))!r}", int(file_of[row]))
+            self._issue(
+                "krl-malformed",
+                int(line[row]),
+                f"cannot read {self._statement(int(file_of[row]), int(where[row]))!r}",
+                int(file_of[row]),
+            )
         before = np.cumsum(motion)
         statements = tuple(
-            Statement(int(before[row]), self._statement(int(file_of[row]), int(where[row])), self.names[file_of[row]], int(line[row]))
+            Statement(
+                int(before[row]),
+                self._statement(int(file_of[row]), int(where[row])),
+                self.names[file_of[row]],
+                int(line[row]),
+            )
             for row in np.flatnonzero((kind == sc.OTHER) | (kind == sc.WAIT_SEC))
         )
         rows = np.flatnonzero(motion)
         speed = _in_force(np.where(kind == sc.VEL_CP, value[:, 0], np.nan))[rows] * MM_PER_M
-        cdis = np.where(blend[rows] == 1, _in_force(np.where(kind == sc.APO_CDIS, value[:, 0], np.nan))[rows], 0.0)
+        cdis = np.where(
+            blend[rows] == 1, _in_force(np.where(kind == sc.APO_CDIS, value[:, 0], np.nan))[rows], 0.0
+        )
         ptp = kind[rows] == sc.PTP
         guard = b"(--no-guard)" not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
@@ -158,7 +170,9 @@ class _Reader:
 
     def _issue(self, code: str, line: int, message: str, file: int = 0, remedy: str = "") -> None:
         name = self.names[file]
-        self.issues.append(Issue("error", code, line, f"{name}: {message}" if name != self.main else message, remedy))
+        self.issues.append(
+            Issue("error", code, line, f"{name}: {message}" if name != self.main else message, remedy)
+        )
 
     def _find_blocks(self, file: int) -> None:
         scanned = self.scanned[file]
@@ -210,7 +224,9 @@ class _Reader:
         try:
             text.decode("ascii")
         except UnicodeDecodeError as error:
-            self._issue("krl-not-ascii", text.count(b"\n", 0, error.start) + 1, "a character that is not ASCII", file)
+            self._issue(
+                "krl-not-ascii", text.count(b"\n", 0, error.start) + 1, "a character that is not ASCII", file
+            )
         if len(text) > _LONGEST_LINE:
             data = np.frombuffer(text, dtype=np.uint8)
             ends = np.concatenate([[-1], np.flatnonzero(data == 10), [len(data)]])
@@ -218,7 +234,10 @@ class _Reader:
                 self._issue("krl-line-too-long", int(row) + 1, f"more than {_LONGEST_LINE} characters", file)
         if text.upper().count(b";FOLD") != text.upper().count(b";ENDFOLD"):
             self._issue("krl-structure", 0, ";FOLD and ;ENDFOLD do not match", file)
-        words = [self._statement(file, int(row)).split("(")[0].split() for row in np.flatnonzero(self.scanned[file].kind == sc.OTHER)]
+        words = [
+            self._statement(file, int(row)).split("(")[0].split()
+            for row in np.flatnonzero(self.scanned[file].kind == sc.OTHER)
+        ]
         first = [word[0].upper() for word in words if word]
         for begin, close in (("WHILE", "ENDWHILE"), ("IF", "ENDIF"), ("FOR", "ENDFOR"), ("LOOP", "ENDLOOP")):
             if first.count(begin) != first.count(close):
@@ -236,4 +255,3 @@ def _waits(kind: NDArray[np.int8], value: Floats, rows: NDArray[np.int64]) -> Fl
     behind = np.minimum(rows + 1, len(kind) - 1)
     direct = (kind[behind] == sc.WAIT_SEC) & (rows + 1 < len(kind))
     return np.where(direct, np.nan_to_num(value[behind, 0]), 0.0)
-

@@ -39,12 +39,13 @@ def scan_krl(text: bytes) -> Scanned:
 
 
 _LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
-    np.frombuffer(word, dtype=np.uint8).copy() for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT SEC", b"C_DIS")
+    np.frombuffer(word, dtype=np.uint8).copy()
+    for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT SEC", b"C_DIS")
 )
 
 
 @njit(cache=True)
-def _starts(data, at, end, word):  # type: ignore[no-untyped-def]
+def _starts(data, at, end, word):
     if at + len(word) > end:
         return False
     for k in range(len(word)):
@@ -57,14 +58,14 @@ def _starts(data, at, end, word):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _blank(data, at, end):  # type: ignore[no-untyped-def]
+def _blank(data, at, end):
     while at < end and (data[at] == 32 or data[at] == 9):
         at += 1
     return at
 
 
 @njit(cache=True)
-def _number(data, at, end):  # type: ignore[no-untyped-def]
+def _number(data, at, end):
     """Return (position behind the number, value); NaN where there is none."""
     sign = 1.0
     if at < end and (data[at] == 45 or data[at] == 43):
@@ -93,7 +94,7 @@ def _number(data, at, end):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _components(data, at, end, value):  # type: ignore[no-untyped-def]
+def _components(data, at, end, value):
     """Read ``{X 1.0,Y 2.0,…}`` into value; return the position behind the brace, -1 where malformed."""
     if at >= end or data[at] != 123:
         return -1
@@ -133,7 +134,7 @@ def _components(data, at, end, value):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan(data, kind, line, span, value, blend):  # type: ignore[no-untyped-def]
+def _scan(data, kind, line, span, value, blend):
     n = len(data)
     at = 0
     number = 0

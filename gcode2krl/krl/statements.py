@@ -33,7 +33,7 @@ def axes_text(q_deg: Floats) -> str:
 
 def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
     """Return text that may stand in a KRL string or comment: printable ASCII, no quotes or braces."""
-    return re.sub(r'[^ !#$%&\'()*+,\-./0-9:;<=>?@A-Z\[\]^_a-z~]', "?", text)[:most]
+    return re.sub(r"[^ !#$%&\'()*+,\-./0-9:;<=>?@A-Z\[\]^_a-z~]", "?", text)[:most]
 
 
 def base_statement(cell: Cell) -> str:
@@ -48,9 +48,12 @@ def tool_statements(cell: Cell, number: int) -> str:
     if tool.tool_data is not None:
         return f"BAS (#TOOL,{tool.tool_data} )"
     load = cell.load
-    centre = f"CM {{X {fixed(load.x_mm, 3)},Y {fixed(load.y_mm, 3)},Z {fixed(load.z_mm, 3)},A 0.0,B 0.0,C 0.0}}"
+    centre = (
+        f"CM {{X {fixed(load.x_mm, 3)},Y {fixed(load.y_mm, 3)},Z {fixed(load.z_mm, 3)},A 0.0,B 0.0,C 0.0}}"
+    )
     inertia = f"J {{X {fixed(load.jx_kgm2, 4)},Y {fixed(load.jy_kgm2, 4)},Z {fixed(load.jz_kgm2, 4)}}}"
-    return f"$TOOL={frame_text(written_tool(cell, number))}\n$LOAD={{M {fixed(load.mass_kg, 3)},{centre},{inertia}}}"
+    load_text = f"{{M {fixed(load.mass_kg, 3)},{centre},{inertia}}}"
+    return f"$TOOL={frame_text(written_tool(cell, number))}\n$LOAD={load_text}"
 
 
 def written_tool(cell: Cell, number: int) -> Floats:
@@ -62,11 +65,21 @@ def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
     """Return what the guard compares: frames set by number, with the inverse of what they should be."""
     checks = []
     if cell.frames.base_data is not None:
-        checks.append({"variable": f"BASE_DATA[{cell.frames.base_data}]", "inverse": frame_text(fr.invert(cell.base_matrix()))})
+        checks.append(
+            {
+                "variable": f"BASE_DATA[{cell.frames.base_data}]",
+                "inverse": frame_text(fr.invert(cell.base_matrix())),
+            }
+        )
     for number in tools:
         data = cell.tool[number].tool_data
         if data is not None:
-            checks.append({"variable": f"TOOL_DATA[{data}]", "inverse": frame_text(fr.invert(written_tool(cell, number)))})
+            checks.append(
+                {
+                    "variable": f"TOOL_DATA[{data}]",
+                    "inverse": frame_text(fr.invert(written_tool(cell, number))),
+                }
+            )
     return checks
 
 
@@ -89,7 +102,9 @@ def event_statements(event: Event, cell: Cell) -> str:
     if template is None:
         return f"; line {line}: M{code} HAS NO KRL IN THE CELL AND WAS RELEASED BY HAND"
     rpm = abs(event.values.get("rpm", 0.0))
-    text = render(template, cell, rpm=rpm, m=code, p=event.values.get("p"), text=event.values.get("text", ""), line=line)
+    text = render(
+        template, cell, rpm=rpm, m=code, p=event.values.get("p"), text=event.values.get("text", ""), line=line
+    )
     return f"; line {line}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
 
 
@@ -99,7 +114,15 @@ def render(template: str, cell: Cell, **values: Any) -> str:
         return _template(template).render(cell=cell, spindle=cell.spindle, **values).strip("\n")
     except (jinja2.TemplateError, TypeError, ValueError, ZeroDivisionError) as error:
         brief = " ".join(template.split())[:40]
-        raise RefusedError(Issue("error", "template", 0, f"template {brief!r} of the cell: {error}", "correct it in the cell file")) from None
+        raise RefusedError(
+            Issue(
+                "error",
+                "template",
+                0,
+                f"template {brief!r} of the cell: {error}",
+                "correct it in the cell file",
+            )
+        ) from None
 
 
 @lru_cache(maxsize=64)
@@ -112,7 +135,11 @@ def environment() -> jinja2.Environment:
     """Return the Jinja2 environment of all KRL templates; an unknown name is an error."""
     loader = jinja2.PackageLoader("gcode2krl.krl", "templates")
     made = jinja2.Environment(
-        loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=False,
     )
     made.filters["decimals"] = lambda value, count: fixed(float(value), int(count))
     made.filters["krl_text"] = ascii_text

@@ -28,10 +28,37 @@ WAIT_LIMIT_S = 0.0006
 _MOST_PER_CHECK = 20
 _FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
 _KNOWN_WORDS = frozenset(
-    "BAS HALT WAIT IF THEN ELSE ENDIF WHILE ENDWHILE FOR ENDFOR LOOP ENDLOOP REPEAT UNTIL SWITCH CASE DEFAULT ENDSWITCH "
-    "RETURN PULSE INTERRUPT GLOBAL TRIGGER CONTINUE".split()
+    [
+        "BAS",
+        "HALT",
+        "WAIT",
+        "IF",
+        "THEN",
+        "ELSE",
+        "ENDIF",
+        "WHILE",
+        "ENDWHILE",
+        "FOR",
+        "ENDFOR",
+        "LOOP",
+        "ENDLOOP",
+        "REPEAT",
+        "UNTIL",
+        "SWITCH",
+        "CASE",
+        "DEFAULT",
+        "ENDSWITCH",
+        "RETURN",
+        "PULSE",
+        "INTERRUPT",
+        "GLOBAL",
+        "TRIGGER",
+        "CONTINUE",
+    ]
 )
-_MOTION_WORDS = frozenset("CIRC SPLINE ENDSPLINE SLIN SPTP SCIRC LIN_REL PTP_REL CIRC_REL SPL".split())
+_MOTION_WORDS = frozenset(
+    ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
+)
 
 
 @dataclass(frozen=True)
@@ -67,7 +94,9 @@ class VerifyReport:
         }
 
 
-def verify_krl(path: str | Path, toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> VerifyReport:
+def verify_krl(
+    path: str | Path, toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
+) -> VerifyReport:
     """Read a program back and compare it with what the G-code and the cell ask for.
 
     ``tolerance_mm`` must be the one the program was made with. Raises `NotUnderstoodError` where a file
@@ -83,13 +112,25 @@ def verify_krl(path: str | Path, toolpath: Toolpath, cell: Cell, tolerance_mm: f
 
 
 def compare(
-    program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, statements: tuple[Statement, ...] | None = None
+    program: KrlProgram,
+    targets: Targets,
+    joints: Joints,
+    cell: Cell,
+    statements: tuple[Statement, ...] | None = None,
 ) -> VerifyReport:
-    """Compare a program as read with the intended targets; with ``statements``, also what stands between motions."""
+    """Compare a program as read with the intended targets; with ``statements``, also what is between them."""
     issues = list(program.issues)
     issues += _rules(program, cell)
     if len(program.ptp) != len(targets):
-        issues.append(Issue("error", "verify-count", _first_difference(program, targets), f"{len(program.ptp)} motions read, {len(targets)} intended", "translate again"))
+        issues.append(
+            Issue(
+                "error",
+                "verify-count",
+                _first_difference(program, targets),
+                f"{len(program.ptp)} motions read, {len(targets)} intended",
+                "translate again",
+            )
+        )
     count = min(len(program.ptp), len(targets))
     deviation, rotation_deg, speed = _differences(program, targets, joints, cell, count)
     issues += _difference_issues(program, targets, joints, count, deviation, rotation_deg, speed)
@@ -97,7 +138,11 @@ def compare(
         issues += _statement_issues(program.statements, statements)
     order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
     worst = tuple(
-        {"line": int(program.line[row]), "gcode_line": int(targets.source_line[row]), "deviation_mm": _number(float(deviation[row]))}
+        {
+            "line": int(program.line[row]),
+            "gcode_line": int(targets.source_line[row]),
+            "deviation_mm": _number(float(deviation[row])),
+        }
         for row in order
     )
     return VerifyReport(
@@ -111,8 +156,10 @@ def compare(
     )
 
 
-def _differences(program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int) -> tuple[Floats, Floats, Floats]:
-    """Return position (mm), rotation (deg) and speed (mm/s) differences per motion; PTP HOME by its joints."""
+def _differences(
+    program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return differences per motion: position (mm), rotation (deg), speed (mm/s); PTP HOME by its joints."""
     home = targets.home[:count]
     deviation = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
     rotation = np.zeros(count)
@@ -120,17 +167,28 @@ def _differences(program: KrlProgram, targets: Targets, joints: Joints, cell: Ce
         rows = np.flatnonzero(targets.tool[:count] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
         read = fr.rotation_from_abc(program.abc_deg[rows] * RAD_PER_DEG) @ turn
-        rotation[rows] = fr.angle_between(fr.quaternion_from_rotation(np.nan_to_num(read)), targets.rotation[rows]) * DEG_PER_RAD
+        rotation[rows] = (
+            fr.angle_between(fr.quaternion_from_rotation(np.nan_to_num(read)), targets.rotation[rows])
+            * DEG_PER_RAD
+        )
     rotation[np.isnan(program.abc_deg[:count]).any(axis=1)] = np.nan
     joint_deg = np.abs(program.q_deg[:count] - joints.q_rad[:count] * DEG_PER_RAD).max(axis=1)
     good_home = home & (joint_deg <= JOINT_LIMIT_DEG)
     deviation[good_home], rotation[good_home] = 0.0, 0.0
-    speed = np.where(targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count]))
+    speed = np.where(
+        targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count])
+    )
     return deviation, rotation, speed
 
 
 def _difference_issues(
-    program: KrlProgram, targets: Targets, joints: Joints, count: int, deviation: Floats, rotation_deg: Floats, speed: Floats
+    program: KrlProgram,
+    targets: Targets,
+    joints: Joints,
+    count: int,
+    deviation: Floats,
+    rotation_deg: Floats,
+    speed: Floats,
 ) -> list[Issue]:
     cdis = np.abs(program.cdis_mm[:count] - targets.cdis_mm[:count])
     wait = np.abs(program.wait_s[:count] - targets.wait_s[:count])
@@ -161,11 +219,22 @@ def _statement_issues(read: tuple[Statement, ...], intended: tuple[Statement, ..
     wanted = [(s.motion, _normal(s.text)) for s in intended]
     if found == wanted:
         return []
-    at = next((k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b), min(len(found), len(wanted)))
+    at = next(
+        (k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b),
+        min(len(found), len(wanted)),
+    )
     line = read[at].line if at < len(read) else (read[-1].line if read else 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
-    return [Issue("error", "verify-statement", line, f"found {have[:60]!r}, intended {want[:60]!r}", "translate again, with the cell it was made with")]
+    return [
+        Issue(
+            "error",
+            "verify-statement",
+            line,
+            f"found {have[:60]!r}, intended {want[:60]!r}",
+            "translate again, with the cell it was made with",
+        )
+    ]
 
 
 def _rules(program: KrlProgram, cell: Cell) -> list[Issue]:
@@ -179,14 +248,27 @@ def _rules(program: KrlProgram, cell: Cell) -> list[Issue]:
     if not program.ptp[0]:
         issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
     cartesian = np.isnan(program.q_deg).all(axis=1)
-    incomplete = cartesian & (np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1))
+    incomplete = cartesian & (
+        np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1)
+    )
     incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
     incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
     for row in np.flatnonzero(incomplete)[:_MOST_PER_CHECK]:
-        issues.append(Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component"))
+        issues.append(
+            Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
+        )
     speed = program.speed_mm_s / MM_PER_M
-    for row in np.flatnonzero(~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6))))[:_MOST_PER_CHECK]:
-        issues.append(Issue("error", "krl-velocity", int(program.line[row]), f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}"))
+    for row in np.flatnonzero(
+        ~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6)))
+    )[:_MOST_PER_CHECK]:
+        issues.append(
+            Issue(
+                "error",
+                "krl-velocity",
+                int(program.line[row]),
+                f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}",
+            )
+        )
     issues += _statement_rules(program, cell)
     return issues
 
@@ -202,13 +284,32 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
         if "#INITMOV" in statement.text.upper():
             starts += 1
         if first in _MOTION_WORDS:
-            issues.append(Issue("error", "krl-motion-unknown", statement.line, f"{first} is a motion this program does not write"))
+            issues.append(
+                Issue(
+                    "error",
+                    "krl-motion-unknown",
+                    statement.line,
+                    f"{first} is a motion this program does not write",
+                )
+            )
         elif rest.startswith("(") and first not in known:
-            issues.append(Issue("error", "krl-call-undeclared", statement.line, f"{first} is called but not declared", "add it to [program] externals of the cell"))
+            issues.append(
+                Issue(
+                    "error",
+                    "krl-call-undeclared",
+                    statement.line,
+                    f"{first} is called but not declared",
+                    "add it to [program] externals of the cell",
+                )
+            )
         elif not (first.startswith("$") or first in known or rest[:1] in ("=", ".", "[", "(")):
-            issues.append(Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}"))
+            issues.append(
+                Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}")
+            )
     if starts != 1:
-        issues.append(Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once"))
+        issues.append(
+            Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once")
+        )
     return issues[:_MOST_PER_CHECK]
 
 

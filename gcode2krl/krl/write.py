@@ -92,14 +92,22 @@ def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]
     if name is not None:
         problem = name_problem(name) if name else "is empty"
         if problem:
-            raise input_error("krl-name", f"--name {name!r}: {problem}", "at most 24 of A-Z, 0-9, _; not starting with a digit")
+            raise input_error(
+                "krl-name",
+                f"--name {name!r}: {problem}",
+                "at most 24 of A-Z, 0-9, _; not starting with a digit",
+            )
         return name.upper(), []
     stem = file.stem if file is not None else "PART"
     good = suggested_name(stem)
     if good == stem.upper():
         return good, []
     remedy = f"name the output {good}.src, or give --name"
-    return good, [Issue("warning", "krl-name", 0, f"{stem!r} is no KRL program name; the program is called {good}", remedy)]
+    return good, [
+        Issue(
+            "warning", "krl-name", 0, f"{stem!r} is no KRL program name; the program is called {good}", remedy
+        )
+    ]
 
 
 def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
@@ -110,7 +118,8 @@ def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[
     return [
         Issue(
             "warning", "program-large", 0,
-            f"{size_mb:.1f} MB, {motions} LIN: more than controllers are known to hold ({cell.program.warn_size_mb:g} MB, {cell.program.memory_moves} LIN)",
+            f"{size_mb:.1f} MB, {motions} LIN: more than controllers are known to hold "
+            f"({cell.program.warn_size_mb:g} MB, {cell.program.memory_moves} LIN)",
             "use --split files, a larger arc chord tolerance, or split the job in the CAM",
         )
     ]  # fmt: skip

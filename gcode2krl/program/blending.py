@@ -18,7 +18,10 @@ _REVERSAL_COS = math.cos(math.radians(0.5))
 
 
 def corner_cdis(
-    position_mm: NDArray[np.float64], tolerance_mm: NDArray[np.float64], cdis_mm: float, exact: NDArray[np.bool_]
+    position_mm: NDArray[np.float64],
+    tolerance_mm: NDArray[np.float64],
+    cdis_mm: float,
+    exact: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Return CDIS (p,) in mm at the end of each motion.
 
@@ -31,7 +34,7 @@ def corner_cdis(
 
 
 @njit(cache=True)
-def _corner_cdis(position, tolerance, cdis, exact, levels, result):  # type: ignore[no-untyped-def]
+def _corner_cdis(position, tolerance, cdis, exact, levels, result):
     count = len(position)
     current = 0.0
     for i in range(count):

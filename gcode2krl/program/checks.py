@@ -32,7 +32,7 @@ def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
 
 
 def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
-    known = toolpath.known.all(axis=1)
+    known = toolpath.is_position()
     from_known = np.concatenate([[False], known[:-1]])
     for row in _stretches(feed & ~(known & from_known)):
         start = toolpath.known[row - 1]
@@ -46,34 +46,73 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]
 
 def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     for row in _stretches(toolpath.machine & ~toolpath.rapid):
-        yield Issue("error", "machine-feed", int(toolpath.source_line[row]), "a feed move in machine coordinates (G53 G1) has no meaning on a robot", "use G53 G0, which becomes a retract")
+        yield Issue(
+            "error",
+            "machine-feed",
+            int(toolpath.source_line[row]),
+            "a feed move in machine coordinates (G53 G1) has no meaning on a robot",
+            "use G53 G0, which becomes a retract",
+        )
     if cell.clearance_z_mm is None:
         for row in _stretches(toolpath.machine):
-            yield Issue("error", "no-clearance", int(toolpath.source_line[row]), "G28, G30 and G53 become a retract, and the cell has no clearance plane", "give [clearance] z_mm in the cell")
+            yield Issue(
+                "error",
+                "no-clearance",
+                int(toolpath.source_line[row]),
+                "G28, G30 and G53 become a retract, and the cell has no clearance plane",
+                "give [clearance] z_mm in the cell",
+            )
 
 
 def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     speed = toolpath.spindle_rad_s
     for row in _stretches(feed & (speed == 0)):
-        yield Issue("error", "spindle-off", int(toolpath.source_line[row]), "feed move with the spindle off", "program S and M3 before it")
+        yield Issue(
+            "error",
+            "spindle-off",
+            int(toolpath.source_line[row]),
+            "feed move with the spindle off",
+            "program S and M3 before it",
+        )
     for row in _stretches(feed & (speed < 0)):
-        yield Issue("error", "spindle-direction", int(toolpath.source_line[row]), "feed move with the spindle turning left (M4)", "the tools of the cell cut with M3")
+        yield Issue(
+            "error",
+            "spindle-direction",
+            int(toolpath.source_line[row]),
+            "feed move with the spindle turning left (M4)",
+            "the tools of the cell cut with M3",
+        )
     rpm = np.abs(speed) * S_PER_MIN / RAD_PER_REV
     most = np.full(len(toolpath), cell.spindle.max_rpm)
     for number, tool in cell.tool.items():
         if tool.max_rpm is not None:
             most[toolpath.tool == number] = min(tool.max_rpm, cell.spindle.max_rpm)
     for row in _stretches(rpm > most * (1 + 1e-9)):
-        yield Issue("error", "spindle-speed", int(toolpath.source_line[row]), f"S{rpm[row]:.0f} is above the {most[row]:.0f} rpm that spindle and tool allow", "lower S, or correct max_rpm in the cell")
+        yield Issue(
+            "error",
+            "spindle-speed",
+            int(toolpath.source_line[row]),
+            f"S{rpm[row]:.0f} is above the {most[row]:.0f} rpm that spindle and tool allow",
+            "lower S, or correct max_rpm in the cell",
+        )
 
 
 def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     most_mm_s = cell.controller.vel_cp_m_s * MM_PER_M
     for row in _stretches(feed & (toolpath.feed_mm_s > most_mm_s * (1 + 1e-9))):
-        yield Issue("error", "feed-too-high", int(toolpath.source_line[row]), f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:.0f} mm/min is above $VEL_MA.CP, {most_mm_s * S_PER_MIN:.0f} mm/min", "check F and the unit (G20/G21)")
+        yield Issue(
+            "error",
+            "feed-too-high",
+            int(toolpath.source_line[row]),
+            f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:.0f} mm/min is above the largest path speed, "
+            f"{most_mm_s * S_PER_MIN:.0f} mm/min",
+            "check F and the unit (G20/G21)",
+        )
     for row in _stretches(feed & ~(toolpath.feed_mm_s > 0)):
         if not np.array_equal(toolpath.position_mm[row], toolpath.position_mm[row - 1]):
-            yield Issue("error", "no-feed", int(toolpath.source_line[row]), "feed move at speed zero", "check F")
+            yield Issue(
+                "error", "no-feed", int(toolpath.source_line[row]), "feed move at speed zero", "check F"
+            )
 
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
@@ -83,20 +122,38 @@ def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> 
         if number == 0 or tool is None or not tool.length_mm:
             continue
         row = int(np.flatnonzero(missing & (toolpath.tool == number))[0])
-        yield Issue("error", "g43-missing", int(toolpath.source_line[row]), f"tool {number} cuts without G43: Z would be read from the spindle nose or from another tool", f"add G43 H{number} after the tool change")
+        yield Issue(
+            "error",
+            "g43-missing",
+            int(toolpath.source_line[row]),
+            f"tool {number} cuts without G43: Z would be read from the spindle nose or from another tool",
+            f"add G43 H{number} after the tool change",
+        )
 
 
 def _clearance(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     clearance = cell.clearance_z_mm
     if clearance is None:
-        yield Issue("error", "no-clearance", 0, "the cell has no clearance plane to approach and leave on", "give [clearance] z_mm in the cell")
+        yield Issue(
+            "error",
+            "no-clearance",
+            0,
+            "the cell has no clearance plane to approach and leave on",
+            "give [clearance] z_mm in the cell",
+        )
         return
     for row in _stretches(feed & (toolpath.position_mm[:, 2] > clearance)):
-        yield Issue("error", "above-clearance", int(toolpath.source_line[row]), f"feed move at Z {toolpath.position_mm[row, 2]:.3f} above the clearance plane at {clearance:.3f} mm", "raise [clearance] z_mm, or check the zero point and the unit")
+        yield Issue(
+            "error",
+            "above-clearance",
+            int(toolpath.source_line[row]),
+            f"feed at Z {toolpath.position_mm[row, 2]:.3f}, above the clearance plane at {clearance:.3f}",
+            "raise [clearance] z_mm, or check the zero point and the unit",
+        )
 
 
 def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
-    moves = toolpath.known.all(axis=1) & ~toolpath.machine
+    moves = toolpath.is_position() & ~toolpath.machine
     for number in np.unique(toolpath.tool[moves]).tolist():
         row = int(np.flatnonzero(moves & (toolpath.tool == number))[0])
         line = int(toolpath.source_line[row])
@@ -107,24 +164,54 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[
         if number == 0:
             yield from _no_tool(cell, line)
         elif number not in cell.tool:
-            yield Issue("error", "tool-unknown", line, f"T{number} is not in the cell", f"add [tool.{number}] with diameter_mm, teeth and length_mm, or tool_data")
+            yield Issue(
+                "error",
+                "tool-unknown",
+                line,
+                f"T{number} is not in the cell",
+                f"add [tool.{number}] with diameter_mm, teeth and length_mm, or tool_data",
+            )
         elif cell.tool[number].length_mm is None and cell.tool[number].frame is None:
-            yield Issue("error", "tool-unknown", line, f"T{number} has no length and no frame in the cell", f"give tool.{number}.length_mm")
+            yield Issue(
+                "error",
+                "tool-unknown",
+                line,
+                f"T{number} has no length and no frame in the cell",
+                f"give tool.{number}.length_mm",
+            )
 
 
 def _no_tool(cell: Cell, line: int) -> Iterator[Issue]:
     mounted = cell.mounted_tool
     if mounted is None or mounted not in cell.tool:
-        yield Issue("error", "tool-missing", line, "no tool has been named (T… M6), and the cell does not say which is mounted", "program T and M6, or give mounted_tool in the cell")
+        yield Issue(
+            "error",
+            "tool-missing",
+            line,
+            "no tool has been named (T… M6), and the cell does not say which is mounted",
+            "program T and M6, or give mounted_tool in the cell",
+        )
     else:
-        yield Issue("warning", "tool-assumed", line, f"no tool has been named (T… M6); tool {mounted} is taken as mounted", "program T and M6")
+        yield Issue(
+            "warning",
+            "tool-assumed",
+            line,
+            f"no tool has been named (T… M6); tool {mounted} is taken as mounted",
+            "program T and M6",
+        )
 
 
 def _events(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     for event in toolpath.events:
         code = m_code(event)
         if code and not has_krl(code, cell):
-            yield Issue("error", "m-code-unmapped", int(event.values["line"]), f"{code} has no KRL in the cell", f'add {code} = "…" to [m_code] of the cell')
+            yield Issue(
+                "error",
+                "m-code-unmapped",
+                int(event.values["line"]),
+                f"{code} has no KRL in the cell",
+                f'add {code} = "…" to [m_code] of the cell',
+            )
 
 
 def m_code(event: Event) -> str:

@@ -59,7 +59,8 @@ def _changing(position_mm: Floats, rows: NDArray[np.int64], spins: Floats, table
     constant_cost = np.where(table > 0, 1.0 - np.minimum(table, 1.0), 1e3).sum(axis=1).min()
     if best_track is None or best_cost >= constant_cost:
         return None
-    return np.interp(path, path[rows], spins[best_track])
+    spin: Floats = np.interp(path, path[rows], spins[best_track])
+    return spin
 
 
 def _cheapest_track(cost_here: Floats, allowed: NDArray[np.int64]) -> tuple[float, NDArray[np.int64]]:

@@ -4,6 +4,7 @@ The robot is either at HOME, standing above the work on the clearance plane, or 
 whose X, Y and Z have all been programmed are positions; machine moves become retracts.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -96,16 +97,23 @@ class _Plan:
     def walk(self) -> None:
         """Go through the rows once: runs of plain moves at a time, everything else one by one."""
         toolpath = self.toolpath
-        plain = toolpath.known.all(axis=1) & ~toolpath.machine
+        plain = toolpath.is_position() & ~toolpath.machine
         plain[0] = False
         if not (plain & np.concatenate([[False], np.ones(len(plain) - 1, dtype=bool)])).any():
-            raise input_error("no-motion", "the program has no move to a programmed position", "program X, Y and Z", source=toolpath.source)
+            raise input_error(
+                "no-motion",
+                "the program has no move to a programmed position",
+                "program X, Y and Z",
+                source=toolpath.source,
+            )
         changes = [(event.row, index) for index, event in enumerate(toolpath.events) if event.kind == "tool"]
-        stops = sorted({0, len(toolpath), *np.flatnonzero(np.diff(plain)) + 1, *(row + 1 for row, _ in changes)})
+        stops = sorted(
+            {0, len(toolpath), *np.flatnonzero(np.diff(plain)) + 1, *(row + 1 for row, _ in changes)}
+        )
         first_tool = next((toolpath.events[index].values["tool"] for row, index in changes if row == 0), 0)
         self.tool = self._frame_tool(first_tool)
         self._home(-1)
-        for start, end in zip(stops, stops[1:], strict=False):
+        for start, end in itertools.pairwise(stops):
             for row, index in changes:
                 if row == start - 1:
                     self._change_tool(index)
@@ -199,7 +207,13 @@ class _Plan:
         tool = np.concatenate(columns.tool)
         keep = _distinct(position, axis, kind)
         kept_index = np.cumsum(keep) - 1
-        position, axis, move, kind, tool = position[keep], _rows(axis, keep), move[keep], kind[keep], tool[keep]
+        position, axis, move, kind, tool = (
+            position[keep],
+            _rows(axis, keep),
+            move[keep],
+            kind[keep],
+            tool[keep],
+        )
         rotation = self._rotations(position, axis, tool, kind, spin_of)
         wait = np.zeros(len(position))
         stand = _StandingAt(np.concatenate(columns.move), kept_index)
@@ -207,7 +221,9 @@ class _Plan:
         for row in np.flatnonzero(toolpath.dwell_s > 0):
             wait[stand.at(int(row))] += toolpath.dwell_s[row]
         rapid = np.where(move >= 0, toolpath.rapid[move] | toolpath.machine[move], True)
-        speed = np.where(rapid, self.cell.controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[np.maximum(move, 0)])
+        speed = np.where(
+            rapid, self.cell.controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[np.maximum(move, 0)]
+        )
         speed[kind != _LIN] = np.nan
         exact = self._exact_stops(move, kind, rapid, wait, events)
         return Targets(
@@ -216,7 +232,9 @@ class _Plan:
             ptp=kind != _LIN,
             home=kind == _HOME,
             speed_mm_s=speed,
-            cdis_mm=corner_cdis(position, self._tolerances(move, tolerance_mm), self.cell.controller.cdis_mm, exact),
+            cdis_mm=corner_cdis(
+                position, self._tolerances(move, tolerance_mm), self.cell.controller.cdis_mm, exact
+            ),
             wait_s=wait,
             move=move,
             source_line=np.where(move >= 0, toolpath.source_line[move], 0),
@@ -257,9 +275,14 @@ class _Plan:
         return tuple(placed)
 
     def _exact_stops(
-        self, move: NDArray[np.int32], kind: NDArray[np.int8], rapid: NDArray[np.bool_], wait: Floats, events: tuple[Event, ...]
+        self,
+        move: NDArray[np.int32],
+        kind: NDArray[np.int8],
+        rapid: NDArray[np.bool_],
+        wait: Floats,
+        events: tuple[Event, ...],
     ) -> NDArray[np.bool_]:
-        exact = (kind != _LIN) | (wait > 0)
+        exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0)
         exact |= (move >= 0) & self.toolpath.exact_stop[move]
         exact[:-1] |= (rapid[:-1] != rapid[1:]) | (kind[1:] != _LIN)
         exact[[event.row for event in events]] = True
@@ -277,7 +300,15 @@ class _Plan:
     def _notes(self) -> list[Issue]:
         if self.cell.verified is not None:
             return []
-        return [Issue("note", "cell-not-verified", 0, "the cell has not been confirmed by a person; the program begins with a HALT", "`gcode2krl models check` lists what to confirm")]
+        return [
+            Issue(
+                "note",
+                "cell-not-verified",
+                0,
+                "the cell has not been confirmed by a person; the program begins with a HALT",
+                "`gcode2krl models check` lists what to confirm",
+            )
+        ]
 
 
 class _StandingAt:
@@ -300,7 +331,8 @@ def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8]) -> NDArray
     different[1:] = (grid[1:] != grid[:-1]).any(axis=1)
     if axis.strides[0] != 0:
         different[1:] |= (axis[1:] != axis[:-1]).any(axis=1)
-    return different | (kind != _LIN)
+    result: NDArray[np.bool_] = different | (kind != _LIN)
+    return result
 
 
 def _rows(values: Floats, keep: NDArray[np.bool_]) -> Floats:
@@ -311,5 +343,5 @@ def _rows(values: Floats, keep: NDArray[np.bool_]) -> Floats:
 
 
 def _highest(toolpath: Toolpath) -> float:
-    known = toolpath.known.all(axis=1)
+    known = toolpath.is_position()
     return float(toolpath.position_mm[known, 2].max()) if known.any() else 0.0

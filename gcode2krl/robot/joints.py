@@ -4,6 +4,7 @@ The controller keeps its configuration on LIN, so the branch is chosen once, for
 two targets the line is sampled, because a limit or a singularity may lie on the way.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,7 @@ WEAK_SIGMA = 0.03
 """Smallest singular value below which an excessive joint speed is called a singularity of the arm."""
 _TRIAL_SAMPLES = 2000
 _MOST_PER_CHECK = 20
+_TURN_OR_MOVE = 'turn the tool about its axis ([frames] spin = "auto" or an angle), or move the part'
 _ANGLE_GRID_RAD = 1e-9
 
 
@@ -61,14 +63,16 @@ def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
     for index, number in enumerate(np.unique(targets.tool)):
         rows = targets.tool == number
         sigma[rows] = smallest_singular_value(q[rows], cell.robot.geometry.array(), tool_position[index])
-    status, turn = status_turn(np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, cell.robot.geometry.array())
+    status, turn = status_turn(
+        np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, cell.robot.geometry.array()
+    )
     joints = Joints(
         q_rad=q,
         qd_rad_s=np.full_like(q, np.nan),
         limit_margin_rad=_limit_margin(q, cell),
         sigma_min=sigma,
-        status=status,
-        turn=turn,
+        status=status.astype(np.int32),
+        turn=turn.astype(np.int32),
     )
     return joints, joint_findings(line, q_line, targets, cell)
 
@@ -124,7 +128,9 @@ def _best_branch(line: Line, targets: Targets, cell: Cell) -> Floats:
     position, rotation = flange_frames(line.position_mm, line.rotation, line.tool, cell)
     chain = np.isnan(line.duration_s)
     stride = max(1, len(position) // _TRIAL_SAMPLES)
-    thin = np.unique(np.concatenate([np.arange(0, len(position), stride), np.flatnonzero(chain), [len(position) - 1]]))
+    thin = np.unique(
+        np.concatenate([np.arange(0, len(position), stride), np.flatnonzero(chain), [len(position) - 1]])
+    )
     scored = []
     for branch in range(8):
         q = _chains(position[thin], rotation[thin], chain[thin], branch, cell.home_q_rad(), cell)
@@ -142,7 +148,7 @@ def _chains(
     geometry = cell.robot.geometry.array()
     pieces = [
         one_branch(position[a:b], rotation[a:b], geometry, branch, reference)
-        for a, b in zip(starts, starts[1:], strict=False)
+        for a, b in itertools.pairwise(starts)
     ]
     return np.concatenate(pieces) if pieces else np.empty((0, 6))
 
@@ -190,20 +196,52 @@ def joint_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> tuple
     findings: list[Issue] = []
     source_line = targets.source_line[line.target]
     if cell.robot.limits.q_deg is None:
-        findings.append(Issue("error", "limits-unknown", 0, f"the joint limits of {cell.robot.model} are not known", "give [robot.limits] q_deg in the cell, from the data sheet"))
+        findings.append(
+            Issue(
+                "error",
+                "limits-unknown",
+                0,
+                f"the joint limits of {cell.robot.model} are not known",
+                "give [robot.limits] q_deg in the cell, from the data sheet",
+            )
+        )
     home = _limit_margin(cell.home_q_rad()[None, :], cell)[0]
     if home < 0:
-        findings.append(Issue("error", "home-limit", 0, f"HOME is {-home * DEG_PER_RAD:.2f} deg beyond a joint limit", "correct [home] q_deg in the cell"))
-    unreached = np.isnan(q).any(axis=1)
+        findings.append(
+            Issue(
+                "error",
+                "home-limit",
+                0,
+                f"HOME is {-home * DEG_PER_RAD:.2f} deg beyond a joint limit",
+                "correct [home] q_deg in the cell",
+            )
+        )
+    unreached: NDArray[np.bool_] = np.logical_or.reduce(np.isnan(q), axis=1)
     for sample in _stretches(unreached):
         x, y, z = line.position_mm[sample]
-        findings.append(Issue("error", "out-of-reach", int(source_line[sample]), f"X {x:.3f} Y {y:.3f} Z {z:.3f} is out of reach", "move the part nearer ([frames] base), or check the unit"))
+        findings.append(
+            Issue(
+                "error",
+                "out-of-reach",
+                int(source_line[sample]),
+                f"X {x:.3f} Y {y:.3f} Z {z:.3f} is out of reach",
+                "move the part nearer ([frames] base), or check the unit",
+            )
+        )
     limits = limits_rad(cell)
     for joint in range(6):
         angle = q[:, joint]
         for sample in _stretches((angle < limits[joint, 0]) | (angle > limits[joint, 1])):
             low, high = limits[joint] * DEG_PER_RAD
-            findings.append(Issue("error", "joint-limit", int(source_line[sample]), f"A{joint + 1} at {angle[sample] * DEG_PER_RAD:.2f} deg, allowed {low:g}..{high:g}", "move the part, turn the tool about its axis ([frames] spin), or use spin = \"auto\""))
+            findings.append(
+                Issue(
+                    "error",
+                    "joint-limit",
+                    int(source_line[sample]),
+                    f"A{joint + 1} at {angle[sample] * DEG_PER_RAD:.2f} deg, allowed {low:g}..{high:g}",
+                    'move the part, turn the tool about its axis ([frames] spin), or use spin = "auto"',
+                )
+            )
     findings += _speed_findings(line, q, source_line, cell)
     return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * _MOST_PER_CHECK])
 
@@ -212,7 +250,16 @@ def _speed_findings(line: Line, q: Floats, source_line: NDArray[np.int32], cell:
     """Joint speeds on straight lines at the programmed speed: singularities, and plain slow joints."""
     findings: list[Issue] = []
     if cell.robot.speeds.qd_deg_s is None:
-        return [Issue("warning", "joint-speeds-unknown", 0, f"the joint speeds of {cell.robot.model} are not known; singularities are judged by |A5| alone", "give [robot.speeds] qd_deg_s in the cell"), *_wrist_findings(line, q, source_line)]
+        return [
+            Issue(
+                "warning",
+                "joint-speeds-unknown",
+                0,
+                f"joint speeds of {cell.robot.model} are not known; singularities are judged by |A5| alone",
+                "give [robot.speeds] qd_deg_s in the cell",
+            ),
+            *_wrist_findings(line, q, source_line),
+        ]
     most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
     speed = np.zeros_like(q)
     speed[1:] = np.abs(np.diff(q, axis=0)) / line.duration_s[1:, None]
@@ -224,20 +271,43 @@ def _speed_findings(line: Line, q: Floats, source_line: NDArray[np.int32], cell:
         wrist = np.abs(np.sin(q[near, 4])).min() < np.sin(WRIST_ZONE_RAD)
         tip = cell.tool_matrix(int(line.tool[sample]))[:3, 3]
         arm = smallest_singular_value(q[near], cell.robot.geometry.array(), tip).min() < WEAK_SIGMA
-        number = f"A{joint + 1} would need {speed[sample, joint] * DEG_PER_RAD:.0f} deg/s of {most[joint] * DEG_PER_RAD:.0f}"
+        needed, allowed = speed[sample, joint] * DEG_PER_RAD, most[joint] * DEG_PER_RAD
+        number = f"A{joint + 1} would need {needed:.0f} deg/s of {allowed:.0f}"
         where = int(source_line[sample])
         if wrist or arm:
             what = "wrist singularity (A5 near 0)" if wrist else "singularity of the arm"
-            findings.append(Issue("error", "singularity", where, f"{what}: {number}", "turn the tool about its axis ([frames] spin or \"auto\"), or move the part"))
+            findings.append(
+                Issue(
+                    "error",
+                    "singularity",
+                    where,
+                    f"{what}: {number}",
+                    _TURN_OR_MOVE,
+                )
+            )
         else:
-            findings.append(Issue("warning", "joint-speed", where, f"{number}: slower than programmed here", "lower F, or move the part"))
+            findings.append(
+                Issue(
+                    "warning",
+                    "joint-speed",
+                    where,
+                    f"{number}: slower than programmed here",
+                    "lower F, or move the part",
+                )
+            )
     return findings
 
 
 def _wrist_findings(line: Line, q: Floats, source_line: NDArray[np.int32]) -> list[Issue]:
     near = np.abs(np.sin(q[:, 4])) < np.sin(WRIST_ZONE_RAD)
     return [
-        Issue("error", "singularity", int(source_line[sample]), f"wrist singularity: A5 at {q[sample, 4] * DEG_PER_RAD:.2f} deg", "turn the tool about its axis ([frames] spin or \"auto\"), or move the part")
+        Issue(
+            "error",
+            "singularity",
+            int(source_line[sample]),
+            f"wrist singularity: A5 at {q[sample, 4] * DEG_PER_RAD:.2f} deg",
+            _TURN_OR_MOVE,
+        )
         for sample in _stretches(near)
     ]  # fmt: skip
 

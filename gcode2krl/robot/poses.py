@@ -13,8 +13,10 @@ Floats = NDArray[np.float64]
 
 
 def forward(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> tuple[Floats, Floats]:
-    """Return the tool pose in ``$BASE``: position (n, 3) in mm, quaternion (n, 4), for joints (n, 6) in rad."""
-    position, rotation = flange_pose(np.atleast_2d(np.asarray(q_rad, dtype=float)), cell.robot.geometry.array())
+    """Return tool poses in ``$BASE`` for joints (n, 6) in rad: position (n, 3) in mm, quaternion (n, 4)."""
+    position, rotation = flange_pose(
+        np.atleast_2d(np.asarray(q_rad, dtype=float)), cell.robot.geometry.array()
+    )
     flange = fr.transform(position, rotation)
     pose = fr.invert(cell.base_matrix()) @ flange @ cell.tool_matrix(tool)
     return pose[:, :3, 3], fr.quaternion_from_rotation(pose[:, :3, :3])
@@ -41,7 +43,7 @@ def jacobian(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> Floats:
 def flange_frames(
     position_mm: Floats, rotation: Floats, tool: NDArray[np.int32], cell: Cell
 ) -> tuple[Floats, Floats]:
-    """Return the flange in the robot root, position (n, 3) and rotation (n, 3, 3), = ``$BASE``·pose·``$TOOL``⁻¹."""
+    """Return the flange in the robot root, (n, 3) and (n, 3, 3): ``$BASE``·pose·``$TOOL``⁻¹."""
     base = cell.base_matrix()
     constant = len(rotation) > 0 and bool((rotation == rotation[0]).all())
     turned = base[:3, :3] @ fr.rotation_from_quaternion(rotation[:1] if constant else rotation)
@@ -52,5 +54,7 @@ def flange_frames(
         tool_inverse = fr.invert(cell.tool_matrix(int(number)))
         tip_rotation = turned if constant else turned[rows]
         flange_rotation[rows] = tip_rotation @ tool_inverse[:3, :3]
-        flange_position[rows] = position_mm[rows] @ base[:3, :3].T + base[:3, 3] + tip_rotation @ tool_inverse[:3, 3]
+        flange_position[rows] = (
+            position_mm[rows] @ base[:3, :3].T + base[:3, 3] + tip_rotation @ tool_inverse[:3, 3]
+        )
     return flange_position, flange_rotation

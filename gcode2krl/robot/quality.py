@@ -24,7 +24,9 @@ def pose_quality(position_mm: Floats, rotation: Floats, tool: NDArray[np.int32],
     limits = limits_rad(cell)
     turns = RAD_PER_REV * np.array([0.0, -1.0, 1.0])
     candidates = q[..., None] + turns  # (n, 8, 6, 3)
-    margin = np.minimum(candidates - limits[:, 0, None], limits[:, 1, None] - candidates).max(axis=-1).min(axis=-1)
+    margin = (
+        np.minimum(candidates - limits[:, 0, None], limits[:, 1, None] - candidates).max(axis=-1).min(axis=-1)
+    )
     wrist = np.abs(np.sin(q[..., 4]))
     stretched = np.arctan2(geometry[1], geometry[4])
     elbow = np.abs(np.sin(q[..., 2] + stretched))
