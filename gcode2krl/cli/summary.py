@@ -24,7 +24,7 @@ def summary_lines(
     blended = targets.cdis_mm > 0
     away = ~targets.home
     lines = _span(targets.source_line[targets.source_line > 0], 0)
-    x, y, z = (_span(targets.position_mm[lin, k], 1) for k in range(3))
+    x, y, z = (_span(targets.position_mm[lin, k], 2) for k in range(3))
     tools = [f"T{n} {cell.tool[n].model}".rstrip() for n in np.unique(targets.tool[lin]).tolist()]
     wrist_deg = np.degrees(np.abs(joints.q_rad[away, 4]).min())
     limit_deg = joints.limit_margin_rad[away].min() * DEG_PER_RAD

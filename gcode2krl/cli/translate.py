@@ -76,7 +76,6 @@ def command(
         if not as_json:
             raise _from_part(error, part) from None
         console.json(_result((), error.issues, None, None, None))
-        console.findings(error.issues, error.source or part)
         return error.exit_code
     if output == STANDARD:
         sys.stdout.buffer.write(written.texts[f"{written.name}.src"])

@@ -31,7 +31,6 @@ def command(
         if not as_json:
             raise
         console.json({"verify": {"max_deviation_mm": None}, "issues": issue_dicts(error.issues)})
-        console.findings(error.issues, error.source)
         return error.exit_code
     if as_json:
         console.json({"verify": report.as_dict(), "issues": issue_dicts(report.issues)})

@@ -65,7 +65,7 @@ _OTHER_AXES = tuple(ord(c) - 65 for c in "ABCUVWE")
 def run(words, start, state, rows, counts, events, found, options, offsets, offset_known, tool_length):
     """Execute blocks from word ``start`` on; return the word at which to go on.
 
-    ``words`` = (letter, value, extra, line); ``counts`` (4,) = rows, events, findings, marks used so far;
+    ``words`` = (letter, value, extra, line); ``counts`` (5,) = rows, events, findings, marks used so far, findings dropped;
     ``options`` (2,) = chord tolerance in mm, block delete. Stops early where a buffer is nearly full.
     """
     letter, line = words[0], words[3]
@@ -121,7 +121,9 @@ def _report(found, counts, number, line, a, b):
     if counts[2] < room:
         row = found[counts[2]]
         row.number, row.line, row.a, row.b = number, line, a, b
-    counts[2] += 1
+        counts[2] += 1
+    else:
+        counts[4] += 1
 
 
 @njit(cache=True)

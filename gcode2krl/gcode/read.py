@@ -135,9 +135,10 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
             if not block.strip():
                 raise input_error("empty", "the file is empty", "export the program again", source=name)
             _reject_binary(block, name)
-        text = rest + block
-        end = len(text) if not block else text.rfind(b"\n") + 1
-        if end == 0 or len(text) - end > LINE_LIMIT:
+        at_end = not block
+        text = rest + (block if not at_end or not rest else b"\n")
+        end = text.rfind(b"\n") + 1
+        if len(text) - end > LINE_LIMIT:
             place = line + text.count(b"\n")
             raise input_error(
                 "line-too-long",
@@ -184,7 +185,7 @@ class _Interpreter:
     ) -> None:
         self.name = name
         self.state = initial_state()
-        self.counts = np.zeros(4, dtype=np.int64)
+        self.counts = np.zeros(5, dtype=np.int64)
         self.buffers = _Buffers(np.zeros(4096, dtype=machine.ROW), np.zeros(256, dtype=machine.EVENT))
         self.found = np.zeros(_MOST_ISSUES, dtype=machine.FOUND)
         self.options = np.array([chord_tolerance_mm, float(block_delete)])
@@ -245,10 +246,10 @@ class _Interpreter:
         """Raise the errors that were found, or return the table."""
         found = [
             make_issue(int(r["number"]), int(r["line"]), float(r["a"]), float(r["b"]))
-            for r in self.found[: min(self.counts[2], _MOST_ISSUES)]
+            for r in self.found[: self.counts[2]]
         ]
         errors = [issue for issue in found if issue.severity == "error"]
-        unseen = int(self.counts[2]) - _MOST_ISSUES
+        unseen = int(self.counts[4])
         if errors:
             if unseen > 0:
                 errors.append(Issue("error", "more", 0, f"{unseen} more findings"))

@@ -38,8 +38,8 @@ def scan(text: NDArray[np.uint8], first_line: int) -> Words:
     letters = np.empty(len(text) + 2, dtype=np.uint8)  # upper bound; pages never touched cost nothing
     values = np.empty(len(letters))
     lines = np.empty(len(letters), dtype=np.int32)
-    extras = np.empty(1024)
-    spans = np.empty((1024, 2), dtype=np.int64)
+    extras = np.zeros(1024)  # only the first findings are ever shown
+    spans = np.empty((int(np.count_nonzero(text == ord("("))), 2), dtype=np.int64)
     count, messages, decimals = _scan(text, first_line, letters, values, lines, extras, spans)
     return Words(letters[:count], values[:count], extras, lines[:count], spans[:messages], decimals)
 

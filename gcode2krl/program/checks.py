@@ -162,7 +162,8 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[
                 line = int(event.values["line"])
                 break
         if number == 0:
-            yield from _no_tool(cell, line)
+            emptied = any(event.kind == "tool" and event.values["tool"] == 0 for event in toolpath.events)
+            yield from _no_tool(cell, line, emptied)
         elif number not in cell.tool:
             yield Issue(
                 "error",
@@ -181,9 +182,11 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[
             )
 
 
-def _no_tool(cell: Cell, line: int) -> Iterator[Issue]:
+def _no_tool(cell: Cell, line: int, emptied: bool) -> Iterator[Issue]:
     mounted = cell.mounted_tool
-    if mounted is None or mounted not in cell.tool:
+    if emptied:
+        yield Issue("error", "tool-missing", line, "moves with an empty spindle (T0 M6)", "change to a tool first")
+    elif mounted is None or mounted not in cell.tool:
         yield Issue(
             "error",
             "tool-missing",

@@ -1,0 +1,255 @@
+"""Seeded real mistakes: does ``gcode2krl translate`` refuse each, with the line and a remedy?
+
+``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py`` through the command line's
+own entry, in a temporary folder, then clean programs that must be translated. The exit code is always 0:
+figures are printed, not judged.
+"""
+
+import argparse
+import contextlib
+import io
+import json
+import re
+import sys
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mistake_cases import CELL_HEAD, CELL_TOOLS, CLEAN, LATER, MISTAKES, PROGRAMS, Clean, Mistake
+
+from gcode2krl.cli.main import _run
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+MARK = "@"
+_FINDING = re.compile(
+    r"^(?:(?P<place>.+?): )?(?P<severity>error|warning|note): (?P<message>.*?)"
+    r"(?: \[(?P<code>[a-z0-9-]+)\])?(?: -> (?P<remedy>.*))?$"
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One printed line."""
+
+    severity: str
+    code: str
+    line: int
+    message: str
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of the command line did."""
+
+    exit_code: int
+    findings: tuple[Finding, ...]
+    new_files: tuple[str, ...]
+    printed: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One mistake, judged."""
+
+    title: str
+    exit_code: int
+    refused: bool
+    """Exit code 1 or 2 with a finding in words, no internal error, and nothing written."""
+    code: str
+    expected: tuple[int, ...]
+    found: int | None
+    right_line: bool
+    """An error that speaks of the mistake names one of the expected lines."""
+    remedy: bool
+    printed: str
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether all three are right."""
+        return self.refused and self.right_line and self.remedy
+
+
+def changed(program: str, change: dict[int, str | None]) -> tuple[str, tuple[int, ...]]:
+    """Return the program with the change, and the marked lines of the result."""
+    lines: list[str] = []
+    for number, line in enumerate(_text(program).splitlines(), start=1):
+        new = change.get(number, line)
+        if new is not None:
+            lines += [MARK + line] if new == MARK else new.split("\n")
+    marked = tuple(number for number, line in enumerate(lines, start=1) if line.startswith(MARK))
+    return "\n".join(line.removeprefix(MARK) for line in lines) + "\n", marked
+
+
+def prepare(case: Mistake, folder: Path) -> tuple[list[str], tuple[int, ...]]:
+    """Write program and cell of a case; return the arguments and the lines that are right."""
+    text, marked = changed(case.program, case.change)
+    if case.cut_after:
+        text = text[: text.index(case.cut_after) + len(case.cut_after)]
+    part, cell = folder / case.name, folder / "cell.toml"
+    part.write_bytes(text.encode() if case.data is None else case.data)
+    cell.write_text(CELL_HEAD + case.cell + CELL_TOOLS, encoding="utf-8")
+    expected = (*((0,) if case.or_whole or not marked else ()), *marked)
+    return [str(part), "--cell", str(cell), "-o", str(folder / "out.src")], expected
+
+
+def prepare_clean(case: Clean, folder: Path) -> list[str]:
+    """Write program and cell of a clean case; return the arguments."""
+    text, _ = changed(case.program, case.change)
+    forms = {
+        "crlf": lambda: text.replace("\n", "\r\n"),
+        "lower": text.lower,
+        "tight": lambda: "\n".join(line if "(" in line else line.replace(" ", "") for line in text.split("\n")),
+        "mark": lambda: "\ufeff" + text.rstrip("\n"),
+        "": lambda: text,
+    }
+    part, cell = folder / "part.nc", folder / "cell.toml"
+    part.write_bytes(forms[case.form]().encode())
+    arguments = [str(part), "-o", str(folder / "out.src")]
+    if case.cell is not None:
+        cell.write_text(CELL_HEAD + case.cell + CELL_TOOLS, encoding="utf-8")
+        arguments += ["--cell", str(cell)]
+    return arguments
+
+
+def run(arguments: list[str], folder: Path) -> Outcome:
+    """Run ``gcode2krl translate`` as the command line does, and read what it printed."""
+    before = {path.name for path in folder.iterdir()}
+    printed = io.StringIO()
+    with contextlib.redirect_stderr(printed), contextlib.redirect_stdout(io.StringIO()):
+        exit_code = _run(["translate", *arguments])
+    files = tuple(sorted({path.name for path in folder.iterdir()} - before))
+    text = printed.getvalue().replace(str(folder) + "/", "")
+    return Outcome(exit_code, tuple(_findings(text)), files, text)
+
+
+def judge(case: Mistake, folder: Path) -> Verdict:
+    """Run one mistake and compare with what is right."""
+    arguments, expected = prepare(case, folder)
+    outcome = run(arguments, folder)
+    errors = [finding for finding in outcome.findings if finding.severity == "error"]
+    internal = "internal error" in outcome.printed or "Traceback" in outcome.printed
+    fitting = [
+        error for error in errors
+        if error.line in expected and re.search(case.about, f"{error.message} {error.code}")
+    ]  # fmt: skip
+    best = max(fitting, key=lambda error: bool(error.remedy), default=errors[0] if errors else None)
+    return Verdict(
+        title=case.title,
+        exit_code=outcome.exit_code,
+        refused=outcome.exit_code in (1, 2) and bool(errors) and not internal and not outcome.new_files,
+        code=best.code if best else "",
+        expected=expected,
+        found=best.line if best else None,
+        right_line=bool(fitting),
+        remedy=bool(best and best.remedy),
+        printed=outcome.printed,
+    )
+
+
+def judge_clean(case: Clean, folder: Path) -> Outcome:
+    """Run one clean program."""
+    return run(prepare_clean(case, folder), folder)
+
+
+def _text(program: str) -> str:
+    return PROGRAMS[program] if program in PROGRAMS else (EXAMPLES / program).read_text(encoding="utf-8")
+
+
+def _findings(printed: str) -> list[Finding]:
+    found = []
+    for text in printed.splitlines():
+        match = _FINDING.match(text)
+        if match is None:
+            continue
+        line = re.search(r":(\d+)$", match["place"] or "")
+        number = int(line[1]) if line and not (match["place"] or "").startswith("cell.toml") else 0
+        found.append(
+            Finding(
+                match["severity"], match["code"] or "-", number, match["message"], (match["remedy"] or "").strip()
+            )
+        )
+    return found
+
+
+def _table(verdicts: list[Verdict], verbose: bool) -> None:
+    head = f"{'no.':>3}  {'mistake':<58} {'exit':>4}  {'code':<22} {'expected':<12} {'found':>5}  remedy  "
+    print(head + "\n" + "-" * (len(head) + 4))
+    for number, verdict in enumerate(verdicts, start=1):
+        expected = "/".join(map(str, verdict.expected))
+        found = "-" if verdict.found is None else str(verdict.found)
+        remedy = "yes" if verdict.remedy else "no"
+        word = "PASS" if verdict.passed else "FAIL"
+        print(
+            f"{number:>3}  {verdict.title:<58} {verdict.exit_code:>4}  {verdict.code:<22} {expected:<12} "
+            f"{found:>5}  {remedy:<6}  {word}"
+        )
+        if verbose or not verdict.passed:
+            for line in verdict.printed.splitlines()[: None if verbose else 6]:
+                print(f"       | {line}")
+
+
+def _clean_table(outcomes: list[tuple[Clean, Outcome]]) -> None:
+    print("\nclean programs")
+    for case, outcome in outcomes:
+        warnings = sum(finding.severity == "warning" for finding in outcome.findings)
+        word = "PASS" if outcome.exit_code == 0 else "FAIL"
+        print(f"     {case.title:<58} exit {outcome.exit_code}, {warnings} warnings  {word}")
+        if word == "FAIL":
+            for line in outcome.printed.splitlines()[:6]:
+                print(f"       | {line}")
+
+
+def totals(verdicts: list[Verdict], outcomes: list[tuple[Clean, Outcome]]) -> dict[str, int]:
+    """Return the figures."""
+    return {
+        "mistakes": len(verdicts),
+        "refused": sum(verdict.refused for verdict in verdicts),
+        "right_line": sum(verdict.refused and verdict.right_line for verdict in verdicts),
+        "remedy": sum(verdict.refused and verdict.remedy for verdict in verdicts),
+        "passed": sum(verdict.passed for verdict in verdicts),
+        "clean": len(outcomes),
+        "clean_refused": sum(outcome.exit_code != 0 for _, outcome in outcomes),
+    }
+
+
+def main() -> None:
+    """Run everything and print the tables, or one JSON object."""
+    parser = argparse.ArgumentParser(description="Seeded mistakes through gcode2krl translate.")
+    parser.add_argument("--json", action="store_true", help="One JSON object on standard output.")
+    parser.add_argument("--verbose", action="store_true", help="Everything that was printed, for each case.")
+    options = parser.parse_args()
+    started = time.perf_counter()
+    verdicts, outcomes = [], []
+    for mistake in MISTAKES:
+        with tempfile.TemporaryDirectory() as folder:
+            verdicts.append(judge(mistake, Path(folder)))
+    for clean in CLEAN:
+        with tempfile.TemporaryDirectory() as folder:
+            outcomes.append((clean, judge_clean(clean, Path(folder))))
+    figures = totals(verdicts, outcomes)
+    if options.json:
+        result = {
+            "mistakes": [{**asdict(verdict), "passed": verdict.passed} for verdict in verdicts],
+            "clean": [{"title": case.title, "exit_code": outcome.exit_code} for case, outcome in outcomes],
+            "later": list(LATER),
+            "totals": figures,
+        }
+        json.dump(result, sys.stdout, indent=2)
+        print()
+        return
+    _table(verdicts, options.verbose)
+    _clean_table(outcomes)
+    print("\nlater, needs material (not looked at here): " + "; ".join(LATER))
+    count = figures["mistakes"]
+    print(f"\nrefused            {figures['refused']} of {count}")
+    print(f"with right line    {figures['right_line']} of {count}")
+    print(f"with remedy        {figures['remedy']} of {count}")
+    print(f"all three          {figures['passed']} of {count}")
+    print(f"clean refused      {figures['clean_refused']} of {figures['clean']}")
+    print(f"time               {time.perf_counter() - started:.1f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""Run the commands named in the README's ``<!-- output: … -->`` comments and put their output below them.
+
+    python docs/update_readme.py
+
+A comment may end in ``| lines A-B`` to keep part of the output. Commands run in the checkout; files they
+write go to a temporary folder where the command says ``{tmp}``, which the README shows without it.
+"""
+
+import re
+import shlex
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BLOCK = re.compile(r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```", re.M | re.S)
+
+
+def output_of(command: str, folder: str) -> str:
+    words = shlex.split(command.replace("{tmp}", Path(folder).as_posix()))
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    return (done.stderr + done.stdout).replace(f"{Path(folder).as_posix()}/", "")
+
+
+def main() -> None:
+    readme = ROOT / "README.md"
+    with tempfile.TemporaryDirectory() as folder:
+
+        def replaced(match: re.Match[str]) -> str:
+            lines = output_of(match["command"], folder).splitlines()
+            if match["first"]:
+                lines = lines[int(match["first"]) - 1 : int(match["last"])]
+            return match[1] + "```text\n" + "\n".join(line.rstrip() for line in lines) + "\n```"
+
+        text = BLOCK.sub(replaced, readme.read_text(encoding="utf-8"))
+    readme.write_text(text, encoding="utf-8", newline="\n")
+
+
+if __name__ == "__main__":
+    main()

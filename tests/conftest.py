@@ -1,0 +1,41 @@
+"""What all tests share: the checkout's folders and a way to run the command line in-process."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from gcode2krl import load_cell
+from gcode2krl.cli.main import _run
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = sorted((ROOT / "examples").glob("*.nc"))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of the command line left."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capfd, tmp_path, monkeypatch):
+    """Run ``gcode2krl`` with arguments, in an empty folder; returns code, output and findings."""
+    monkeypatch.chdir(tmp_path)
+
+    def run_command(*arguments):
+        capfd.readouterr()
+        code = _run([str(argument) for argument in arguments])
+        out, err = capfd.readouterr()
+        return Outcome(code, out, err)
+
+    return run_command
+
+
+@pytest.fixture(scope="session")
+def cell():
+    """The default cell."""
+    return load_cell()

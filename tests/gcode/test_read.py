@@ -1,0 +1,171 @@
+"""Reading: conventions beyond what LinuxCNC's interpreter prints, memory, tools, events."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl.gcode import read_stream
+from gcode2krl.gcode import read as reading
+
+
+def read(text, cell=None, **options):
+    return read_stream(io.BytesIO(text.encode("latin-1")), "part.nc", cell, **options)
+
+
+def test_row_0_is_the_start_and_axes_not_programmed_stay():
+    toolpath = read("G21 G0 X5\nZ7\nM2\n")
+    np.testing.assert_array_equal(toolpath.position_mm, [[0, 0, 0], [5, 0, 0], [5, 0, 7]])
+    np.testing.assert_array_equal(toolpath.known, [[0, 0, 0], [1, 0, 0], [1, 0, 1]])
+    assert toolpath.feed_mm_s[1] == np.inf
+    np.testing.assert_array_equal(toolpath.axis, [[0, 0, 1]] * 3)
+
+
+def test_incremental_moves_do_not_make_an_axis_known():
+    toolpath = read("G21 G91 G0 X5\nG90 X1\nG91 X1\nM2\n")
+    np.testing.assert_array_equal(toolpath.known[:, 0], [0, 0, 1, 1])
+
+
+def test_machine_moves_make_axes_unknown():
+    toolpath = read("G21 G0 X1 Y2 Z3\nG28 G91 Z0\nG90 G0 X4\nZ5\nM2\n")
+    np.testing.assert_array_equal(toolpath.machine, [0, 0, 1, 1, 0, 0])
+    np.testing.assert_array_equal(toolpath.known[:, 2], [0, 1, 1, 0, 0, 1])
+
+
+def test_a_change_of_length_offset_makes_z_unknown(cell):
+    toolpath = read("G21 T1 M6\nG0 X0 Y0 Z50\nG43 H1\nX10\nG0 Z40\nM2\n", cell)
+    np.testing.assert_array_equal(toolpath.known[:, 2], [0, 1, 0, 1])
+    np.testing.assert_allclose(toolpath.position_mm[:, 2], [0, 50, -50, 40])
+    np.testing.assert_array_equal(np.isnan(toolpath.length_offset_mm), [1, 1, 0, 0])
+
+
+def test_events_stand_at_the_row_where_the_tool_stands():
+    toolpath = read("G21 (MSG, look out)\nT3 M6\nS500 M3 M8\nG0 X1 Y1 Z1\nS700\nM7\nG0 X2\nM0\nM30\n")
+    kinds = [(event.row, event.kind, event.values.get("m")) for event in toolpath.events]
+    assert kinds == [
+        (0, "message", -1), (0, "tool", None), (0, "spindle", 3), (0, "coolant", 8), (1, "spindle", 3),
+        (1, "coolant", 7), (2, "message", 0), (2, "message", 30), (2, "spindle", 5), (2, "coolant", 9),
+    ]  # fmt: skip
+    assert toolpath.events[0].values["text"] == "look out"
+    assert toolpath.events[5].values["flood"]
+    assert toolpath.events[5].values["mist"]
+    np.testing.assert_allclose(toolpath.spindle_rad_s[1:] * 60 / (2 * np.pi), [500, 700])
+
+
+def test_dwells_add_up_at_the_row():
+    toolpath = read("G21 G0 X1 Y1 Z1\nG4 P0.5\nG4 P1\nX2\nM2\n")
+    np.testing.assert_allclose(toolpath.dwell_s, [0, 1.5, 0])
+
+
+def test_path_modes():
+    toolpath = read("G21 G0 X1\nG61 X2\nG64 P0.1 X3\nG20 G64 P0.1 X4\nG64 X5\nM2\n")
+    np.testing.assert_array_equal(toolpath.exact_stop, [0, 0, 1, 0, 0, 0])
+    np.testing.assert_allclose(toolpath.tolerance_mm, [np.nan, np.nan, np.nan, 0.1, 2.54, np.nan])
+
+
+def test_chords_of_an_arc_share_a_number_and_end_exactly():
+    toolpath = read("G21 G0 X10 Y0 Z0\nG3 X-10 I-10 F100\nG1 X0\nG2 X1 Y1 R1\nM2\n")
+    assert set(toolpath.arc.tolist()) == {-1, 0, 1}
+    last = np.flatnonzero(toolpath.arc == 0)[-1]
+    np.testing.assert_array_equal(toolpath.position_mm[last], [-10, 0, 0])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(0.01, 500), st.floats(0, 2 * np.pi), st.floats(0.05, 2 * np.pi - 0.05), st.booleans(),
+    st.sampled_from([0.001, 0.01, 0.1]),
+)  # fmt: skip
+def test_chords_stay_within_the_tolerance(radius, start, sweep, ccw, tolerance):
+    end = start + sweep if ccw else start - sweep
+    x0, y0 = radius * np.cos(start), radius * np.sin(start)
+    x1, y1 = radius * np.cos(end), radius * np.sin(end)
+    code = "G3" if ccw else "G2"
+    text = f"G21 G0 X{x0:.9f} Y{y0:.9f} Z0\n{code} X{x1:.9f} Y{y1:.9f} I{-x0:.9f} J{-y0:.9f} F100\nM2\n"
+    points = read(text, chord_tolerance_mm=tolerance).position_mm[1:, :2]
+    np.testing.assert_allclose(np.hypot(*points.T), radius, atol=1e-6)
+    middle = (points[1:] + points[:-1]) / 2
+    assert (radius - np.hypot(*middle.T)).max() <= tolerance + 1e-7
+    turned = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(sweep, abs=1e-5)
+
+
+def test_long_files_are_read_in_pieces_with_the_same_result(monkeypatch):
+    text = "G21 G0 X0 Y0 Z0\nG1 F500 X1\n" + "".join(f"X{k % 97}.{k % 10} (MSG, {k})\n" for k in range(3000)) + "M2\n"
+    whole = read(text)
+    monkeypatch.setattr(reading, "_PIECE_BYTES", 5000)
+    pieces = read(text)
+    np.testing.assert_array_equal(pieces.position_mm, whole.position_mm)
+    np.testing.assert_array_equal(pieces.source_line, whole.source_line)
+    assert pieces.events == whole.events
+    assert len(whole) == 3003
+
+
+def test_a_large_arc_grows_the_rows():
+    toolpath = read("G21 G0 X0 Y0 Z0\nG3 X0 Y0 I900 P30 F100\nM2\n", chord_tolerance_mm=0.001)
+    assert len(toolpath) > 60_000
+    np.testing.assert_array_equal(toolpath.position_mm[-1], [0, 0, 0])
+
+
+def test_block_delete():
+    text = "G21 G0 X1\n/X2\nX3\nM2\n"
+    np.testing.assert_array_equal(read(text).position_mm[:, 0], [0, 1, 2, 3])
+    np.testing.assert_array_equal(read(text, block_delete=True).position_mm[:, 0], [0, 1, 3])
+
+
+def test_work_offsets_of_the_cell(tmp_path):
+    from gcode2krl import load_cell
+
+    path = tmp_path / "cell.toml"
+    path.write_text("[work_offsets]\nG55 = { x_mm = 100.0, z_mm = -5.0 }\n", encoding="ascii")
+    toolpath = read("G21 G55 G0 X1 Y1 Z1\nG56 X1\nM2\n", load_cell(path))
+    np.testing.assert_allclose(toolpath.position_mm[1:], [[101, 1, -4], [1, 1, -4]])
+    assert [(issue.code, issue.line) for issue in toolpath.issues] == [("work-offset-unknown", 2)]
+
+
+def test_findings_of_a_whole_program():
+    codes = [issue.code for issue in read("G0 X1.2345 Y2 Z3\n").issues]
+    assert codes == ["no-program-end", "unit-doubtful"]
+    assert [issue.code for issue in read("G0 X100\nM2\nG1 X5\n").issues] == ["after-end", "unit-unnamed"]
+    assert [issue.code for issue in read("(part in INCHES)\nG21 G0 X100\nM2\n").issues] == ["unit-doubtful"]
+
+
+def test_all_errors_come_together_with_their_lines():
+    with pytest.raises(Gcode2KrlError) as caught:
+        read("G21\nG77\nG0 X\nG1 X1\nG0 X1 Q5\nM2\n")
+    assert [issue.line for issue in caught.value.issues] == [2, 3, 4, 5]
+    assert all(issue.remedy for issue in caught.value.issues)
+
+
+def test_warnings_never_crowd_out_an_error():
+    with pytest.raises(Gcode2KrlError, match="G77"):
+        read("G21\n" + "G55\nG54\n" * 2000 + "G77\n")
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(alphabet="GXYZFIJRMTSHNPO0123456789.-+ ()%/;#[]=\n\r\tßA", max_size=200))
+def test_any_text_gives_a_table_or_findings(text):
+    try:
+        toolpath = read_stream(io.BytesIO(text.encode("utf-8")), "part.nc")
+    except Gcode2KrlError as error:
+        assert error.issues
+        assert all(issue.message for issue in error.issues)
+    else:
+        assert np.isfinite(toolpath.position_mm).all()
+
+
+def test_a_folder_is_not_a_part(tmp_path):
+    with pytest.raises(Gcode2KrlError, match="cannot read"):
+        read_gcode(tmp_path)
+
+
+def test_a_tool_table_in_mm(tmp_path):
+    table = tmp_path / "tool.tbl"
+    table.write_text("T1 P1 Z12.5 D6 ; mill\n\nT2 P2 Z+20\n", encoding="ascii")
+    toolpath = read("G21 T2 M6\nG43 G0 Z50 X0 Y0\nM2\n", tools=table)
+    np.testing.assert_array_equal(toolpath.length_offset_mm[1:], [20.0])
+    table.write_text("Z1\n", encoding="ascii")
+    with pytest.raises(Gcode2KrlError, match=r"tool\.tbl:1"):
+        read("G21\n", tools=table)
