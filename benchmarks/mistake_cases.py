@@ -77,6 +77,7 @@ M5
 M30
 """
 PROGRAMS = {"base": BASE, "inch": INCH, "no tool": NO_TOOL}
+HOME_END = "G28 G91 Z0.\nG28 X0. Y0.\nG90"
 CELL_HEAD = 'verified = { by = "benchmark", date = "2026-01-15" }\n'
 CELL_TOOLS = "[tool.7]\nlength_mm = 120.0\n[tool.14]\nlength_mm = 90.0\n"
 """The clean cell: the demonstration cell with two tools of different length. A case's text goes between."""
@@ -85,6 +86,11 @@ LIMITS = """\
 [robot.limits]
 q_deg = [[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-122.5, 122.5], [-350, 350]]
 """
+A5_ZERO = (
+    LIMITS.replace("-122.5, 122.5", "-110, 110")
+    + "[home]\nq_deg = [0, -110, 90, 0, 20, 0]\n[frames.base]\ny_mm = -30.0\nz_mm = 1496.8\n"
+)
+"""Forearm level and A1 zero in the middle of line 17; A5 limited by cables, so the elbow stays up."""
 
 KRL = b"&ACCESS RVP\n&REL 1\nDEF PART()\nPTP {X 10,Y 20,Z 30,A 0,B 0,C 0}\nEND\n"
 KRL_DATA = b"DEFDAT PART\nDECL FDAT FPOINT1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE}\nENDDAT\n"
@@ -129,6 +135,11 @@ TOOL_MISTAKES = (
         "tool without a length", r"T30|tool.30", {6: "@N30 T30 M6", 10: "@N70 G43 Z25. H30"},
         cell="[tool.30]\ndiameter_mm = 12\nteeth = 3\n",
     ),
+    Mistake(
+        "tool length in metres, shorter than its flutes", r"length",
+        {6: "@N30 T32 M6", 10: "N70 G43 Z25. H32"}, or_whole=True,
+        cell="[tool.32]\ndiameter_mm = 12\nteeth = 3\nlength_mm = 0.12\nflute_length_mm = 26\n",
+    ),
     Mistake("H of another tool", r"H14", {10: "@N70 G43 Z25. H14"}),
     Mistake("second tool called without M6", r"H14|T14|M6", {21: "@N180 T14", 24: "@"}),
     Mistake("M6 without T", r"T", {6: "@N30 M6"}),
@@ -153,6 +164,10 @@ SPINDLE_MISTAKES = (
     Mistake("S missing", r"[Ss]pindle|\bS\b", {7: "@N40 M3", 12: "@"}),
     Mistake("M3 missing", r"[Ss]pindle|M3", {7: "@N40 S8000", 12: "@"}),
     Mistake("M3 missing after the tool change", r"[Ss]pindle|M3", {22: "@N190 S10000", 26: "@"}),
+    Mistake(
+        "spindle not started again after M6 stopped it", r"[Ss]pindle|M3",
+        {20: None, 21: "@", 22: "N190 M8", 26: "@"},
+    ),
     Mistake("M5 before the last cut", r"[Ss]pindle", {17: "@N135 M5\n@N140 G1 Y-10."}),
     Mistake("S0 M3", r"[Ss]pindle|S0", {7: "@N40 S0 M3", 12: "@"}),
     Mistake("M4 with a right-hand mill", r"M4|[Ss]pindle", {7: "@N40 S8000 M4", 12: "@"}),
@@ -302,6 +317,10 @@ FILE_MISTAKES = (
         "file cut off inside a number", r"(?i)end|M30|M2|cut off|truncated",
         {27: "@"}, cut_after="N240 X1", or_whole=True,
     ),
+    Mistake(
+        "file cut off at the end of a line", r"(?i)end|M30|M2|cut off|truncated",
+        {28: "@"}, cut_after="N250 Y60.\n", or_whole=True,
+    ),
     Mistake("empty file", r"(?i)empty|motion|move", data=b""),
     Mistake("header without any move", r"(?i)motion|move", data=b"%\nG21 G90 G17\nG54\nT7 M6\nM30\n%\n"),
     Mistake(
@@ -319,8 +338,9 @@ FILE_MISTAKES = (
 )  # fmt: skip
 
 ROBOT_MISTAKES = (
-    Mistake("X far out of reach", r"reach", {15: "@N120 G1 X2110."}),
-    Mistake("Z far below reach", r"reach", {26: "@N230 G1 Z-1950. F400."}),
+    Mistake("X far out of reach", r"reach", {27: "@N240 X2110. F900."}),
+    Mistake("stray digit in X, an arc follows", r"reach|radius", {15: "@N120 G1 X2110.", 16: "@"}),
+    Mistake("Z far below reach", r"reach", {26: "@N230 G1 Z-2500. F400."}),
     Mistake(
         "A1 beyond a limit set for the cables", r"A1",
         {13: "@"}, cell=LIMITS.replace("-185, 185", "-3, 3"),
@@ -335,7 +355,7 @@ ROBOT_MISTAKES = (
     ),
     Mistake(
         "A5 through zero in the cut", r"(?i)singular",
-        {17: "@"}, cell="[frames.base]\ny_mm = -30.0\nz_mm = 1496.8\n",
+        {17: "@"}, cell=A5_ZERO,
     ),
     Mistake(
         "base in metres", r"reach|A\d",
@@ -346,6 +366,15 @@ ROBOT_MISTAKES = (
         {9: "@", 10: "@"}, cell="[work_offsets.G54]\nz_mm = 150000.0\n", or_whole=True,
     ),
     Mistake("HOME beyond a joint limit", r"HOME", cell="[home]\nq_deg = [0, -150, 90, 0, 0, 0]\n"),
+    Mistake("HOME in radians", r"HOME", cell="[home]\nq_deg = [0, -1.571, 1.571, 0, 0, 0]\n"),
+    Mistake(
+        "HOME with the tip below the clearance plane", r"HOME|clearance",
+        cell="[frames.base]\nz_mm = 1480.0\n",
+    ),
+    Mistake(
+        "clearance plane out of reach", r"reach|clearance",
+        {9: "@", 10: "@"}, cell="[clearance]\nz_mm = 5000.0\n", or_whole=True,
+    ),
     Mistake("robot without known joint limits", r"limits", cell='[robot]\nmodel = "KR 120 R2500 pro"\n'),
 )  # fmt: skip
 
@@ -371,6 +400,7 @@ CELL_MISTAKES = (
         "KRL template of M3 names nothing", r"(?i)template|spindel|M3",
         {7: "@"}, cell='[m_code]\nM3 = "$OUT[{{ spindel.run_cw_output }}]=TRUE"\n', or_whole=True,
     ),
+    Mistake("load above what the robot carries", r"(?i)load|mass_kg", cell="[load]\nmass_kg = 450\n"),
     Mistake("negative load", r"mass_kg", cell="[load]\nmass_kg = -120\n"),
 )  # fmt: skip
 
@@ -392,11 +422,12 @@ CLEAN = (
     Clean("byte-order mark, no line end at the end", form="mark"),
     Clean("no T, no M6, no G43: the mounted tool", "no tool"),
     Clean("inch program with G20", "inch"),
-    Clean("G28 in header and footer", change={5: "G28 G91 Z0.\nG90\nG54", 30: "M5\nG28 G91 Z0.\nG28 X0. Y0.\nG90"}),
+    Clean("G28 in header and footer", change={5: "G28 G91 Z0.\nG90\nG54", 30: f"M5\n{HOME_END}"}),
     Clean("G53 G0 Z0 before the tool change", change={20: "M5\nG53 G0 Z0."}),
-    Clean("work offset G55 of the cell", change={5: "G55"}, cell="[work_offsets.G55]\nx_mm = 50.0\nz_mm = 30.0\n"),
+    Clean("work offset G55 of the cell", change={5: "G55"}, cell="[work_offsets.G55]\nz_mm = 30.0\n"),
     Clean("comments with ; and remarks after the end", change={8: "M8 ; coolant", 32: "%\nend of file"}),
     Clean("next tool preselected with T alone", change={7: "S8000 M3\nT14", 21: "M6"}),
+    Clean("typed by hand, neither M30 nor %", "no tool", change={10: None}),
     Clean("G43 without H", change={10: "G43 Z25."}),
     Clean("dwell after the spindle start, G64 tolerance", change={8: "M8\nG4 P2.\nG64 P0.02"}),
     Clean("G41 named only in a comment", change={3: "(NO G41, NO G81, NO #100, UNITS MM)"}),

@@ -100,7 +100,7 @@ def prepare_clean(case: Clean, folder: Path) -> list[str]:
     forms = {
         "crlf": lambda: text.replace("\n", "\r\n"),
         "lower": text.lower,
-        "tight": lambda: "\n".join(line if "(" in line else line.replace(" ", "") for line in text.split("\n")),
+        "tight": lambda: re.sub(r"^[^(\n]+$", lambda line: line[0].replace(" ", ""), text, flags=re.M),
         "mark": lambda: "\ufeff" + text.rstrip("\n"),
         "": lambda: text,
     }
@@ -165,11 +165,8 @@ def _findings(printed: str) -> list[Finding]:
             continue
         line = re.search(r":(\d+)$", match["place"] or "")
         number = int(line[1]) if line and not (match["place"] or "").startswith("cell.toml") else 0
-        found.append(
-            Finding(
-                match["severity"], match["code"] or "-", number, match["message"], (match["remedy"] or "").strip()
-            )
-        )
+        remedy = (match["remedy"] or "").strip()
+        found.append(Finding(match["severity"], match["code"] or "-", number, match["message"], remedy))
     return found
 
 

@@ -169,6 +169,14 @@ class Tool(Provenance):
     def _consistent(self) -> Self:
         if self.corner_radius_mm > self.diameter_mm / 2 + 1e-9:
             raise ValueError("corner_radius_mm is larger than half the diameter")
+        if (
+            self.length_mm is not None
+            and self.flute_length_mm is not None
+            and self.length_mm < self.flute_length_mm
+        ):
+            raise ValueError(
+                f"length_mm {self.length_mm:g} is shorter than the flutes, {self.flute_length_mm:g} mm"
+            )
         if self.tool_data is not None and self.axis is None:
             raise ValueError('axis is required with tool_data: "+x", "-x", "+y", "-y", "+z" or "-z"')
         if self.axis not in (None, "+z") and self.frame is None:
@@ -408,23 +416,20 @@ def _fill_in(section: Any, kind: str, beside: Path | None) -> Any:
 
 
 def _validation_issues(error: ValidationError) -> Iterator[Issue]:
+    """Turn pydantic's findings into lines that name the key, what was found and what is allowed."""
+    not_keys = ("literal[", "constrained-", "function-", "float", "int", "tuple")
     for detail in error.errors(include_url=False):
-        steps = [
-            str(step)
-            for step in detail["loc"]
-            if not str(step).startswith(("literal[", "constrained-", "function-", "float", "tuple"))
-        ]
-        found = "nothing" if detail["type"] == "missing" else _brief(detail["input"])
-        allowed = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-        if detail["type"] == "extra_forbidden":
-            allowed = "no such key"
-        yield Issue(
-            "error",
-            "cell-key",
-            0,
-            f"{'.'.join(steps)}: found {found}, allowed: {allowed}",
-            "`gcode2krl models schema` lists the keys",
-        )
+        key = ".".join(str(step) for step in detail["loc"] if not str(step).startswith(not_keys))
+        message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        if detail["type"] == "missing":
+            text = f"{key}: missing"
+        elif detail["type"] == "extra_forbidden":
+            text = f"{key}: there is no such key"
+        elif detail["type"] == "value_error":
+            text = f"{key}: {message}"
+        else:
+            text = f"{key}: found {_brief(detail['input'])}, allowed: {message}"
+        yield Issue("error", "cell-key", 0, text, "docs/cell.md and `gcode2krl models schema` list the keys")
 
 
 def _brief(value: Any) -> str:

@@ -1,5 +1,6 @@
 """The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
 
+import difflib
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,13 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
     by_folded_name = {_fold(name): file for name, file in known.items()}
     file = by_folded_name.get(_fold(model))
     if file is None:
-        raise input_error("model-unknown", f"{kind[:-1]}.model: found {model!r}, allowed: {', '.join(known)}")
+        near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
+        remedy = (
+            f"did you mean {read_toml(by_folded_name[near[0]])['model']!r}?" if near else "see the library"
+        )
+        raise input_error(
+            "model-unknown", f"{kind[:-1]}.model: found {model!r}, allowed: {', '.join(known)}", remedy
+        )
     return read_toml(file)
 
 

@@ -22,8 +22,8 @@ class Event(NamedTuple):
 
     ``kind`` is ``tool`` (values: ``tool``), ``spindle`` (``rpm``, signed, 0 = off), ``coolant`` (``mist``,
     ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have
-    ``m``, the M number (-1 for a mere text), and every event has ``line``; ``by_end`` marks what the
-    program's end does without a word of its own.
+    ``m``, the M number (-1 for a mere text), and every event has ``line``; ``implied`` marks what a tool
+    change or the program's end does without a word of its own.
     """
 
     row: int
@@ -95,6 +95,8 @@ class Toolpath(Table):
     positions a robot may be sent to."""
     length_offset_mm: Floats = _column(np.float64)
     """(n,) tool length offset in force (G43), NaN = none (G49)."""
+    length_offset_tool: Ints = _column(np.int32)
+    """(n,) the tool whose length that is (H), -1 = none."""
     events: tuple[Event, ...] = ()
     source: str = ""
 

@@ -53,7 +53,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
         ("[controller]\nadvance = 7", ("controller.advance", "7")),
         ("[frames]\nbase = { x_m = 1 }", ("frames.base.x_m", "no such key")),
         ("[robot]\nmodel = 'KR 9000'", ("robot.model", "KR 9000", "KR 300 R2500 ultra")),
-        ("[tool.30]\nteeth = 3", ("tool.30.diameter_mm", "nothing")),
+        ("[tool.30]\nteeth = 3", ("tool.30.diameter_mm", "missing")),
         ("[tool.1]\ndiameter_mm = -4", ("tool.1.diameter_mm", "-4", "greater than 0")),
         ("[tool.1]\ntool_data = 3", ("tool.1", "axis is required")),
         ("[tool.1]\ncorner_radius_mm = 9", ("tool.1", "half the diameter")),

@@ -29,3 +29,12 @@ def test_titles_are_distinct():
     titles = [case.title for case in (*mistakes.MISTAKES, *mistakes.CLEAN)]
     assert len(titles) == len(set(titles))
     assert len(mistakes.MISTAKES) >= 50
+
+
+def test_no_tool_change_by_hand_while_the_spindle_turns(tmp_path):
+    case = mistakes.Clean("M5 missing before the second M6", change={20: "G4 P0.5"})
+    outcome = mistakes.judge_clean(case, tmp_path)
+    if outcome.exit_code == 0:
+        program = (tmp_path / "out.src").read_text(encoding="utf-8")
+        before_change = program[: program.index("change to tool 14 by hand")]
+        assert before_change.rindex("$OUT[1]=TRUE") < before_change.rfind("$OUT[1]=FALSE")

@@ -233,7 +233,7 @@ FINDINGS: dict[int, Finding] = {
         "warning",
         "h-differs",
         "H{a:.0f} while tool {b:.0f} is in the spindle",
-        "use the H of the tool, or G43 without H",
+        "use the H of the tool, or G43 without H; if the tool is wrong, M6 may be missing",
     ),
     OFFSET_UNKNOWN: Finding(
         "warning",
@@ -258,34 +258,35 @@ FINDINGS: dict[int, Finding] = {
     ),
 }
 
-_LATER = "comes with the full language"
+_LATER = "not read yet"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     50: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
     70: ("lathe diameter mode", "this is a milling translator"),
     80: ("lathe radius mode", "this is a milling translator"),
-    100: (f"setting offsets in the program {_LATER}", "put the offsets into [work_offsets] of the cell"),
+    100: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     330: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     380: ("probing is not a motion this program can make", "probe on the controller"),
     410: (
-        f"cutter radius compensation {_LATER}",
+        f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
-    430: (f"dynamic tool offsets {_LATER}", "use G43 H"),
-    520: (f"local offsets {_LATER}", "let the post write final coordinates"),
+    430: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
+    520: (f"local offsets: {_LATER}", "let the post write final coordinates"),
     700: ("lathe cycle", "this is a milling translator"),
-    730: (f"drilling cycles {_LATER}", "let the post write the cycle out in G0 and G1"),
+    730: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
     760: ("threading cycle of a lathe", "mill the thread"),
-    920: (f"coordinate shifts in the program {_LATER}", "put the offset into [work_offsets] of the cell"),
+    810: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
+    920: (f"coordinate shifts in the program: {_LATER}", "put the offset into [work_offsets] of the cell"),
     960: ("constant surface speed is for lathes", "program S in rpm"),
-    970: (f"spindle speed mode words {_LATER}", "remove G97; S is always in rpm"),
+    970: (f"spindle speed mode words: {_LATER}", "remove G97; S is always in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
     190: ("spindle orientation is not mapped", "map it in [m_code] of the cell once it is read"),
     480: ("override switches have no meaning here", "remove it"),
     600: ("pallet change has no meaning here", "use M0"),
-    620: (f"digital and analogue I/O words {_LATER}", "map an own M-code in [m_code] of the cell"),
-    700: (f"saving modal state {_LATER}", "remove it"),
-    980: (f"subprograms {_LATER}", "let the post write the program out"),
+    620: (f"digital and analogue I/O words: {_LATER}", "map an own M-code in [m_code] of the cell"),
+    700: (f"saving modal state: {_LATER}", "remove it"),
+    980: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
 

@@ -26,6 +26,7 @@ from gcode2krl.gcode.state import (
     EVENT_TOOL,
     GROUP_OF_G,
     GROUPS,
+    IMPLIED_M5,
     UNKNOWN_GROUP,
     UNSUPPORTED_GROUP,
 )
@@ -40,6 +41,7 @@ ROW = np.dtype(
         ("tolerance", "f8"),
         ("dwell", "f8"),
         ("length_offset", "f8"),
+        ("offset_tool", "i4"),
         ("tool", "i4"),
         ("line", "i4"),
         ("arc", "i4"),
@@ -65,7 +67,7 @@ _OTHER_AXES = tuple(ord(c) - 65 for c in "ABCUVWE")
 def run(words, start, state, rows, counts, events, found, options, offsets, offset_known, tool_length):
     """Execute blocks from word ``start`` on; return the word at which to go on.
 
-    ``words`` = (letter, value, extra, line); ``counts`` (5,) = rows, events, findings, marks used so far, findings dropped;
+    ``words`` = letter, value, extra, line; ``counts`` (5,) = rows, events, findings, marks, dropped findings;
     ``options`` (2,) = chord tolerance in mm, block delete. Stops early where a buffer is nearly full.
     """
     letter, line = words[0], words[3]
@@ -266,6 +268,7 @@ def _emit(s, rows, counts, line, feed, rapid, machine, arc):
     row.tolerance = s.tolerance
     row.dwell = 0.0
     row.length_offset = s.length_offset
+    row.offset_tool = s.offset_tool
     row.tool = s.tool
     row.line = line
     row.arc = arc
@@ -327,6 +330,9 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
             if s.selected_tool < 0:
                 _report(found, counts, f.TOOL_NOT_SELECTED, line, 0.0, 0.0)
                 return False
+            if s.direction != 0:  # a tool change stops the spindle, with or without M5
+                s.direction = 0
+                _event(s, events, counts, EVENT_SPINDLE, line, 0.0, IMPLIED_M5)
             s.tool = s.selected_tool
             _event(s, events, counts, EVENT_TOOL, line, s.tool, 0.0)
             if s.tool > 0 and math.isnan(_length_of(s.tool, tool_length)):
@@ -370,8 +376,10 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
                 _report(found, counts, f.TOOL_UNDECLARED, line, tool, 0.0)
             length = 0.0
         _set_length_offset(s, length)
+        s.offset_tool = tool
     elif g[8] == 490:
         _set_length_offset(s, np.nan)
+        s.offset_tool = -1
     if g[10] >= 0:
         code = g[10]
         s.work_offset = (code - 540) // 10 if code <= 590 else code - 585
@@ -466,8 +474,13 @@ def _block(
         else:
             for index in (_I, _J, _K, _R, _P):
                 used[index] = True
+            if not (s.known_x and s.known_y and s.known_z) and s.unknown_feed_line == 0:
+                s.unknown_feed_line = line
+            end = _target(s, offsets, has, word)
             if not _arc(line, s, rows, counts, found, options, offsets, has, word, motion):
                 return False
+            s.x, s.y, s.z = end  # also after a wrong arc, so that one mistake is one finding
+            _learn(s, has)
         s.largest_mm = max(s.largest_mm, abs(s.x), abs(s.y), abs(s.z))
         if abs(s.x) > _FAR_MM or abs(s.y) > _FAR_MM or abs(s.z) > _FAR_MM:
             _report(found, counts, f.TOO_FAR, line, max(abs(s.x), abs(s.y), abs(s.z)), 0.0)
@@ -539,6 +552,8 @@ def _straight(line, s, rows, counts, found, offsets, has, word, motion, machine)
         x, y, z = _target(s, offsets, has, word)
     speed = np.inf
     if motion == 1:
+        if not (s.known_x and s.known_y and s.known_z) and s.unknown_feed_line == 0:
+            s.unknown_feed_line = line
         length = math.sqrt((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2)
         finding, speed = _feed_speed(s, has, word, length)
         if finding != f.OK:

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, Severity, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode.findings import make_issue
 from gcode2krl.gcode.state import (
@@ -16,6 +16,7 @@ from gcode2krl.gcode.state import (
     EVENT_M,
     EVENT_SPINDLE,
     EVENT_TOOL,
+    IMPLIED_M5,
     WORK_OFFSETS,
     initial_state,
 )
@@ -202,6 +203,7 @@ class _Interpreter:
     def _start_row(self) -> None:
         row = self.buffers.rows[0]
         row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
+        row["offset_tool"] = -1
         row["rapid"], row["line"] = 1, 0
         self.counts[0] = 1
 
@@ -249,24 +251,32 @@ class _Interpreter:
             for r in self.found[: self.counts[2]]
         ]
         errors = [issue for issue in found if issue.severity == "error"]
+        severity: Severity = "error" if errors else "warning"
         unseen = int(self.counts[4])
+        unknown = int(self.state["unknown_feed_line"][0])
+        if unknown and any(i.code == "arc-radius-mismatch" and i.line > unknown for i in errors):
+            sentence = "feed move from a position that has not been programmed; arcs after it cannot fit"
+            errors.insert(
+                0, Issue("error", "undefined-position", unknown, sentence, "program X, Y and Z with G0 first")
+            )
+        more = [Issue(severity, "more", 0, f"{unseen} more findings", "mend these first")] if unseen else []
         if errors:
-            if unseen > 0:
-                errors.append(Issue("error", "more", 0, f"{unseen} more findings"))
-            raise NotUnderstoodError(errors, self.name)
+            raise NotUnderstoodError([*errors, *more], self.name)
+        found += more
         issues = [*found, *self._whole_program_issues(head)]
         return self._toolpath(tuple(issues))
 
     def _whole_program_issues(self, head: bytes) -> Iterator[Issue]:
         state = self.state[0]
         if not state["ended"]:
-            yield Issue(
-                "warning",
-                "no-program-end",
-                0,
-                "the program ends without M2, M30 or %",
-                "is the file complete?",
+            cut_off = state["tape_marks"] == 1
+            code = "cut-off" if cut_off else "no-program-end"
+            what = (
+                "the file begins with % and ends without %, M2 or M30"
+                if cut_off
+                else "no M2, M30 or % at the end"
             )
+            yield Issue("warning", code, 0, what, "is the file complete?")
         if self.rest_line:
             yield Issue(
                 "warning",
@@ -316,6 +326,7 @@ class _Interpreter:
             machine=rows["machine"].astype(np.bool_),
             known=np.stack([rows["known_x"], rows["known_y"], rows["known_z"]], axis=1).astype(np.bool_),
             length_offset_mm=rows["length_offset"].copy(),
+            length_offset_tool=rows["offset_tool"].copy(),
             events=(*self._events(), *self._stopped_by_end()),
             issues=issues,
             source=self.name,
@@ -326,9 +337,11 @@ class _Interpreter:
         state, row = self.state[0], int(self.counts[0]) - 1
         line = int(state["end_line"])
         if state["direction"]:
-            yield Event(row, "spindle", {"rpm": 0.0, "m": 5, "line": line, "by_end": True})
+            yield Event(row, "spindle", {"rpm": 0.0, "m": 5, "line": line, "implied": True})
         if state["mist"] or state["flood"]:
-            yield Event(row, "coolant", {"mist": False, "flood": False, "m": 9, "line": line, "by_end": True})
+            yield Event(
+                row, "coolant", {"mist": False, "flood": False, "m": 9, "line": line, "implied": True}
+            )
 
     def _events(self) -> Iterator[Event]:
         for event in self.buffers.events[: self.counts[1]]:
@@ -342,7 +355,8 @@ class _Interpreter:
             if kind == EVENT_TOOL:
                 yield Event(row, "tool", {"tool": int(a), "line": line})
             elif kind == EVENT_SPINDLE:
-                yield Event(row, "spindle", {"rpm": a, "m": int(b), "line": line})
+                spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
+                yield Event(row, "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle)
             elif kind == EVENT_COOLANT:
                 yield Event(
                     row,

@@ -30,13 +30,13 @@ STATE = np.dtype(
         ("tool", "i4"),
         ("selected_tool", "i4"),  # -1 = none yet
         ("length_offset", "f8"),  # NaN = G49
+        ("offset_tool", "i4"),  # whose length it is, -1 = G49
         ("exact_stop", "i1"),
         ("tolerance", "f8"),  # NaN = none
         ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
         ("home_28", "f8", 3),  # machine coordinates, mm
         ("home_30", "f8", 3),
         ("arcs", "i4"),
-        ("dwell_open", "i1"),
         ("mist", "i1"),
         ("flood", "i1"),
         ("ended", "i1"),
@@ -45,6 +45,7 @@ STATE = np.dtype(
         ("unit_named", "i1"),
         ("blocks", "i8"),
         ("largest_mm", "f8"),
+        ("unknown_feed_line", "i4"),  # first feed move from a position not programmed
     ]
 )
 
@@ -59,6 +60,7 @@ def initial_state() -> NDArray[np.void]:
     state["feed_mode"] = 94
     state["selected_tool"] = -1
     state["length_offset"] = np.nan
+    state["offset_tool"] = -1
     state["tolerance"] = np.nan
     return state
 
@@ -99,5 +101,6 @@ GROUP_OF_G = _group_table()
 """Modal group of a G-code given as ten times its number, (1000,)."""
 GROUPS = 12
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-EVENT_KINDS = ("tool", "spindle", "coolant", "message", "m", "message_text")
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
+IMPLIED_M5 = -5
+"""M number of a spindle stop that a tool change brings about."""

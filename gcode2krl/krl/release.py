@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from gcode2krl.errors import Issue, RefusedError, input_error
 
-STRICTER_HERE = frozenset({"h-differs", "tool-undeclared", "work-offset-unknown", "unit-doubtful"})
+STRICTER_HERE = frozenset({"h-differs", "work-offset-unknown", "unit-doubtful", "cut-off"})
 """Warnings of reading and predicting that are errors in a program for a robot."""
 NEVER_RELEASED = frozenset(
     {

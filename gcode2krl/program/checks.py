@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Event, Toolpath
-from gcode2krl.units import MM_PER_M, RAD_PER_REV, S_PER_MIN
+from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 _MOST_PER_CHECK = 20
 
@@ -35,8 +35,8 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]
     known = toolpath.is_position()
     from_known = np.concatenate([[False], known[:-1]])
     for row in _stretches(feed & ~(known & from_known)):
-        start = toolpath.known[row - 1]
-        missing = ", ".join(name for name, is_known in zip("XYZ", start, strict=True) if not is_known)
+        both = toolpath.known[row - 1] & toolpath.known[row]
+        missing = ", ".join(name for name, is_known in zip("XYZ", both, strict=True) if not is_known)
         yield Issue(
             "error", "undefined-position", int(toolpath.source_line[row]),
             f"feed move from a position whose {missing} has not been programmed",
@@ -82,17 +82,24 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
             "feed move with the spindle turning left (M4)",
             "the tools of the cell cut with M3",
         )
-    rpm = np.abs(speed) * S_PER_MIN / RAD_PER_REV
-    most = np.full(len(toolpath), cell.spindle.max_rpm)
-    for number, tool in cell.tool.items():
-        if tool.max_rpm is not None:
-            most[toolpath.tool == number] = min(tool.max_rpm, cell.spindle.max_rpm)
-    for row in _stretches(rpm > most * (1 + 1e-9)):
+    for event in toolpath.events:
+        if event.kind == "spindle":
+            yield from _spindle_speed(event, toolpath, cell)
+
+
+def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    tool = cell.tool.get(int(toolpath.tool[min(event.row + 1, len(toolpath) - 1)]))
+    most = cell.spindle.max_rpm
+    if tool is not None and tool.max_rpm is not None:
+        most = min(most, tool.max_rpm)
+    rpm = abs(event.values["rpm"])
+    if rpm > most * (1 + 1e-9):
+        sentence = f"S{rpm:.0f} is above the {most:.0f} rpm that spindle and tool allow"
         yield Issue(
             "error",
             "spindle-speed",
-            int(toolpath.source_line[row]),
-            f"S{rpm[row]:.0f} is above the {most[row]:.0f} rpm that spindle and tool allow",
+            int(event.values["line"]),
+            sentence,
             "lower S, or correct max_rpm in the cell",
         )
 
@@ -116,17 +123,18 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator
 
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
-    missing = feed & np.isnan(toolpath.length_offset_mm)
-    for number in np.unique(toolpath.tool[missing]):
-        tool = cell.tool.get(int(number))
-        if number == 0 or tool is None or not tool.length_mm:
+    other = feed & (toolpath.tool > 0) & (toolpath.length_offset_tool != toolpath.tool)
+    for row in _stretches(other):
+        number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
+        tool = cell.tool.get(number)
+        if tool is None or (offset < 0 and not tool.length_mm):
             continue
-        row = int(np.flatnonzero(missing & (toolpath.tool == number))[0])
+        having = "without G43" if offset < 0 else f"with the length of tool {offset} (G43 H{offset})"
         yield Issue(
             "error",
             "g43-missing",
             int(toolpath.source_line[row]),
-            f"tool {number} cuts without G43: Z would be read from the spindle nose or from another tool",
+            f"tool {number} cuts {having}: Z would be that of another tool or of the spindle nose",
             f"add G43 H{number} after the tool change",
         )
 
@@ -185,7 +193,9 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[
 def _no_tool(cell: Cell, line: int, emptied: bool) -> Iterator[Issue]:
     mounted = cell.mounted_tool
     if emptied:
-        yield Issue("error", "tool-missing", line, "moves with an empty spindle (T0 M6)", "change to a tool first")
+        yield Issue(
+            "error", "tool-missing", line, "moves with an empty spindle (T0 M6)", "change to a tool first"
+        )
     elif mounted is None or mounted not in cell.tool:
         yield Issue(
             "error",
@@ -213,7 +223,9 @@ def _events(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
                 "m-code-unmapped",
                 int(event.values["line"]),
                 f"{code} has no KRL in the cell",
-                f'add {code} = "…" to [m_code] of the cell',
+                "give tool_change in the cell"
+                if code == "M6"
+                else f'add {code} = "…" to [m_code] of the cell',
             )
 
 

@@ -152,11 +152,12 @@ class _Plan:
         position = self.toolpath.position_mm[rows]
         self.axis = self.toolpath.axis[start]
         above = self._above(position[0])
-        if self.place == "home":
-            self._add(above, -1, _PTP)
-        elif self.place == "clearance" and not np.array_equal(above, self.here):
-            self._add(above, -1)
         moves = np.arange(start, end, dtype=np.int32)
+        direct = np.array_equal(above, position[0])  # the first position lies on the plane or above it
+        if self.place == "home":
+            self._add(above, start if direct else -1, _PTP)
+        elif self.place == "clearance" and not direct and not np.array_equal(above, self.here):
+            self._add(above, -1)
         self.columns.append(position, self.toolpath.axis[rows], moves, self.tool, _LIN)
         self.here, self.axis, self.place = position[-1], self.toolpath.axis[end - 1], "path"
 
@@ -237,12 +238,19 @@ class _Plan:
             ),
             wait_s=wait,
             move=move,
-            source_line=np.where(move >= 0, toolpath.source_line[move], 0),
+            source_line=self._source_lines(move, kind),
             tool=tool,
             events=events,
             issues=(*toolpath.issues, *check_toolpath(toolpath, self.cell), *self._notes()),
             source=toolpath.source,
         )
+
+    def _source_lines(self, move: NDArray[np.int32], kind: NDArray[np.int8]) -> NDArray[np.int32]:
+        """Return the G-code line of each target; what is added has that of the move it leads to."""
+        own = np.flatnonzero(move >= 0)
+        after = own[np.minimum(np.searchsorted(own, np.arange(len(move))), len(own) - 1)]
+        line: NDArray[np.int32] = np.where(kind == _HOME, 0, self.toolpath.source_line[move[after]])
+        return np.where(move >= 0, self.toolpath.source_line[move], line)
 
     def _axes(self) -> Floats:
         if self.toolpath.axis.strides[0] == 0:
@@ -266,13 +274,17 @@ class _Plan:
         for index, event in enumerate(self.toolpath.events):
             if index in self.tool_events:
                 target = int(kept_index[self.tool_events[index]])
-            elif event.values.get("by_end"):
-                target = int(kept_index[-1])  # at HOME, not while the mill is still in the work
+            elif event.values.get("implied"):  # above the work, not while the mill is still in it
+                target = int(kept_index[self._next_tool_change(index)])
             else:
                 target = stand.at(event.row)
             earliest = max(earliest, target)
             placed.append(Event(earliest, event.kind, event.values))
         return tuple(placed)
+
+    def _next_tool_change(self, index: int) -> int:
+        """Return the (unthinned) target of the tool change after an event, else the last, HOME."""
+        return next((at for k, at in sorted(self.tool_events.items()) if k > index), self.columns.count - 1)
 
     def _exact_stops(
         self,

@@ -16,7 +16,7 @@ from gcode2krl.errors import Issue
 from gcode2krl.robot.inverse_kinematics import one_branch
 from gcode2krl.robot.jacobian import smallest_singular_value
 from gcode2krl.robot.kinematics import status_turn
-from gcode2krl.robot.poses import flange_frames
+from gcode2krl.robot.poses import flange_frames, forward
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, RAD_PER_REV
 
@@ -32,6 +32,8 @@ _TRIAL_SAMPLES = 2000
 _MOST_PER_CHECK = 20
 _TURN_OR_MOVE = 'turn the tool about its axis ([frames] spin = "auto" or an angle), or move the part'
 _ANGLE_GRID_RAD = 1e-9
+_PTP_SAMPLES = 50
+_PTP_TOLERANCE_MM = 0.01
 
 
 @dataclass(frozen=True)
@@ -188,7 +190,13 @@ def _cost(q: Floats, cell: Cell) -> tuple[float, float]:
     start = np.abs(q[0] - cell.home_q_rad()).sum()
     wrist = np.nanmin(np.abs(np.sin(q[:, 4]))) if not np.isnan(q).all() else 0.0
     poor = max(0.0, np.sin(WRIST_ZONE_RAD) - wrist) / np.sin(WRIST_ZONE_RAD)
-    return float(bad.mean()), float(np.nan_to_num(start, nan=1e3) + 10.0 * poor)
+    other_arm = _arm_bits(q[:1], cell) != _arm_bits(cell.home_q_rad()[None, :], cell)
+    return float(bad.mean()), float(np.nan_to_num(start, nan=1e3) + 10.0 * poor + 20.0 * other_arm)
+
+
+def _arm_bits(q: Floats, cell: Cell) -> int:
+    """Return the bits of S that say how the arm stands (the wrist's bit left out)."""
+    return int(status_turn(np.nan_to_num(q), cell.robot.geometry.array())[0][0]) & 3
 
 
 def joint_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> tuple[Issue, ...]:
@@ -243,6 +251,18 @@ def joint_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> tuple
                 )
             )
     findings += _speed_findings(line, q, source_line, cell)
+    findings += _ptp_findings(line, q, targets, cell)
+    mass, rated = cell.load.mass_kg, cell.robot.payload.mass_kg
+    if rated is not None and mass > rated:
+        findings.append(
+            Issue(
+                "error",
+                "overload",
+                0,
+                f"the load of {mass:g} kg is above the rated {rated:g} kg",
+                "correct [load]",
+            )
+        )
     return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * _MOST_PER_CHECK])
 
 
@@ -296,6 +316,35 @@ def _speed_findings(line: Line, q: Floats, source_line: NDArray[np.int32], cell:
                 )
             )
     return findings
+
+
+def _ptp_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> list[Issue]:
+    """PTP between HOME and the clearance plane, sampled in joint space: no dip below the plane."""
+    clearance = cell.clearance_z_mm
+    if clearance is None:
+        return []
+    remedy = "choose HOME above the plane ([home] q_deg), or lower [clearance] z_mm"
+    home_z = targets.position_mm[targets.home, 2].min(initial=np.inf)
+    if home_z < clearance - _PTP_TOLERANCE_MM:
+        sentence = f"the tip at HOME is at Z {home_z:.1f}, below the clearance plane at {clearance:g}"
+        return [Issue("error", "home-below-clearance", 0, sentence, remedy)]
+    at_target = np.full((len(targets), 6), np.nan)
+    at_target[line.target[line.is_target]] = q[line.is_target]
+    at_target[targets.home] = cell.home_q_rad()
+    findings = []
+    for row in np.flatnonzero(targets.ptp[1:]) + 1:
+        part = np.linspace(0.0, 1.0, _PTP_SAMPLES)[:, None]
+        path = at_target[row - 1] + (at_target[row] - at_target[row - 1]) * part
+        if np.isnan(path).any():
+            continue
+        lowest = forward(path, cell, int(targets.tool[row]))[0][:, 2].min()
+        if lowest < clearance - _PTP_TOLERANCE_MM:
+            sentence = f"PTP comes down to Z {lowest:.1f}, below the clearance plane at {clearance:g}"
+            remedy = "choose HOME above the plane ([home] q_deg), or lower [clearance] z_mm"
+            findings.append(
+                Issue("error", "ptp-below-clearance", int(targets.source_line[row]), sentence, remedy)
+            )
+    return findings[:1]
 
 
 def _wrist_findings(line: Line, q: Floats, source_line: NDArray[np.int32]) -> list[Issue]:

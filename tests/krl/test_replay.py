@@ -134,6 +134,19 @@ def test_no_ptp_leaves_from_below_the_clearance_plane(run):
             assert before.values["Z"] >= run.cell.clearance_z_mm
 
 
+def test_ptp_does_not_dip_below_the_clearance_plane(run):
+    """On its way, too: the joints run straight, the tip does not."""
+    for row, motion in enumerate(run.motions[1:], start=1):
+        if motion.kind != "PTP":
+            continue
+        start, end = run.joints[np.searchsorted(run.rows, [row - 1, row])]
+        tips = [
+            motion.base.inv() * run.robot.forward(start + part * (end - start)) * motion.tool
+            for part in np.linspace(0, 1, 41)
+        ]
+        assert min(tip.translation[2] for tip in tips) > run.cell.clearance_z_mm - 0.01
+
+
 def test_no_approximation_between_rapid_and_feed(run):
     rapid = np.ones(len(run.motions), dtype=bool)
     for row, motion in run.paired.items():

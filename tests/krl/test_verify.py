@@ -1,6 +1,7 @@
 """What was changed in a written program is noticed, with its line; what is merely laid out anew is not."""
 
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -62,6 +63,13 @@ def swap(pattern, occurrence=0):
     return edit
 
 
+def swap_lin(lines):
+    """Swap two LIN that follow each other directly."""
+    at = next(k for k, pair in enumerate(pairwise(lines)) if all(text.startswith("LIN") for text in pair))
+    lines[at : at + 2] = lines[at + 1], lines[at]
+    return at
+
+
 def plus(amount, decimals):
     return lambda text: f"{float(text) + amount:.{decimals}f}"
 
@@ -82,7 +90,7 @@ TAMPERINGS = {
     "HOME at the end": (change(r"^PTP \{A1 0.0000,A2 (-90.0000)", plus(0.01, 4), -1), "verify-position"),
     "LIN deleted": (delete(LIN, 1), "verify-count"),
     "LIN doubled": (insert("LIN {X 40.000,Y 0.000,Z 9.000,A 0,B 0,C 0}", LIN), "verify-count"),
-    "LIN swapped": (swap(r"^LIN \{X 20.000,Y 40.000"), "verify-position"),
+    "LIN swapped": (swap_lin, "verify-position"),
     "C_DIS removed": (change(LIN + r".*\}( C_DIS)", lambda _: ""), "verify-cdis"),
     "C_DIS added": (change(r"^LIN \{X 40.000,Y 30.500.*\}()", lambda _: " C_DIS"), "verify-cdis"),
     "VEL.CP by 1 %": (change(r"^\$VEL.CP=(0.0250000)", times(1.01, 7)), "verify-speed"),
@@ -126,7 +134,7 @@ TAMPERINGS = {
     "second INITMOV": (insert("BAS (#INITMOV,0 )", LIN), "krl-initmov"),
 }  # fmt: skip
 SOMEWHERE_IN_THE_FILE = {"krl-structure", "krl-initmov"}
-NEXT_MOTION = {"VEL.CP by 1 %", "VEL.CP deleted", "APO.CDIS", "dwell", "dwell deleted"}
+NEXT_MOTION = {"VEL.CP by 1 %", "VEL.CP deleted", "APO.CDIS", "dwell", "dwell deleted", "LIN deleted"}
 """Noticed at a motion that the changed line has a say in, not at the line itself."""
 
 
@@ -157,6 +165,8 @@ def test_tampering_is_noticed(make, name, capsys):
         after = [k for k in motions if k >= line][:3]
         assert any(issue.line in (before, *after) for issue in found)
     elif code not in SOMEWHERE_IN_THE_FILE:
+        while made.lines[line - 1].startswith(";FOLD"):  # a deleted line is missed at the next statement
+            line += 1
         assert line in [issue.line for issue in found], [issue.text() for issue in found]
     with pytest.raises(SystemExit) as leaving:
         main(["verify", str(made.src), str(made.part), "-q"])

@@ -1,0 +1,132 @@
+"""Tool frames from axis and spin: z is the axis, the spin turns about it, the tilt is the shortest."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from gcode2krl.program import smooth_spin, tool_rotation
+
+angles = st.floats(-2 * np.pi, 2 * np.pi)
+components = st.floats(-1, 1)
+axes = st.tuples(components, components, components).filter(lambda v: np.linalg.norm(v) > 0.05)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def unit(vector):
+    return np.array(vector) / np.linalg.norm(vector)
+
+
+@settings(deadline=None)
+@given(st.lists(axes, min_size=1, max_size=5), angles)
+def test_z_is_the_axis(vectors, spin):
+    axis = np.array([unit(v) for v in vectors])
+    quaternion = tool_rotation(axis, spin)
+    assert np.linalg.norm(quaternion, axis=1) == pytest.approx(1)
+    assert Rotation.from_quat(quaternion).apply(UP) == pytest.approx(axis, abs=2e-6)
+
+
+@settings(deadline=None)
+@given(axes, angles, angles)
+def test_spin_turns_about_the_axis(vector, first, second):
+    axis = unit(vector)[None]
+    a, b = (Rotation.from_quat(tool_rotation(axis, spin)) for spin in (first, second))
+    expected = Rotation.from_rotvec((second - first) * axis)
+    assert ((b * a.inv()) * expected.inv()).magnitude() == pytest.approx(0, abs=1e-6)
+
+
+@settings(deadline=None)
+@given(axes)
+def test_zero_spin_is_the_shortest_tilt(vector):
+    axis = unit(vector)[None]
+    tilt = Rotation.from_quat(tool_rotation(axis, 0.0)).magnitude()[0]
+    assert tilt == pytest.approx(np.arccos(np.clip(axis[0, 2], -1, 1)), abs=1e-5)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(axes, angles), min_size=1, max_size=5))
+def test_a_spin_for_each_row(rows):
+    axis = np.array([unit(v) for v, _ in rows])
+    spin = np.array([angle for _, angle in rows])
+    one_by_one = [tool_rotation(axis[k : k + 1], float(spin[k]))[0] for k in range(len(rows))]
+    assert tool_rotation(axis, spin) == pytest.approx(np.array(one_by_one), abs=1e-9)
+
+
+def test_three_axes_have_no_rotation():
+    axis = np.broadcast_to(UP, (4, 3))
+    assert tool_rotation(axis, 0.0) == pytest.approx(np.tile([0, 0, 0, 1.0], (4, 1)), abs=0)
+
+
+@pytest.mark.parametrize("spin_deg", [-180, -30, 0, 90, 360])
+def test_three_axes_turn_about_z(spin_deg):
+    found = Rotation.from_quat(tool_rotation(UP[None], np.radians(spin_deg)))
+    assert (found * Rotation.from_euler("z", -spin_deg, degrees=True)).magnitude() == pytest.approx(
+        0, abs=1e-9
+    )
+
+
+def test_upside_down():
+    found = Rotation.from_quat(tool_rotation(-UP[None], 0.0))
+    assert found.as_matrix()[0] == pytest.approx(np.diag([1, -1, -1]), abs=1e-12)
+
+
+def test_no_rows():
+    assert tool_rotation(np.empty((0, 3)), 0.0).shape == (0, 4)
+
+
+# --- the search for a spin ------------------------------------------------------------------------------
+
+PATH = np.column_stack([np.linspace(0, 2000, 201), np.zeros(201), np.zeros(201)])
+
+
+def around(centre_of, width_rad):
+    """Return a quality of two branches: 1 at a centre that may move with the row, 0 at its width."""
+
+    def quality(rows, spin):
+        off = np.abs(np.angle(np.exp(1j * (spin - centre_of(rows)))))
+        good = np.maximum(1 - off / width_rad, -1.0)
+        return np.stack([good, np.full(len(rows), -1.0)], axis=1)
+
+    return quality
+
+
+def test_zero_where_zero_is_good():
+    assert smooth_spin(PATH, around(lambda rows: np.zeros(len(rows)), np.pi)) == pytest.approx(0)
+
+
+@pytest.mark.parametrize("centre_deg", [-150, -40, 60, 175])
+def test_constant_where_a_constant_will_do(centre_deg):
+    spin = smooth_spin(PATH, around(lambda rows: np.full(len(rows), np.radians(centre_deg)), np.radians(30)))
+    assert isinstance(spin, float)
+    assert abs(np.degrees(spin) - centre_deg) <= 0.7 * 30
+
+
+def test_smallest_turn_wins_a_tie():
+    assert smooth_spin(PATH, lambda rows, spin: np.ones((len(rows), 2))) == pytest.approx(0)
+
+
+def test_changes_slowly_where_no_constant_will_do():
+    """The good angle wanders by 120 degrees with a width of 25: the spin follows it without a jump."""
+
+    def wanders(rows):
+        return np.radians(120) * PATH[rows, 0] / 2000
+
+    quality = around(wanders, np.radians(25))
+    spin = smooth_spin(PATH, quality)
+    assert np.shape(spin) == (201,)
+    rows = np.arange(201)
+    worst = min(quality(rows[k : k + 1], spin[k])[0, 0] for k in rows)
+    assert worst > 0
+    assert np.abs(np.diff(spin)).max() <= np.radians(5.001) * 10 / 25 * 2.5  # 10 mm a row
+
+
+def test_a_single_position():
+    assert smooth_spin(PATH[:1], around(lambda rows: np.full(len(rows), 1.0), 0.5)) == pytest.approx(
+        1.0, abs=0.36
+    )
+
+
+def test_impossible_everywhere_is_still_a_number():
+    spin = smooth_spin(PATH, lambda rows, spin: np.full((len(rows), 8), -1.0))
+    assert np.isfinite(spin).all()
