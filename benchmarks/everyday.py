@@ -20,7 +20,11 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 def make_part(folder: Path, lines: int) -> Path:
     script = EXAMPLES / "make_examples.py"
-    subprocess.run([sys.executable, script, "--out", folder, "--raster-lines", str(lines)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, script, "--out", folder, "--raster-lines", str(lines)],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return next(folder.glob("raster_*.nc"))
 
 
@@ -32,7 +36,9 @@ def translate(part: Path, environment: dict[str, str]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--lines", type=int, default=30_000)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

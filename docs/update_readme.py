@@ -13,16 +13,21 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```", re.M | re.S)
+BLOCK = re.compile(
+    r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```",
+    re.M | re.S,
+)
 
 
 def output_of(command: str, folder: str) -> str:
+    """Return what a command prints, findings first."""
     words = shlex.split(command.replace("{tmp}", Path(folder).as_posix()))
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     return (done.stderr + done.stdout).replace(f"{Path(folder).as_posix()}/", "")
 
 
 def main() -> None:
+    """Replace the output below each command."""
     readme = ROOT / "README.md"
     with tempfile.TemporaryDirectory() as folder:
 

@@ -23,7 +23,8 @@ class Event(NamedTuple):
     ``kind`` is ``tool`` (values: ``tool``), ``spindle`` (``rpm``, signed, 0 = off), ``coolant`` (``mist``,
     ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have
     ``m``, the M number (-1 for a mere text), and every event has ``line``; ``implied`` marks what a tool
-    change or the program's end does without a word of its own.
+    change or the program's end does without a word of its own, ``dwell_s`` is the part of the row's dwell
+    that lies before the event.
     """
 
     row: int

@@ -26,7 +26,9 @@ def test_abc_and_quaternions_agree_with_scipy():
 @given(angles, angles, angles)
 def test_abc_round_trip(a, b, c):
     rotation = frames.rotation_from_abc([a, b, c])
-    np.testing.assert_allclose(frames.rotation_from_abc(frames.abc_from_rotation(rotation)), rotation, atol=1e-8)
+    np.testing.assert_allclose(
+        frames.rotation_from_abc(frames.abc_from_rotation(rotation)), rotation, atol=1e-8
+    )
 
 
 @given(angles, angles)

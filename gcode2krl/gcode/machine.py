@@ -53,7 +53,7 @@ ROW = np.dtype(
         ("known_z", "i1"),
     ]
 )
-EVENT = np.dtype([("row", "i8"), ("kind", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8")])
+EVENT = np.dtype([("row", "i8"), ("kind", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8"), ("dwell", "f8")])
 FOUND = np.dtype([("number", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8")])
 
 ROWS_PER_BLOCK, EVENTS_PER_BLOCK = 4, 16
@@ -88,7 +88,7 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
             break
         before[0] = state[0]
         used_before[:] = counts
-        if not _gather(words, i, j, s, counts, events, found, options, has, word, g_in_group, m_codes):
+        if not _gather(words, i, j, s, rows, counts, events, found, options, has, word, g_in_group, m_codes):
             i = j
             continue
         done = _block(
@@ -129,14 +129,15 @@ def _report(found, counts, number, line, a, b):
 
 
 @njit(cache=True)
-def _event(s, events, counts, kind, line, a, b):
+def _event(s, rows, events, counts, kind, line, a, b):
     row = events[counts[1]]
     row.row, row.kind, row.line, row.a, row.b = counts[0] - 1, kind, line, a, b
+    row.dwell = rows[counts[0] - 1].dwell
     counts[1] += 1
 
 
 @njit(cache=True)
-def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_group, m_codes):
+def _gather(words, i, j, s, rows, counts, events, found, options, has, word, g_in_group, m_codes):
     """Sort the words of a block into ``has``/``word``, G-codes by group, M-codes; False: skip the block."""
     letter, value, extra, line = words
     at = line[i]
@@ -161,7 +162,7 @@ def _gather(words, i, j, s, counts, events, found, options, has, word, g_in_grou
                 s.end_line = at
             return False
         elif c == 40:
-            _event(s, events, counts, EVENT_TEXT, at, value[k], 0.0)
+            _event(s, rows, events, counts, EVENT_TEXT, at, value[k], 0.0)
         elif c == 33:
             what = extra[counts[3]] if counts[3] < len(extra) else 0.0
             counts[3] += 1
@@ -298,7 +299,7 @@ def _feed_speed(s, has, word, length_mm):
 
 
 @njit(cache=True)
-def _settings(line, s, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):
+def _settings(line, s, rows, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):
     """Everything of a block before its motion; return False where the block is wrong."""
     if g[5] >= 0:
         s.feed_mode = g[5] // 10
@@ -317,7 +318,9 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
         changed = s.rpm != word[_S]
         s.rpm = word[_S]
         if changed and s.direction != 0:
-            _event(s, events, counts, EVENT_SPINDLE, line, s.rpm * s.direction, 4 if s.direction < 0 else 3)
+            _event(
+                s, rows, events, counts, EVENT_SPINDLE, line, s.rpm * s.direction, 4 if s.direction < 0 else 3
+            )
     if has[_T]:
         used[_T] = True
         tool = _whole(word[_T])
@@ -332,16 +335,16 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
                 return False
             if s.direction != 0:  # a tool change stops the spindle, with or without M5
                 s.direction = 0
-                _event(s, events, counts, EVENT_SPINDLE, line, 0.0, IMPLIED_M5)
+                _event(s, rows, events, counts, EVENT_SPINDLE, line, 0.0, IMPLIED_M5)
             s.tool = s.selected_tool
-            _event(s, events, counts, EVENT_TOOL, line, s.tool, 0.0)
+            _event(s, rows, events, counts, EVENT_TOOL, line, s.tool, 0.0)
             if s.tool > 0 and math.isnan(_length_of(s.tool, tool_length)):
                 _report(found, counts, f.TOOL_UNDECLARED, line, s.tool, 0.0)
     for m in m_codes:
         if m >= 3 and m <= 5:
             direction = 1 if m == 3 else (-1 if m == 4 else 0)
             s.direction = direction
-            _event(s, events, counts, EVENT_SPINDLE, line, s.rpm * direction, m)
+            _event(s, rows, events, counts, EVENT_SPINDLE, line, s.rpm * direction, m)
         elif m >= 7 and m <= 9:
             if m == 9:
                 s.mist, s.flood = 0, 0
@@ -349,12 +352,12 @@ def _settings(line, s, counts, events, found, offset_known, tool_length, has, wo
                 s.mist = 1
             else:
                 s.flood = 1
-            _event(s, events, counts, EVENT_COOLANT, line, m, s.mist + 2 * s.flood)
+            _event(s, rows, events, counts, EVENT_COOLANT, line, m, s.mist + 2 * s.flood)
         elif m >= 0 and m != 6 and m != 0 and m != 1 and m != 2 and m != 30:
             p = word[_P] if has[_P] else np.nan
             used[_P] |= has[_P]
             used[_Q] |= has[_Q]
-            _event(s, events, counts, EVENT_M, line, m, p)
+            _event(s, rows, events, counts, EVENT_M, line, m, p)
     if g[2] >= 0:
         s.plane = g[2] // 10
     if g[6] >= 0:
@@ -420,7 +423,9 @@ def _block(
 ):
     """Execute one block; return False only where the row buffer is too small for it."""
     used = np.zeros(26, dtype=np.bool_)
-    if not _settings(line, s, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used):
+    if not _settings(
+        line, s, rows, counts, events, found, offset_known, tool_length, has, word, g, m_codes, used
+    ):
         return True
     axes = has[_X] or has[_Y] or has[_Z]
     special = g[0]
@@ -490,7 +495,7 @@ def _block(
             _report(found, counts, f.UNUSED_WORD, line, index + 65, 0.0)
     for m in m_codes:
         if m == 0 or m == 1 or m == 2 or m == 30:
-            _event(s, events, counts, EVENT_M, line, m, np.nan)
+            _event(s, rows, events, counts, EVENT_M, line, m, np.nan)
             if m >= 2:
                 s.ended = 1
                 s.end_line = line
@@ -534,6 +539,8 @@ def _machine_home(line, s, rows, counts, offsets, has, word, code):
     if has[_Y] or not any_axis:
         s.y = home[1]
         s.known_y = 0
+    if has[_X] and has[_Y]:
+        s.known_z = 0  # the robot goes to HOME: the old height must not come back by itself
     if has[_Z] or not any_axis:
         s.z = home[2] - offset
         s.known_z = 0

@@ -344,6 +344,12 @@ class _Interpreter:
             )
 
     def _events(self) -> Iterator[Event]:
+        """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
+        for event, plain in zip(self.buffers.events, self._plain_events(), strict=False):
+            dwell_s = float(event["dwell"])
+            yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
+
+    def _plain_events(self) -> Iterator[Event]:
         for event in self.buffers.events[: self.counts[1]]:
             row, kind, a, b, line = (
                 int(event["row"]),

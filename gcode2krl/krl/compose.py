@@ -11,6 +11,7 @@ from gcode2krl import __version__
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.krl import statements as st
+from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import fixed, motion_lines
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
@@ -58,9 +59,10 @@ class _Composer:
         self.position, self.abc_deg = written_poses(targets, cell)
         self.speed_m_s = targets.speed_mm_s / MM_PER_M
         self.state = np.array([-1.0, -1.0, 0.0])
-        self.events: dict[int, list[str]] = {}
+        self.events: dict[int, list[tuple[float, str]]] = {}
         for event in targets.events:
-            self.events.setdefault(event.row, []).append(st.event_statements(event, cell))
+            text = st.event_statements(event, cell)
+            self.events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
         self.guarded_pose = False
 
     def files(self) -> dict[str, bytes]:
@@ -76,7 +78,7 @@ class _Composer:
                 if not whole:
                     body.append(self._motions(start, end))
                     continue
-                part = f"{self.name[:20]}_{len(subprograms) + 1:03d}"
+                part = part_name(self.name, len(subprograms) + 1)
                 body.append(_text(f"{part}( )"))
                 self.state[:] = -1.0, -1.0, 0.0  # each part says its speed and CDIS again
                 subprograms.append((part, self._motions(start, end)))
@@ -140,9 +142,12 @@ class _Composer:
                 self.guarded_pose = True
                 q_deg = self.joints.q_rad[row] * DEG_PER_RAD
                 lines.append(st.environment().get_template("pose_guard.j2").render(q_deg=q_deg))
-        if targets.wait_s[row] > 0:
-            lines.append(f"WAIT SEC {fixed(targets.wait_s[row], 3)}")
-        lines += self.events.get(row, [])
+        waited_s = 0.0
+        for dwell_s, text in self.events.get(row, []):
+            lines += _dwell(dwell_s - waited_s)
+            waited_s = max(waited_s, dwell_s)
+            lines.append(text)
+        lines += _dwell(targets.wait_s[row] - waited_s)
         return _text("\n".join(lines))
 
     def _ptp(self, row: int) -> str:
@@ -150,9 +155,7 @@ class _Composer:
             return f"PTP {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
         values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
         pose = ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True))
-        turn = sum(
-            1 << k for k, angle in enumerate(self.joints.q_rad[row]) if np.rint(angle / _T_GRID_RAD) < 0
-        )
+        turn = turn_bits(self.joints.q_rad[row])
         return f"PTP {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
     def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
@@ -199,6 +202,11 @@ class _Composer:
         return files
 
 
+def turn_bits(q_rad: Floats) -> int:
+    """Return KUKA's T of joint angles (6,): a bit for each angle that prints as negative."""
+    return sum(1 << k for k, angle in enumerate(q_rad) if np.rint(angle / _T_GRID_RAD) < 0)
+
+
 def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
     """Return positions (p, 3) in mm and A, B, C (p, 3) in degrees in the controller's tool axes."""
     rotation = targets.rotation
@@ -210,6 +218,11 @@ def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
         first = chosen[:1] if (chosen == chosen[0]).all() else chosen
         abc_deg[rows] = fr.abc_from_rotation(fr.rotation_from_quaternion(first) @ turn) * DEG_PER_RAD
     return targets.position_mm, abc_deg
+
+
+def _dwell(seconds: float) -> list[str]:
+    """Return a dwell, marked so that it is not taken for a wait of a template."""
+    return [f"WAIT SEC {fixed(seconds, 3)} ; dwell"] if seconds > 0 else []
 
 
 def _subprogram(name: str, motions: bytes) -> bytes:

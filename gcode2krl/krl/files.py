@@ -15,18 +15,33 @@ def write_together(files: Mapping[Path, bytes]) -> None:
     Raises `NotUnderstoodError` where a folder does not exist or the disk refuses; nothing half-written stays.
     """
     temporary: dict[Path, Path] = {}
+    aside: dict[Path, Path] = {}
     try:
         for target, content in files.items():
             temporary[target] = _write_beside(target, content)
         for target, written in temporary.items():
+            if target.exists():
+                old = written.with_suffix(".old")
+                target.replace(old)
+                aside[target] = old
             written.replace(target)
     except OSError as error:
-        place = str(error.filename or next(iter(files)))
-        raise unwritable(next(iter(files)), error.strerror or place) from None
+        _restore(temporary, aside)
+        raise unwritable(next(iter(files)), error.strerror or str(error)) from None
     finally:
-        for written in temporary.values():
+        for leftover in (*temporary.values(), *aside.values()):
             with contextlib.suppress(OSError):
-                written.unlink(missing_ok=True)
+                leftover.unlink(missing_ok=True)
+
+
+def _restore(temporary: Mapping[Path, Path], aside: Mapping[Path, Path]) -> None:
+    """Put the old files back, and take new ones away that have none."""
+    for target, written in temporary.items():
+        with contextlib.suppress(OSError):
+            if target in aside:
+                os.replace(aside[target], target)  # noqa: PTH105 - not the call that has just failed
+            elif not written.exists():
+                target.unlink(missing_ok=True)
 
 
 def unwritable(target: Path, why: str) -> NotUnderstoodError:

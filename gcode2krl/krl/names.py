@@ -1,6 +1,7 @@
 """Names of KRL programs: at most 24 characters A-Z, 0-9, _, not starting with a digit, no keyword."""
 
 import re
+import zlib
 
 LONGEST = 24
 _KEYWORDS = frozenset(
@@ -116,15 +117,24 @@ _KEYWORDS = frozenset(
 
 def name_problem(name: str) -> str:
     """Return what is wrong with a program name, empty where it is good."""
-    if not re.fullmatch(r"[A-Z0-9_]+", name.upper()):
+    if not re.fullmatch(r"[A-Za-z0-9_]+", name):
         return "only A-Z, 0-9 and _ are allowed"
     if name[0].isdigit():
         return "must not begin with a digit"
-    if len(name) > LONGEST:
+    if len(name.upper()) > LONGEST:
         return f"longer than {LONGEST} characters"
     if name.upper() in _KEYWORDS:
         return "is a KRL keyword"
     return ""
+
+
+def part_name(name: str, number: int) -> str:
+    """Return the name of a part: ``NAME_001``; a long name is cut and told apart by its checksum."""
+    suffix = f"_{number:03d}"
+    if len(name) + len(suffix) <= LONGEST:
+        return name + suffix
+    checksum = f"{zlib.crc32(name.upper().encode()) & 0xFFFF:04X}"
+    return name[: LONGEST - len(suffix) - len(checksum)] + checksum + suffix
 
 
 def suggested_name(stem: str) -> str:

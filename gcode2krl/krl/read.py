@@ -16,9 +16,10 @@ from gcode2krl.units import MM_PER_M
 Floats = NDArray[np.float64]
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
-_DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|GLOBAL|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
+_DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
 _EXTERNAL = re.compile(r"^\s*EXT\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
 _LONGEST_LINE = 471
+_COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
 
 
 class Statement(NamedTuple):
@@ -53,8 +54,12 @@ class KrlProgram:
     """Names of the files; ``file_of`` (p,) points into it."""
     file_of: NDArray[np.int32]
     statements: tuple[Statement, ...]
+    declarations: tuple[Statement, ...] = ()
+    """Declarations of the main program."""
     issues: tuple[Issue, ...] = ()
     guard: bool = True
+    def_line: int = 0
+    """Line of the main DEF."""
     texts: Mapping[str, bytes] = field(default_factory=dict)
 
 
@@ -101,6 +106,8 @@ class _Reader:
         self.issues: list[Issue] = []
         self.blocks: dict[str, _Block] = {}
         self.order: list[str] = []
+        self.declarations: list[Statement] = []
+        self.def_lines: dict[str, int] = {}
         for index in range(len(self.names)):
             self._find_blocks(index)
 
@@ -153,20 +160,22 @@ class _Reader:
             ptp=ptp,
             speed_mm_s=np.where(ptp, np.nan, speed),
             cdis_mm=cdis,
-            wait_s=_waits(kind, value, rows),
+            wait_s=_dwells((kind == sc.WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
             line=line[rows],
             file=self.names,
             file_of=file_of[rows],
             statements=statements,
+            declarations=tuple(self.declarations),
             issues=tuple(self.issues),
             guard=guard,
+            def_line=self.def_lines[main_name],
             texts=self.texts,
         )
 
     def _statement(self, file: int, row: int) -> str:
         a, b = self.scanned[file].span[row]
         text = self.texts[self.names[file]][a:b].decode("ascii", "replace")
-        return text.split(" ;")[0].strip() if '"' not in text else text.strip()
+        return _COMMENT.sub(r"\1", text).strip()
 
     def _issue(self, code: str, line: int, message: str, file: int = 0, remedy: str = "") -> None:
         name = self.names[file]
@@ -184,6 +193,7 @@ class _Reader:
                 if name:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} has no END", file)
                 name, start = found.group(1).upper(), int(row) + 1
+                self.def_lines.setdefault(name, int(scanned.line[row]))
             elif text.upper() == "END":
                 if not name:
                     self._issue("krl-structure", int(scanned.line[row]), "END without DEF", file)
@@ -207,6 +217,12 @@ class _Reader:
             text = self._statement(file, int(row))
             call = _CALL.match(text)
             if _DECLARATION.match(text):
+                if depth == 0:
+                    self.declarations.append(Statement(0, text, self.names[file], int(scanned.line[row])))
+                if row > self._last_declaration(file, start, end):
+                    self._issue(
+                        "krl-structure", int(scanned.line[row]), f"{text[:40]!r} behind statements", file
+                    )
                 yield _Block(file, at, int(row))
                 at = int(row) + 1
             elif call and call.group(1).upper() in self.blocks:
@@ -217,6 +233,13 @@ class _Reader:
                     return
                 yield from self._execute(call.group(1).upper(), depth + 1)
         yield _Block(file, at, end)
+
+    def _last_declaration(self, file: int, start: int, end: int) -> int:
+        """Return the last row of the run of declarations with which a block begins."""
+        kind, at = self.scanned[file].kind, start
+        while at < end and kind[at] == sc.OTHER and _DECLARATION.match(self._statement(file, at)):
+            at += 1
+        return at - 1
 
     def _text_rules(self, file: int, name: str) -> None:
         """Rules of the text itself: ASCII, line length, folds and loops closed."""
@@ -250,8 +273,11 @@ def _in_force(values: Floats) -> Floats:
     return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
-def _waits(kind: NDArray[np.int8], value: Floats, rows: NDArray[np.int64]) -> Floats:
-    """Return the dwell that stands right behind each motion."""
-    behind = np.minimum(rows + 1, len(kind) - 1)
-    direct = (kind[behind] == sc.WAIT_SEC) & (rows + 1 < len(kind))
-    return np.where(direct, np.nan_to_num(value[behind, 0]), 0.0)
+def _dwells(
+    marked: NDArray[np.bool_], seconds: Floats, motions_before: NDArray[np.int64], count: int
+) -> Floats:
+    """Return the dwell (p,) behind each motion: the waits that are marked as such."""
+    dwell = np.zeros(count)
+    rows = np.flatnonzero(marked & (motions_before > 0))
+    np.add.at(dwell, motions_before[rows] - 1, np.nan_to_num(seconds[rows]))
+    return dwell

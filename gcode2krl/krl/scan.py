@@ -24,7 +24,7 @@ class Scanned(NamedTuple):
     value: NDArray[np.float64]
     """(k, 14) components by `KEYS`, NaN where absent; a lone number stands in column 0."""
     blend: NDArray[np.int8]
-    """(k,) 1 for ``C_DIS``, 0 for an exact motion, -1 where the line is malformed."""
+    """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
 
 
 def scan_krl(text: bytes) -> Scanned:
@@ -40,8 +40,12 @@ def scan_krl(text: bytes) -> Scanned:
 
 _LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
     np.frombuffer(word, dtype=np.uint8).copy()
-    for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT SEC", b"C_DIS")
+    for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT", b"C_DIS")
 )
+
+
+_SEC_WORD = np.frombuffer(b"SEC", dtype=np.uint8).copy()
+_DWELL_WORD = np.frombuffer(b"DWELL", dtype=np.uint8).copy()
 
 
 @njit(cache=True)
@@ -178,7 +182,9 @@ def _scan(data, kind, line, span, value, blend):
             elif _starts(data, begin, end, _CDIS_WORD):
                 setting, behind = APO_CDIS, begin + 9
             elif _starts(data, begin, end, _WAIT_WORD):
-                setting, behind = WAIT_SEC, begin + 8
+                second = _blank(data, begin + 4, end)
+                if second > begin + 4 and _starts(data, second, end, _SEC_WORD):
+                    setting, behind = WAIT_SEC, second + 3
             if setting >= 0:
                 kind[count] = setting
                 behind = _blank(data, behind, end)
@@ -190,5 +196,7 @@ def _scan(data, kind, line, span, value, blend):
                 behind = _blank(data, behind, end)
                 if np.isnan(value[count, 0]) or (behind < end and data[behind] != 59):
                     blend[count] = MALFORMED
+                elif setting == WAIT_SEC and behind < end:
+                    blend[count] = _starts(data, _blank(data, behind + 1, end), end, _DWELL_WORD)
         count += 1
     return count

@@ -6,6 +6,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+from jinja2.sandbox import SandboxedEnvironment
 from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
@@ -111,18 +112,18 @@ def event_statements(event: Event, cell: Cell) -> str:
 def render(template: str, cell: Cell, **values: Any) -> str:
     """Render a template of the cell; raises `RefusedError` where it cannot be."""
     try:
-        return _template(template).render(cell=cell, spindle=cell.spindle, **values).strip("\n")
-    except (jinja2.TemplateError, TypeError, ValueError, ZeroDivisionError) as error:
-        brief = " ".join(template.split())[:40]
-        raise RefusedError(
-            Issue(
-                "error",
-                "template",
-                0,
-                f"template {brief!r} of the cell: {error}",
-                "correct it in the cell file",
-            )
-        ) from None
+        text = str(_template(template).render(cell=cell, spindle=cell.spindle, **values)).strip("\n")
+    except Exception as error:  # a template is a user's program: whatever it raises is a finding
+        raise _template_error(template, str(error) or type(error).__name__) from None
+    if not text.isascii():
+        raise _template_error(template, "a character that is not ASCII")
+    return text
+
+
+def _template_error(template: str, what: str) -> RefusedError:
+    brief = " ".join(template.split())[:40]
+    message = f"template {brief!r} of the cell: {what}"
+    return RefusedError(Issue("error", "template", 0, message, "correct it in the cell file"))
 
 
 @lru_cache(maxsize=64)
@@ -134,7 +135,7 @@ def _template(text: str) -> jinja2.Template:
 def environment() -> jinja2.Environment:
     """Return the Jinja2 environment of all KRL templates; an unknown name is an error."""
     loader = jinja2.PackageLoader("gcode2krl.krl", "templates")
-    made = jinja2.Environment(
+    made = SandboxedEnvironment(  # a cell file may come from elsewhere
         loader=loader,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

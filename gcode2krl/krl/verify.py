@@ -1,6 +1,7 @@
 """Verify: the program read back against what it should say, and against the controller's rules."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from gcode2krl import frames as fr
 from gcode2krl import predict
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import Issue
-from gcode2krl.krl.compose import Layout, compose
+from gcode2krl.krl.compose import Layout, compose, turn_bits
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.tables import Joints, Targets, Toolpath
@@ -108,7 +109,7 @@ def verify_krl(
     layout = Layout(guard=program.guard)
     expected = compose(targets, joints, cell, program.name, layout)
     intended = read_texts(expected, f"{program.name}.src")
-    return compare(program, targets, joints, cell, intended.statements)
+    return compare(program, targets, joints, cell, intended, _data_issues(Path(path), program))
 
 
 def compare(
@@ -116,10 +117,11 @@ def compare(
     targets: Targets,
     joints: Joints,
     cell: Cell,
-    statements: tuple[Statement, ...] | None = None,
+    intended: KrlProgram | None = None,
+    more_issues: Sequence[Issue] = (),
 ) -> VerifyReport:
-    """Compare a program as read with the intended targets; with ``statements``, also what is between them."""
-    issues = list(program.issues)
+    """Compare a program as read with the intended targets; with ``intended``, also what is between them."""
+    issues = [*program.issues, *more_issues]
     issues += _rules(program, cell)
     if len(program.ptp) != len(targets):
         issues.append(
@@ -134,11 +136,14 @@ def compare(
     count = min(len(program.ptp), len(targets))
     deviation, rotation_deg, speed = _differences(program, targets, joints, cell, count)
     issues += _difference_issues(program, targets, joints, count, deviation, rotation_deg, speed)
-    if statements is not None:
-        issues += _statement_issues(program.statements, statements)
+    if intended is not None:
+        issues += _statement_issues(program.statements, intended.statements, program)
+        own, wanted = (_own_declarations(p.declarations) for p in (program, intended))
+        issues += _statement_issues(own, wanted, program)
     order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
     worst = tuple(
         {
+            "file": program.file[program.file_of[row]],
             "line": int(program.line[row]),
             "gcode_line": int(targets.source_line[row]),
             "deviation_mm": _number(float(deviation[row])),
@@ -194,7 +199,10 @@ def _difference_issues(
     wait = np.abs(program.wait_s[:count] - targets.wait_s[:count])
     other_kind = program.ptp[:count] != targets.ptp[:count]
     pose = targets.ptp[:count] & ~targets.home[:count]
+    turn = np.zeros(count)
+    turn[pose] = [turn_bits(q) for q in joints.q_rad[:count][pose]]
     status = pose & (program.status_turn[:count, 0] != joints.status[:count])
+    status |= pose & (program.status_turn[:count, 1] != turn)
     checks = (
         ("verify-motion", other_kind, "PTP and LIN exchanged", None),
         ("verify-position", ~(deviation <= POSITION_LIMIT_MM), "{:.4f} mm off", deviation),
@@ -202,39 +210,61 @@ def _difference_issues(
         ("verify-speed", ~(speed <= SPEED_LIMIT_MM_S), "speed {:.3f} mm/s off", speed),
         ("verify-cdis", ~(cdis <= CDIS_LIMIT_MM), "approximation {:.3f} mm off", cdis),
         ("verify-wait", ~(wait <= WAIT_LIMIT_S), "dwell {:.3f} s off", wait),
-        ("verify-status", status, "status S differs from the predicted branch", None),
+        ("verify-status", status, "S or T differs from the predicted branch", None),
     )
     issues = []
     for code, wrong, sentence, amount in checks:
         for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK]:
             text = sentence.format(amount[row]) if amount is not None else sentence
             gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
-            issues.append(Issue("error", code, int(program.line[row]), text + gcode, "translate again"))
+            text = _in_file(program, program.file[program.file_of[row]]) + text + gcode
+            issues.append(Issue("error", code, int(program.line[row]), text, "translate again"))
     return issues
 
 
-def _statement_issues(read: tuple[Statement, ...], intended: tuple[Statement, ...]) -> list[Issue]:
-    """Compare what stands between the motions: settings, guard, outputs, waits, calls."""
+def _in_file(program: KrlProgram, file: str) -> str:
+    """Return the words that name a file other than the main one."""
+    return "" if file == program.file[0] else f"{file}: "
+
+
+def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the declarations but those of the program's own parts, which depend on how it is split."""
+    return tuple(
+        s for s in declarations if not re.match(r"EXT\s+\w+_\d{3,}\s*\(\s*\)", s.text, re.IGNORECASE)
+    )
+
+
+def _data_issues(path: Path, program: KrlProgram) -> list[Issue]:
+    """Check the ``.dat`` beside the program: it must be there and have its name."""
+    inside = any(s.text.upper().startswith("EXT BAS") for s in program.declarations)
+    data = path.with_suffix(".dat")
+    if inside:
+        return []
+    if not data.is_file():
+        return [Issue("error", "krl-data", 0, f"{data.name} is missing", "translate again")]
+    named = re.search(r"^\s*DEFDAT\s+(\w+)", data.read_text("ascii", "replace"), re.IGNORECASE | re.MULTILINE)
+    if named is None or named.group(1).upper() != program.name:
+        text = f"{data.name} is not the data list of {program.name}"
+        return [Issue("error", "krl-data", program.def_line, text, "translate again")]
+    return []
+
+
+def _statement_issues(
+    read: tuple[Statement, ...], intended: tuple[Statement, ...], program: KrlProgram
+) -> list[Issue]:
+    """Compare what stands between the motions: settings, guard, outputs, waits, calls, declarations."""
     found = [(s.motion, _normal(s.text)) for s in read]
     wanted = [(s.motion, _normal(s.text)) for s in intended]
     if found == wanted:
         return []
-    at = next(
-        (k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b),
-        min(len(found), len(wanted)),
-    )
-    line = read[at].line if at < len(read) else (read[-1].line if read else 0)
+    shorter = min(len(found), len(wanted))
+    at = next((k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b), shorter)
+    here = read[min(at, len(read) - 1)] if read else Statement(0, "", program.file[0], 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
-    return [
-        Issue(
-            "error",
-            "verify-statement",
-            line,
-            f"found {have[:60]!r}, intended {want[:60]!r}",
-            "translate again, with the cell it was made with",
-        )
-    ]
+    text = f"{_in_file(program, here.file)}found {have[:60]!r}, intended {want[:60]!r}"
+    remedy = "translate again, with the cell it was made with"
+    return [Issue("error", "verify-statement", here.line, text, remedy)]
 
 
 def _rules(program: KrlProgram, cell: Cell) -> list[Issue]:

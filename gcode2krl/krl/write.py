@@ -97,6 +97,10 @@ def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]
                 f"--name {name!r}: {problem}",
                 "at most 24 of A-Z, 0-9, _; not starting with a digit",
             )
+        if file is not None and file.stem.upper() != name.upper():
+            sentence = f"the file {file.name} holds the program {name.upper()}"
+            remedy = f"call it {name.upper()}.src on the controller"
+            return name.upper(), [Issue("warning", "krl-name", 0, sentence, remedy)]
         return name.upper(), []
     stem = file.stem if file is not None else "PART"
     good = suggested_name(stem)

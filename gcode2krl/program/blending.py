@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
 """The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
 
-_REVERSAL_COS = math.cos(math.radians(0.5))
+_REVERSAL_COS = math.cos(math.radians(1.0))
 
 
 def corner_cdis(

@@ -11,6 +11,7 @@ from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 _MOST_PER_CHECK = 20
+_SLOWEST_MM_S = 0.001
 
 
 def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
@@ -114,6 +115,14 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator
             f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:.0f} mm/min is above the largest path speed, "
             f"{most_mm_s * S_PER_MIN:.0f} mm/min",
             "check F and the unit (G20/G21)",
+        )
+    for row in _stretches(feed & (toolpath.feed_mm_s > 0) & (toolpath.feed_mm_s < _SLOWEST_MM_S)):
+        yield Issue(
+            "error",
+            "feed-too-low",
+            int(toolpath.source_line[row]),
+            f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:g} mm/min is too small for $VEL.CP",
+            "check F and the feed mode (G93, G94, G95)",
         )
     for row in _stretches(feed & ~(toolpath.feed_mm_s > 0)):
         if not np.array_equal(toolpath.position_mm[row], toolpath.position_mm[row - 1]):

@@ -38,6 +38,7 @@ def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
     table = np.stack([quality(rows, float(spin)) for spin in spins])  # (spins, rows, branches)
     worst = np.minimum(table.min(axis=1).max(axis=1), GOOD_ENOUGH + 0.1)
     best = int(np.argmax(np.round(worst, 2)))
+    spins = np.round(spins, 12) + 0.0
     if worst[best] >= GOOD_ENOUGH or len(rows) < 3:
         return float(spins[best])
     changing = _changing(position_mm, rows, spins, table)

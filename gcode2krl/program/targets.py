@@ -7,11 +7,12 @@ whose X, Y and Z have all been programmed are positions; machine moves become re
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.program.blending import corner_cdis
@@ -181,15 +182,17 @@ class _Plan:
         new = self._frame_tool(self.toolpath.events[index].values["tool"])
         if self.columns.count > 1:
             self._retract(-1)
-            longer_mm = self._length(new) - self._length(self.tool)
-            if self.place == "clearance" and longer_mm > 0:
-                self._add(self.here + longer_mm * _UP, -1)
-            self.here = self.here - longer_mm * _UP
+            deeper_mm = self._deeper_mm(new)
+            if self.place == "clearance" and deeper_mm > 0:
+                self._add(self.here + deeper_mm * _UP, -1)
+            self.here = np.full(3, np.nan)  # the new tip is elsewhere
         self.tool_events[index] = self.columns.count - 1
         self.tool = new
 
-    def _length(self, number: int) -> float:
-        return self.cell.tool[number].length_mm or self.cell.frames.tool_length_mm
+    def _deeper_mm(self, number: int) -> float:
+        """Return how far below the present tip another tool's tip stands, the flange at rest."""
+        shift = fr.invert(self.cell.tool_matrix(self.tool)) @ self.cell.tool_matrix(number)
+        return -float(shift[2, 3])
 
     def _leave(self) -> None:
         self._retract(-1)
@@ -206,7 +209,7 @@ class _Plan:
         kind = np.concatenate(columns.kind)
         axis = self._axes()
         tool = np.concatenate(columns.tool)
-        keep = _distinct(position, axis, kind)
+        keep = _distinct(position, axis, kind, tool)
         kept_index = np.cumsum(keep) - 1
         position, axis, move, kind, tool = (
             position[keep],
@@ -219,14 +222,15 @@ class _Plan:
         wait = np.zeros(len(position))
         stand = _StandingAt(np.concatenate(columns.move), kept_index)
         events = self._place_events(stand, kept_index)
-        for row in np.flatnonzero(toolpath.dwell_s > 0):
-            wait[stand.at(int(row))] += toolpath.dwell_s[row]
+        for row in np.flatnonzero(toolpath.dwell_s > 0).tolist():
+            for target, dwell_s in self._dwells(row, stand, kept_index):
+                wait[target] += dwell_s
         rapid = np.where(move >= 0, toolpath.rapid[move] | toolpath.machine[move], True)
         speed = np.where(
             rapid, self.cell.controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[np.maximum(move, 0)]
         )
         speed[kind != _LIN] = np.nan
-        exact = self._exact_stops(move, kind, rapid, wait, events)
+        exact = self._exact_stops(move, kind, tool, rapid, wait, events)
         return Targets(
             position_mm=position,
             rotation=rotation,
@@ -279,8 +283,30 @@ class _Plan:
             else:
                 target = stand.at(event.row)
             earliest = max(earliest, target)
-            placed.append(Event(earliest, event.kind, event.values))
+            dwell_s = event.values.get("dwell_s", 0.0) - self._dwell_before_change_s(event.row, index)
+            values = {**event.values, "dwell_s": dwell_s} if dwell_s > 0 else _without_dwell(event.values)
+            placed.append(Event(earliest, event.kind, values))
         return tuple(placed)
+
+    def _changes_at(self, row: int) -> list[int]:
+        """Return the tool changes (numbers of events) at a row of the Toolpath, in order."""
+        return sorted(index for index in self.tool_events if self.toolpath.events[index].row == row)
+
+    def _dwell_before_change_s(self, row: int, index: int) -> float:
+        """Return the dwell at a row that is over before the last tool change up to an event."""
+        earlier = [k for k in self._changes_at(row) if k <= index]
+        return float(self.toolpath.events[earlier[-1]].values.get("dwell_s", 0.0)) if earlier else 0.0
+
+    def _dwells(
+        self, row: int, stand: "_StandingAt", kept_index: NDArray[np.int64]
+    ) -> list[tuple[int, float]]:
+        """Return (target, seconds) of the dwell at a row: before and after tool changes there."""
+        marks = [(stand.at(row), 0.0)]
+        for index in self._changes_at(row):
+            before_s = float(self.toolpath.events[index].values.get("dwell_s", 0.0))
+            marks.append((int(kept_index[self.tool_events[index]]), before_s))
+        ends = [*(start_s for _, start_s in marks[1:]), float(self.toolpath.dwell_s[row])]
+        return [(target, end_s - start_s) for (target, start_s), end_s in zip(marks, ends, strict=True)]
 
     def _next_tool_change(self, index: int) -> int:
         """Return the (unthinned) target of the tool change after an event, else the last, HOME."""
@@ -290,6 +316,7 @@ class _Plan:
         self,
         move: NDArray[np.int32],
         kind: NDArray[np.int8],
+        tool: NDArray[np.int32],
         rapid: NDArray[np.bool_],
         wait: Floats,
         events: tuple[Event, ...],
@@ -297,6 +324,7 @@ class _Plan:
         exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0)
         exact |= (move >= 0) & self.toolpath.exact_stop[move]
         exact[:-1] |= (rapid[:-1] != rapid[1:]) | (kind[1:] != _LIN)
+        exact[1:] |= tool[1:] != tool[:-1]  # the way there began with another tip
         exact[[event.row for event in events]] = True
         exact[-1] = True
         return exact
@@ -336,15 +364,21 @@ class _StandingAt:
         return int(self.kept_index[self.moved[index]]) if index >= 0 else 0
 
 
-def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Mark the rows that print as another point than the row before, or are PTP."""
+def _distinct(
+    position: Floats, axis: Floats, kind: NDArray[np.int8], tool: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """Mark the rows that print as another point than the row before, are PTP or move another tool."""
     grid = np.rint(position / GRID_MM)
     different = np.ones(len(position), dtype=bool)
-    different[1:] = (grid[1:] != grid[:-1]).any(axis=1)
+    different[1:] = (grid[1:] != grid[:-1]).any(axis=1) | (tool[1:] != tool[:-1])
     if axis.strides[0] != 0:
         different[1:] |= (axis[1:] != axis[:-1]).any(axis=1)
     result: NDArray[np.bool_] = different | (kind != _LIN)
     return result
+
+
+def _without_dwell(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if key != "dwell_s"}
 
 
 def _rows(values: Floats, keep: NDArray[np.bool_]) -> Floats:

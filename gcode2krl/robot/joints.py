@@ -55,7 +55,7 @@ def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
 
     Joint speeds are NaN (they belong to a Motion). A target out of reach has NaN angles.
     """
-    line = sample_lines(targets)
+    line = sample_lines(targets, cell)
     q_line = _best_branch(line, targets, cell)
     q = np.full((len(targets), 6), np.nan)
     q[line.target[line.is_target]] = q_line[line.is_target]
@@ -79,32 +79,47 @@ def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
     return joints, joint_findings(line, q_line, targets, cell)
 
 
-def sample_lines(targets: Targets) -> Line:
-    """Sample the straight lines between targets; a PTP target starts a new chain."""
+def sample_lines(targets: Targets, cell: Cell) -> Line:
+    """Sample the straight lines between targets; a PTP target starts a new chain.
+
+    After a tool change a line begins where the new tool's tip stands, the flange at rest.
+    """
     position, rotation = targets.position_mm, targets.rotation
     count = len(targets)
-    length = np.zeros(count)
-    length[1:] = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    from_position, from_rotation = _starts(targets, cell)
+    length = np.linalg.norm(position - from_position, axis=1)
     angle = np.zeros(count)
     if not (rotation == rotation[0]).all():
-        angle[1:] = fr.angle_between(rotation[1:], rotation[:-1])
+        angle = fr.angle_between(rotation, from_rotation)
     steps = np.maximum(1, np.ceil(np.maximum(length / STEP_MM, angle / STEP_RAD))).astype(np.int64)
     steps[targets.ptp] = 1
     steps[targets.home] = 0
     target = np.repeat(np.arange(count), steps)
     last = np.cumsum(steps)
     part = (np.arange(len(target)) - (last - steps)[target] + 1) / steps[target]
-    before = np.maximum(target - 1, 0)
-    start = np.where(targets.ptp[target], target, before)
-    points = position[start] + (position[target] - position[start]) * part[:, None]
+    start = from_position[target]
+    points = start + (position[target] - start) * part[:, None]
     turned = rotation[target]
     partial = np.flatnonzero((angle[target] > 0) & (part < 1))
     if len(partial):
         turned = np.array(turned)
-        turned[partial] = _between(rotation[start[partial]], rotation[target[partial]], part[partial])
+        turned[partial] = _between(from_rotation[target[partial]], rotation[target[partial]], part[partial])
     speed = targets.speed_mm_s[target]
     duration = np.where(targets.ptp[target], np.nan, np.maximum(length[target], 1e-9) / speed / steps[target])
     return Line(points, turned, targets.tool[target], target, duration, part == 1.0)
+
+
+def _starts(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
+    """Return position (p, 3) and rotation (p, 4) at which each motion begins; PTP begins where it ends."""
+    before = np.maximum(np.arange(len(targets)) - 1, 0)
+    before[targets.ptp] = np.flatnonzero(targets.ptp)
+    position, rotation = targets.position_mm[before], targets.rotation[before]
+    for row in np.flatnonzero((targets.tool != targets.tool[before]) & ~targets.ptp):
+        old = fr.transform(position[row], fr.rotation_from_quaternion(rotation[row]))
+        old_tool, new_tool = (cell.tool_matrix(int(targets.tool[k])) for k in (row - 1, row))
+        new = old @ fr.invert(old_tool) @ new_tool
+        position[row], rotation[row] = new[:3, 3], fr.quaternion_from_rotation(new[:3, :3])
+    return position, rotation
 
 
 def _between(a: Floats, b: Floats, part: Floats) -> Floats:

@@ -37,8 +37,8 @@ def test_every_example_is_translated_verified_and_verifies_again(run, tmp_path, 
 def test_json_has_every_key_of_the_contract(run, part):
     result = json.loads(run(part, "-o", "part.src", "--json").out)
     assert set(result) == {
-        "files", "moves", "time_s", "path_mm", "max_force_N", "max_deflection_mm", "corner_error_mm", "verify",
-        "pilot", "issues",
+        "files", "moves", "time_s", "path_mm", "max_force_N", "max_deflection_mm", "corner_error_mm",
+        "verify", "pilot", "issues",
     }  # fmt: skip
     assert result["moves"] == 5
     assert result["path_mm"] == pytest.approx(50 + 52 + 52 + 0, abs=60)
@@ -240,7 +240,9 @@ def test_the_cell_files_of_the_documents_are_valid(tmp_path):
 
     from gcode2krl import load_cell
 
-    blocks = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "cell.md").read_text(encoding="utf-8"), flags=re.S)
+    blocks = re.findall(
+        r"```toml\n(.*?)```", (ROOT / "docs" / "cell.md").read_text(encoding="utf-8"), flags=re.S
+    )
     assert len(blocks) >= 5
     for block in blocks:
         path = tmp_path / "cell.toml"

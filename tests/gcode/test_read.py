@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import Gcode2KrlError, read_gcode
-from gcode2krl.gcode import read_stream
 from gcode2krl.gcode import read as reading
+from gcode2krl.gcode import read_stream
 
 
 def read(text, cell=None, **options):
@@ -93,7 +93,11 @@ def test_chords_stay_within_the_tolerance(radius, start, sweep, ccw, tolerance):
 
 
 def test_long_files_are_read_in_pieces_with_the_same_result(monkeypatch):
-    text = "G21 G0 X0 Y0 Z0\nG1 F500 X1\n" + "".join(f"X{k % 97}.{k % 10} (MSG, {k})\n" for k in range(3000)) + "M2\n"
+    text = (
+        "G21 G0 X0 Y0 Z0\nG1 F500 X1\n"
+        + "".join(f"X{k % 97}.{k % 10} (MSG, {k})\n" for k in range(3000))
+        + "M2\n"
+    )
     whole = read(text)
     monkeypatch.setattr(reading, "_PIECE_BYTES", 5000)
     pieces = read(text)
@@ -150,10 +154,12 @@ def test_any_text_gives_a_table_or_findings(text):
     try:
         toolpath = read_stream(io.BytesIO(text.encode("utf-8")), "part.nc")
     except Gcode2KrlError as error:
-        assert error.issues
-        assert all(issue.message for issue in error.issues)
+        messages = [issue.message for issue in error.issues]
     else:
+        messages = ["fine"]
         assert np.isfinite(toolpath.position_mm).all()
+    assert messages
+    assert all(messages)
 
 
 def test_a_folder_is_not_a_part(tmp_path):

@@ -8,7 +8,11 @@ from gcode2krl import load_cell, read_gcode, set_targets, write_krl
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-PROGRAMS = sorted((HERE / "programs").glob("*.nc")) + [ROOT / "examples" / "test_piece.nc", ROOT / "examples" / "cam_style.nc"]
+PROGRAMS = [
+    *sorted((HERE / "programs").glob("*.nc")),
+    ROOT / "examples" / "test_piece.nc",
+    ROOT / "examples" / "cam_style.nc",
+]
 
 
 @pytest.mark.parametrize("part", PROGRAMS, ids=lambda path: path.stem)

@@ -163,10 +163,10 @@ def test_longer_tool_finds_room(plan):
     )
     assert made.steps[row] == ("LIN", 10, 20, 150)
     assert made.targets.tool[row] == 1
-    assert flange_heights(made)[row] == 100 + 150
+    assert flange_heights(made)[row] == pytest.approx(100 + 150)
     assert made.steps[row + 1] == ("LIN", 10, 20, 100)  # the same place for the arm
     assert made.targets.tool[row + 1] == 2
-    assert flange_heights(made)[row + 1] == 100 + 150
+    assert flange_heights(made)[row + 1] == pytest.approx(100 + 150)
 
 
 @pytest.mark.parametrize("length", [60.0, 150.0])
