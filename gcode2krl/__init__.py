@@ -14,6 +14,7 @@ _HOMES = {
     "Cell": "gcode2krl.cell",
     "read_gcode": "gcode2krl.gcode",
     "set_targets": "gcode2krl.predict",
+    "plan_motion": "gcode2krl.predict",
     "solve_joints": "gcode2krl.predict",
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
@@ -26,6 +27,7 @@ __all__ = [
     "Issue",
     "__version__",
     "load_cell",
+    "plan_motion",
     "read_gcode",
     "set_targets",
     "solve_joints",
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
     from gcode2krl.errors import Gcode2KrlError, Issue
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
-    from gcode2krl.predict import set_targets, solve_joints
+    from gcode2krl.predict import plan_motion, set_targets, solve_joints
 
 
 def __getattr__(name: str) -> Any:

@@ -94,3 +94,17 @@ def angle_between(quaternion_a: ArrayLike, quaternion_b: ArrayLike) -> Floats:
     half_chord = np.linalg.norm(a - b, axis=-1) / 2.0
     angle: Floats = 4.0 * np.arcsin(np.clip(half_chord, 0.0, 1.0))
     return angle
+
+
+def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
+    """Return the rotations between quaternions (n, 4) and (n, 4) at shares (n,), by the shorter way."""
+    b = np.where(np.sum(a * b, axis=1, keepdims=True) < 0, -b, b)
+    half = np.arccos(np.clip(np.sum(a * b, axis=1), -1.0, 1.0))
+    sine = np.sin(half)
+    small = sine < 1e-9
+    safe = np.where(small, 1.0, sine)
+    wa = np.where(small, 1 - part, np.sin((1 - part) * half) / safe)
+    wb = np.where(small, part, np.sin(part * half) / safe)
+    mixed = wa[:, None] * a + wb[:, None] * b
+    result: Floats = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+    return result

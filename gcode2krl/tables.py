@@ -135,6 +135,31 @@ class Targets(Table):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Motion(Table):
+    """What the controller will command: a row per time sample, from the first programmed position at rest
+    to the end of the last programmed move."""
+
+    time_s: Floats = _column(np.float64)
+    position_mm: Floats = _column(np.float64, 3)
+    """(m, 3) tool tip in ``$BASE``."""
+    rotation: Floats = _column(np.float64, 4)
+    """(m, 4) quaternion x, y, z, w of the tool frame in ``$BASE``."""
+    speed_mm_s: Floats = _column(np.float64)
+    acceleration_mm_s2: Floats = _column(np.float64)
+    """(m,) magnitude of the acceleration vector of the tip."""
+    jerk_mm_s3: Floats = _column(np.float64)
+    """(m,) magnitude of the jerk vector of the tip."""
+    path_mm: Floats = _column(np.float64)
+    """(m,) arc length along the blended path."""
+    move: Ints = _column(np.int32)
+    """(m,) row of Toolpath."""
+    corner: Bools = _column(np.bool_)
+    """(m,) True inside an approximated corner."""
+    tool: Ints = _column(np.int32)
+    """(m,) tool number whose frame moves."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Joints(Table):
     """Joint angles along a Motion or at Targets."""
 

@@ -31,7 +31,7 @@ def summary_lines(
     read_back = f"{report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg"
     speed_off = report.max_speed_difference_mm_min
 
-    yield f"{part} -> {', '.join(str(file) for file in written.files)} ({size_mb:.2f} MB)"
+    yield f"{part} -> {_files(written)} ({size_mb:.2f} MB)"
     yield f"  program    {written.name}: {len(toolpath) - 1} moves, {len(targets)} motions, lines {lines}"
     yield f"  path       {steps_m[feed].sum():.3f} m at feed, {steps_m[rapid].sum():.3f} m rapid"
     yield f"  feed       {_span(targets.speed_mm_s[feed] * S_PER_MIN, 0)} mm/min"
@@ -43,6 +43,13 @@ def summary_lines(
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
     yield "  not known  time, corner error, forces, deflection; collision and material are not checked"
+
+
+def _files(written: WrittenProgram) -> str:
+    names = [str(file) for file in written.files]
+    if len(names) <= 3:
+        return ", ".join(names)
+    return f"{names[0]}, {len(names) - 2} parts {names[1]} ... {names[-2]}, {names[-1]}"
 
 
 def _span(values: "np.ndarray[tuple[int], np.dtype[np.float64 | np.int32]]", decimals: int) -> str:

@@ -17,7 +17,8 @@ from gcode2krl.robot.inverse_kinematics import one_branch
 from gcode2krl.robot.jacobian import smallest_singular_value
 from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.poses import flange_frames, forward
-from gcode2krl.tables import Joints, Targets
+from gcode2krl.tables import Joints, Motion, Targets
+from gcode2krl.tool_tips import motion_starts
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, RAD_PER_REV
 
 Floats = NDArray[np.float64]
@@ -56,27 +57,41 @@ def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
     Joint speeds are NaN (they belong to a Motion). A target out of reach has NaN angles.
     """
     line = sample_lines(targets, cell)
-    q_line = _best_branch(line, targets, cell)
+    chain = np.isnan(line.duration_s)
+    q_line = _best_branch(line.position_mm, line.rotation, line.tool, chain, cell)
     q = np.full((len(targets), 6), np.nan)
     q[line.target[line.is_target]] = q_line[line.is_target]
     q[targets.home] = cell.home_q_rad()
-    tool_position = np.array([cell.tool_matrix(n)[:3, 3] for n in np.unique(targets.tool)])
+    joints = _joints(q, np.full_like(q, np.nan), targets.tool, cell)
+    return joints, joint_findings(line, q_line, targets, cell)
+
+
+def follow_motion(motion: Motion, cell: Cell) -> Joints:
+    """Return joints at each sample (m) of a Motion, one branch for all; speeds are central differences."""
+    chain = np.zeros(len(motion), dtype=np.bool_)
+    chain[0] = True
+    q = _best_branch(motion.position_mm, motion.rotation, motion.tool, chain, cell)
+    qd = np.gradient(q, motion.time_s, axis=0) if len(motion) > 1 else np.zeros_like(q)
+    changed = np.flatnonzero(np.diff(motion.tool)) if len(motion) > 1 else np.zeros(0, dtype=np.int64)
+    qd[changed], qd[changed + 1] = 0.0, 0.0  # the flange rests while the tool changes
+    return _joints(q, qd, motion.tool, cell)
+
+
+def _joints(q: Floats, qd: Floats, tool: NDArray[np.int32], cell: Cell) -> Joints:
+    geometry = cell.robot.geometry.array()
     sigma = np.empty(len(q))
-    for index, number in enumerate(np.unique(targets.tool)):
-        rows = targets.tool == number
-        sigma[rows] = smallest_singular_value(q[rows], cell.robot.geometry.array(), tool_position[index])
-    status, turn = status_turn(
-        np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, cell.robot.geometry.array()
-    )
-    joints = Joints(
+    for number in np.unique(tool):
+        rows = tool == number
+        sigma[rows] = smallest_singular_value(q[rows], geometry, cell.tool_matrix(int(number))[:3, 3])
+    status, turn = status_turn(np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, geometry)
+    return Joints(
         q_rad=q,
-        qd_rad_s=np.full_like(q, np.nan),
+        qd_rad_s=qd,
         limit_margin_rad=_limit_margin(q, cell),
         sigma_min=sigma,
         status=status.astype(np.int32),
         turn=turn.astype(np.int32),
     )
-    return joints, joint_findings(line, q_line, targets, cell)
 
 
 def sample_lines(targets: Targets, cell: Cell) -> Line:
@@ -86,7 +101,8 @@ def sample_lines(targets: Targets, cell: Cell) -> Line:
     """
     position, rotation = targets.position_mm, targets.rotation
     count = len(targets)
-    from_position, from_rotation = _starts(targets, cell)
+    from_position, from_rotation = motion_starts(targets, cell)
+    from_position[targets.ptp], from_rotation[targets.ptp] = position[targets.ptp], rotation[targets.ptp]
     length = np.linalg.norm(position - from_position, axis=1)
     angle = np.zeros(count)
     if not (rotation == rotation[0]).all():
@@ -103,47 +119,21 @@ def sample_lines(targets: Targets, cell: Cell) -> Line:
     partial = np.flatnonzero((angle[target] > 0) & (part < 1))
     if len(partial):
         turned = np.array(turned)
-        turned[partial] = _between(from_rotation[target[partial]], rotation[target[partial]], part[partial])
+        turned[partial] = fr.slerp(from_rotation[target[partial]], rotation[target[partial]], part[partial])
     speed = targets.speed_mm_s[target]
     duration = np.where(targets.ptp[target], np.nan, np.maximum(length[target], 1e-9) / speed / steps[target])
     return Line(points, turned, targets.tool[target], target, duration, part == 1.0)
 
 
-def _starts(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
-    """Return position (p, 3) and rotation (p, 4) at which each motion begins; PTP begins where it ends."""
-    before = np.maximum(np.arange(len(targets)) - 1, 0)
-    before[targets.ptp] = np.flatnonzero(targets.ptp)
-    position, rotation = targets.position_mm[before], targets.rotation[before]
-    for row in np.flatnonzero((targets.tool != targets.tool[before]) & ~targets.ptp):
-        old = fr.transform(position[row], fr.rotation_from_quaternion(rotation[row]))
-        old_tool, new_tool = (cell.tool_matrix(int(targets.tool[k])) for k in (row - 1, row))
-        new = old @ fr.invert(old_tool) @ new_tool
-        position[row], rotation[row] = new[:3, 3], fr.quaternion_from_rotation(new[:3, :3])
-    return position, rotation
-
-
-def _between(a: Floats, b: Floats, part: Floats) -> Floats:
-    """Spherical interpolation of quaternions (n, 4)."""
-    b = np.where(np.sum(a * b, axis=1, keepdims=True) < 0, -b, b)
-    half = np.arccos(np.clip(np.sum(a * b, axis=1), -1.0, 1.0))
-    sine = np.sin(half)
-    small = sine < 1e-9
-    safe = np.where(small, 1.0, sine)
-    wa = np.where(small, 1 - part, np.sin((1 - part) * half) / safe)
-    wb = np.where(small, part, np.sin(part * half) / safe)
-    mixed = wa[:, None] * a + wb[:, None] * b
-    result: Floats = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
-    return result
-
-
-def _best_branch(line: Line, targets: Targets, cell: Cell) -> Floats:
+def _best_branch(
+    tip_mm: Floats, tip_rotation: Floats, tool: NDArray[np.int32], chain: NDArray[np.bool_], cell: Cell
+) -> Floats:
     """Return the joints (m, 6) of the branch and turns that keep the whole program within the limits.
 
     Among branches that do, the one whose weakest point (limits, wrist) is not poor and whose start lies
     nearest to HOME. A trial on a thinned line picks the branch, the full line gets only that one.
     """
-    position, rotation = flange_frames(line.position_mm, line.rotation, line.tool, cell)
-    chain = np.isnan(line.duration_s)
+    position, rotation = flange_frames(tip_mm, tip_rotation, tool, cell)
     stride = max(1, len(position) // _TRIAL_SAMPLES)
     thin = np.unique(
         np.concatenate([np.arange(0, len(position), stride), np.flatnonzero(chain), [len(position) - 1]])

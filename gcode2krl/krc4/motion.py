@@ -1,0 +1,222 @@
+"""Targets to Motion: the chain of LIN motions as the controller will command it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
+from gcode2krl.krc4.sampling import sample, sample_times
+from gcode2krl.tables import Motion, Targets
+from gcode2krl.tool_tips import motion_starts
+from gcode2krl.units import MM_PER_M, RAD_PER_DEG
+
+Floats = NDArray[np.float64]
+_MOST_SAMPLES = 50_000_000
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The moves of a Motion: n moves between the first and the last programmed position."""
+
+    first: int
+    """Row of Targets at which the motion starts at rest."""
+    start_mm: Floats
+    end_mm: Floats
+    from_rotation: Floats
+    to_rotation: Floats
+    length_mm: Floats
+    """(n,) lengths; a mere reorientation counts as the way it takes the time of."""
+    speed_mm_s: Floats
+    blend_mm: Floats
+    """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop."""
+    wait_s: Floats
+    move: NDArray[np.int32]
+    source_line: NDArray[np.int32]
+    tool: NDArray[np.int32]
+    cos_half: Floats
+    """(n,) cos(alpha/2) at the end of each move, alpha = interior angle."""
+
+    def corner_error_mm(self) -> Floats:
+        """Return the corner errors (n,), d·cos(alpha/2)/2."""
+        return self.blend_mm * self.cos_half / 2.0
+
+
+def build_chain(targets: Targets, cell: Cell) -> Chain:
+    """Return the chain of a program. PTP motions inside it are taken as straight, at the rapid speed."""
+    programmed = np.flatnonzero(targets.move >= 0)
+    first, last = int(programmed[0]), int(programmed[-1])
+    rows = slice(first + 1, last + 1)
+    start, from_rotation = (column[rows] for column in motion_starts(targets, cell))
+    end, to_rotation = targets.position_mm[rows], targets.rotation[rows]
+    length = np.linalg.norm(end - start, axis=1)
+    rapid = cell.controller.rapid_m_s * MM_PER_M
+    speed = np.where(targets.ptp[rows], rapid, targets.speed_mm_s[rows])
+    length, speed = _with_orientation(length, speed, from_rotation, to_rotation, cell)
+    d, cos_half = _blends(start, end, length, targets.cdis_mm[rows])
+    if cell.controller.advance == 0:
+        d = np.zeros_like(d)
+    move = targets.move[rows]
+    following = np.flatnonzero(move >= 0)
+    owner = move[following[np.minimum(np.searchsorted(following, np.arange(len(move))), len(following) - 1)]]
+    return Chain(
+        first=first,
+        start_mm=np.ascontiguousarray(start),
+        end_mm=np.ascontiguousarray(end),
+        from_rotation=from_rotation,
+        to_rotation=to_rotation,
+        length_mm=length,
+        speed_mm_s=speed,
+        blend_mm=d,
+        wait_s=targets.wait_s[rows],
+        move=owner if len(move) else move,
+        source_line=targets.source_line[rows],
+        tool=targets.tool[rows],
+        cos_half=cos_half,
+    )
+
+
+def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Floats | None = None) -> Profile:
+    """Return the profile of a chain; ``look_ahead`` False leaves the model of ``$ADVANCE`` out."""
+    controller = cell.controller
+    in_view = UNLIMITED if controller.advance == "unlimited" or not look_ahead else int(controller.advance)
+    return plan_profile(
+        chain.length_mm,
+        chain.speed_mm_s if speed_mm_s is None else speed_mm_s,
+        chain.blend_mm,
+        chain.blend_mm <= 0.0,
+        chain.wait_s,
+        controller.acc_cp_m_s2 * MM_PER_M,
+        controller.k_s,
+        in_view,
+        controller.law == "averages",
+    )
+
+
+def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, dt_s: float) -> Motion:
+    """Return the Motion of a chain, sampled every ``dt_s`` from 0 to its end."""
+    if not (np.isfinite(dt_s) and dt_s > 0):
+        raise input_error("option-value", f"sample time {dt_s} s is not positive")
+    if profile.total_s / dt_s > _MOST_SAMPLES:
+        hours = profile.total_s / 3600.0
+        raise input_error(
+            "too-long",
+            f"the motion lasts {hours:.1f} h, more than {_MOST_SAMPLES} samples",
+            "use a larger --dt",
+        )
+    if len(chain.length_mm) == 0:
+        return _standstill(targets, chain)
+    time = sample_times(profile, dt_s)
+    position, figures, row, part = sample(
+        time, profile, chain.start_mm, chain.end_mm, chain.length_mm, chain.blend_mm, cell.controller.k_s
+    )
+    blend = chain.blend_mm
+    inside = part * chain.length_mm[row]
+    before = np.where(row > 0, blend[row - 1], 0.0)
+    corner = (inside > chain.length_mm[row] - blend[row]) | (inside < before)
+    return Motion(
+        time_s=time,
+        position_mm=position,
+        rotation=_rotations(chain, row, part),
+        speed_mm_s=figures[:, 0],
+        acceleration_mm_s2=figures[:, 1],
+        jerk_mm_s3=figures[:, 2],
+        path_mm=figures[:, 3],
+        move=chain.move[row],
+        corner=corner,
+        tool=chain.tool[row],
+    )
+
+
+def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
+    """Return what costs time: look-ahead on short moves, and how much the two laws differ."""
+    issues = []
+    if cell.controller.advance != "unlimited" and len(chain.length_mm):
+        free = plan(chain, cell, look_ahead=False)
+        lost_s = profile.total_s - free.total_s
+        if lost_s > 0.01 * profile.total_s:
+            own, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))
+            worst = int(np.argmax(own - ideal))
+            sentence = (
+                f"moves too short for a look-ahead of {cell.controller.advance} cost {lost_s:.1f} s of "
+                f"{profile.total_s:.1f} s, most at this line (unverified: how the controller plans ahead)"
+            )
+            remedy = "merge collinear moves, raise the chord tolerance, or let the CAM write longer moves"
+            issues.append(Issue("note", "short-moves", int(chain.source_line[worst]), sentence, remedy))
+    law = cell.controller.law
+    other_law = "trapezoid" if law == "averages" else "averages"
+    other_controller = cell.controller.model_copy(update={"law": other_law})
+    other_s = plan(chain, cell.model_copy(update={"controller": other_controller})).total_s
+    if abs(other_s - profile.total_s) > 0.05 * profile.total_s:
+        sentence = f"time by law {law} {profile.total_s:.1f} s, by {other_law} {other_s:.1f} s"
+        remedy = "undecided without a trace of the controller"
+        issues.append(Issue("note", "law-undecided", 0, sentence, remedy))
+    return tuple(issues)
+
+
+def _with_orientation(
+    length: Floats, speed: Floats, from_rotation: Floats, to_rotation: Floats, cell: Cell
+) -> tuple[Floats, Floats]:
+    """Limit the speed by ``$VEL.ORI``; a reorientation on the spot gets the length it takes the time of."""
+    if len(length) == 0 or bool(
+        (to_rotation == to_rotation[0]).all() and (from_rotation == to_rotation[0]).all()
+    ):
+        return length, speed
+    angle = fr.angle_between(from_rotation, to_rotation)
+    most_rad_s = cell.controller.vel_ori_deg_s * RAD_PER_DEG
+    turning = angle > 1e-12
+    way = np.where(turning & (length * most_rad_s < angle * speed), angle * speed / most_rad_s, length)
+    on_spot = length < 1e-9
+    limited = np.where(
+        on_spot | ~turning, speed, np.minimum(speed, length * most_rad_s / np.where(turning, angle, 1.0))
+    )
+    return np.where(on_spot, way, length), limited
+
+
+def _blends(start: Floats, end: Floats, length: Floats, cdis: Floats) -> tuple[Floats, Floats]:
+    """Return (d, cos(alpha/2)) at the end of each move: d = min(CDIS, L1/2, L2/2), 0 at the last."""
+    count = len(length)
+    d, cos_half = np.zeros(count), np.zeros(count)
+    if count < 2:
+        return d, cos_half
+    way = end - start
+    size = np.linalg.norm(way, axis=1)
+    product = size[:-1] * size[1:]
+    real = product > 0
+    cos_turn = np.clip(np.einsum("ij,ij->i", way[:-1], way[1:]) / np.where(real, product, 1.0), -1.0, 1.0)
+    cos_half[:-1] = np.where(real, np.sqrt((1.0 - cos_turn) / 2.0), 0.0)
+    d[:-1] = np.where(
+        real & (cos_turn > -1.0 + 1e-12), np.minimum(cdis[:-1], np.minimum(length[:-1], length[1:]) / 2), 0.0
+    )
+    return d, cos_half
+
+
+def _rotations(chain: Chain, row: NDArray[np.int64], part: Floats) -> Floats:
+    """Orientation goes with the position along each move (``$ORI_TYPE = #VAR``)."""
+    constant = bool(
+        (chain.to_rotation == chain.to_rotation[0]).all()
+        and (chain.from_rotation == chain.to_rotation[0]).all()
+    )
+    if constant:
+        return np.broadcast_to(chain.to_rotation[0], (len(row), 4))
+    return fr.slerp(chain.from_rotation[row], chain.to_rotation[row], part)
+
+
+def _standstill(targets: Targets, chain: Chain) -> Motion:
+    """A program of one position: one sample at rest."""
+    row = chain.first
+    zero = np.zeros(1)
+    return Motion(
+        time_s=zero, position_mm=targets.position_mm[row : row + 1], rotation=targets.rotation[row : row + 1],
+        speed_mm_s=zero, acceleration_mm_s2=zero, jerk_mm_s3=zero, path_mm=zero,
+        move=targets.move[row : row + 1], corner=np.zeros(1, dtype=np.bool_),
+        tool=targets.tool[row : row + 1],
+    )  # fmt: skip
+
+
+def with_speed(chain: Chain, speed_mm_s: Floats) -> Chain:
+    """Return the chain with other speeds (n,)."""
+    return replace(chain, speed_mm_s=speed_mm_s)

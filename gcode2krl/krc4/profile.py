@@ -1,0 +1,180 @@
+"""Speed along a chain of moves: what the planner asks for before the last moving average.
+
+The programmed speeds become pieces of constant acceleration: ramps of slope a (the first average of the law),
+constant speed, standstill. The second average, of length k, is applied when the motion is sampled. Both laws
+of the controller model differ only where a move is too short to reach its speed: ``averages`` lets the ramps
+up and down overlap (their sum), ``trapezoid`` runs up with a as far as it gets.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+UNLIMITED = -1
+"""Number of moves in view where the look-ahead model is off."""
+
+
+class Profile(NamedTuple):
+    """Pieces of constant acceleration, by time."""
+
+    time_s: Floats
+    path_mm: Floats
+    speed_mm_s: Floats
+    acceleration_mm_s2: Floats
+    integral_mm_s: Floats
+    """Integral of the path over time up to the piece."""
+    move_end_s: Floats
+    """(n,) time at which each move ends, before the last average."""
+    total_s: float
+
+
+def plan_profile(
+    length_mm: Floats, speed_mm_s: Floats, blend_mm: Floats, stop: NDArray[np.bool_], wait_s: Floats,
+    a_mm_s2: float, k_s: float, moves_in_view: int, averages: bool,
+) -> Profile:  # fmt: skip
+    """Plan a chain of n moves that starts and ends at rest.
+
+    Parameters
+    ----------
+    length_mm, speed_mm_s : (n,) of each move.
+    blend_mm : (n,) distance before and after the end of a move within which the corner is blended.
+    stop : (n,) True where the end of a move is an exact stop.
+    wait_s : (n,) dwell after that stop.
+    moves_in_view : ``$ADVANCE``, or `UNLIMITED`.
+    averages : the law; False = trapezoid.
+    """
+    count = len(length_mm)
+    vertex = _vertex_speeds(length_mm, speed_mm_s, stop, a_mm_s2, k_s, moves_in_view)
+    head, tail = _margins(length_mm, speed_mm_s, blend_mm, stop, vertex, k_s)
+    _reachable(length_mm - head - tail, vertex, a_mm_s2)
+    pieces = np.empty((5, 7 * count + 2))
+    move_end = np.empty(count)
+    used, total = _pieces(
+        length_mm, speed_mm_s, stop, wait_s, vertex, head, tail, a_mm_s2, k_s, averages, pieces, move_end
+    )
+    t, s, v, a, i = (np.ascontiguousarray(column[:used]) for column in pieces)
+    return Profile(t, s, v, a, i, move_end, total)
+
+
+@njit(cache=True)
+def _vertex_speeds(length, speed, stop, a, k, in_view):
+    """Upper bound (n + 1,) of the speed at each vertex: programmed, stops, look-ahead.
+
+    Look-ahead (an assumption, the controller's planning is not published): at the end of a move only the next
+    ``in_view`` moves are known, and a stop at their end must be possible: v·(v/a + k)/2 <= what is in view.
+    """
+    count = len(length)
+    vertex = np.zeros(count + 1)
+    for i in range(count - 1):
+        if stop[i]:
+            continue
+        bound = min(speed[i], speed[i + 1])
+        if in_view >= 0:
+            seen = 0.0
+            known_stop = False
+            for j in range(i + 1, min(i + 1 + in_view, count)):
+                seen += length[j]
+                if stop[j] or j == count - 1:
+                    known_stop = True
+                    break
+            if not known_stop:
+                bound = min(bound, 0.5 * (math.sqrt(a * a * k * k + 8.0 * a * seen) - a * k))
+        vertex[i + 1] = bound
+    return vertex
+
+
+@njit(cache=True)
+def _margins(length, speed, blend, stop, vertex, k):
+    """Part of a move that is run at the speed of a slower neighbour: slowing down ends where the corner
+    begins, speeding up begins where it ends; v·k/2 is what the last average smears across that point."""
+    count = len(length)
+    head, tail = np.zeros(count), np.zeros(count)
+    for i in range(count - 1):
+        if stop[i]:
+            continue
+        low = vertex[i + 1]
+        if speed[i] > speed[i + 1] and low == speed[i + 1]:
+            tail[i] = min(0.5 * length[i], blend[i] + 0.5 * low * k)
+        elif speed[i] < speed[i + 1] and low == speed[i]:
+            head[i + 1] = min(0.5 * length[i + 1], blend[i] + 0.5 * low * k)
+    return head, tail
+
+
+@njit(cache=True)
+def _reachable(length, vertex, a):
+    """Lower the vertex speeds to what can be reached and braked with a."""
+    for i in range(len(length) - 1, -1, -1):
+        vertex[i] = min(vertex[i], math.sqrt(vertex[i + 1] ** 2 + 2.0 * a * max(length[i], 0.0)))
+    for i in range(len(length)):
+        vertex[i + 1] = min(vertex[i + 1], math.sqrt(vertex[i] ** 2 + 2.0 * a * max(length[i], 0.0)))
+
+
+@njit(cache=True)
+def phases(length, v, u0, u1, a, averages):
+    """Durations of running up, constant speed and slowing down of a move from u0 to u1 at most at v."""
+    if averages:
+        up, down = (v - u0) / a, (v - u1) / a
+        total = (length + 0.5 * (v - u0) * up + 0.5 * (v - u1) * down) / v
+        if total >= up and total >= down:
+            if total >= up + down:
+                return up, total - up - down, down
+            return total - down, up + down - total, total - up  # the ramps overlap and add
+    top = min(v, math.sqrt(0.5 * (2.0 * a * length + u0 * u0 + u1 * u1)))
+    top = max(top, u0, u1)
+    constant = (length - (top * top - u0 * u0) / (2.0 * a) - (top * top - u1 * u1) / (2.0 * a)) / top
+    return (top - u0) / a, max(0.0, constant), (top - u1) / a
+
+
+@njit(cache=True)
+def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out, move_end):
+    """Write the pieces (time, path, speed, acceleration, integral); return how many and the total time."""
+    used = 0
+    t, s, area = 0.0, 0.0, 0.0
+    count = len(length)
+    for i in range(count):
+        start = s
+        u0, u1 = vertex[i], vertex[i + 1]
+        main = length[i] - head[i] - tail[i]
+        rise, level, fall = 0.0, 0.0, 0.0
+        if main > 0.0:
+            rise, level, fall = phases(main, speed[i], u0, u1, a, averages)
+        steps = (
+            (head[i] / u0 if head[i] > 0.0 else 0.0, u0, 0.0),
+            (rise, u0, a),
+            (level, u0 + a * rise, 0.0),
+            (fall, u0 + a * rise, -a),
+            (tail[i] / u1 if tail[i] > 0.0 else 0.0, u1, 0.0),
+        )
+        for duration, v, acceleration in steps:
+            if duration <= 0.0:
+                continue
+            same = used > 0 and acceleration == 0.0 and out[3, used - 1] == 0.0 and out[2, used - 1] == v
+            if not same:
+                out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = (
+                    t,
+                    s,
+                    v,
+                    acceleration,
+                    area,
+                )
+                used += 1
+            area += s * duration + v * duration**2 / 2.0 + acceleration * duration**3 / 6.0
+            s += v * duration + acceleration * duration**2 / 2.0
+            t += duration
+        drift = start + length[i] - s
+        if abs(drift) > 1e-9:
+            s = start + length[i]
+        move_end[i] = t
+        if stop[i] or i == count - 1:
+            rest = k + (wait[i] if i < count - 1 else 0.0)
+            if rest > 0.0:
+                out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = t, s, 0.0, 0.0, area
+                used += 1
+                area += s * rest
+                t += rest
+    out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = t, s, 0.0, 0.0, area
+    return used + 1, t
