@@ -4,10 +4,12 @@ The names below are the public Python interface; they are imported on first use,
 ``import gcode2krl`` stays quick.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from gcode2krl.version import __version__
 
 _HOMES = {
     "load_cell": "gcode2krl.cell",
@@ -15,6 +17,7 @@ _HOMES = {
     "read_gcode": "gcode2krl.gcode",
     "set_targets": "gcode2krl.predict",
     "plan_motion": "gcode2krl.predict",
+    "Prediction": "gcode2krl.prediction",
     "solve_joints": "gcode2krl.predict",
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
@@ -25,9 +28,11 @@ __all__ = [
     "Cell",
     "Gcode2KrlError",
     "Issue",
+    "Prediction",
     "__version__",
     "load_cell",
     "plan_motion",
+    "predict",
     "read_gcode",
     "set_targets",
     "solve_joints",
@@ -40,7 +45,8 @@ if TYPE_CHECKING:
     from gcode2krl.errors import Gcode2KrlError, Issue
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
-    from gcode2krl.predict import plan_motion, set_targets, solve_joints
+    from gcode2krl.predict import plan_motion, predict, set_targets, solve_joints
+    from gcode2krl.prediction import Prediction
 
 
 def __getattr__(name: str) -> Any:
@@ -48,3 +54,18 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'gcode2krl' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+class _Package(ModuleType):
+    """The package; ``gcode2krl.predict`` is the function, although a module has the same name."""
+
+    @property
+    def predict(self) -> Any:
+        return import_module("gcode2krl.predict").predict
+
+    @predict.setter
+    def predict(self, module: ModuleType) -> None:
+        """Importing the module of that name does not hide the function."""
+
+
+sys.modules[__name__].__class__ = _Package

@@ -394,6 +394,21 @@ def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str =
     return cell
 
 
+def as_toml(cell: Cell) -> dict[str, Any]:
+    """Return a resolved cell as plain tables; what is None is left out, as TOML has no null."""
+    record = cell.model_dump(mode="json", exclude_none=True)
+    record["tool"] = {str(number): tool for number, tool in record["tool"].items()}
+    return record
+
+
+def cell_from_resolved(record: dict[str, Any], source: str) -> Cell:
+    """Return the cell that `as_toml` wrote, without laying it over anything."""
+    try:
+        return Cell.model_validate(record)
+    except ValidationError as error:
+        raise NotUnderstoodError(_validation_issues(error), source) from None
+
+
 def cell_schema() -> dict[str, Any]:
     """Return the JSON schema of a cell file for editors; nothing is required, as a file may be partial."""
     schema = Cell.model_json_schema()

@@ -1,19 +1,71 @@
 """The pipeline, and whatever needs two stages: targets with their spin search, joints of targets."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import krc4, program, robot
-from gcode2krl.cell import Cell
+from gcode2krl import gcode, krc4, program, robot
+from gcode2krl.cell import Cell, load_cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Motion, Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
+from gcode2krl.version import __version__
 
 Floats = NDArray[np.float64]
 _SLOWING_ROUNDS = 3
+
+
+def predict(
+    part: str | Path,
+    cell: Cell | None = None,
+    *,
+    dt_s: float | None = None,
+    tolerance_mm: float | None = None,
+    chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
+    block_delete: bool = False,
+) -> Prediction:
+    """Run every stage there is on a part: G-code, targets, motion, joints.
+
+    ``dt_s`` is the sample time, by default the controller's cycle. Raises `NotUnderstoodError` where the
+    G-code, the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
+    """
+    cell = cell if cell is not None else load_cell()
+    toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
+    settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
+    return predict_toolpath(toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance_mm, settings=settings)
+
+
+def predict_toolpath(
+    toolpath: Toolpath,
+    cell: Cell,
+    *,
+    dt_s: float | None = None,
+    tolerance_mm: float | None = None,
+    settings: dict[str, Any] | None = None,
+) -> Prediction:
+    """Run every stage behind the G-code; see `predict`."""
+    dt_s = cell.controller.cycle_s if dt_s is None else dt_s
+    targets = set_targets(toolpath, cell, tolerance_mm)
+    motion = plan_motion(targets, cell, dt_s)
+    joints = solve_joints(motion, cell)
+    inputs: dict[str, Any] = {
+        "program": toolpath.source,
+        "version": __version__,
+        "dt_s": dt_s,
+        **(settings or {}),
+    }
+    if tolerance_mm is not None:
+        inputs["tolerance_mm"] = tolerance_mm
+    source = Path(toolpath.source)
+    if source.is_file():
+        inputs["program_sha256"] = hashlib.sha256(source.read_bytes()).hexdigest()
+    return Prediction(toolpath, targets, cell, motion, joints, inputs)
 
 
 def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:
@@ -28,11 +80,18 @@ def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = Non
     NotUnderstoodError
         Where the program has no motion, or the tolerance is not positive.
     """
+    return targets_and_joints(toolpath, cell, tolerance_mm)[0]
+
+
+def targets_and_joints(
+    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
+) -> tuple[Targets, Joints]:
+    """Return what `set_targets` returns, and the joints it was checked with."""
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     targets = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
-    _, findings = robot.follow(targets, cell)
-    return replace(targets, issues=(*targets.issues, *findings))
+    joints, findings = robot.follow(targets, cell)
+    return replace(targets, issues=(*targets.issues, *findings)), replace(joints, issues=findings)
 
 
 def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:
@@ -71,11 +130,31 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     return replace(motion, issues=tuple(issues))
 
 
-def corner_errors_mm(targets: Targets, cell: Cell) -> tuple[Floats, NDArray[np.int32]]:
-    """Return the corner error (c,) in mm and the G-code line (c,) of each blended corner of the program."""
+def corner_errors(
+    toolpath: Toolpath, targets: Targets, cell: Cell, tolerance_mm: float | None = None
+) -> tuple[Floats, tuple[Issue, ...]]:
+    """Return the corner error (n,) in mm at the end of each move, and where a tolerance is not kept.
+
+    A tolerance is asked for by ``G64 P``, by ``tolerance_mm`` or by the cell, in this order.
+    """
     chain = krc4.build_chain(targets, cell)
-    blended = chain.blend_mm > 0
-    return chain.corner_error_mm()[blended], chain.source_line[blended]
+    error_mm = chain.corner_error_mm()
+    own = cell.controller.tolerance_mm
+    below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+    programmed = toolpath.tolerance_mm[chain.move] if len(chain.move) else np.zeros(0)
+    allowed = np.where(np.isnan(programmed), below, programmed)
+    beyond = np.flatnonzero(error_mm > allowed * (1.0 + 1e-9))
+    findings = tuple(
+        Issue(
+            "error",
+            "corner-tolerance",
+            int(chain.source_line[row]),
+            f"the corner is {error_mm[row]:.4f} mm off, {allowed[row]:g} mm were asked for",
+            "lower the tolerance",
+        )
+        for row in beyond[:20]
+    )
+    return error_mm, findings
 
 
 def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:

@@ -6,11 +6,11 @@ from typing import Any
 
 import click
 
-from gcode2krl import __version__
 from gcode2krl.cli.console import Console
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.version import __version__
 
-_COMMANDS = {"translate": "translate", "verify": "verify", "models": "models"}
+_COMMANDS = {name: name for name in ("translate", "predict", "verify", "models")}
 _OWN_OPTIONS = ("-h", "--help", "--version")
 
 

@@ -1,16 +1,22 @@
 """``gcode2krl translate part.nc -o part.src``, the default command."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part, require_other
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
+from gcode2krl.prediction import Prediction
+from gcode2krl.tables import Targets
+
+Floats = NDArray[np.float64]
 
 
 @click.command("translate")
@@ -50,8 +56,8 @@ def command(
         file = _output_file(part, output, cell_path)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        from gcode2krl import predict
         from gcode2krl.krl import write_krl
+        from gcode2krl.predict import corner_errors, plan_motion, targets_and_joints
 
         options = _words(
             tolerance=tolerance,
@@ -60,11 +66,16 @@ def command(
             spin=cell.frames.spin,
         )
         with console.progress("planning, writing, verifying", None):
-            targets = predict.set_targets(toolpath, cell, tolerance)
+            targets, joints = targets_and_joints(toolpath, cell, tolerance)
+            corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
+            targets = replace(targets, issues=(*targets.issues, *corner_issues))
+            _refuse_early(targets, allow)
+            motion = plan_motion(targets, cell, cell.controller.cycle_s)
+            prediction = Prediction(toolpath, targets, cell, motion)
             written = write_krl(
-                targets,
+                prediction,
                 file,
-                cell,
+                joints=joints,
                 name=name,
                 allow=allow,
                 guard=not no_guard,
@@ -75,7 +86,7 @@ def command(
     except Gcode2KrlError as error:
         if not as_json:
             raise _from_part(error, part) from None
-        console.json(_result((), error.issues, None, None, None))
+        console.json(_result((), error.issues))
         return error.exit_code
     if output == STANDARD:
         sys.stdout.buffer.write(written.texts[f"{written.name}.src"])
@@ -83,12 +94,13 @@ def command(
         console.findings(written.issues, part)
         return 0
     if as_json:
-        console.json(_result(written.files, written.issues, toolpath, targets, written.report.as_dict()))
+        figures = _figures(prediction, corner_mm)
+        console.json(_result(written.files, written.issues, figures, written.report.as_dict()))
         return 0
     console.findings(written.issues, part)
     from gcode2krl.cli.summary import summary_lines
 
-    for line in summary_lines(part, toolpath, targets, predict.solve_joints(targets, cell), written, cell):
+    for line in summary_lines(part, prediction, joints, corner_mm, written):
         console.say(line)
     return 0
 
@@ -130,33 +142,42 @@ def _words(**options: Any) -> str:
     )
 
 
+def _refuse_early(targets: Targets, allow: tuple[str, ...]) -> None:
+    """Refuse what cannot move at all before its motion is planned."""
+    from gcode2krl.krl.release import released
+
+    if any(issue.severity == "error" for issue in targets.issues):
+        released(targets.issues, allow)
+
+
+def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:
+    """Return the figures of the contract that the stages give."""
+    motion = prediction.motion
+    return {
+        "moves": len(prediction.toolpath) - 1,
+        "time_s": float(motion.time_s[-1]) if motion is not None else None,
+        "path_mm": float(motion.path_mm[-1]) if motion is not None else None,
+        "corner_error_mm": float(corner_mm.max(initial=0.0)),
+    }
+
+
 def _result(
     files: tuple[Path, ...],
     issues: tuple[Issue, ...],
-    toolpath: Any,
-    targets: Any,
-    verify: dict[str, Any] | None,
+    figures: dict[str, Any] | None = None,
+    verify: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the object of the contract; a figure whose stage did not run is null."""
+    known = figures or {}
     return {
         "files": [str(file) for file in files],
-        "moves": len(toolpath) - 1 if toolpath is not None else None,
-        "time_s": None,
-        "path_mm": programmed_path_mm(targets) if targets is not None else None,
+        "moves": known.get("moves"),
+        "time_s": known.get("time_s"),
+        "path_mm": known.get("path_mm"),
         "max_force_N": None,
         "max_deflection_mm": None,
-        "corner_error_mm": None,
+        "corner_error_mm": known.get("corner_error_mm"),
         "verify": verify or {"max_deviation_mm": None},
         "pilot": {"knots": None, "max_error_N": None},
         "issues": issue_dicts(issues),
     }
-
-
-def programmed_path_mm(targets: Any) -> float:
-    """Return the length of the straight lines from the first to the last programmed position."""
-    rows = np.flatnonzero((targets.move >= 0) & ~targets.ptp)
-    if len(rows) < 2:
-        return 0.0
-    steps = np.linalg.norm(np.diff(targets.position_mm[rows[0] : rows[-1] + 1], axis=0), axis=1)
-    lin = ~targets.ptp[rows[0] + 1 : rows[-1] + 1]
-    return float(steps[lin].sum())

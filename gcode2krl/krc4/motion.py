@@ -116,6 +116,8 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
     blend = chain.blend_mm
     inside = part * chain.length_mm[row]
     before = np.where(row > 0, blend[row - 1], 0.0)
+    move = chain.move[row]
+    move[0] = targets.move[chain.first]
     corner = (inside > chain.length_mm[row] - blend[row]) | (inside < before)
     return Motion(
         time_s=time,
@@ -125,7 +127,7 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
         acceleration_mm_s2=figures[:, 1],
         jerk_mm_s3=figures[:, 2],
         path_mm=figures[:, 3],
-        move=chain.move[row],
+        move=move,
         corner=corner,
         tool=chain.tool[row],
     )

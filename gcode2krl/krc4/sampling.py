@@ -14,8 +14,7 @@ Floats = NDArray[np.float64]
 def sample_times(profile: Profile, dt_s: float) -> Floats:
     """Return the sample times (m,) in s, the last one at or behind the end of the motion."""
     count = math.ceil(profile.total_s / dt_s - 1e-9) + 1
-    times: Floats = np.arange(count) * dt_s
-    return times
+    return np.arange(count, dtype=np.float64) * dt_s
 
 
 def sample(

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import __version__
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.krl import statements as st
@@ -15,6 +14,7 @@ from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import fixed, motion_lines
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
+from gcode2krl.version import __version__
 
 Floats = NDArray[np.float64]
 NEWLINE = b"\r\n"

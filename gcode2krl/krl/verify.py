@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
-from gcode2krl import predict
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import Issue
 from gcode2krl.krl.compose import Layout, compose, turn_bits
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
+from gcode2krl.predict import set_targets, solve_joints
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M, RAD_PER_DEG, S_PER_MIN
 
@@ -104,8 +104,8 @@ def verify_krl(
     cannot be read or the G-code has no motion.
     """
     program = read_krl(path)
-    targets = predict.set_targets(toolpath, cell, tolerance_mm)
-    joints = predict.solve_joints(targets, cell)
+    targets = set_targets(toolpath, cell, tolerance_mm)
+    joints = solve_joints(targets, cell)
     layout = Layout(guard=program.guard)
     expected = compose(targets, joints, cell, program.name, layout)
     intended = read_texts(expected, f"{program.name}.src")

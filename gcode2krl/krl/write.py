@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from gcode2krl import predict
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krl.compose import Layout, compose
@@ -16,7 +15,9 @@ from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import released
 from gcode2krl.krl.verify import VerifyReport, compare
-from gcode2krl.tables import Targets
+from gcode2krl.predict import solve_joints
+from gcode2krl.prediction import Prediction
+from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
 
 
@@ -33,10 +34,11 @@ class WrittenProgram:
 
 
 def write_krl(
-    targets: Targets,
+    source: Targets | Prediction,
     path: str | Path | None,
-    cell: Cell,
+    cell: Cell | None = None,
     *,
+    joints: Joints | None = None,
     name: str | None = None,
     allow: Sequence[str] = (),
     guard: bool = True,
@@ -48,8 +50,10 @@ def write_krl(
 
     Parameters
     ----------
-    targets : from `set_targets`; errors among its ``issues`` refuse the program.
+    source : Targets from `set_targets`, or a Prediction; errors among its ``issues`` refuse the program.
     path : the ``.src``; None composes and verifies without writing (everything in one ``.src`` text).
+    cell : needed with Targets; a Prediction has its own.
+    joints : joints at the targets where they are known already.
     name : program name; default: the file's stem.
     allow : findings released by hand, ``CODE:LINE``; the header lists them.
     guard : compare frames, robot and inputs before the first motion.
@@ -64,10 +68,13 @@ def write_krl(
     NotUnderstoodError
         Where the output cannot be written or a name or release is wrong.
     """
+    targets, cell = (source.targets, source.cell) if isinstance(source, Prediction) else (source, cell)
+    if cell is None:
+        raise input_error("option-value", "write_krl needs a cell with Targets")
     file = Path(path) if path is not None else None
     program_name, issues = _program_name(file, name)
-    issues = list(released([*issues, *targets.issues], allow, strict))
-    joints = predict.solve_joints(targets, cell)
+    issues = list(released([*issues, *source.issues], allow, strict))
+    joints = solve_joints(targets, cell) if joints is None else joints
     layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow))
     texts = compose(targets, joints, cell, program_name, layout)
     issues += released(_size_issues(texts, targets, cell), (), strict)

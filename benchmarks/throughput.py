@@ -1,0 +1,388 @@
+"""A raster of a million lines: what each stage and the whole process cost, beside other programs.
+
+The yardstick is LinuxCNC's stand-alone interpreter, ``rs274 -g``, which reads the same file in the same run.
+Every figure is a whole process, start-up included, unless the table says otherwise; kernels are compiled
+before. Nothing is judged here: the figures are printed.
+
+    python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
+    python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
+    python benchmarks/throughput.py --scaling                     also 10^4, 10^5 and 10^6 lines
+    python benchmarks/throughput.py --scaling 10000000            up to 10^7 (needs memory and minutes)
+"""
+
+import argparse
+import importlib.util
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import gcode2krl
+
+# This process stays small (no numpy): Linux counts the parent's pages at the start of a child as its own.
+
+HERE = Path(__file__).resolve().parent
+PEERS = ("rs274", "gcodeparser", "pygcode", "toppra")
+YARDSTICK = "LinuxCNC rs274 -g, interprets only"
+PYGCODE_LINES = 20_000
+WARM_UP_LINES = 2_000
+CYCLE_S = 0.012
+SMALLEST_SCALE = 10_000
+HAS_MOTION = "plan_motion" in gcode2krl.__all__
+
+READ = "from gcode2krl import read_gcode; read_gcode({part!r})"
+CHAIN = """
+from gcode2krl import load_cell, plan_motion, read_gcode, set_targets, solve_joints, write_krl
+cell = load_cell({cell!r})
+toolpath = read_gcode({part!r}, cell)
+targets = set_targets(toolpath, cell)
+motion = plan_motion(targets, cell, dt_s={cycle})
+joints = solve_joints(motion, cell)
+write_krl(targets, {out!r}, cell)
+"""
+# --- one process, measured -------------------------------------------------------------------------
+
+
+class Run(NamedTuple):
+    """What one process took; ``problem`` is empty where it ended well."""
+
+    seconds: float
+    peak_mb: float
+    output: str
+    problem: str
+
+
+def run(command: Sequence[str], folder: Path) -> Run:
+    """Run a process to its end, with its wall time and its own peak memory."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        start = time.perf_counter()
+        process = subprocess.Popen(command, cwd=folder, stdout=out, stderr=err, stdin=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        seconds = time.perf_counter() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        err.seek(0)
+        said = err.read().decode("utf-8", "replace").strip().splitlines()
+        problem = f"exit code {process.returncode}: {said[-1] if said else ''}" if process.returncode else ""
+        return Run(seconds, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem)
+
+
+@dataclass
+class Work:
+    """A row of the table."""
+
+    name: str
+    command: list[str]
+    to_reach: float | None = None
+    seconds_of: Callable[[Run], float] = lambda run: run.seconds
+    runs: list[Run] = field(default_factory=list)
+    problem: str = ""
+
+    def repeat(self, folder: Path) -> None:
+        """Run once more, unless it has failed."""
+        if self.problem:
+            return
+        once = run(self.command, folder)
+        self.problem = once.problem
+        self.runs.append(once)
+
+    def seconds(self) -> list[float]:
+        return [self.seconds_of(once) for once in self.runs]
+
+
+# --- files -----------------------------------------------------------------------------------------
+
+
+def make_raster(folder: Path, lines: int) -> Path:
+    """Write the raster of so many lines and return its file."""
+    script = HERE.parent / "examples" / "make_examples.py"
+    options = ["--out", str(folder), "--raster-lines", str(lines)]
+    subprocess.run([sys.executable, str(script), *options], check=True, stdout=subprocess.DEVNULL)
+    return folder / f"raster_{lines}.nc"
+
+
+def rewrite(part: Path, name: str, change: Callable[[str], str], most: int | None = None) -> Path:
+    """Write a changed copy of a part, line by line, at most so many lines."""
+    copy = part.with_name(name)
+    with part.open(encoding="ascii") as source, copy.open("w", encoding="ascii", newline="\n") as target:
+        for number, line in enumerate(source):
+            if number == most:
+                break
+            target.write(change(line))
+    return copy
+
+
+def count_lines(part: Path) -> int:
+    with part.open("rb") as file:
+        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
+
+
+def write_inputs(folder: Path) -> None:
+    """Write the tool table and parameters of rs274, and the two cells."""
+    (folder / "tool.tbl").write_text("T13 P13 Z0 D8\n", encoding="ascii")
+    (folder / "vars.var").write_text("", encoding="ascii")
+    (folder / "unlimited.toml").write_text('[controller]\nadvance = "unlimited"\n', encoding="ascii")
+    (folder / "look_ahead.toml").write_text("", encoding="ascii")
+
+
+# --- the work: peers -------------------------------------------------------------------------------
+
+
+def rs274_command(binary: str, part: Path, output: str) -> list[str]:
+    return [binary, "-g", "-n", "2", "-t", "tool.tbl", "-v", "vars.var", str(part), output]
+
+
+def rs274_problem(binary: str, folder: Path) -> str:
+    """Return why rs274 is no yardstick here: it must report each move of a short raster ('' = it does)."""
+    short = folder / f"raster_{WARM_UP_LINES}.nc"
+    once = run(rs274_command(binary, short, "moves.txt"), folder)
+    if once.problem:
+        return once.problem
+    moves = len(re.findall(r"STRAIGHT_(?:FEED|TRAVERSE)\(", (folder / "moves.txt").read_text("ascii")))
+    wanted = len(re.findall(r"^[^(\n]*[XYZ]-?\d.*$", short.read_text("ascii"), re.MULTILINE))
+    return "" if moves == wanted else f"rs274 made {moves} moves of {wanted}: the figure would be wrong"
+
+
+def yardstick(part: Path, folder: Path) -> Work | str:
+    """Return rs274 as work, or the word why not."""
+    binary = shutil.which("rs274")
+    if binary is None:
+        return "rs274: not found (Debian package linuxcnc-uspace)"
+    problem = rs274_problem(binary, folder)
+    return problem or Work(YARDSTICK, rs274_command(binary, part, "/dev/null"))
+
+
+def peer_script(name: str, part: Path) -> list[str]:
+    return [sys.executable, str(HERE / "peers" / name), str(part)]
+
+
+def gcodeparser(part: Path) -> Work:
+    named = rewrite(part, "named.nc", lambda line: f"G1 {line}" if line[0] in "XYZ" else line)
+    return Work("gcodeparser, G1 on every line", peer_script("parse_gcodeparser.py", named))
+
+
+def pygcode(part: Path, lines: int) -> Work:
+    """A piece of the file; start-up counts once, the rest in proportion."""
+    piece = rewrite(part, "piece.nc", lambda line: line, PYGCODE_LINES)
+    factor = max(1.0, lines / PYGCODE_LINES)
+
+    def scaled(once: Run) -> float:
+        worked = float(once.output.split()[0])
+        return once.seconds + worked * (factor - 1.0)
+
+    name = "pygcode" + (f", {PYGCODE_LINES:,} lines, scaled" if factor > 1 else "")
+    return Work(name, peer_script("parse_pygcode.py", piece), seconds_of=scaled)
+
+
+def peers(wanted: Sequence[str], part: Path, lines: int) -> tuple[list[Work], list[str]]:
+    """Return the parsers that are installed, and a word on each that is not."""
+    makers = {"gcodeparser": lambda: gcodeparser(part), "pygcode": lambda: pygcode(part, lines)}
+    chosen = [name for name in makers if name in wanted]
+    missing = [name for name in chosen if importlib.util.find_spec(name) is None]
+    found = [makers[name]() for name in chosen if name not in missing]
+    return found, [f"{name}: not installed (pip install {name})" for name in missing]
+
+
+def toppra_line(part: Path, folder: Path) -> str:
+    """Return the sentence on toppra, which is timed on a piece of the path by the point."""
+    if importlib.util.find_spec("toppra") is None:
+        return "toppra: not installed (pip install toppra)"
+    once = run(peer_script("time_toppra.py", part), folder)
+    if once.problem:
+        return f"toppra: {once.problem}"
+    seconds, points = (float(word) for word in once.output.split()[-2:])
+    point_us = seconds / points * 1e6
+    return f"toppra: {point_us:.1f} us a point (time law only, {points:,.0f} points, without start-up)"
+
+
+# --- the work: ours --------------------------------------------------------------------------------
+
+
+def chain_work(name: str, part: Path, cell: str, to_reach: float | None = None) -> Work:
+    code = CHAIN.format(cell=cell, part=str(part), cycle=CYCLE_S, out=str(part.with_name("chain.src")))
+    return Work(name, [sys.executable, "-c", code], to_reach)
+
+
+def our_work(part: Path) -> list[Work]:
+    """Return reading, translating and, where it exists, the chain with the time law."""
+    out = str(part.with_name("out.src"))
+    read = [sys.executable, "-c", READ.format(part=str(part))]
+    translate = [sys.executable, "-m", "gcode2krl", str(part), "-o", out, "-q"]
+    work = [Work("read into a Toolpath", read, 0.25), Work("translate: KRL written and verified", translate)]
+    if HAS_MOTION:
+        work.append(chain_work("the same, 12 ms plan, joints", part, "unlimited.toml", 0.6))
+        work.append(chain_work("the same with look-ahead on", part, "look_ahead.toml"))
+    return work
+
+
+def warm_up(folder: Path) -> None:
+    """Compile the kernels: everything once on a short raster."""
+    for work in our_work(make_raster(folder, WARM_UP_LINES)):
+        work.repeat(folder)
+
+
+# --- stage by stage (a child process runs this) ----------------------------------------------------
+
+
+def stages(part: str, cell_path: str, out: str) -> list[tuple[str, float, int]]:
+    """Return (stage, seconds, rows it made) of one chain in this process."""
+    cell = gcode2krl.load_cell(cell_path)
+    times: list[tuple[str, float, int]] = []
+
+    def timed(name: str, stage: Callable, *arguments: object, **options: object) -> object:
+        start = time.perf_counter()
+        made = stage(*arguments, **options)
+        times.append((name, time.perf_counter() - start, len(made) if hasattr(made, "__len__") else 0))
+        return made
+
+    toolpath = timed("read_gcode", gcode2krl.read_gcode, part, cell)
+    targets = timed("set_targets", gcode2krl.set_targets, toolpath, cell)
+    followed = targets
+    if HAS_MOTION:
+        followed = timed("plan_motion", gcode2krl.plan_motion, targets, cell, dt_s=CYCLE_S)
+    timed("solve_joints", gcode2krl.solve_joints, followed, cell)
+    timed("write_krl", gcode2krl.write_krl, targets, out, cell)
+    return times
+
+
+def run_stages(part: str, folder: Path) -> None:
+    """Print the stages as JSON, once the kernels are loaded."""
+    out = str(folder / "stages.src")
+    stages(str(folder / f"raster_{WARM_UP_LINES}.nc"), "unlimited.toml", out)
+    print(json.dumps(stages(part, "unlimited.toml", out)))
+
+
+def print_stages(part: Path, lines: int, folder: Path) -> None:
+    once = run([sys.executable, str(Path(__file__).resolve()), "--stages-of", str(part)], folder)
+    print("\nstage by stage, one process, kernels loaded, look-ahead unlimited; write_krl verifies too")
+    if once.problem:
+        print(f"  {once.problem}")
+        return
+    print(f"  {'':<14}{'s':>8}{'lines/s':>14}{'rows':>13}")
+    table = json.loads(once.output)
+    table.append(("together", sum(seconds for _, seconds, _ in table), 0))
+    for name, seconds, rows in table:
+        print(f"  {name:<14}{seconds:8.2f}{lines / seconds:14,.0f}{f'{rows:,}' if rows else '':>13}")
+
+
+# --- tables ----------------------------------------------------------------------------------------
+
+
+def print_table(table: Sequence[Work]) -> None:
+    measure = next((w for w in table if w.name == YARDSTICK and not w.problem), None)
+    unit_s = min(measure.seconds()) if measure else None
+    print(f"  {'':<40}{'best s':>9}{'median s':>10}{'x rs274':>9}{'to reach':>10}{'peak MB':>9}")
+    for work in table:
+        if work.problem:
+            print(f"  {work.name:<40}  {work.problem}")
+            continue
+        best = min(work.seconds())
+        ratio = f"{best / unit_s:.2f}" if unit_s else "-"
+        wanted = f"<= {work.to_reach:g}" if work.to_reach else ""
+        peak_mb = max(once.peak_mb for once in work.runs)
+        middle = statistics.median(work.seconds())
+        print(f"  {work.name:<40}{best:9.2f}{middle:10.2f}{ratio:>9}{wanted:>10}{peak_mb:9.0f}")
+
+
+def compare(arguments: argparse.Namespace, folder: Path) -> None:
+    """Time the file with all programs in turn, round after round."""
+    part = make_raster(folder, arguments.lines)
+    lines, words = count_lines(part), []
+    table, missing = peers(arguments.peers, part, lines)
+    measure = yardstick(part, folder) if "rs274" in arguments.peers else "rs274: not asked for"
+    if isinstance(measure, Work):
+        table.insert(0, measure)
+    else:
+        words.append(measure)
+    table += our_work(part)
+    for _ in range(arguments.repeats):
+        for work in table:
+            work.repeat(folder)
+    megabytes = part.stat().st_size / 1e6
+    print(f"{lines:,} lines, {megabytes:.1f} MB; {arguments.repeats} rounds, programs in turn;", end=" ")
+    print(f"whole processes on {os.cpu_count()} processors; ratios of the best")
+    print_table(table)
+    words += missing
+    if "toppra" in arguments.peers:
+        words.append(toppra_line(part, folder))
+    if not HAS_MOTION:
+        words.append("time law and joints along it: not in this version, row skipped")
+    for word in words:
+        print(f"  {word}")
+    print_stages(part, lines, folder)
+
+
+def print_scaling(largest: int, repeats: int, folder: Path) -> None:
+    """Print best time and peak memory over size, and what each further line costs."""
+    print("\ngrowth: best s, us and bytes for each line more than in the row above")
+    before: dict[str, tuple[int, float, float]] = {}
+    size = SMALLEST_SCALE
+    while size <= largest:
+        part = make_raster(folder, size)
+        lines = count_lines(part)
+        for work in our_work(part)[:3]:
+            for _ in range(repeats):
+                work.repeat(folder)
+            if work.problem:
+                print(f"  {lines:>10,}  {work.name:<38}{work.problem}")
+                continue
+            best, peak_mb = min(work.seconds()), max(once.peak_mb for once in work.runs)
+            growth = ""
+            if work.name in before:
+                old_lines, old_s, old_mb = before[work.name]
+                more = lines - old_lines
+                growth = f"{(best - old_s) / more * 1e6:8.2f} us{(peak_mb - old_mb) * 2**20 / more:8.0f} B"
+            before[work.name] = lines, best, peak_mb
+            print(f"  {lines:>10,}  {work.name:<38}{best:8.2f} s{peak_mb:7.0f} MB{growth}")
+        part.unlink()
+        size *= 10
+
+
+# --- command ---------------------------------------------------------------------------------------
+
+
+def peer_names(text: str) -> list[str]:
+    names = [name for name in text.split(",") if name]
+    unknown = sorted(set(names) - set(PEERS))
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}; known: {', '.join(PEERS)}")
+    return names
+
+
+def options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--lines", type=int, default=1_000_000)
+    parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all four")
+    parser.add_argument("--repeats", type=int, default=3, help="rounds (default: 3)")
+    parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
+    parser.add_argument("--stages-of", help=argparse.SUPPRESS)
+    return parser.parse_args()
+
+
+def main() -> None:
+    arguments = options()
+    if arguments.stages_of:
+        run_stages(arguments.stages_of, Path.cwd())
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_inputs(folder)
+        warm_up(folder)
+        compare(arguments, folder)
+        if arguments.scaling:
+            print_scaling(arguments.scaling, arguments.repeats, folder)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""``gcode2krl predict part.nc -o prediction/``."""
+
+from pathlib import Path
+
+import click
+
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part
+from gcode2krl.errors import Gcode2KrlError, input_error
+
+
+@click.command("predict")
+@click.argument("part")
+@click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
+@common_options
+@gcode_options
+@click.option(
+    "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
+)
+@click.option("--csv", is_flag=True, help="Write the tables as CSV too.")
+@click.option("--plot", is_flag=True, help="Draw path, speed and joints as PNG.")
+def command(
+    part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    tolerance: float | None, chord_tolerance: float, block_delete: bool,
+    dt_s: float | None, csv: bool, plot: bool,
+) -> int:  # fmt: skip
+    """Predict what the controller will command: path, timing, joints.
+
+    Findings that would refuse a program are only reported here.
+    """
+    console = Console(quiet, as_json)
+    try:
+        folder = _folder(part, output)
+        cell = read_cell(cell_path)
+        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        from gcode2krl.predict import predict_toolpath
+
+        with console.progress("predicting", None):
+            settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
+            prediction = predict_toolpath(
+                toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings
+            )
+            files = prediction.save(folder, csv=csv)
+            if plot:
+                from gcode2krl.report.figures import prediction_figures, save_figures
+
+                files += save_figures(prediction_figures(prediction), folder)
+    except Gcode2KrlError as error:
+        if not as_json:
+            error.source = error.source or part
+            raise
+        console.json(
+            {"files": [], "moves": None, "time_s": None, "path_mm": None, "issues": issue_dicts(error.issues)}
+        )
+        return error.exit_code
+    motion = prediction.motion
+    if motion is None:
+        raise AssertionError("predict_toolpath always plans a motion")
+    if as_json:
+        console.json(
+            {
+                "files": [str(file) for file in files],
+                "moves": len(toolpath) - 1,
+                "time_s": float(motion.time_s[-1]),
+                "path_mm": float(motion.path_mm[-1]),
+                "issues": issue_dicts(prediction.issues),
+            }
+        )
+        return 0
+    console.findings(prediction.issues, part)
+    console.say(f"{part} -> {folder}: {', '.join(file.name for file in files)}")
+    console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")
+    top, steepest = motion.speed_mm_s.max(), motion.acceleration_mm_s2.max()
+    console.say(f"  speed up to {top:.1f} mm/s, acceleration up to {steepest:.0f} mm/s2")
+    return 0
+
+
+def _folder(part: str, output: str | None) -> Path:
+    if output == STANDARD or (output is None and part == STANDARD):
+        raise input_error("option-value", "a prediction is a folder", "give -o prediction/")
+    folder = Path(output) if output is not None else Path(part).with_suffix(".prediction")
+    if folder.exists() and not folder.is_dir():
+        raise input_error("output-unwritable", "this is a file", "name a folder", source=str(folder))
+    return folder

@@ -1,0 +1,191 @@
+"""A prediction: the tables of a part and its cell, saved as a folder and loaded again.
+
+The folder holds ``prediction.toml`` (inputs, hashes, versions, settings, the cell as resolved, findings and
+events) and a Parquet file a table: ``toolpath``, ``targets``, and ``motion`` with Motion and Joints side by
+side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_rad`` ….
+"""
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gcode2krl.cell import Cell, as_toml, cell_from_resolved
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.tables import Event, Joints, Motion, Table, Targets, Toolpath
+
+SCHEMA = "gcode2krl/prediction/1"
+_UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
+_AXES = {3: "xyz", 4: "xyzw"}
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What is known of a part in a cell; None where a stage did not run."""
+
+    toolpath: Toolpath
+    targets: Targets
+    cell: Cell
+    motion: Motion | None = None
+    joints: Joints | None = None
+    inputs: dict[str, Any] = field(default_factory=dict)
+    """Program, its SHA-256, version and settings."""
+
+    @property
+    def forces(self) -> None:
+        """Cutting forces: None, their stage does not exist yet."""
+        return None
+
+    @property
+    def deflection(self) -> None:
+        """Deflection: None, its stage does not exist yet."""
+        return None
+
+    @property
+    def issues(self) -> tuple[Issue, ...]:
+        """All findings, of the targets (which carry those of the G-code) and of the motion."""
+        return (*self.targets.issues, *(self.motion.issues if self.motion is not None else ()))
+
+    def save(self, folder: str | Path, csv: bool = False) -> list[Path]:
+        """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files."""
+        place = Path(folder)
+        try:
+            place.mkdir(exist_ok=True)
+            return list(self._write(place, csv))
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise input_error("output-unwritable", f"cannot write: {why}", source=str(place)) from None
+
+    def _write(self, place: Path, csv: bool) -> Iterator[Path]:
+        import polars as pl
+        import tomli_w
+
+        tables: dict[str, dict[str, Any]] = {
+            "toolpath": dict(_columns(self.toolpath)),
+            "targets": dict(_columns(self.targets)),
+        }
+        if self.motion is not None:
+            tables["motion"] = dict(_columns(self.motion))
+            if self.joints is not None:
+                tables["motion"] |= dict(_columns(self.joints))
+        for name, columns in tables.items():
+            frame = pl.DataFrame(columns)
+            frame.write_parquet(place / f"{name}.parquet")
+            yield place / f"{name}.parquet"
+            if csv:
+                frame.write_csv(place / f"{name}.csv")
+                yield place / f"{name}.csv"
+        record = {
+            "schema": SCHEMA,
+            "inputs": self.inputs,
+            "issues": [_issue_record(issue) for issue in self.issues],
+            "toolpath_events": [_event_record(event) for event in self.toolpath.events],
+            "targets_events": [_event_record(event) for event in self.targets.events],
+            "cell": as_toml(self.cell),
+        }
+        (place / "prediction.toml").write_bytes(tomli_w.dumps(record).encode("utf-8"))
+        yield place / "prediction.toml"
+
+    @classmethod
+    def load(cls, folder: str | Path) -> "Prediction":
+        """Read a folder that `save` wrote; raises `NotUnderstoodError` naming the file it cannot read."""
+        import polars as pl
+
+        place = Path(folder)
+        record = _read_record(place / "prediction.toml")
+        found: dict[str, Any] = {}
+        for name in ("toolpath", "targets", "motion"):
+            file = place / f"{name}.parquet"
+            if not file.exists() and name == "motion":
+                continue
+            try:
+                found[name] = pl.read_parquet(file)
+            except (OSError, pl.exceptions.PolarsError) as error:
+                raise input_error("file-unreadable", f"cannot read: {error}", source=str(file)) from None
+        issues = tuple(Issue(**issue) for issue in record["issues"])
+        source = str(record["inputs"].get("program", ""))
+        try:
+            toolpath = _table(
+                Toolpath, found["toolpath"], events=_events(record["toolpath_events"]), source=source
+            )
+            targets = _table(
+                Targets,
+                found["targets"],
+                events=_events(record["targets_events"]),
+                source=source,
+                issues=issues,
+            )
+            motion = _table(Motion, found["motion"]) if "motion" in found else None
+            joints = (
+                _table(Joints, found["motion"]) if "motion" in found and "q1_rad" in found["motion"] else None
+            )
+        except (KeyError, ValueError, pl.exceptions.PolarsError) as error:
+            raise input_error(
+                "prediction-columns", f"not the tables of a prediction: {error}", source=str(place)
+            ) from None
+        cell = cell_from_resolved(record["cell"], source=str(place / "prediction.toml"))
+        return cls(toolpath, targets, cell, motion, joints, record["inputs"])
+
+
+def _read_record(file: Path) -> dict[str, Any]:
+    try:
+        record = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise input_error("not-toml", str(error), source=str(file)) from None
+    if record.get("schema") != SCHEMA:
+        found = record.get("schema")
+        raise input_error(
+            "prediction-schema", f"schema: found {found!r}, allowed: {SCHEMA}", source=str(file)
+        )
+    return record
+
+
+def column_names(name: str, width: int) -> list[str]:
+    """Return the names on disk of a column of the given width (0 = a plain column)."""
+    if width == 0:
+        return [name]
+    unit = next((unit for unit in _UNITS if name.endswith(unit)), "")
+    stem = name[: len(name) - len(unit)] if unit else name
+    if width in _AXES:
+        return [f"{stem}_{axis}{unit}" for axis in _AXES[width]]
+    return [f"{stem}{number}{unit}" for number in range(1, width + 1)]
+
+
+def _columns(table: Table) -> Iterator[tuple[str, Any]]:
+    for spec in fields(table):
+        if "tail" not in spec.metadata:
+            continue
+        values = getattr(table, spec.name)
+        names = column_names(spec.name, values.shape[1] if values.ndim == 2 else 0)
+        for number, name in enumerate(names):
+            yield name, np.ascontiguousarray(values[:, number] if values.ndim == 2 else values)
+
+
+def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
+    columns: dict[str, Any] = {}
+    for spec in fields(kind):
+        if "tail" not in spec.metadata:
+            continue
+        tail = spec.metadata["tail"]
+        names = column_names(spec.name, tail[0] if tail else 0)
+        parts = [frame[name].to_numpy() for name in names]
+        columns[spec.name] = np.stack(parts, axis=1) if tail else parts[0]
+    return kind(**columns, **more)
+
+
+def _issue_record(issue: Issue) -> dict[str, Any]:
+    return {name: getattr(issue, name) for name in ("severity", "code", "line", "message", "remedy")}
+
+
+def _event_record(event: Event) -> dict[str, Any]:
+    return {"row": event.row, "kind": event.kind, "values": event.values}
+
+
+def _events(records: list[dict[str, Any]]) -> tuple[Event, ...]:
+    return tuple(Event(record["row"], record["kind"], record["values"]) for record in records)
