@@ -1,5 +1,6 @@
 """The pipeline, and whatever needs two stages: targets with their spin search, joints of targets."""
 
+import functools
 import hashlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -86,11 +87,11 @@ def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = Non
 def targets_and_joints(
     toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
 ) -> tuple[Targets, Joints]:
-    """Return what `set_targets` returns, and the joints it was checked with."""
+    """Return what `set_targets` returns, and the joints it was checked with (``sigma_min`` left NaN)."""
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     targets = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
-    joints, findings = robot.follow(targets, cell)
+    joints, findings = robot.follow(targets, cell, conditioning=False)
     return replace(targets, issues=(*targets.issues, *findings)), replace(joints, issues=findings)
 
 
@@ -172,14 +173,12 @@ def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats 
     """Return the largest joint speed over its limit (n,) of each move of the chain; None without limits."""
     if cell.robot.speeds.qd_deg_s is None or len(chain.length_mm) == 0:
         return None
-    joints = robot.follow_motion(motion, cell)
-    load = np.nan_to_num(np.abs(joints.qd_rad_s) / (np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG)).max(
-        axis=1
-    )
-    share = np.zeros(len(chain.length_mm))
-    by_row = np.full(int(max(chain.move.max(), motion.move.max())) + 1, 0.0)
+    _, qd_rad_s = robot.motion_angles(motion, cell)
+    most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
+    load = functools.reduce(np.fmax, (np.abs(qd_rad_s) / most).T, np.zeros(len(motion)))
+    by_row = np.zeros(int(max(chain.move.max(), motion.move.max())) + 1)
     np.maximum.at(by_row, motion.move, load)
-    share[:] = by_row[chain.move]
+    share: Floats = by_row[chain.move]
     return share
 
 

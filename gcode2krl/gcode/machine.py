@@ -86,6 +86,9 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
             j += 1
         if counts[0] + ROWS_PER_BLOCK > len(rows) or counts[1] + EVENTS_PER_BLOCK > len(events):
             break
+        if _plain_block(letter, words[1], line, i, j, s, rows, counts, offsets):
+            i = j
+            continue
         before[0] = state[0]
         used_before[:] = counts
         if not _gather(words, i, j, s, rows, counts, events, found, options, has, word, g_in_group, m_codes):
@@ -114,6 +117,51 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
         s.blocks += 1
         i = j
     return i
+
+
+@njit(cache=True)
+def _plain_block(letter, value, line, i, j, s, rows, counts, offsets):
+    """Execute a block of nothing but X, Y, Z and F under G0 or G1: the bulk of a CAM file.
+
+    Returns False, with nothing done, where the block is anything else or needs a closer look.
+    """
+    if s.motion > 1 or s.motion < 0 or s.feed_mode != 94:
+        return False
+    x, y, z, feed = 0.0, 0.0, 0.0, s.feed
+    named = 0
+    for k in range(i, j):
+        c = letter[k]
+        bit = 0
+        if c == 88:
+            x, bit = value[k], 1
+        elif c == 89:
+            y, bit = value[k], 2
+        elif c == 90:
+            z, bit = value[k], 4
+        elif c == 70:
+            feed, bit = value[k] * s.unit_mm, 8
+        if bit == 0 or named & bit:
+            return False
+        named |= bit
+    known = s.known_x and s.known_y and s.known_z
+    if named & 7 == 0 or feed < 0.0 or (s.motion == 1 and (feed <= 0.0 or not known)):
+        return False
+    base_x, base_y, base_z = offsets[s.work_offset]
+    x = x * s.unit_mm + (base_x if s.absolute else s.x) if named & 1 else s.x
+    y = y * s.unit_mm + (base_y if s.absolute else s.y) if named & 2 else s.y
+    z = z * s.unit_mm + (base_z if s.absolute else s.z) if named & 4 else s.z
+    largest = max(abs(x), abs(y), abs(z))
+    if largest > _FAR_MM:
+        return False
+    s.largest_mm = max(s.largest_mm, largest)
+    s.x, s.y, s.z, s.feed = x, y, z, feed
+    if s.absolute:
+        s.known_x |= named & 1
+        s.known_y |= (named >> 1) & 1
+        s.known_z |= (named >> 2) & 1
+    _emit(s, rows, counts, line[i], feed / 60.0 if s.motion == 1 else np.inf, s.motion == 0, False, -1)
+    s.blocks += 1
+    return True
 
 
 @njit(cache=True)

@@ -83,8 +83,7 @@ class _Composer:
                 self.state[:] = -1.0, -1.0, 0.0  # each part says its speed and CDIS again
                 subprograms.append((part, self._motions(start, end)))
                 self.state[:] = -1.0, -1.0, 0.0
-        main = self._head(subprograms) + b"".join(body) + self._foot()
-        return self._assemble(main, subprograms)
+        return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
 
     def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
         """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program."""
@@ -188,14 +187,17 @@ class _Composer:
     def _foot(self) -> bytes:
         return _text(st.render(self.cell.program.epilogue, self.cell)) + _text("END")
 
-    def _assemble(self, main: bytes, subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
-        defs = [(name, _subprogram(name, text)) for name, text in subprograms]
-        files = {}
-        if self.layout.split == "files":
-            head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
-            files = {f"{name}.src": head + text for name, text in defs}
-            defs = []
-        files = {f"{self.name}.src": main + b"".join(NEWLINE + text for _, text in defs), **files}
+    def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
+        parts: dict[str, bytes] = {}
+        for name, motions in subprograms:
+            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
+            text = [_text(f"DEF {name}( )\n{needed}"), motions, _text("END")]
+            if self.layout.split == "files":
+                head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
+                parts[f"{name}.src"] = b"".join([head, *text])
+            else:
+                main += [NEWLINE, *text]
+        files = {f"{self.name}.src": b"".join(main), **parts}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
             files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
@@ -223,11 +225,6 @@ def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
 def _dwell(seconds: float) -> list[str]:
     """Return a dwell, marked so that it is not taken for a wait of a template."""
     return [f"WAIT SEC {fixed(seconds, 3)} ; dwell"] if seconds > 0 else []
-
-
-def _subprogram(name: str, motions: bytes) -> bytes:
-    needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
-    return _text(f"DEF {name}( )\n{needed}") + motions + _text("END")
 
 
 def _text(text: str) -> bytes:

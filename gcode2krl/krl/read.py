@@ -18,7 +18,6 @@ _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$",
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
 _DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
 _EXTERNAL = re.compile(r"^\s*EXT\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
-_LONGEST_LINE = 471
 _COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
 
 
@@ -112,8 +111,8 @@ class _Reader:
             self._find_blocks(index)
 
     def read(self) -> KrlProgram:
-        for index, name in enumerate(self.names):
-            self._text_rules(index, name)
+        for index in range(len(self.names)):
+            self._text_rules(index)
         if not self.order:
             raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
         main_name = self.order[0]
@@ -126,7 +125,8 @@ class _Reader:
         blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
         file_of = np.concatenate([np.full(b - a, f, dtype=np.int32) for f, a, b in runs])
         where = np.concatenate([np.arange(a, b) for _, a, b in runs])
-        motion = (kind == sc.LIN) | (kind == sc.PTP)
+        axes = kind == sc.PTP_AXES
+        motion = (kind == sc.LIN) | (kind == sc.PTP) | axes
         for row in np.flatnonzero(blend == sc.MALFORMED)[:20]:
             self._issue(
                 "krl-malformed",
@@ -149,14 +149,19 @@ class _Reader:
         cdis = np.where(
             blend[rows] == 1, _in_force(np.where(kind == sc.APO_CDIS, value[:, 0], np.nan))[rows], 0.0
         )
-        ptp = kind[rows] == sc.PTP
+        ptp = kind[rows] != sc.LIN
+        joint_rows = np.flatnonzero(axes[rows])
+        pose = value[rows]
+        q_deg = np.full((len(rows), 6), np.nan)
+        q_deg[joint_rows] = pose[joint_rows, :6]
+        pose[joint_rows] = np.nan
         guard = b"(--no-guard)" not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
             name=main_name,
-            position_mm=value[rows, 0:3],
-            abc_deg=value[rows, 3:6],
-            status_turn=value[rows, 6:8],
-            q_deg=value[rows, 8:14],
+            position_mm=pose[:, 0:3],
+            abc_deg=pose[:, 3:6],
+            status_turn=pose[:, 6:8],
+            q_deg=q_deg,
             ptp=ptp,
             speed_mm_s=np.where(ptp, np.nan, speed),
             cdis_mm=cdis,
@@ -241,21 +246,15 @@ class _Reader:
             at += 1
         return at - 1
 
-    def _text_rules(self, file: int, name: str) -> None:
+    def _text_rules(self, file: int) -> None:
         """Rules of the text itself: ASCII, line length, folds and loops closed."""
-        text = self.texts[name]
-        try:
-            text.decode("ascii")
-        except UnicodeDecodeError as error:
-            self._issue(
-                "krl-not-ascii", text.count(b"\n", 0, error.start) + 1, "a character that is not ASCII", file
-            )
-        if len(text) > _LONGEST_LINE:
-            data = np.frombuffer(text, dtype=np.uint8)
-            ends = np.concatenate([[-1], np.flatnonzero(data == 10), [len(data)]])
-            for row in np.flatnonzero(np.diff(ends) > _LONGEST_LINE + 2)[:5]:
-                self._issue("krl-line-too-long", int(row) + 1, f"more than {_LONGEST_LINE} characters", file)
-        if text.upper().count(b";FOLD") != text.upper().count(b";ENDFOLD"):
+        scanned = self.scanned[file]
+        if scanned.not_ascii:
+            self._issue("krl-not-ascii", scanned.not_ascii, "a character that is not ASCII", file)
+        if scanned.too_long:
+            text = f"more than {sc.LONGEST_LINE} characters"
+            self._issue("krl-line-too-long", scanned.too_long, text, file)
+        if scanned.open_folds:
             self._issue("krl-structure", 0, ";FOLD and ;ENDFOLD do not match", file)
         words = [
             self._statement(file, int(row)).split("(")[0].split()

@@ -9,8 +9,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER = 0, 1, 2, 3, 4, 5
-KEYS = ("X", "Y", "Z", "A", "B", "C", "S", "T", "A1", "A2", "A3", "A4", "A5", "A6")
+LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER, PTP_AXES = 0, 1, 2, 3, 4, 5, 6
+KEYS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
+"""Columns of a Cartesian target; of ``PTP_AXES`` the first six are A1 to A6."""
+LONGEST_LINE = 471
+"""Characters in a line of KRL, as KUKA's documentation is remembered."""
 MALFORMED = -1
 
 
@@ -22,20 +25,27 @@ class Scanned(NamedTuple):
     span: NDArray[np.int64]
     """(k, 2) first and last byte of the statement."""
     value: NDArray[np.float64]
-    """(k, 14) components by `KEYS`, NaN where absent; a lone number stands in column 0."""
+    """(k, 8) components by `KEYS`, NaN where absent; a lone number stands in column 0."""
     blend: NDArray[np.int8]
     """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
+    too_long: int
+    """First line that is too long, 0 = none."""
+    not_ascii: int
+    """First line with a character that is not ASCII, 0 = none."""
+    open_folds: int
+    """``;FOLD`` less ``;ENDFOLD``."""
 
 
 def scan_krl(text: bytes) -> Scanned:
     """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
     data = np.frombuffer(text, dtype=np.uint8)
-    most = int(np.count_nonzero(data == 10)) + 2
+    most = text.count(b"\n") + 2
     kind, blend = np.empty(most, dtype=np.int8), np.empty(most, dtype=np.int8)
     line, span = np.empty(most, dtype=np.int32), np.empty((most, 2), dtype=np.int64)
     value = np.empty((most, len(KEYS)))
-    count = _scan(data, kind, line, span, value, blend)
-    return Scanned(kind[:count], line[:count], span[:count], value[:count], blend[:count])
+    count, too_long, not_ascii, folds = _scan(data, kind, line, span, value, blend)
+    rows = slice(count)
+    return Scanned(kind[rows], line[rows], span[rows], value[rows], blend[rows], too_long, not_ascii, folds)
 
 
 _LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
@@ -46,6 +56,8 @@ _LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
 
 _SEC_WORD = np.frombuffer(b"SEC", dtype=np.uint8).copy()
 _DWELL_WORD = np.frombuffer(b"DWELL", dtype=np.uint8).copy()
+_FOLD_WORD = np.frombuffer(b";FOLD", dtype=np.uint8).copy()
+_ENDFOLD_WORD = np.frombuffer(b";ENDFOLD", dtype=np.uint8).copy()
 
 
 @njit(cache=True)
@@ -99,14 +111,15 @@ def _number(data, at, end):
 
 @njit(cache=True)
 def _components(data, at, end, value):
-    """Read ``{X 1.0,Y 2.0,…}`` into value; return the position behind the brace, -1 where malformed."""
+    """Read ``{X 1.0,Y 2.0,…}`` into value; return (position behind the brace or -1, components as bits)."""
+    found = 0
     if at >= end or data[at] != 123:
-        return -1
+        return -1, found
     at += 1
     while True:
         at = _blank(data, at, end)
         if at >= end:
-            return -1
+            return -1, found
         letter = data[at] - 32 if data[at] >= 97 else data[at]
         at += 1
         column = -1
@@ -115,26 +128,27 @@ def _components(data, at, end, value):
         elif letter >= 65 and letter <= 67:
             column = 3 + letter - 65
             if letter == 65 and at < end and data[at] >= 49 and data[at] <= 54:
-                column = 8 + data[at] - 49
+                column = 8 + data[at] - 49  # A1 to A6: columns 0 to 5, bits 8 to 13
                 at += 1
         elif letter == 83:
             column = 6
         elif letter == 84:
             column = 7
         if column < 0 or at >= end or (data[at] != 32 and data[at] != 9):
-            return -1
+            return -1, found
         at = _blank(data, at, end)
         at, number = _number(data, at, end)
-        if np.isnan(number) or not np.isnan(value[column]):
-            return -1
-        value[column] = number
+        if np.isnan(number) or found & (1 << column):
+            return -1, found
+        found |= 1 << column
+        value[column - 8 if column >= 8 else column] = number
         at = _blank(data, at, end)
         if at < end and data[at] == 44:
             at += 1
         elif at < end and data[at] == 125:
-            return at + 1
+            return at + 1, found
         else:
-            return -1
+            return -1, found
 
 
 @njit(cache=True)
@@ -143,16 +157,25 @@ def _scan(data, kind, line, span, value, blend):
     at = 0
     number = 0
     count = 0
+    too_long, not_ascii, folds = 0, 0, 0
     while at < n:
         number += 1
         end = at
         while end < n and data[end] != 10:
+            if data[end] > 127 and not_ascii == 0:
+                not_ascii = number
             end += 1
+        if end - at > LONGEST_LINE + 1 and too_long == 0:
+            too_long = number
         begin = _blank(data, at, end)
         at = end + 1
         while end > begin and (data[end - 1] == 13 or data[end - 1] == 32 or data[end - 1] == 9):
             end -= 1
         if begin == end or data[begin] == 59 or data[begin] == 38:
+            if _starts(data, begin, end, _FOLD_WORD):
+                folds += 1
+            elif _starts(data, begin, end, _ENDFOLD_WORD):
+                folds -= 1
             continue
         kind[count], blend[count], line[count] = OTHER, 0, number
         span[count, 0], span[count, 1] = begin, end
@@ -164,8 +187,11 @@ def _scan(data, kind, line, span, value, blend):
             motion = PTP
         if motion >= 0:
             kind[count] = motion
-            behind = _components(data, _blank(data, begin + 3, end), end, value[count])
-            if behind < 0:
+            behind, found = _components(data, _blank(data, begin + 3, end), end, value[count])
+            axes = found >= 256
+            if axes and motion == PTP:
+                kind[count] = PTP_AXES
+            if behind < 0 or (axes and (motion == LIN or found & 255)):
                 blend[count] = MALFORMED
             else:
                 behind = _blank(data, behind, end)
@@ -199,4 +225,4 @@ def _scan(data, kind, line, span, value, blend):
                 elif setting == WAIT_SEC and behind < end:
                     blend[count] = _starts(data, _blank(data, behind + 1, end), end, _DWELL_WORD)
         count += 1
-    return count
+    return count, too_long, not_ascii, folds

@@ -202,26 +202,25 @@ def worst_corner(targets: Targets, motion: Motion) -> Corner | None:
     error[rows.max() :] = 0.0
 
     nearest, resolved = _nearest_samples(targets, motion, row_of, reach)
-    score = error.copy()
+    row = int(np.argmax(np.where(resolved, 0.0, error)))
+    point = position[row] + reach[row] * (unit[row] - unit[row - 1]) / 4.0
+    distance = 0.0 if resolved[row] else float(error[row])
     measured = np.flatnonzero(resolved & (error > 0.0))
-    score[measured] = np.linalg.norm(motion.position_mm[nearest[measured]] - position[measured], axis=1)
-    best: Corner | None = None
-    for row in np.argsort(-score, kind="stable")[:200]:
-        if score[row] <= 1e-9:
+    bound = np.linalg.norm(motion.position_mm[nearest[measured]] - position[measured], axis=1)
+    order = np.argsort(-bound, kind="stable")
+    for some in np.array_split(order, max(len(order) // 5000, 1)):
+        if not len(some) or bound[some[0]] <= distance:
             break
-        if resolved[row]:
-            point = _between_samples(motion.position_mm[nearest[row] - 1 : nearest[row] + 2], position[row])
-        else:
-            point = position[row] + reach[row] * (unit[row] - unit[row - 1]) / 4.0
-        distance = float(np.linalg.norm(point - position[row]))
-        if best is None or distance > best.distance_mm:
-            across = unit[row] - cosine[row - 1] * unit[row - 1]
-            across /= max(float(np.linalg.norm(across)), 1e-12)
-            line = int(targets.source_line[row])
-            best = Corner(
-                int(row), line, distance, float(reach[row]), bool(resolved[row]), point, unit[row - 1], across
-            )
-    return best
+        points = _between_samples(motion.position_mm, nearest[measured[some]], position[measured[some]])
+        missed = np.linalg.norm(points - position[measured[some]], axis=1)
+        if missed.max() > distance:
+            row, point, distance = measured[some[missed.argmax()]], points[missed.argmax()], missed.max()
+    if distance <= 1e-9:
+        return None
+    across = unit[row] - cosine[row - 1] * unit[row - 1]
+    across /= np.linalg.norm(across)
+    line, sampled = int(targets.source_line[row]), bool(resolved[row])
+    return Corner(int(row), line, float(distance), float(reach[row]), sampled, point, unit[row - 1], across)
 
 
 def _nearest_samples(
@@ -252,9 +251,30 @@ def _nearest_samples(
     return nearest, resolved
 
 
-def _between_samples(three: Floats, vertex: Floats) -> Floats:
-    """Return the point nearest to the vertex on the parabola through three samples at equal times."""
-    s = np.linspace(-1.0, 1.0, 401)[:, None]
-    points: Floats = three[1] + s * (three[2] - three[0]) / 2.0
-    points = points + s**2 * (three[2] - 2.0 * three[1] + three[0]) / 2.0
-    return points[np.argmin(np.linalg.norm(points - vertex, axis=1))]
+def _between_samples(path_mm: Floats, nearest: NDArray[np.int64], vertex: Floats) -> Floats:
+    """Return (k, 3) the points nearest to the vertices on the parabolas through three samples each."""
+    before, middle, after = (path_mm[nearest + step] for step in (-1, 0, 1))
+    s = np.linspace(-1.0, 1.0, 201)[:, None, None]
+    points = middle + s * (after - before) / 2.0 + s**2 * (after - 2.0 * middle + before) / 2.0
+    pick = np.linalg.norm(points - vertex, axis=2).argmin(axis=0)
+    found: Floats = points[pick, np.arange(len(pick))]
+    return found
+
+
+def smooth(samples: Floats) -> Floats:
+    """Return samples at equal times with the curve between them, exact where that is a parabola.
+
+    Between two samples it is the blend of the parabolas through three on either side (Catmull and Rom).
+    """
+    if not 3 <= len(samples) <= 500:
+        return samples
+    padded = np.concatenate([2 * samples[:1] - samples[1:2], samples, 2 * samples[-1:] - samples[-2:-1]])
+    a, b, c, d = (padded[first : len(padded) - 3 + first, None] for first in range(4))
+    s = np.linspace(0.0, 1.0, 11)[:-1, None]
+    curve = (
+        b
+        + s * (c - a) / 2.0
+        + s**2 * (a - 2.5 * b + 2.0 * c - d / 2.0)
+        + s**3 * (1.5 * (b - c) + (d - a) / 2.0)
+    )
+    return np.concatenate([curve.reshape(-1, samples.shape[1]), samples[-1:]])

@@ -4,6 +4,7 @@ The controller keeps its configuration on LIN, so the branch is chosen once, for
 two targets the line is sampled, because a limit or a singularity may lie on the way.
 """
 
+import functools
 import itertools
 from dataclasses import dataclass
 
@@ -51,10 +52,11 @@ class Line:
     is_target: NDArray[np.bool_]
 
 
-def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
+def follow(targets: Targets, cell: Cell, conditioning: bool = True) -> tuple[Joints, tuple[Issue, ...]]:
     """Return joints at each target (p) and the findings along the lines between them.
 
-    Joint speeds are NaN (they belong to a Motion). A target out of reach has NaN angles.
+    Joint speeds are NaN (they belong to a Motion). A target out of reach has NaN angles. Without
+    ``conditioning`` the column ``sigma_min`` is NaN, which saves its time.
     """
     line = sample_lines(targets, cell)
     chain = np.isnan(line.duration_s)
@@ -62,25 +64,31 @@ def follow(targets: Targets, cell: Cell) -> tuple[Joints, tuple[Issue, ...]]:
     q = np.full((len(targets), 6), np.nan)
     q[line.target[line.is_target]] = q_line[line.is_target]
     q[targets.home] = cell.home_q_rad()
-    joints = _joints(q, np.full_like(q, np.nan), targets.tool, cell)
+    joints = _joints(q, np.full_like(q, np.nan), targets.tool, cell, conditioning)
     return joints, joint_findings(line, q_line, targets, cell)
 
 
 def follow_motion(motion: Motion, cell: Cell) -> Joints:
-    """Return joints at each sample (m) of a Motion, one branch for all; speeds are central differences."""
+    """Return joints at each sample (m) of a Motion, one branch for all."""
+    q, qd = motion_angles(motion, cell)
+    return _joints(q, qd, motion.tool, cell)
+
+
+def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
+    """Return angles (m, 6) in rad and speeds (m, 6) in rad/s of a Motion; speeds are central differences."""
     chain = np.zeros(len(motion), dtype=np.bool_)
     chain[0] = True
     q = _best_branch(motion.position_mm, motion.rotation, motion.tool, chain, cell)
     qd = np.gradient(q, motion.time_s, axis=0) if len(motion) > 1 else np.zeros_like(q)
     changed = np.flatnonzero(np.diff(motion.tool)) if len(motion) > 1 else np.zeros(0, dtype=np.int64)
     qd[changed], qd[changed + 1] = 0.0, 0.0  # the flange rests while the tool changes
-    return _joints(q, qd, motion.tool, cell)
+    return q, qd
 
 
-def _joints(q: Floats, qd: Floats, tool: NDArray[np.int32], cell: Cell) -> Joints:
+def _joints(q: Floats, qd: Floats, tool: NDArray[np.int32], cell: Cell, conditioning: bool = True) -> Joints:
     geometry = cell.robot.geometry.array()
-    sigma = np.empty(len(q))
-    for number in np.unique(tool):
+    sigma = np.full(len(q), np.nan)
+    for number in np.unique(tool) if conditioning else ():
         rows = tool == number
         sigma[rows] = smallest_singular_value(q[rows], geometry, cell.tool_matrix(int(number))[:3, 3])
     status, turn = status_turn(np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, geometry)
@@ -170,8 +178,8 @@ def limits_rad(cell: Cell) -> Floats:
 
 def _limit_margin(q: Floats, cell: Cell) -> Floats:
     limits = limits_rad(cell)
-    margin: Floats = np.minimum(q - limits[:, 0], limits[:, 1] - q).min(axis=1)
-    return margin
+    margins = (np.minimum(q[:, k] - low, high - q[:, k]) for k, (low, high) in enumerate(limits))
+    return functools.reduce(np.minimum, margins)
 
 
 def _turns(q: Floats, cell: Cell) -> Floats:
@@ -229,7 +237,7 @@ def joint_findings(line: Line, q: Floats, targets: Targets, cell: Cell) -> tuple
                 "correct [home] q_deg in the cell",
             )
         )
-    unreached: NDArray[np.bool_] = np.logical_or.reduce(np.isnan(q), axis=1)
+    unreached = np.isnan(q[:, 0])  # a pose out of reach has no angle at all
     for sample in _stretches(unreached):
         x, y, z = line.position_mm[sample]
         findings.append(
@@ -288,7 +296,7 @@ def _speed_findings(line: Line, q: Floats, source_line: NDArray[np.int32], cell:
     most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
     speed = np.zeros_like(q)
     speed[1:] = np.abs(np.diff(q, axis=0)) / line.duration_s[1:, None]
-    load = np.nan_to_num(speed / most).max(axis=1, initial=0.0) if len(q) else np.zeros(0)
+    load = functools.reduce(np.fmax, (speed / most).T, np.zeros(len(q)))
     fast = load > 1.0 + 1e-6
     for sample in _stretches(fast):
         joint = int(np.argmax(speed[sample] / most))
