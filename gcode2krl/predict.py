@@ -169,6 +169,11 @@ def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
     return replace(joints, issues=findings)
 
 
+def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
+    """Return the joints at the PTP targets alone, which is what a program needs; other rows are NaN."""
+    return robot.ptp_joints(targets, cell)
+
+
 def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats | None:
     """Return the largest joint speed over its limit (n,) of each move of the chain; None without limits."""
     if cell.robot.speeds.qd_deg_s is None or len(chain.length_mm) == 0:

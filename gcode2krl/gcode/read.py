@@ -1,13 +1,13 @@
 """``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, NotUnderstoodError, Severity, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode.findings import make_issue
@@ -23,6 +23,9 @@ from gcode2krl.gcode.state import (
 from gcode2krl.gcode.words import LINE_LIMIT, Words, scan
 from gcode2krl.tables import Event, Toolpath
 
+if TYPE_CHECKING:  # a cell file costs its library a noticeable start
+    from gcode2krl.cell import Cell
+
 CHORD_TOLERANCE_MM = 0.01
 _PIECE_BYTES = 8_000_000
 _MOST_ISSUES = 1000
@@ -35,7 +38,7 @@ Progress = Callable[[int], None]
 
 def read_gcode(
     path: str | Path,
-    cell: Cell | None = None,
+    cell: "Cell | None" = None,
     *,
     dialect: str = "linuxcnc",
     tools: str | Path | None = None,
@@ -82,7 +85,7 @@ def read_gcode(
 def read_stream(
     stream: BinaryIO,
     name: str,
-    cell: Cell | None = None,
+    cell: "Cell | None" = None,
     *,
     dialect: str = "linuxcnc",
     tools: str | Path | None = None,
@@ -102,10 +105,11 @@ def read_stream(
     )
     offsets, offset_known = _work_offsets(cell)
     interpreter = _Interpreter(name, chord_tolerance_mm, block_delete, offsets, offset_known, lengths)
+    size = _size_of(stream)
     head = b""
     for first_line, text in _pieces(stream, name):
         head = head or text[:4000].tobytes()
-        interpreter.feed(scan(text, first_line), text)
+        interpreter.feed(scan(text, first_line), text, size)
         if progress is not None:
             progress(len(text))
         if interpreter.ended:
@@ -114,7 +118,15 @@ def read_stream(
     return interpreter.finish(head)
 
 
-def _work_offsets(cell: Cell | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _size_of(stream: BinaryIO) -> int:
+    """Return the size of a file in bytes, 0 where the stream is none."""
+    try:
+        return os.fstat(stream.fileno()).st_size
+    except (OSError, AttributeError):  # a stream in memory has no file
+        return 0
+
+
+def _work_offsets(cell: "Cell | None") -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
         if frame.a_deg or frame.b_deg or frame.c_deg:
@@ -207,15 +219,17 @@ class _Interpreter:
         row["rapid"], row["line"] = 1, 0
         self.counts[0] = 1
 
-    def feed(self, words: Words, text: NDArray[np.uint8]) -> None:
-        """Execute a piece of words."""
+    def feed(self, words: Words, text: NDArray[np.uint8], size: int) -> None:
+        """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
         columns = (words.letter, words.value, words.extra, words.line)
         self.counts[3] = 0
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         first_message = len(self.messages)
         words.value[words.letter == ord("(")] += first_message
         self.messages += [_decode(text[a:b]) for a, b in words.message_span]
-        self._reserve(len(words.line) and int(words.line[-1] - words.line[0]) + 1)
+        lines = int(words.line[-1] - words.line[0]) + 1 if len(words.line) else 0
+        whole = int(1.02 * lines * size / len(text)) if self.counts[0] == 1 else 0
+        self._reserve(max(lines, whole))
         at = 0
         while True:
             at = machine.run(
@@ -377,7 +391,7 @@ class _Interpreter:
 
 
 def _grown(array: NDArray[np.void], size: int) -> NDArray[np.void]:
-    larger = np.zeros(max(size, len(array) * 3 // 2), dtype=array.dtype)
+    larger = np.empty(max(size, len(array) * 3 // 2), dtype=array.dtype)
     larger[: len(array)] = array
     return larger
 

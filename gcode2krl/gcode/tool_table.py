@@ -2,12 +2,15 @@
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.cell import Cell
 from gcode2krl.errors import input_error
+
+if TYPE_CHECKING:  # a cell file costs its library a noticeable start
+    from gcode2krl.cell import Cell
 
 _WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)", re.IGNORECASE)
 _LARGEST_TOOL = 99999
@@ -33,7 +36,7 @@ def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
     return _by_number(lengths)
 
 
-def lengths_from_cell(cell: Cell | None) -> NDArray[np.float64]:
+def lengths_from_cell(cell: "Cell | None") -> NDArray[np.float64]:
     """Return length by tool number (t,) in mm from a cell; NaN where a tool is not declared."""
     tools = cell.tool if cell is not None else {}
     return _by_number(

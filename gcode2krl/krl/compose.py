@@ -214,7 +214,7 @@ def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
     rotation = targets.rotation
     abc_deg = np.empty((len(targets), 3))
     for number in np.unique(targets.tool):
-        rows = targets.tool == number
+        rows = targets.tool == number if (targets.tool != number).any() else slice(None)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
         chosen = rotation[rows]
         first = chosen[:1] if (chosen == chosen[0]).all() else chosen

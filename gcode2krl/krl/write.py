@@ -15,7 +15,7 @@ from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import released
 from gcode2krl.krl.verify import VerifyReport, compare
-from gcode2krl.predict import solve_joints
+from gcode2krl.predict import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
@@ -74,7 +74,7 @@ def write_krl(
     file = Path(path) if path is not None else None
     program_name, issues = _program_name(file, name)
     issues = list(released([*issues, *source.issues], allow, strict))
-    joints = solve_joints(targets, cell) if joints is None else joints
+    joints = solve_ptp_joints(targets, cell) if joints is None else joints
     layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow))
     texts = compose(targets, joints, cell, program_name, layout)
     issues += released(_size_issues(texts, targets, cell), (), strict)

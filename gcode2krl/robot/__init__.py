@@ -1,6 +1,6 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
-from gcode2krl.robot.joints import follow, follow_motion, joint_findings, motion_angles
+from gcode2krl.robot.joints import follow, follow_motion, joint_findings, motion_angles, ptp_joints
 from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
 from gcode2krl.robot.quality import pose_quality
 
@@ -14,4 +14,5 @@ __all__ = [
     "joint_findings",
     "motion_angles",
     "pose_quality",
+    "ptp_joints",
 ]

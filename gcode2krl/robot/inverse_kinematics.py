@@ -74,7 +74,7 @@ def one_branch(
     ----------
     position_mm : (n, 3)
         Origin of the flange in the robot root, row after row along the path.
-    rotation : (n, 3, 3)
+    rotation : (n, 3, 3), or (1, 3, 3) for all rows
         Its axes as columns, orthonormal and right-handed; this is not checked.
     geometry : (6,)
         a1, a2, c1, c2, c3, c4 in mm; see `kinematics`.
@@ -99,7 +99,7 @@ def one_branch(
     if not np.isfinite(reference).all():
         raise ValueError("q_reference_rad is not finite")
     position = read_only("position_mm", position_mm, -1, 3)
-    axes = read_only("rotation", rotation, len(position), 3, 3)
+    axes = read_only("rotation", rotation, 1 if np.shape(rotation)[0] == 1 else len(position), 3, 3)
     q_rad = np.empty((len(position), 6))
     _path_rows(position, axes, read_only("geometry", geometry, 6), int(branch), reference, q_rad)
     return q_rad
@@ -109,7 +109,7 @@ def one_branch(
 def _all_rows(position_mm: FloatArray, rotation: FloatArray, geometry: FloatArray, q_rad: FloatArray) -> None:
     for i in range(position_mm.shape[0]):
         for arm in range(4):
-            q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm, rotation, i, geometry, arm, 0.0)
+            q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm[i], rotation, i, geometry, arm, 0.0)
             for branch in (arm, arm + 4):
                 q4, q5, q6 = _wrist(rotation, i, cos_1, sin_1, cos_23, sin_23, branch, 0.0)
                 q = (q1, q2, q3, q4, q5, q6)
@@ -129,9 +129,13 @@ def _path_rows(
     before = np.empty(6)
     for j in range(6):
         before[j] = q_reference_rad[j]
+    last_rotation = rotation.shape[0] - 1
     for i in range(position_mm.shape[0]):
-        q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm, rotation, i, geometry, branch, before[0])
-        q4, q5, q6 = _wrist(rotation, i, cos_1, sin_1, cos_23, sin_23, branch, before[3])
+        turned = min(i, last_rotation)
+        q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(
+            position_mm[i], rotation, turned, geometry, branch, before[0]
+        )
+        q4, q5, q6 = _wrist(rotation, turned, cos_1, sin_1, cos_23, sin_23, branch, before[3])
         q = (q1, q2, q3, q4, q5, q6)
         reached = not math.isnan(q6)  # NaN as soon as any part of the pose is
         for j in range(6):
@@ -146,8 +150,8 @@ def _arm(
 ) -> tuple[float, float, float, float, float, float, float]:
     """Return A1, A2, A3, cos A1, sin A1, cos(A2 + A3), sin(A2 + A3), all NaN where out of reach."""
     a1, a2, c1, c2, c3, c4 = geometry
-    x = position_mm[i, 0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
-    y = position_mm[i, 1] - c4 * rotation[i, 1, 2]
+    x = position_mm[0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
+    y = position_mm[1] - c4 * rotation[i, 1, 2]
     radius = math.sqrt(x * x + y * y)
     if branch & 1:  # overhead: axis 1 turns its back on the wrist centre
         x, y, radius = -x, -y, -radius
@@ -158,7 +162,7 @@ def _arm(
 
     # triangle of upper arm, forearm and the line from axis 2 to the wrist centre; angles count downwards
     along = radius - a1
-    down = c1 - (position_mm[i, 2] - c4 * rotation[i, 2, 2])
+    down = c1 - (position_mm[2] - c4 * rotation[i, 2, 2])
     forearm_2 = c3 * c3 + a2 * a2
     forearm = math.sqrt(forearm_2)
     distance_2 = along * along + down * down

@@ -68,6 +68,18 @@ def follow(targets: Targets, cell: Cell, conditioning: bool = True) -> tuple[Joi
     return joints, joint_findings(line, q_line, targets, cell)
 
 
+def ptp_joints(targets: Targets, cell: Cell) -> Joints:
+    """Return what `follow` does, at the PTP targets only; the other rows are NaN, S and T there 0."""
+    line = sample_lines(targets, cell)
+    chain = np.isnan(line.duration_s)
+    _, _, thin, q_thin = _trial(line.position_mm, line.rotation, line.tool, chain, cell)
+    q = np.full((len(targets), 6), np.nan)
+    starts = chain[thin]
+    q[line.target[thin[starts]]] = q_thin[starts]
+    q[targets.home] = cell.home_q_rad()
+    return _joints(q, np.full_like(q, np.nan), targets.tool, cell, conditioning=False)
+
+
 def follow_motion(motion: Motion, cell: Cell) -> Joints:
     """Return joints at each sample (m) of a Motion, one branch for all."""
     q, qd = motion_angles(motion, cell)
@@ -141,18 +153,31 @@ def _best_branch(
     Among branches that do, the one whose weakest point (limits, wrist) is not poor and whose start lies
     nearest to HOME. A trial on a thinned line picks the branch, the full line gets only that one.
     """
+    branch, turns, _, _ = _trial(tip_mm, tip_rotation, tool, chain, cell)
     position, rotation = flange_frames(tip_mm, tip_rotation, tool, cell)
-    stride = max(1, len(position) // _TRIAL_SAMPLES)
-    thin = np.unique(
-        np.concatenate([np.arange(0, len(position), stride), np.flatnonzero(chain), [len(position) - 1]])
-    )
+    q = _chains(position, rotation, chain, branch, cell.home_q_rad(), cell)
+    if turns.any():
+        q += turns
+    return q
+
+
+def _trial(
+    tip_mm: Floats, tip_rotation: Floats, tool: NDArray[np.int32], chain: NDArray[np.bool_], cell: Cell
+) -> tuple[int, Floats, NDArray[np.int64], Floats]:
+    """Return (branch, turns (6,), samples (t,), their joints (t, 6)) of the best branch on a thinned line."""
+    stride = max(1, len(tip_mm) // _TRIAL_SAMPLES)
+    chosen = chain.copy()
+    chosen[::stride] = True
+    chosen[-1] = True
+    thin = np.flatnonzero(chosen)
+    position, rotation = flange_frames(tip_mm[thin], tip_rotation[thin], tool[thin], cell)
     scored = []
     for branch in range(8):
-        q = _chains(position[thin], rotation[thin], chain[thin], branch, cell.home_q_rad(), cell)
+        q = _chains(position, rotation, chain[thin], branch, cell.home_q_rad(), cell)
         turns = _turns(q, cell)
-        scored.append((_cost(q + turns, cell), branch, turns))
-    _, branch, turns = min(scored, key=lambda entry: (entry[0], entry[1]))
-    return _chains(position, rotation, chain, branch, cell.home_q_rad(), cell) + turns
+        scored.append((_cost(q + turns, cell), branch, turns, q + turns))
+    _, branch, turns, q = min(scored, key=lambda entry: (entry[0], entry[1]))
+    return branch, turns, thin, q
 
 
 def _chains(
@@ -162,7 +187,9 @@ def _chains(
     starts = [*np.flatnonzero(chain), len(position)]
     geometry = cell.robot.geometry.array()
     pieces = [
-        one_branch(position[a:b], rotation[a:b], geometry, branch, reference)
+        one_branch(
+            position[a:b], rotation[a:b] if len(rotation) > 1 else rotation, geometry, branch, reference
+        )
         for a, b in itertools.pairwise(starts)
     ]
     return np.concatenate(pieces) if pieces else np.empty((0, 6))

@@ -31,7 +31,8 @@ def inverse(position_mm: ArrayLike, rotation: ArrayLike, cell: Cell, tool: int =
     quaternion = np.atleast_2d(np.asarray(rotation, dtype=float))
     tools = np.full(len(position), tool, dtype=np.int32)
     flange_position, flange_rotation = flange_frames(position, quaternion, tools, cell)
-    return all_branches(flange_position, flange_rotation, cell.robot.geometry.array())
+    rotations = np.broadcast_to(flange_rotation, (len(position), 3, 3))
+    return all_branches(flange_position, rotations, cell.robot.geometry.array())
 
 
 def jacobian(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> Floats:
@@ -43,10 +44,17 @@ def jacobian(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> Floats:
 def flange_frames(
     position_mm: Floats, rotation: Floats, tool: NDArray[np.int32], cell: Cell
 ) -> tuple[Floats, Floats]:
-    """Return the flange in the robot root, (n, 3) and (n, 3, 3): ``$BASE``·pose·``$TOOL``⁻¹."""
+    """Return the flange in the robot root, (n, 3) and (n, 3, 3): ``$BASE``·pose·``$TOOL``⁻¹.
+
+    One tool in one orientation gives one rotation, (1, 3, 3).
+    """
     base = cell.base_matrix()
     constant = len(rotation) > 0 and bool((rotation == rotation[0]).all())
     turned = base[:3, :3] @ fr.rotation_from_quaternion(rotation[:1] if constant else rotation)
+    if constant and (tool == tool[0]).all():
+        tool_inverse = fr.invert(cell.tool_matrix(int(tool[0])))
+        lever = base[:3, 3] + turned[0] @ tool_inverse[:3, 3]
+        return position_mm @ base[:3, :3].T + lever, turned @ tool_inverse[:3, :3]
     flange_position = np.empty((len(position_mm), 3))
     flange_rotation = np.empty((len(position_mm), 3, 3))
     for number in np.unique(tool):

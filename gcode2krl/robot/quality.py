@@ -20,7 +20,8 @@ def pose_quality(position_mm: Floats, rotation: Floats, tool: NDArray[np.int32],
     """
     geometry = cell.robot.geometry.array()
     flange_position, flange_rotation = flange_frames(position_mm, rotation, tool, cell)
-    q = all_branches(flange_position, flange_rotation, geometry)
+    rotations = np.broadcast_to(flange_rotation, (len(position_mm), 3, 3))
+    q = all_branches(flange_position, rotations, geometry)
     limits = limits_rad(cell)
     turns = RAD_PER_REV * np.array([0.0, -1.0, 1.0])
     candidates = q[..., None] + turns  # (n, 8, 6, 3)
