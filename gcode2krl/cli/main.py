@@ -10,7 +10,10 @@ from gcode2krl.cli.console import Console
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.version import __version__
 
-_COMMANDS = {name: name for name in ("translate", "predict", "verify", "models")}
+_COMMANDS = {
+    name: name.replace("-", "_")
+    for name in ("translate", "predict", "verify", "identify", "make-test", "models")
+}
 _OWN_OPTIONS = ("-h", "--help", "--version")
 
 

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import click
+import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part
 from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.prediction import Prediction
 
 
 @click.command("predict")
@@ -42,9 +44,7 @@ def command(
             )
             files = prediction.save(folder, csv=csv)
             if plot:
-                from gcode2krl.report.figures import prediction_figures, save_figures
-
-                files += save_figures(prediction_figures(prediction), folder)
+                files += _draw(prediction, folder)
     except Gcode2KrlError as error:
         if not as_json:
             error.source = error.source or part
@@ -73,6 +73,23 @@ def command(
     top, steepest = motion.speed_mm_s.max(), motion.acceleration_mm_s2.max()
     console.say(f"  speed up to {top:.1f} mm/s, acceleration up to {steepest:.0f} mm/s2")
     return 0
+
+
+def _draw(prediction: Prediction, folder: Path) -> list[Path]:
+    """Draw path, speed and joints; returns the files."""
+    from gcode2krl.report import figures as fig
+
+    motion, joints, robot = prediction.motion, prediction.joints, prediction.cell.robot
+    if motion is None or joints is None:
+        return []
+    limits = np.array(robot.limits.q_deg) if robot.limits.q_deg is not None else None
+    speeds = np.array(robot.speeds.qd_deg_s) if robot.speeds.qd_deg_s is not None else None
+    drawn = {
+        "path": fig.path_figure(prediction.toolpath, prediction.targets, motion),
+        "kinematics": fig.kinematics_figure(prediction.toolpath, motion),
+        "joints": fig.joints_figure(motion, joints, limits, speeds),
+    }
+    return fig.save_figures(drawn, folder)
 
 
 def _folder(part: str, output: str | None) -> Path:

@@ -16,6 +16,8 @@ from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
 Floats = NDArray[np.float64]
 _MOST_SAMPLES = 50_000_000
+_STRAIGHT_COS = 1e-7
+"""cos(alpha/2) below which a line goes straight on and there is no corner."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,9 @@ class Chain:
     """(n,) lengths; a mere reorientation counts as the way it takes the time of."""
     speed_mm_s: Floats
     blend_mm: Floats
-    """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop."""
+    """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop, or straight on."""
+    stop: NDArray[np.bool_]
+    """(n,) True where the end of a move is an exact stop."""
     wait_s: Floats
     move: NDArray[np.int32]
     source_line: NDArray[np.int32]
@@ -57,8 +61,8 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     speed = np.where(targets.ptp[rows], rapid, targets.speed_mm_s[rows])
     length, speed = _with_orientation(length, speed, from_rotation, to_rotation, cell)
     d, cos_half = _blends(start, end, length, targets.cdis_mm[rows])
-    if cell.controller.advance == 0:
-        d = np.zeros_like(d)
+    stop = (d <= 0.0) | (cell.controller.advance == 0)
+    d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
     move = targets.move[rows]
     following = np.flatnonzero(move >= 0)
     owner = move[following[np.minimum(np.searchsorted(following, np.arange(len(move))), len(following) - 1)]]
@@ -71,6 +75,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         length_mm=length,
         speed_mm_s=speed,
         blend_mm=d,
+        stop=stop,
         wait_s=targets.wait_s[rows],
         move=owner if len(move) else move,
         source_line=targets.source_line[rows],
@@ -87,7 +92,7 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
         chain.length_mm,
         chain.speed_mm_s if speed_mm_s is None else speed_mm_s,
         chain.blend_mm,
-        chain.blend_mm <= 0.0,
+        chain.stop,
         chain.wait_s,
         controller.acc_cp_m_s2 * MM_PER_M,
         controller.k_s,

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+_ROOM = 0.8
 UNLIMITED = -1
 """Number of moves in view where the look-ahead model is off."""
 
@@ -47,17 +48,35 @@ def plan_profile(
     moves_in_view : ``$ADVANCE``, or `UNLIMITED`.
     averages : the law; False = trapezoid.
     """
-    count = len(length_mm)
-    vertex = _vertex_speeds(length_mm, speed_mm_s, stop, a_mm_s2, k_s, moves_in_view)
-    head, tail = _margins(length_mm, speed_mm_s, blend_mm, stop, vertex, k_s)
-    _reachable(length_mm - head - tail, vertex, a_mm_s2)
-    pieces = np.empty((5, 7 * count + 2))
-    move_end = np.empty(count)
+    if len(length_mm) == 0:
+        rest = np.zeros(1)
+        return Profile(rest, rest, rest, rest, rest, np.zeros(0), 0.0)
+    bound = _vertex_speeds(length_mm, speed_mm_s, stop, a_mm_s2, k_s, moves_in_view)
+    last = _run_ends(speed_mm_s, bound)
+    first = np.concatenate([[0], last[:-1] + 1])
+    length = np.add.reduceat(length_mm, first)
+    vertex = np.concatenate([[0.0], bound[last + 1]])
+    head, tail, top = _margins(length, speed_mm_s[first], blend_mm[last], stop[last], vertex, k_s)
+    _reachable(length - head - tail, vertex, a_mm_s2)
+    pieces = np.empty((5, 6 * len(length) + 2))
     used, total = _pieces(
-        length_mm, speed_mm_s, stop, wait_s, vertex, head, tail, a_mm_s2, k_s, averages, pieces, move_end
+        length, top, stop[last], wait_s[last], vertex, head, tail, a_mm_s2, k_s, averages, pieces
     )
     t, s, v, a, i = (np.ascontiguousarray(column[:used]) for column in pieces)
+    move_end = np.empty(len(length_mm))
+    _move_ends(np.cumsum(length_mm), t, s, v, a, move_end)
     return Profile(t, s, v, a, i, move_end, total)
+
+
+def _run_ends(speed_mm_s: Floats, bound_mm_s: Floats) -> NDArray[np.int64]:
+    """Return the last move of each run: moves of one speed whose inner vertices hold nothing back.
+
+    Such a run is one programmed rectangle to the law, however many moves it has.
+    """
+    held_back = bound_mm_s[1:] < speed_mm_s
+    held_back[:-1] |= speed_mm_s[1:] != speed_mm_s[:-1]
+    held_back[-1] = True
+    return np.flatnonzero(held_back)
 
 
 @njit(cache=True)
@@ -75,33 +94,68 @@ def _vertex_speeds(length, speed, stop, a, k, in_view):
         bound = min(speed[i], speed[i + 1])
         if in_view >= 0:
             seen = 0.0
-            known_stop = False
             for j in range(i + 1, min(i + 1 + in_view, count)):
                 seen += length[j]
-                if stop[j] or j == count - 1:
-                    known_stop = True
+                if stop[j]:
                     break
-            if not known_stop:
-                bound = min(bound, 0.5 * (math.sqrt(a * a * k * k + 8.0 * a * seen) - a * k))
+            bound = min(bound, 0.5 * (math.sqrt(a * a * k * k + 8.0 * a * seen) - a * k))
         vertex[i + 1] = bound
     return vertex
 
 
 @njit(cache=True)
 def _margins(length, speed, blend, stop, vertex, k):
-    """Part of a move that is run at the speed of a slower neighbour: slowing down ends where the corner
-    begins, speeding up begins where it ends; v·k/2 is what the last average smears across that point."""
+    """Return (head, tail, top) of each run: what it runs at the speed of its ends, and its own top speed.
+
+    Slowing down ends where the corner begins, speeding up begins where it ends; v·k/2 is what the last
+    average smears across that point. A margin longer than the run reaches into the next; ``vertex`` is
+    lowered there.
+    """
     count = len(length)
-    head, tail = np.zeros(count), np.zeros(count)
-    for i in range(count - 1):
-        if stop[i]:
-            continue
-        low = vertex[i + 1]
-        if speed[i] > speed[i + 1] and low == speed[i + 1]:
-            tail[i] = min(0.5 * length[i], blend[i] + 0.5 * low * k)
-        elif speed[i] < speed[i + 1] and low == speed[i]:
-            head[i + 1] = min(0.5 * length[i + 1], blend[i] + 0.5 * low * k)
-    return head, tail
+    head, tail, top = np.zeros(count), np.zeros(count), speed.copy()
+    bound = vertex.copy()
+    for i in range(1, count):  # behind slow places
+        way = 0.0
+        for j in range(i, 0, -1):
+            if stop[j - 1]:
+                break
+            reach = blend[j - 1] + 0.5 * bound[j] * k - way
+            if bound[j] < top[i] and reach > 0.0:
+                if reach > _ROOM * length[i]:
+                    top[i] = bound[j]
+                else:
+                    head[i] = max(head[i], reach)
+                if reach >= length[i]:
+                    vertex[i + 1] = min(vertex[i + 1], bound[j])
+            way += length[j - 1]
+            if way > blend[j - 1] + 0.5 * top[i] * k:
+                break
+    for i in range(count - 2, -1, -1):  # before slow places
+        way = 0.0
+        for j in range(i, count - 1):
+            if stop[j]:
+                break
+            reach = blend[j] + 0.5 * bound[j + 1] * k - way
+            if bound[j + 1] < top[i] and reach > 0.0:
+                if reach + head[i] > _ROOM * length[i]:
+                    top[i] = bound[j + 1]
+                else:
+                    tail[i] = max(tail[i], reach)
+                if reach >= length[i]:
+                    vertex[i] = min(vertex[i], bound[j + 1])
+            way += length[j + 1]
+            if way > blend[j] + 0.5 * top[i] * k:
+                break
+    for i in range(count):
+        if top[i] <= vertex[i]:
+            head[i] = 0.0
+        if top[i] <= vertex[i + 1]:
+            tail[i] = 0.0
+        if head[i] + tail[i] > _ROOM * length[i]:
+            head[i], tail[i] = 0.0, 0.0
+        vertex[i] = min(vertex[i], top[i])
+        vertex[i + 1] = min(vertex[i + 1], top[i])
+    return head, tail, top
 
 
 @njit(cache=True)
@@ -130,7 +184,7 @@ def phases(length, v, u0, u1, a, averages):
 
 
 @njit(cache=True)
-def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out, move_end):
+def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out):
     """Write the pieces (time, path, speed, acceleration, integral); return how many and the total time."""
     used = 0
     t, s, area = 0.0, 0.0, 0.0
@@ -168,7 +222,6 @@ def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out, 
         drift = start + length[i] - s
         if abs(drift) > 1e-9:
             s = start + length[i]
-        move_end[i] = t
         if stop[i] or i == count - 1:
             rest = k + (wait[i] if i < count - 1 else 0.0)
             if rest > 0.0:
@@ -178,3 +231,16 @@ def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out, 
                 t += rest
     out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = t, s, 0.0, 0.0, area
     return used + 1, t
+
+
+@njit(cache=True)
+def _move_ends(path_end, time, path, speed, acceleration, move_end):
+    """Write the time (n,) at which each move ends, before the last average."""
+    piece, last = 0, len(time) - 1
+    for i in range(len(path_end)):
+        while piece < last and path[piece + 1] < path_end[i] - 1e-9:
+            piece += 1
+        way = max(0.0, path_end[i] - path[piece])
+        v, a = speed[piece], acceleration[piece]
+        faster = v + math.sqrt(max(0.0, v * v + 2.0 * a * way))
+        move_end[i] = time[piece] + (2.0 * way / faster if faster > 0.0 else 0.0)

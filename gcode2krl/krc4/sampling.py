@@ -80,7 +80,8 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
     count = len(length)
     now, then = 0, 0
     i = 0
-    begin = 0.0  # path at the start of move i
+    begin = 0.0  # planned path at the start of move i
+    travelled = 0.0  # the same in space: a reorientation on the spot has none
     saved = 0.0  # how much shorter the corners behind are than their lines
     u, w = np.zeros(3), np.zeros(3)
     first, second, third = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -97,6 +98,9 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             if blend[i] > 0.0:  # leaving the move behind leaves its corner's middle behind
                 saved += 2.0 * blend[i] * (1.0 - arc_length(1.0, _sharpness(start, end, length, i)))
             begin += length[i]
+            for c in range(3):
+                u[c] = end[i, c] - start[i, c]
+            travelled += math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
             i += 1
         inside = min(max(s - begin, 0.0), length[i])
         d_end = blend[i]
@@ -105,6 +109,7 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             u[c] = (end[i, c] - start[i, c]) / length[i] if length[i] > 0.0 else 0.0
             second[c], third[c] = 0.0, 0.0
         shorter = saved
+        share = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
         if d_end > 0.0 and inside > length[i] - d_end:
             j, tau, d = i, (inside - length[i] + d_end) / (2.0 * d_end), d_end
         elif d_start > 0.0 and inside < d_start:
@@ -134,7 +139,7 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             acceleration2 += (first[c] * a + second[c] * v * v) ** 2
             jerk2 += (first[c] * jerk + 3.0 * second[c] * v * a) ** 2
         figures[row, 0], figures[row, 1] = math.sqrt(speed2), math.sqrt(acceleration2)
-        figures[row, 2], figures[row, 3] = math.sqrt(jerk2), begin + inside - shorter
+        figures[row, 2], figures[row, 3] = math.sqrt(jerk2), travelled + inside * share - shorter
         move[row] = i
         part[row] = inside / length[i] if length[i] > 0.0 else 1.0
 

@@ -124,24 +124,24 @@ def intervals(time_s: Floats, mask: Bools, most: int = MOST_BARS) -> tuple[list[
 
 
 def line_ticks(time_s: Floats, line: Ints, most: int = 14) -> tuple[list[float], list[str]]:
-    """Return times at which a G-code line begins and their labels, evenly spread and at most ``most``.
+    """Return times at which a G-code line begins and their labels, in order and at most ``most`` + 1.
 
-    A line is labelled at its beginning; what lies closer to the tick before than the axis has room for has
-    none.
+    Of the lines that begin too close together to label each, the one that lasts longest is labelled. Line 0,
+    what the program's own lines do not say, has no label.
     """
     begins = np.flatnonzero(np.diff(line, prepend=line[0] - 1))
-    room = float(time_s[-1] - time_s[0]) / most
+    lasts = np.diff(time_s[begins], append=time_s[-1])
+    begins, lasts = begins[line[begins] > 0], lasts[line[begins] > 0]
+    room = max(float(time_s[-1] - time_s[0]) / most, 1e-9)
+    slot = ((time_s[begins] - time_s[0]) / room).astype(np.int64)
+    order = np.lexsort((-lasts, slot))
+    _, first = np.unique(slot[order], return_index=True)
     times: list[float] = []
     labels: list[str] = []
-    at = 0
-    while at < len(begins):
-        row = begins[at]
-        if line[row] > 0:
+    for row in begins[order[first]]:
+        if not times or time_s[row] - times[-1] > 0.75 * room:
             times.append(float(time_s[row]))
             labels.append(str(line[row]))
-            at = max(at + 1, int(np.searchsorted(time_s[begins], time_s[row] + room)))
-        else:
-            at += 1
     return times, labels
 
 

@@ -6,6 +6,7 @@ it is imported only where a figure is asked for.
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -120,15 +121,7 @@ def kinematics_figure(toolpath: Toolpath, motion: Motion) -> Figure:
         for axes, (name, unit, values) in zip((first, *rest), panels, strict=True):
             _shade(axes, bars, ORANGE, shade)
             if name == "Speed":
-                axes.plot(
-                    *thin(motion.time_s, feed),
-                    color=BLACK,
-                    lw=0.8,
-                    drawstyle="steps-post",
-                    ls=(0, (4, 3)),
-                    zorder=3,
-                    label="programmed feed",
-                )
+                _programmed_feed(axes, motion.time_s, feed)
             axes.plot(*thin(motion.time_s, values), color=BLUE, lw=1.1, label="commanded")
             axes.set_ylabel(f"{name} ({unit})")
             axes.set_ylim(bottom=0.0)
@@ -284,7 +277,14 @@ def _draw_path(axes: Axes, programmed: Floats, path: Floats, rapid: Bools, corne
             axes.plot(*thin_path(shown).T, color=colour, lw=1.2, zorder=3, label=label)
     if corner.any():
         dots = thin_dots(path[corner])
-        axes.plot(*dots.T, ".", color=ORANGE, ms=2.5, zorder=4, label="samples in approximated corners")
+        axes.plot(
+            *dots.T,
+            ".",
+            color=ORANGE,
+            ms=2.5 if len(dots) < 2000 else 1.2,
+            zorder=4,
+            label="samples in approximated corners",
+        )
     axes.plot(*path[0], "^", color=GREEN, mec=BLACK, mew=0.7, ms=8, zorder=5, label="start")
     axes.plot(*path[-1], "s", color=VERMILION, mec=BLACK, mew=0.7, ms=7, zorder=5, label="end")
 
@@ -300,17 +300,19 @@ def _draw_corner(axes: Axes, corner: Corner, targets: Targets, motion: Motion) -
         np.abs((motion.position_mm[near] - vertex) @ np.cross(corner.along, corner.across)) <= corner.reach_mm
     )
     near = near[beside & np.isin(motion.move[near], targets.move[corner.target : corner.target + 2])]
-    samples = thin_path((motion.position_mm[near] - vertex) @ plane)
+    samples = (motion.position_mm[near] - vertex) @ plane
     axes.plot(*np.stack([before, [0.0, 0.0], after]).T, color=GREY, lw=0.9, zorder=2)
     s = np.linspace(0.0, 1.0, 101)[:, None]
     parabola = corner.reach_mm * (
         (1.0 - s) ** 2 * before / np.linalg.norm(before) + s**2 * after / np.linalg.norm(after)
     )
     if corner.sampled:
-        axes.plot(*smooth(samples).T, color=BLUE, lw=1.2, zorder=3)
+        axes.plot(*thin_path(smooth(samples)).T, color=BLUE, lw=1.2, zorder=3)
     else:
         axes.plot(*parabola.T, color=BLUE, lw=1.2, ls="--", zorder=3)
-    axes.plot(*samples.T, ".", color=ORANGE if corner.sampled else BLUE, ms=5, zorder=4)
+    inside = samples[motion.corner[near]]
+    axes.plot(*thin_path(samples).T, ".", color=BLUE, ms=5, zorder=4)
+    axes.plot(*thin_path(inside).T, ".", color=ORANGE, ms=5, zorder=4)
     apex = (corner.nearest_mm - vertex) @ plane
     axes.plot(*np.stack([[0.0, 0.0], apex]).T, color=VERMILION, lw=1.4, zorder=5)
     axes.plot(0.0, 0.0, "o", ms=5, mfc="white", mec=BLACK, zorder=6)
@@ -375,11 +377,21 @@ def _line_axis(axes: Axes, motion: Motion, line: Ints) -> None:
     upper.set_xlabel("G-code line, where it begins")
 
 
+def _programmed_feed(axes: Axes, time_s: Floats, feed_mm_s: Floats) -> None:
+    """Draw the programmed feed as steps: dashed over the speed, or pale behind it where it changes often."""
+    often = np.count_nonzero(np.diff(feed_mm_s[np.isfinite(feed_mm_s)])) > 100
+    dashes: dict[str, Any] = (
+        {"color": GREY, "lw": 0.5} if often else {"color": BLACK, "lw": 0.8, "ls": (0, (4, 3)), "zorder": 3}
+    )
+    axes.plot(*thin(time_s, feed_mm_s), drawstyle="steps-post", label="programmed feed", **dashes)
+
+
 def _angle_limits(axes: Axes, angle_deg: Floats, limit: Floats | None) -> None:
     """Draw the joint's limits where they are near its range; note their distance otherwise."""
     present = angle_deg[np.isfinite(angle_deg)]
     if not len(present):
         axes.set_title("out of reach", loc="right", fontsize=8, color=VERMILION)
+        axes.set_yticks([])
         return
     low, high = float(present.min()), float(present.max())
     room = max(0.25 * (high - low), 5.0)

@@ -25,7 +25,7 @@ def polyline(points, speeds, mode="G64"):
     """Return a program: a rapid to the first point, then a feed move to each other one."""
     text = HEAD + mode + "\nG0 " + move_word(points[0]) + "\n"
     for point, speed in zip(points[1:], speeds, strict=True):
-        text += f"G1 {move_word(point)} F{60 * speed:.9g}\n"
+        text += f"G1 {move_word(point)} F{60 * speed:.14g}\n"
     return text + "M30\n"
 
 

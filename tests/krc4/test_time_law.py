@@ -1,5 +1,6 @@
 """The controller's speed along the path: plan_motion and the closed forms against brute force."""
 
+import itertools
 from dataclasses import fields, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from gcode2krl import plan_motion, set_targets
 from gcode2krl.krc4 import effective_acceleration, jerk, speed_step
 from tests.krc4 import oracle
-from tests.krc4.conftest import HEAD, K_S, straight
+from tests.krc4.conftest import HEAD, K_S, polyline, straight
 
 CYCLE_S = 0.012
 few = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -66,7 +67,9 @@ def test_other_filter_lengths(run_program, k_s):
     assert np.abs(motion.path_mm - wanted.position(motion.time_s)).max() < 1e-3
 
 
-@pytest.mark.parametrize(("length", "speed", "a_m_s2"), [(10, 1000, 2), (60, 1000, 4), (1, 25, 2), (300, 400, 2)])
+@pytest.mark.parametrize(
+    ("length", "speed", "a_m_s2"), [(10, 1000, 2), (60, 1000, 4), (1, 25, 2), (300, 400, 2)]
+)
 def test_trapezoid(run_program, length, speed, a_m_s2):
     motion = run_program(straight([length], [speed]), acc_cp_m_s2=float(a_m_s2), law="trapezoid")
     assert_follows(motion, oracle.line(length, speed, a_m_s2 * 1000, K_S, "trapezoid"))
@@ -86,8 +89,8 @@ def test_the_two_laws_differ_on_short_fast_moves_only(run_program):
 def test_undecided_law_is_a_finding_where_it_matters(run_program):
     short = run_program(straight([10], [1000]), acc_cp_m_s2=2.0)
     long = run_program(straight([200], [50]), acc_cp_m_s2=2.0)
-    assert any("undecided" in issue.message for issue in short.issues)
-    assert not any("undecided" in issue.message for issue in long.issues)
+    assert any("undecided" in issue.message + (issue.remedy or "") for issue in short.issues)
+    assert not any("undecided" in issue.message + (issue.remedy or "") for issue in long.issues)
 
 
 # --- changes of speed, stops ------------------------------------------------------------------------------
@@ -99,7 +102,7 @@ def test_undecided_law_is_a_finding_where_it_matters(run_program):
         [(200, 20), (200, 80)],
         [(200, 80), (200, 20)],
         [(150, 100), (100, 10), (250, 300)],
-        [(120, 300), (60, 40), (30, 40), (200, 200), (90, 25)],
+        [(160, 300), (60, 40), (30, 40), (200, 200), (90, 25)],
         [(60, 50), (60, 50.5), (60, 50)],
     ],
 )
@@ -119,7 +122,7 @@ def test_slowing_ends_and_speeding_up_begins_at_the_vertex(run_program, first, s
     assert speed_at[1] == pytest.approx(slow, rel=1e-5)
     slow_side, fast_side = (speed_at[0], speed_at[2]) if first < second else (speed_at[2], speed_at[0])
     assert slow_side == pytest.approx(slow, rel=1e-9)
-    assert slow < fast_side < slow + 0.5
+    assert slow + 0.01 < fast_side < slow + 0.5
 
 
 STOPS = [(50, 40, 0.0), (3, 75, 0.25), (0.4, 75, 0.0), (120, 400, 1.0), (20, 10, 0.0)]
@@ -349,12 +352,10 @@ def test_doubling_the_samples_changes_nothing(run_program, text):
     ],
 )
 def test_reversed_program_mirrors_the_path(run_program, points, speed):
-    from tests.krc4.conftest import polyline
-
     speeds = [speed] * (len(points) - 1)
     there = run_program(polyline(points, speeds), dt_s=0.001, cdis_mm=8.0)
     back = run_program(polyline(points[::-1], speeds), dt_s=0.001, cdis_mm=8.0)
-    length = sum(np.linalg.norm(np.subtract(b, a)) for a, b in zip(points, points[1:], strict=False))
+    length = sum(np.linalg.norm(np.subtract(b, a)) for a, b in itertools.pairwise(points))
     duration = length / speed + speed / 2000 + K_S
     assert there.time_s[-1] == pytest.approx(duration, abs=0.001)
     assert back.time_s[-1] == pytest.approx(duration, abs=0.001)
@@ -372,9 +373,7 @@ def test_reversed_program_mirrors_the_path(run_program, points, speed):
 def test_collinear_pieces_are_one_line(run_program, pieces, speed, law):
     pieces = [round(piece, 3) for piece in pieces]
     whole = run_program(straight([sum(pieces)], [speed], start_mm=-200.0), cdis_mm=1.0, law=law)
-    split = run_program(
-        straight(pieces, [speed] * len(pieces), start_mm=-200.0), cdis_mm=1.0, law=law
-    )
+    split = run_program(straight(pieces, [speed] * len(pieces), start_mm=-200.0), cdis_mm=1.0, law=law)
     assert len(split) == len(whole)
     assert np.abs(split.position_mm - whole.position_mm).max() < 1e-5
     peak = whole.acceleration_mm_s2.max()

@@ -1,0 +1,233 @@
+"""Measured runs: the controller's trace of the commanded position, read, checked and cut at standstills.
+
+Columns as in ``controller.csv``: ``t_s``, ``x_cmd_mm``, ``y_cmd_mm``, ``z_cmd_mm``; others are left alone.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.errors import NotUnderstoodError, input_error
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+TIME = "t_s"
+POSITION = ("x_cmd_mm", "y_cmd_mm", "z_cmd_mm")
+LEAST_ROWS = 10
+_LONGEST_CYCLE_S = 1.0
+_METRES_SHOW_BELOW = 0.02
+"""A trace that spans less than this share of the program on an axis is taken to be in another unit."""
+_MOST_DECIMALS = 7
+_QUIET_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class ControllerTrace:
+    """The commanded position over time, in order, without missing values."""
+
+    time_s: Floats
+    """(n,)"""
+    position_mm: Floats
+    """(n, 3) in ``$BASE``."""
+    row: Ints
+    """(n,) number of each sample in the file: its line in a CSV, its 1-based row in Parquet."""
+    dropped: int
+    """Rows left out because a value is missing (empty, NaN or infinite)."""
+    source: str
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+def read_controller_trace(path: str | Path) -> ControllerTrace:
+    """Read a trace from CSV with a header line, or from Parquet.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Names file, row and column: unreadable file, missing column, what is not a number, time that does not
+        rise or is not in seconds, fewer than 10 rows.
+    """
+    file = Path(path)
+    frame, first_row = _read_frame(file)
+    missing = [name for name in (TIME, *POSITION) if name not in frame.columns]
+    if missing:
+        raise input_error(
+            "trace-column",
+            f"column {', '.join(missing)}: missing; the file has {', '.join(frame.columns[:12])}",
+            f"name the columns {TIME}, {', '.join(POSITION)}",
+            source=str(file),
+        )
+    values = np.stack([_numbers(frame[name], name, first_row, file) for name in (TIME, *POSITION)], axis=1)
+    complete = np.isfinite(values).all(axis=1)
+    row = np.flatnonzero(complete) + first_row
+    trace = ControllerTrace(
+        time_s=np.ascontiguousarray(values[complete, 0]),
+        position_mm=np.ascontiguousarray(values[complete, 1:]),
+        row=row,
+        dropped=int(np.count_nonzero(~complete)),
+        source=str(file),
+    )
+    _check_rows(trace)
+    _check_time(trace)
+    return trace
+
+
+def check_scale(trace: ControllerTrace, program_mm: Floats) -> None:
+    """Raise `NotUnderstoodError` where a column spans about a thousandth of the program's (p, 3) positions.
+
+    That is how a column in metres that is named ``_mm`` shows.
+    """
+    wanted, found = np.ptp(program_mm, axis=0), np.ptp(trace.position_mm, axis=0)
+    for name, programmed_mm, traced_mm in zip(POSITION, wanted.tolist(), found.tolist(), strict=True):
+        if programmed_mm > 1.0 and 1e-4 * programmed_mm < traced_mm < _METRES_SHOW_BELOW * programmed_mm:
+            raise input_error(
+                "trace-unit",
+                f"column {name} spans {traced_mm:.4g}, the program {programmed_mm:.4g} mm: "
+                "about 1000 times less, so metres",
+                "multiply the column by 1000",
+                line=int(trace.row[0]),
+                source=trace.source,
+            )
+
+
+def resolution_mm(position_mm: Floats) -> float:
+    """Return the step of the last decimal in which positions were recorded; 0 where no rounding shows."""
+    for decimals in range(_MOST_DECIMALS):
+        if np.abs(np.round(position_mm, decimals) - position_mm).max(initial=0.0) < 1e-9:
+            return float(10.0**-decimals)
+    return 0.0
+
+
+def noise_mm(trace: ControllerTrace, window: int = 10) -> float:
+    """Return a rough 1-sigma noise of one axis, from second differences in the quietest quarter of a trace."""
+    second = np.diff(trace.position_mm, n=2, axis=0)
+    if len(second) < window:
+        return 0.0
+    squares = np.cumsum(np.concatenate([np.zeros((1, 3)), second**2]), axis=0)
+    power = (squares[window:] - squares[:-window]).max(axis=1) / window
+    return math.sqrt(max(float(np.quantile(power, _QUIET_SHARE)), 0.0) / 6.0)  # 1² + 2² + 1²
+
+
+def standstills(trace: ControllerTrace, least_s: float, still_mm: float) -> Ints:
+    """Return (s, 2) first and last sample of each standstill of at least ``least_s``.
+
+    Within a standstill no axis moves by more than ``still_mm``. The first and the last sample of the trace
+    count as standstills of their own where the trace begins or ends in motion.
+    """
+    count = len(trace)
+    width = min(count, math.ceil(least_s / float(np.median(np.diff(trace.time_s))) - 1e-6) + 1)
+    windows = np.lib.stride_tricks.sliding_window_view(trace.position_mm, width, axis=0)
+    quiet = (windows.max(axis=-1) - windows.min(axis=-1)).max(axis=1) <= still_mm
+    still = np.zeros(count + 1, dtype=np.int64)
+    starts = np.flatnonzero(quiet)
+    np.add.at(still, starts, 1)
+    np.add.at(still, starts + width, -1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.cumsum(still)[:count] > 0, [0]]).astype(np.int8)))
+    runs = [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+    if not runs or runs[0][0] > 0:
+        runs.insert(0, (0, 0))
+    if runs[-1][1] < count - 1:
+        runs.append((count - 1, count - 1))
+    return np.array(_joined(runs, trace.position_mm, still_mm), dtype=np.int64)
+
+
+def _joined(runs: list[tuple[int, int]], position_mm: Floats, still_mm: float) -> list[tuple[int, int]]:
+    """Join neighbours between which nothing moves: noise had parted one standstill."""
+    joined = [runs[0]]
+    for first, last in runs[1:]:
+        before = joined[-1]
+        place = position_mm[before[0] : before[1] + 1].mean(axis=0)
+        between = position_mm[before[1] : first + 1]
+        if np.abs(between - place).max() <= still_mm:
+            joined[-1] = (before[0], last)
+        else:
+            joined.append((first, last))
+    return joined
+
+
+def _read_frame(file: Path) -> "tuple[pl.DataFrame, int]":
+    """Return the table, and the number of its first row in the file."""
+    import polars as pl
+
+    try:
+        with file.open("rb") as stream:
+            parquet = stream.read(4) == b"PAR1"
+        if parquet:
+            return pl.read_parquet(file), 1
+        return pl.read_csv(file, infer_schema=False), 2
+    except OSError as error:
+        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
+    except pl.exceptions.NoDataError:
+        raise input_error(
+            "trace-empty", "the file is empty", "export the trace with a header line", source=str(file)
+        ) from None
+    except pl.exceptions.PolarsError as error:
+        why = str(error).splitlines()[0]
+        raise input_error("trace-unreadable", f"not a table: {why}", source=str(file)) from None
+
+
+def _numbers(column: "pl.Series", name: str, first_row: int, file: Path) -> Floats:
+    """Return a column (n,) as numbers, NaN where empty; anything else is an error with its row."""
+    import polars as pl
+
+    text = column.cast(pl.String).str.strip_chars()
+    numbers = text.cast(pl.Float64, strict=False)
+    wrong = (numbers.is_null() & text.is_not_null() & (text != "")).arg_true()
+    for index in wrong.to_list():
+        if str(text[index]).casefold() in ("nan", "null", "none", "na"):
+            continue
+        raise input_error(
+            "trace-number",
+            f"row {index + first_row}, column {name}: {text[index]!r} is not a number",
+            "decimals with a point, columns separated by commas",
+            line=index + first_row,
+            source=str(file),
+        )
+    return numbers.fill_null(math.nan).to_numpy().astype(np.float64)
+
+
+def _check_rows(trace: ControllerTrace) -> None:
+    if len(trace) < LEAST_ROWS:
+        dropped = f" ({trace.dropped} dropped for missing values)" if trace.dropped else ""
+        raise input_error(
+            "trace-short",
+            f"{len(trace)} usable rows{dropped}, at least {LEAST_ROWS} are needed",
+            "record the whole program",
+            source=trace.source,
+        )
+
+
+def _check_time(trace: ControllerTrace) -> None:
+    step = np.diff(trace.time_s)
+    back = np.flatnonzero(step <= 0)
+    if len(back):
+        raise _time_error(trace, int(back[0]))
+    cycle_s = float(np.median(step))
+    if cycle_s > _LONGEST_CYCLE_S:
+        raise input_error(
+            "trace-unit",
+            f"column {TIME}: {cycle_s:g} s between samples, so not seconds",
+            "divide the column by 1000 if it is in ms",
+            line=int(trace.row[1]),
+            source=trace.source,
+        )
+
+
+def _time_error(trace: ControllerTrace, index: int) -> NotUnderstoodError:
+    row = int(trace.row[index + 1])
+    before, after = trace.time_s[index], trace.time_s[index + 1]
+    return input_error(
+        "trace-time",
+        f"row {row}, column {TIME}: {after:g} s does not come after {before:g} s",
+        "export one recording, in order",
+        line=row,
+        source=trace.source,
+    )
