@@ -8,6 +8,7 @@ write go to a temporary folder where the command says ``{tmp}``, which the READM
 
 import re
 import shlex
+import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -39,6 +40,17 @@ def main() -> None:
 
         text = BLOCK.sub(replaced, readme.read_text(encoding="utf-8"))
     readme.write_text(text, encoding="utf-8", newline="\n")
+    draw_pictures()
+
+
+def draw_pictures() -> None:
+    """Draw the pictures of the README: those of a prediction of the test piece."""
+    images = ROOT / "docs" / "images"
+    images.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        output_of("gcode2krl predict examples/test_piece.nc -o {tmp}/p --plot", folder)
+        for name in ("path", "kinematics", "joints"):
+            shutil.copy(Path(folder) / "p" / f"{name}.png", images / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -170,7 +170,7 @@ class Joints(Table):
     limit_margin_rad: Floats = _column(np.float64)
     """(m,) distance to the nearest joint limit, negative beyond it."""
     sigma_min: Floats = _column(np.float64)
-    """(m,) smallest singular value of the Jacobian (translations per metre)."""
+    """(m,) smallest singular value of the Jacobian, its translations over the length of the stretched arm."""
     status: Ints = _column(np.int32)
     """(m,) KUKA's S bits."""
     turn: Ints = _column(np.int32)

@@ -56,7 +56,7 @@ def command(
         file = _output_file(part, output, cell_path)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        from gcode2krl.krl import write_krl
+        from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.predict import corner_errors, plan_motion, targets_and_joints
 
         options = _words(
@@ -65,6 +65,8 @@ def command(
             block_delete=block_delete,
             spin=cell.frames.spin,
         )
+        if file is None and name is None and part != STANDARD:
+            name = suggested_name(Path(part).stem)
         with console.progress("planning, writing, verifying", None):
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
