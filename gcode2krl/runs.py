@@ -26,6 +26,8 @@ _METRES_SHOW_BELOW = 0.02
 """A trace that spans less than this share of the program on an axis is taken to be in another unit."""
 _MOST_DECIMALS = 7
 _QUIET_SHARE = 0.25
+_STILL_SIGMA = 8.0
+_SAME_PLACE_MM = 0.2
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def resolution_mm(position_mm: Floats) -> float:
 
 
 def noise_mm(trace: ControllerTrace, window: int = 10) -> float:
-    """Return a rough 1-sigma noise of one axis, from second differences in the quietest quarter of a trace."""
+    """Return a rough 1-sigma noise of one axis: second differences in the quietest quarter of a trace."""
     second = np.diff(trace.position_mm, n=2, axis=0)
     if len(second) < window:
         return 0.0
@@ -137,6 +139,60 @@ def standstills(trace: ControllerTrace, least_s: float, still_mm: float) -> Ints
     if runs[-1][1] < count - 1:
         runs.append((count - 1, count - 1))
     return np.array(_joined(runs, trace.position_mm, still_mm), dtype=np.int64)
+
+
+def program_rests(trace: ControllerTrace, wanted_mm: Floats, line: Ints, least_s: float) -> tuple[Ints, int]:
+    """Return the standstills (s + 1, 2) of a program's s sections, and how many other sections there are.
+
+    Parameters
+    ----------
+    wanted_mm : (s + 1, 3) where the program stands still, in order.
+    line : (s + 1,) its G-code lines, for the words of an error.
+    least_s : what counts as a standstill.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the trace does not stand still at these places, all of them and no other between.
+    """
+    still_mm = _STILL_SIGMA * noise_mm(trace) + 2.0 * resolution_mm(trace.position_mm) + 1e-4
+    rests = standstills(trace, least_s, still_mm)
+    places = np.array([trace.position_mm[first : last + 1].mean(axis=0) for first, last in rests])
+    gaps = [places[j : j + len(wanted_mm)] - wanted_mm for j in range(len(places) - len(wanted_mm) + 1)]
+    tolerance_mm = _SAME_PLACE_MM + still_mm
+    for j, gap in enumerate(gaps):
+        if np.abs(gap).max() <= tolerance_mm:
+            return rests[j : j + len(wanted_mm)], len(places) - len(wanted_mm)
+    for gap in gaps:
+        shift = gap.mean(axis=0)
+        if np.abs(gap - shift).max() <= tolerance_mm and len(wanted_mm) > 2:
+            x, y, z = shift.tolist()
+            raise _no_match(
+                trace, 0, f"the trace is shifted against the program by ({x:.3f}, {y:.3f}, {z:.3f}) mm",
+                "record with the $BASE and $TOOL of the program",
+            )  # fmt: skip
+    counts = f"the trace has {len(places) - 1} sections between standstills, the program {len(wanted_mm) - 1}"
+    at, gap_start = 0, 0
+    for j in range(len(places)):
+        room = min(len(wanted_mm), len(places) - j)
+        off = np.abs(places[j : j + room] - wanted_mm[:room]).max(axis=1) > tolerance_mm
+        agree = int(np.argmax(off)) if off.any() else room
+        if agree > at:
+            at, gap_start = agree, j
+    if gap_start + at >= len(places):
+        where = f"; it ends before G-code line {line[min(at, len(line) - 1)]}"
+        raise _no_match(trace, int(trace.row[-1]), counts + where, "record the whole program")
+    found, needed = (", ".join(f"{x:.3f}" for x in p) for p in (places[gap_start + at], wanted_mm[at]))
+    raise _no_match(
+        trace, int(trace.row[rests[gap_start + at, 0]]),
+        f"{counts}; they part at standstill {at + 1} (G-code line {line[at]}): "
+        f"({found}) instead of ({needed})",
+        "record this program, without stops of your own; name it with --part",
+    )  # fmt: skip
+
+
+def _no_match(trace: ControllerTrace, row: int, message: str, remedy: str) -> NotUnderstoodError:
+    return input_error("trace-sections", message, remedy, line=row, source=trace.source)
 
 
 def _joined(runs: list[tuple[int, int]], position_mm: Floats, still_mm: float) -> list[tuple[int, int]]:

@@ -12,12 +12,13 @@ from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.krc4.identify import CornerFit, Estimate, Identification, Section, identify_controller
 from gcode2krl.tables import Toolpath
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from gcode2krl.krc4.identify import CornerFit, Estimate, Identification, Section
 
 _MS_PER_S = 1000.0
 _MOST_SHOWN = 20
@@ -66,12 +67,15 @@ def command(
     _say(result, trace, console)
     for file in files:
         console.say(f"  wrote      {file}")
+    if apply_to is not None and not _is_own_cdis(result, read_cell(cell_path)):
+        console.say("             without cdis_mm: the corners were not programmed with that of the cell")
     return 0
 
 
 def _identify(
     trace_path: str, part: str | None, cell: Cell, tolerance_mm: float | None, console: Console
-) -> Identification:
+) -> "Identification":
+    from gcode2krl.krc4.identify import identify_controller
     from gcode2krl.predict import set_targets
     from gcode2krl.runs import read_controller_trace
 
@@ -93,15 +97,15 @@ def _test_toolpath(cell: Cell) -> Toolpath:
 # --- words ----------------------------------------------------------------------------------------------
 
 
-def _say(result: Identification, trace: str, console: Console) -> None:
+def _say(result: "Identification", trace: str, console: Console) -> None:
     k, cycle_ms = result.k_s, result.cycle_s * _MS_PER_S
     inside = "inside" if k.contains(result.k_whole_s) else "outside"
+    taken = "taken" if result.k_best_s == result.k_whole_s else "not taken"
     fitted = sum(section.fitted for section in result.sections)
     console.say(f"{trace}: {len(result.sections)} sections, {fitted} fitted")
     console.say(f"  k          {k.value:.5f} s, 90 % {k.low:.5f} .. {k.high:.5f}")
-    console.say(
-        f"             {result.k_cycles} cycles of {cycle_ms:g} ms = {result.k_whole_s:.3f} s, {inside}"
-    )
+    whole = f"{result.k_cycles} cycles of {cycle_ms:g} ms = {result.k_whole_s:.3f} s"
+    console.say(f"             {whole}, {inside}; {taken} as whole cycles")
     if result.cdis_mm is None:
         console.say("  CDIS       not determined")
     else:
@@ -124,7 +128,7 @@ def _say(result: Identification, trace: str, console: Console) -> None:
         console.say(f"             … and {len(result.corners) - _MOST_SHOWN} more, see --json")
 
 
-def _corner_line(corner: CornerFit) -> str:
+def _corner_line(corner: "CornerFit") -> str:
     d, error = corner.d_mm, corner.error_mm
     programmed = corner.programmed_d_mm * (error.value / d.value)
     return (
@@ -141,7 +145,7 @@ _KEYS = (
 )  # fmt: skip
 
 
-def _record(result: Identification, files: list[Path]) -> dict[str, Any]:
+def _record(result: "Identification", files: list[Path]) -> dict[str, Any]:
     cdis = result.cdis_mm
     values = (
         result.k_s.value, _interval(result.k_s), result.k_cycles, result.k_whole_s,
@@ -155,12 +159,12 @@ def _record(result: Identification, files: list[Path]) -> dict[str, Any]:
     return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
 
 
-def _interval(estimate: Estimate) -> list[float] | None:
+def _interval(estimate: "Estimate") -> list[float] | None:
     """Return the 90 % interval, None where it is infinite (JSON has no infinity)."""
     return [estimate.low, estimate.high] if math.isfinite(estimate.high) else None
 
 
-def _section_record(section: Section) -> dict[str, Any]:
+def _section_record(section: "Section") -> dict[str, Any]:
     return {
         "lines": [section.first_line, section.last_line], "moves": section.moves,
         "length_mm": section.length_mm, "speed_mm_s": section.speed_mm_s, "fitted": section.fitted,
@@ -168,7 +172,7 @@ def _section_record(section: Section) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _corner_record(corner: CornerFit) -> dict[str, Any]:
+def _corner_record(corner: "CornerFit") -> dict[str, Any]:
     return {
         "line": corner.source_line, "angle_deg": corner.angle_deg, "speed_mm_s": corner.speed_mm_s,
         "cdis_mm": corner.cdis_mm, "programmed_d_mm": corner.programmed_d_mm,
@@ -180,7 +184,7 @@ def _corner_record(corner: CornerFit) -> dict[str, Any]:
 # --- the cell file --------------------------------------------------------------------------------------
 
 
-def _apply(result: Identification, file: Path, trace: str, cell: Cell) -> Path:
+def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path:
     """Write k, CDIS and law into a cell file, its other keys kept; comments are lost.
 
     CDIS is what programs *write*; it goes into the cell only where the corners of the trace were programmed
@@ -196,7 +200,7 @@ def _apply(result: Identification, file: Path, trace: str, cell: Cell) -> Path:
     if not isinstance(section, dict):
         raise input_error("cell-key", "controller: found no table", "write [controller]", source=str(file))
     values: dict[str, Any] = {"k_s": round(result.k_best_s, 5)}
-    if result.cdis_mm is not None and result.cdis_programmed_mm == cell.controller.cdis_mm:
+    if result.cdis_mm is not None and _is_own_cdis(result, cell):
         values["cdis_mm"] = round(result.cdis_mm.value, 4)
     if result.law != "undecided":
         values["law"] = result.law
@@ -211,10 +215,15 @@ def _apply(result: Identification, file: Path, trace: str, cell: Cell) -> Path:
     return file
 
 
+def _is_own_cdis(result: "Identification", cell: Cell) -> bool:
+    """Tell whether the corners of the trace were programmed with the cell's CDIS."""
+    return result.cdis_programmed_mm == cell.controller.cdis_mm
+
+
 # --- the figure -----------------------------------------------------------------------------------------
 
 
-def _save_figure(result: Identification, file: Path) -> Path:
+def _save_figure(result: "Identification", file: Path) -> Path:
     from gcode2krl.krl.files import write_together
     from gcode2krl.report.drawing import look
 
@@ -231,7 +240,7 @@ def _save_figure(result: Identification, file: Path) -> Path:
     return file
 
 
-def figure(result: Identification) -> "Figure":
+def figure(result: "Identification") -> "Figure":
     """Return the trace with the fit over it: speed of a short and a long line, the sharpest corner."""
     from matplotlib.figure import Figure
 
@@ -252,25 +261,27 @@ def figure(result: Identification) -> "Figure":
     return drawing
 
 
-def _draw_speed(axes: "Axes", section: Section, title: str) -> None:
+def _draw_speed(axes: "Axes", section: "Section", title: str) -> None:
     from gcode2krl.report.drawing import BLUE, VERMILION
 
     time = section.time_s - section.start_s
     step = np.diff(time)
     middle = 0.5 * (time[1:] + time[:-1])
+    along = section.model_mm[-1] - section.model_mm[0]
+    along = along / max(float(np.linalg.norm(along)), 1e-12)
     for points, style, colour, label in (
         (section.model_mm, "-", VERMILION, "fitted law, between samples"),
         (section.position_mm, ".", BLUE, "trace, between samples"),
     ):
-        speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / step
+        speed = np.diff(points, axis=0) @ along / step
         axes.plot(middle, speed, style, color=colour, label=label)
-    axes.set(xlabel="time from the start in s", ylabel="speed in mm/s")
+    axes.set(xlabel="time from the start in s", ylabel="speed along the line in mm/s")
     words = f"{title}: {section.length_mm:g} mm at {section.speed_mm_s:g} mm/s, line {section.first_line}"
     axes.set_title(words)
     axes.legend(loc="lower center")
 
 
-def _draw_corner(axes: "Axes", result: Identification) -> None:
+def _draw_corner(axes: "Axes", result: "Identification") -> None:
     from gcode2krl.report.drawing import BLUE, VERMILION
 
     bent = [section for section in result.sections if section.fitted and section.corner_deg < 179.0]
@@ -286,10 +297,11 @@ def _draw_corner(axes: "Axes", result: Identification) -> None:
     )
     axes.plot(section.position_mm[:, first], section.position_mm[:, second], ".", color=BLUE, label="trace")
     corner = next(c for c in result.corners if section.first_line <= c.source_line <= section.last_line)
-    vertex = _vertex_of(section)
-    reach = 1.6 * corner.d_mm.value
-    axes.set_xlim(vertex[first] - reach, vertex[first] + reach)
-    axes.set_ylim(vertex[second] - reach, vertex[second] + reach)
+    near = np.linalg.norm(section.model_mm - _apex_of(section), axis=1) < 1.5 * corner.d_mm.value
+    shown = section.model_mm[near]
+    margin = 0.1 * corner.d_mm.value
+    axes.set_xlim(shown[:, first].min() - margin, shown[:, first].max() + margin)
+    axes.set_ylim(shown[:, second].min() - margin, shown[:, second].max() + margin)
     axes.set_aspect("equal")
     axes.set(xlabel=f"{'xyz'[first]} in mm", ylabel=f"{'xyz'[second]} in mm")
     axes.set_title(
@@ -299,7 +311,7 @@ def _draw_corner(axes: "Axes", result: Identification) -> None:
     axes.legend()
 
 
-def _vertex_of(section: Section) -> "np.ndarray[Any, np.dtype[np.float64]]":
+def _apex_of(section: "Section") -> "np.ndarray[Any, np.dtype[np.float64]]":
     """Return the point of the path that lies furthest from the line between its ends."""
     start, end = section.model_mm[0], section.model_mm[-1]
     way = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
@@ -308,7 +320,7 @@ def _vertex_of(section: Section) -> "np.ndarray[Any, np.dtype[np.float64]]":
     return np.asarray(section.model_mm[int(np.argmax(off))])
 
 
-def _draw_residuals(axes: "Axes", result: Identification) -> None:
+def _draw_residuals(axes: "Axes", result: "Identification") -> None:
     from gcode2krl.report.drawing import BLUE, GREY, ORANGE
 
     number = np.arange(1, len(result.sections) + 1)
@@ -316,7 +328,8 @@ def _draw_residuals(axes: "Axes", result: Identification) -> None:
     fitted = np.array([section.fitted for section in result.sections])
     axes.bar(number[fitted], rms[fitted], color=BLUE, label="fitted")
     if not fitted.all():
-        axes.bar(number[~fitted], rms[~fitted], color=ORANGE, label="only judged: unequal speeds")
+        axes.bar(number[~fitted], rms[~fitted], color=ORANGE, label="judged only")
     axes.axhline(result.noise_mm, color=GREY, linestyle="--", label="noise at rest")
     axes.set(xlabel="section", ylabel="residual in mm rms", title="how well the law holds")
-    axes.legend(loc="lower right")
+    axes.set_ylim(0.0, 1.35 * max(float(rms.max()), result.noise_mm, 1e-9))
+    axes.legend(loc="upper left", ncols=3)

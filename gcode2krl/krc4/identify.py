@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
+from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krc4.motion import Chain, build_chain
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample
-from gcode2krl.runs import ControllerTrace, check_scale, noise_mm, resolution_mm, standstills
+from gcode2krl.runs import ControllerTrace, check_scale, program_rests, resolution_mm
 from gcode2krl.tables import Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 
@@ -258,18 +258,17 @@ def _pieces(trace: ControllerTrace, targets: Targets, chain: Chain) -> tuple[lis
     if len(chain.length_mm) == 0:
         raise input_error("trace-sections", "the program has no move", source=targets.source)
     bounds = _program_bounds(chain)
-    still_mm = 8.0 * noise_mm(trace) + 2.0 * resolution_mm(trace.position_mm) + 1e-4
-    rests = standstills(trace, _LEAST_STILL_S, still_mm)
-    places = np.array([trace.position_mm[first : last + 1].mean(axis=0) for first, last in rests])
-    wanted = np.concatenate([chain.start_mm[:1], chain.end_mm[[end - 1 for _, end in bounds]]])
-    offset = _matched(trace, rests, places, wanted, bounds, chain, 0.2 + still_mm)
+    last = [end - 1 for _, end in bounds]
+    wanted = np.concatenate([chain.start_mm[:1], chain.end_mm[last]])
+    lines = np.append(chain.source_line[[first for first, _ in bounds]], chain.source_line[last[-1]])
+    rests, others = program_rests(trace, wanted, lines.astype(np.int64), _LEAST_STILL_S)
     pieces = [
-        _piece(trace, targets, chain, bound, rests[offset + number], rests[offset + number + 1])
-        for number, bound in enumerate(bounds)
+        _piece(trace, targets, chain, bound, before, after)
+        for bound, before, after in zip(bounds, rests[:-1], rests[1:], strict=True)
     ]
     if not any(piece.fitted for piece in pieces):
         pieces = [replace(piece, fitted=True) for piece in pieces]
-    return pieces, len(rests) - 1 - len(bounds)
+    return pieces, others
 
 
 def _program_bounds(chain: Chain) -> list[tuple[int, int]]:
@@ -279,47 +278,6 @@ def _program_bounds(chain: Chain) -> list[tuple[int, int]]:
     starts = np.concatenate([[0], ends[:-1]])
     moved = [float(chain.length_mm[first:end].sum()) > 0 for first, end in zip(starts, ends, strict=True)]
     return [(int(first), int(end)) for first, end, moves in zip(starts, ends, moved, strict=True) if moves]
-
-
-def _matched(
-    trace: ControllerTrace, rests: Ints, places: Floats, wanted: Floats,
-    bounds: list[tuple[int, int]], chain: Chain, tolerance_mm: float,
-) -> int:  # fmt: skip
-    """Return the number of the trace's standstill at which the program starts."""
-    spare = len(places) - len(wanted)
-    gaps = [places[j : j + len(wanted)] - wanted for j in range(spare + 1)]
-    for j, gap in enumerate(gaps):
-        if np.abs(gap).max() <= tolerance_mm:
-            return j
-    for gap in gaps:
-        shift = gap.mean(axis=0)
-        if np.abs(gap - shift).max() <= tolerance_mm and len(wanted) > 2:
-            x, y, z = shift.tolist()
-            raise _no_match(
-                trace, 0, f"the trace is shifted against the program by ({x:.3f}, {y:.3f}, {z:.3f}) mm",
-                "record with the $BASE and $TOOL of the program",
-            )  # fmt: skip
-    found, needed = len(places) - 1, len(wanted) - 1
-    if not gaps:
-        raise _no_match(
-            trace, 0, f"the trace has {found} sections between standstills, the program {needed}",
-            "record the whole program, without stops of your own; name it with --part",
-        )  # fmt: skip
-    agree = [int(np.argmax(np.abs(gap).max(axis=1) > tolerance_mm)) for gap in gaps]
-    best = int(np.argmax(agree))
-    at = agree[best]
-    line = int(chain.source_line[bounds[min(at, len(bounds) - 1)][0]])
-    found_mm, wanted_mm = (", ".join(f"{x:.3f}" for x in p) for p in (places[best + at], wanted[at]))
-    raise _no_match(
-        trace, int(trace.row[rests[best + at, 0]]),
-        f"the trace has {found} sections between standstills, the program {needed}; they part at standstill "
-        f"{at + 1} (G-code line {line}): ({found_mm}) instead of ({wanted_mm})",
-        "record this program, without stops of your own; name it with --part",
-    )  # fmt: skip
-
-
-def _no_match(trace: ControllerTrace, row: int, message: str, remedy: str) -> NotUnderstoodError:
-    return input_error("trace-sections", message, remedy, line=row, source=trace.source)
 
 
 def _piece(
@@ -549,10 +507,11 @@ def _estimates(fit: _Fit, pieces: list[_Piece], settings: _Settings) -> tuple[Es
         weight = (residual / np.maximum(1.0 - leverage, 0.1)) ** 2
         covariance = inverse @ (kept.T * weight @ kept) @ inverse
         half[used] = _QUANTILE_90 * np.sqrt(np.diag(covariance))
-    k, ratio = ((v, float(h)) for v, h in zip((fit.k_s, fit.ratio), half, strict=True))
-    return Estimate(k[0], k[0] - k[1], k[0] + k[1]), Estimate(
-        ratio[0], ratio[0] - ratio[1], ratio[0] + ratio[1]
-    )
+    return _around(fit.k_s, half[0]), _around(fit.ratio, half[1])
+
+
+def _around(value: float, half: float) -> Estimate:
+    return Estimate(float(value), float(value - half), float(value + half))
 
 
 def _union(own: Estimate, other: Estimate) -> Estimate:
@@ -707,8 +666,8 @@ def _corner_fit(piece: _Piece, fit: _Fit, number: int, row: int, settings: _Sett
         speed_mm_s=float(min(piece.speed_mm_s[row], piece.speed_mm_s[row + 1])),
         cdis_mm=float(piece.cdis_mm[row]),
         programmed_d_mm=float(piece.blend_mm(piece.cdis_mm)[row]),
-        d_mm=Estimate(own, own - half, own + half),
-        error_mm=Estimate(own * share, (own - half) * share, (own + half) * share),
+        d_mm=_around(own, half),
+        error_mm=_around(own * share, half * share),
     )
 
 
@@ -737,8 +696,8 @@ def _issues(
         worst = max((section for section in sections if section.fitted), key=lambda section: section.rms_mm)
         yield Issue(
             "warning", "law-misfit", worst.first_line,
-            f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at this "
-            "line; the intervals do not cover that",
+            f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at "
+            "this line; the intervals do not cover that",
             "was the override 100 %, and $ACC.CP that of the cell?",
         )  # fmt: skip
     for section in sections:

@@ -93,7 +93,7 @@ class _Writer:
         self.lines.append(f"({text})")
 
     def line_to(self, x_mm: float, y_mm: float, speed_mm_s: float) -> None:
-        x, y = self.origin + (x_mm, y_mm)
+        x, y = self.origin + np.array([x_mm, y_mm])
         self.lines.append(f"G1 X{x:.3f} Y{y:.3f} F{speed_mm_s * S_PER_MIN:g}")
 
     def blend(self, tolerance_mm: float) -> None:
