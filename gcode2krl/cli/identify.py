@@ -88,7 +88,7 @@ def _identify(
 
 def _test_toolpath(cell: Cell) -> Toolpath:
     from gcode2krl.gcode import read_stream
-    from gcode2krl.krc4.test_program import controller_test_program
+    from gcode2krl.krc4.trial_program import controller_test_program
 
     text = controller_test_program(cell).encode("ascii")
     return read_stream(io.BytesIO(text), "test program", cell)

@@ -57,6 +57,6 @@ def command(
 
 
 def _program(cell_path: str | None, at: tuple[float, float, float] | None) -> str:
-    from gcode2krl.krc4.test_program import controller_test_program
+    from gcode2krl.krc4.trial_program import controller_test_program
 
     return controller_test_program(read_cell(cell_path), at or None)

@@ -16,7 +16,7 @@ from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.krc4 import identify
 from gcode2krl.krc4.identify import identify_controller
-from gcode2krl.krc4.test_program import CDIS_MM, controller_test_program, corner_tolerance_mm
+from gcode2krl.krc4.trial_program import CDIS_MM, controller_test_program, corner_tolerance_mm
 from gcode2krl.runs import ControllerTrace
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
