@@ -113,7 +113,7 @@ def cut_pieces(trace: ControllerTrace, targets: Targets, chain: Chain) -> tuple[
 
 def _program_bounds(chain: Chain) -> list[tuple[int, int]]:
     """Return (first, end) rows of the chain of each section that moves."""
-    ends = np.flatnonzero((chain.blend_mm <= 0.0) & (chain.wait_s >= LEAST_DWELL_S)) + 1
+    ends = np.flatnonzero(chain.stop & (chain.wait_s >= LEAST_DWELL_S)) + 1
     ends = np.unique(np.append(ends, len(chain.length_mm)))
     starts = np.concatenate([[0], ends[:-1]])
     moved = [float(chain.length_mm[first:end].sum()) > 0 for first, end in zip(starts, ends, strict=True)]
@@ -127,7 +127,7 @@ def _piece(
     last_still, first_still = int(before[1]), int(after[0])
     low = max(int(before[0]), last_still - _MARGIN_SAMPLES)
     high = min(int(after[1]), first_still + _MARGIN_SAMPLES) + 1
-    stop = np.array(chain.blend_mm[rows] <= 0.0)
+    stop = np.array(chain.stop[rows])
     stop[-1] = True
     length = np.array(chain.length_mm[rows])
     half = np.append(np.minimum(length[:-1], length[1:]) / 2.0, 0.0)

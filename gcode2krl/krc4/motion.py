@@ -31,8 +31,9 @@ class Chain:
     from_rotation: Floats
     to_rotation: Floats
     length_mm: Floats
-    """(n,) lengths; a mere reorientation counts as the way it takes the time of."""
+    """(n,) lengths over ``scale``; a mere reorientation counts as the way it takes the time of."""
     speed_mm_s: Floats
+    """(n,) programmed speeds over ``scale``."""
     blend_mm: Floats
     """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop, or straight on."""
     stop: NDArray[np.bool_]
@@ -43,10 +44,19 @@ class Chain:
     tool: NDArray[np.int32]
     cos_half: Floats
     """(n,) cos(alpha/2) at the end of each move, alpha = interior angle."""
+    scale: Floats
+    """(n,) unit of length of each move: 1, but behind a corner that takes a change of speed v1 to v2 it is
+    v2/v1 times that before. In these units such a corner has one speed and equal distances, which is a
+    constant acceleration vector between v1 and v2 with d1/d2 = v1/v2."""
 
     def corner_error_mm(self) -> Floats:
-        """Return the corner errors (n,), d·cos(alpha/2)/2."""
-        return self.blend_mm * self.cos_half / 2.0
+        """Return the corner errors (n,): the distance of the vertex to the parabola's middle."""
+        d, error = self.blend_mm, np.zeros(len(self.blend_mm))
+        corners = np.flatnonzero(d > 0)
+        before, after = self.scale[corners], self.scale[corners + 1]
+        cos_turn = 1.0 - 2.0 * self.cos_half[corners] ** 2
+        error[corners] = d[corners] * np.sqrt(before**2 + after**2 - 2.0 * before * after * cos_turn) / 4.0
+        return error
 
 
 def build_chain(targets: Targets, cell: Cell) -> Chain:
@@ -63,6 +73,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     d, cos_half = _blends(start, end, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
     d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
+    scale = _scales(length, speed, d, targets.cdis_mm[rows], stop, cell)
     move = targets.move[rows]
     following = np.flatnonzero(move >= 0)
     owner = move[following[np.minimum(np.searchsorted(following, np.arange(len(move))), len(following) - 1)]]
@@ -72,8 +83,8 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         end_mm=np.ascontiguousarray(end),
         from_rotation=from_rotation,
         to_rotation=to_rotation,
-        length_mm=length,
-        speed_mm_s=speed,
+        length_mm=length / scale,
+        speed_mm_s=speed / scale,
         blend_mm=d,
         stop=stop,
         wait_s=targets.wait_s[rows],
@@ -81,6 +92,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         source_line=targets.source_line[rows],
         tool=targets.tool[rows],
         cos_half=cos_half,
+        scale=scale,
     )
 
 
@@ -94,7 +106,7 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
         chain.blend_mm,
         chain.stop,
         chain.wait_s,
-        controller.acc_cp_m_s2 * MM_PER_M,
+        controller.acc_cp_m_s2 * MM_PER_M / chain.scale,
         controller.k_s,
         in_view,
         controller.law == "averages",
@@ -199,6 +211,36 @@ def _blends(start: Floats, end: Floats, length: Floats, cdis: Floats) -> tuple[F
         real & (cos_turn > -1.0 + 1e-12), np.minimum(cdis[:-1], np.minimum(length[:-1], length[1:]) / 2), 0.0
     )
     return d, cos_half
+
+
+def _scales(
+    length: Floats, speed: Floats, blend: Floats, cdis: Floats, stop: NDArray[np.bool_], cell: Cell
+) -> Floats:
+    """Return the unit of length of each move; ``blend`` gets the distances in these units.
+
+    A corner takes a change of speed where |v2 - v1|/a + k <= T, its duration (design assumption, the paper is
+    silent), and where the look-ahead lets the faster of the two be reached.
+    """
+    scale = np.ones(len(length))
+    v1, v2 = speed[:-1], speed[1:]
+    ratio = v2 / v1
+    widest = np.minimum(cdis[:-1] / np.maximum(1.0, ratio), np.minimum(length[:-1], length[1:] / ratio) / 2)
+    a, k = cell.controller.acc_cp_m_s2 * MM_PER_M, cell.controller.k_s
+    enough = np.abs(v2 - v1) / a + k <= 2.0 * widest / v1
+    wide = (blend[:-1] > 0) & ~stop[:-1] & (v1 != v2) & enough
+    advance = cell.controller.advance
+    for row in np.flatnonzero(wide):
+        fastest = max(v1[row], v2[row])
+        seen = (
+            length[row + 1 :].sum() if advance == "unlimited" else length[row + 1 : row + 1 + advance].sum()
+        )
+        if fastest * (fastest / a + k) / 2 > seen:
+            continue
+        chain_end = row + 1 + int(np.argmax(stop[row + 1 :]))
+        scale[row + 1 : chain_end + 1] *= ratio[row]
+        blend[row] = widest[row]
+    blend[:-1] /= scale[:-1]
+    return scale
 
 
 def _rotations(chain: Chain, row: NDArray[np.int64], part: Floats) -> Floats:

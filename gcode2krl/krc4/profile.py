@@ -35,7 +35,7 @@ class Profile(NamedTuple):
 
 def plan_profile(
     length_mm: Floats, speed_mm_s: Floats, blend_mm: Floats, stop: NDArray[np.bool_], wait_s: Floats,
-    a_mm_s2: float, k_s: float, moves_in_view: int, averages: bool,
+    a_mm_s2: Floats | float, k_s: float, moves_in_view: int, averages: bool,
 ) -> Profile:  # fmt: skip
     """Plan a chain of n moves that starts and ends at rest.
 
@@ -45,22 +45,25 @@ def plan_profile(
     blend_mm : (n,) distance before and after the end of a move within which the corner is blended.
     stop : (n,) True where the end of a move is an exact stop.
     wait_s : (n,) dwell after that stop.
+    a_mm_s2 : a number, or (n,) where the moves are scaled (see `Chain.scale`).
     moves_in_view : ``$ADVANCE``, or `UNLIMITED`.
     averages : the law; False = trapezoid.
     """
     if len(length_mm) == 0:
         rest = np.zeros(1)
         return Profile(rest, rest, rest, rest, rest, np.zeros(0), 0.0)
-    bound = _vertex_speeds(length_mm, speed_mm_s, stop, a_mm_s2, k_s, moves_in_view)
-    last = _run_ends(speed_mm_s, bound)
+    acceleration = np.ascontiguousarray(np.broadcast_to(np.asarray(a_mm_s2, dtype=float), length_mm.shape))
+    bound = _vertex_speeds(length_mm, speed_mm_s, stop, acceleration, k_s, moves_in_view)
+    last = _run_ends(speed_mm_s, acceleration, bound)
     first = np.concatenate([[0], last[:-1] + 1])
     length = np.add.reduceat(length_mm, first)
     vertex = np.concatenate([[0.0], bound[last + 1]])
     head, tail, top = _margins(length, speed_mm_s[first], blend_mm[last], stop[last], vertex, k_s)
-    _reachable(length - head - tail, vertex, a_mm_s2)
+    run_acceleration = acceleration[first]
+    _reachable(length - head - tail, vertex, run_acceleration)
     pieces = np.empty((5, 6 * len(length) + 2))
     used, total = _pieces(
-        length, top, stop[last], wait_s[last], vertex, head, tail, a_mm_s2, k_s, averages, pieces
+        length, top, stop[last], wait_s[last], vertex, head, tail, run_acceleration, k_s, averages, pieces
     )
     t, s, v, a, i = (np.ascontiguousarray(column[:used]) for column in pieces)
     move_end = np.empty(len(length_mm))
@@ -68,13 +71,13 @@ def plan_profile(
     return Profile(t, s, v, a, i, move_end, total)
 
 
-def _run_ends(speed_mm_s: Floats, bound_mm_s: Floats) -> NDArray[np.int64]:
+def _run_ends(speed_mm_s: Floats, a_mm_s2: Floats, bound_mm_s: Floats) -> NDArray[np.int64]:
     """Return the last move of each run: moves of one speed whose inner vertices hold nothing back.
 
     Such a run is one programmed rectangle to the law, however many moves it has.
     """
     held_back = bound_mm_s[1:] < speed_mm_s
-    held_back[:-1] |= speed_mm_s[1:] != speed_mm_s[:-1]
+    held_back[:-1] |= (speed_mm_s[1:] != speed_mm_s[:-1]) | (a_mm_s2[1:] != a_mm_s2[:-1])
     held_back[-1] = True
     return np.flatnonzero(held_back)
 
@@ -98,7 +101,8 @@ def _vertex_speeds(length, speed, stop, a, k, in_view):
                 seen += length[j]
                 if stop[j]:
                     break
-            bound = min(bound, 0.5 * (math.sqrt(a * a * k * k + 8.0 * a * seen) - a * k))
+            ak = a[i] * k
+            bound = min(bound, 0.5 * (math.sqrt(ak * ak + 8.0 * a[i] * seen) - ak))
         vertex[i + 1] = bound
     return vertex
 
@@ -162,9 +166,9 @@ def _margins(length, speed, blend, stop, vertex, k):
 def _reachable(length, vertex, a):
     """Lower the vertex speeds to what can be reached and braked with a."""
     for i in range(len(length) - 1, -1, -1):
-        vertex[i] = min(vertex[i], math.sqrt(vertex[i + 1] ** 2 + 2.0 * a * max(length[i], 0.0)))
+        vertex[i] = min(vertex[i], math.sqrt(vertex[i + 1] ** 2 + 2.0 * a[i] * max(length[i], 0.0)))
     for i in range(len(length)):
-        vertex[i + 1] = min(vertex[i + 1], math.sqrt(vertex[i] ** 2 + 2.0 * a * max(length[i], 0.0)))
+        vertex[i + 1] = min(vertex[i + 1], math.sqrt(vertex[i] ** 2 + 2.0 * a[i] * max(length[i], 0.0)))
 
 
 @njit(cache=True)
@@ -195,12 +199,12 @@ def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out):
         main = length[i] - head[i] - tail[i]
         rise, level, fall = 0.0, 0.0, 0.0
         if main > 0.0:
-            rise, level, fall = phases(main, speed[i], u0, u1, a, averages)
+            rise, level, fall = phases(main, speed[i], u0, u1, a[i], averages)
         steps = (
             (head[i] / u0 if head[i] > 0.0 else 0.0, u0, 0.0),
-            (rise, u0, a),
-            (level, u0 + a * rise, 0.0),
-            (fall, u0 + a * rise, -a),
+            (rise, u0, a[i]),
+            (level, u0 + a[i] * rise, 0.0),
+            (fall, u0 + a[i] * rise, -a[i]),
             (tail[i] / u1 if tail[i] > 0.0 else 0.0, u1, 0.0),
         )
         for duration, v, acceleration in steps:

@@ -45,19 +45,21 @@ def sample(
 
 
 @njit(cache=True)
-def arc_length(tau, sharp):
-    """Length of the parabola's share tau, in units of 2·d; ``sharp`` = 1 - u1·u2.
+def arc_length(tau, uu, uw, ww):
+    """Length of the parabola's share tau, in units of 2·d: the integral of |(1 - t)·u + t·w| from 0 to tau.
 
-    The integral of sqrt(1 - 2·t·(1 - t)·sharp) from 0 to tau.
+    ``uu``, ``uw``, ``ww`` are the products of the tangents u before and w after the corner.
     """
-    if sharp < 1e-12:
-        return tau
-    q2 = max(0.5 / sharp - 0.25, 1e-300)
+    bend = uu - 2.0 * uw + ww
+    if bend < 1e-12 * (uu + ww):
+        return math.sqrt(uu) * tau
+    middle = (uw - uu) / bend  # the square of the length is bend·((t + middle)² + q2)
+    q2 = max(uu / bend - middle * middle, 1e-300)
     q = math.sqrt(q2)
-    x0, x1 = -0.5, tau - 0.5
+    x0, x1 = middle, tau + middle
     r0, r1 = math.sqrt(x0 * x0 + q2), math.sqrt(x1 * x1 + q2)
     value = 0.5 * (x1 * r1 - x0 * r0 + q2 * (math.asinh(x1 / q) - math.asinh(x0 / q)))
-    return math.sqrt(2.0 * sharp) * value
+    return math.sqrt(bend) * value
 
 
 @njit(cache=True)
@@ -84,7 +86,7 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
     travelled = 0.0  # the same in space: a reorientation on the spot has none
     saved = 0.0  # how much shorter the corners behind are than their lines
     u, w = np.zeros(3), np.zeros(3)
-    first, second, third = np.zeros(3), np.zeros(3), np.zeros(3)
+    first, second = np.zeros(3), np.zeros(3)
     for row in range(len(time)):
         now, s, v, a, area = _at(pieces, now, time[row])
         jerk = 0.0
@@ -95,25 +97,26 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             v = (s - s_old) / k
             s = (area - area_old) / k
         while i < count - 1 and s >= begin + length[i]:
+            travelled += math.sqrt(_product(start, end, i, i))
             if blend[i] > 0.0:  # leaving the move behind leaves its corner's middle behind
-                saved += 2.0 * blend[i] * (1.0 - arc_length(1.0, _sharpness(start, end, length, i)))
+                saved += _saving(start, end, length, blend, i)
             begin += length[i]
-            for c in range(3):
-                u[c] = end[i, c] - start[i, c]
-            travelled += math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
             i += 1
         inside = min(max(s - begin, 0.0), length[i])
         d_end = blend[i]
         d_start = blend[i - 1] if i > 0 else 0.0
         for c in range(3):
             u[c] = (end[i, c] - start[i, c]) / length[i] if length[i] > 0.0 else 0.0
-            second[c], third[c] = 0.0, 0.0
-        shorter = saved
+            second[c] = 0.0
         share = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+        way = travelled + inside * share - saved
         if d_end > 0.0 and inside > length[i] - d_end:
             j, tau, d = i, (inside - length[i] + d_end) / (2.0 * d_end), d_end
+            way = travelled + length[i] * share - saved - _short_of_vertex(start, end, length, blend, j, tau)
         elif d_start > 0.0 and inside < d_start:
             j, tau, d = i - 1, (inside + d_start) / (2.0 * d_start), d_start
+            before = saved - _saving(start, end, length, blend, j)
+            way = travelled - before - _short_of_vertex(start, end, length, blend, j, tau)
         else:
             j, tau, d = -1, 0.0, 0.0
         if j < 0:
@@ -129,25 +132,37 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
                 position[row, c] = end[j, c] + d * (tau * tau * w[c] - (1.0 - tau) * (1.0 - tau) * u[c])
                 first[c] = (1.0 - tau) * u[c] + tau * w[c]
                 second[c] = (w[c] - u[c]) / (2.0 * d)
-            sharp = _sharpness(start, end, length, j)
-            whole = 2.0 * d * (1.0 - arc_length(1.0, sharp))
-            here = 2.0 * d * (tau - arc_length(tau, sharp))
-            shorter = saved + here if j == i else saved - whole + here
         speed2, acceleration2, jerk2 = 0.0, 0.0, 0.0
         for c in range(3):
             speed2 += (first[c] * v) ** 2
             acceleration2 += (first[c] * a + second[c] * v * v) ** 2
             jerk2 += (first[c] * jerk + 3.0 * second[c] * v * a) ** 2
         figures[row, 0], figures[row, 1] = math.sqrt(speed2), math.sqrt(acceleration2)
-        figures[row, 2], figures[row, 3] = math.sqrt(jerk2), travelled + inside * share - shorter
+        figures[row, 2], figures[row, 3] = math.sqrt(jerk2), way
         move[row] = i
         part[row] = inside / length[i] if length[i] > 0.0 else 1.0
 
 
 @njit(cache=True)
-def _sharpness(start, end, length, i):
-    """Return 1 - u1·u2 of the corner at the end of move i."""
+def _product(start, end, i, j):
+    """Return the product of two moves as vectors."""
     dot = 0.0
     for c in range(3):
-        dot += (end[i, c] - start[i, c]) * (end[i + 1, c] - start[i + 1, c])
-    return 1.0 - dot / (length[i] * length[i + 1])
+        dot += (end[i, c] - start[i, c]) * (end[j, c] - start[j, c])
+    return dot
+
+
+@njit(cache=True)
+def _short_of_vertex(start, end, length, blend, i, tau):
+    """Return how far the path at share tau of the corner behind move i is short of the corner's vertex."""
+    uu = _product(start, end, i, i) / length[i] ** 2
+    ww = _product(start, end, i + 1, i + 1) / length[i + 1] ** 2
+    uw = _product(start, end, i, i + 1) / (length[i] * length[i + 1])
+    return blend[i] * (math.sqrt(uu) - 2.0 * arc_length(tau, uu, uw, ww))
+
+
+@njit(cache=True)
+def _saving(start, end, length, blend, i):
+    """Return how much shorter the corner behind move i is than its two lines."""
+    join = blend[i] * math.sqrt(_product(start, end, i + 1, i + 1)) / length[i + 1]
+    return join + _short_of_vertex(start, end, length, blend, i, 1.0)

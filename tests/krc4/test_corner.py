@@ -292,6 +292,20 @@ def test_corner_between_unequal_speeds_runs_at_the_slower(run_program):
         assert motion.speed_mm_s.max() == pytest.approx(60, rel=1e-6)
 
 
+def test_a_wide_corner_takes_the_change_of_speed(run_program):
+    """|dv|/a + k <= 2·d/v: each line is left and joined at its own speed, and the direction is continuous."""
+    p = triangle(120, 120, 90)
+    motion = run_program(polyline(p, (50, 40)), dt_s=FINE_S, cdis_mm=20.0)
+    rows = np.flatnonzero(motion.corner)
+    assert motion.speed_mm_s[rows[0]] == pytest.approx(50, rel=0.01)
+    assert motion.speed_mm_s[rows[-1]] == pytest.approx(40, rel=0.01)
+    inner = motion.acceleration_mm_s2[rows[2:-2]]
+    assert np.ptp(inner) < 1e-6 * inner.max()  # a constant acceleration vector
+    velocity = np.diff(motion.position_mm, axis=0) / np.diff(motion.time_s)[:, None]
+    change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)[:-1]
+    assert change.max() <= motion.acceleration_mm_s2.max() * FINE_S * 1.02 + 1e-6
+
+
 def test_exact_stop_has_no_corner(run_program):
     p = triangle(60, 60, 90)
     for text in (polyline(p, [40, 40], "G61"), polyline(p, [40, 40])):
