@@ -16,6 +16,8 @@ from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
 Floats = NDArray[np.float64]
 _MOST_SAMPLES = 50_000_000
+_WORTH_SAYING = 0.01
+"""Share of the time above which a loss is a finding."""
 _STRAIGHT_COS = 1e-7
 """cos(alpha/2) below which a line goes straight on and there is no corner."""
 
@@ -156,7 +158,7 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
     if cell.controller.advance != "unlimited" and len(chain.length_mm):
         free = plan(chain, cell, look_ahead=False)
         lost_s = profile.total_s - free.total_s
-        if lost_s > 0.01 * profile.total_s:
+        if lost_s > _WORTH_SAYING * profile.total_s:
             own, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))
             worst = int(np.argmax(own - ideal))
             sentence = (
@@ -165,6 +167,7 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
             )
             remedy = "merge collinear moves, raise the chord tolerance, or let the CAM write longer moves"
             issues.append(Issue("note", "short-moves", int(chain.source_line[worst]), sentence, remedy))
+    issues += _stop_issues(chain, profile, cell)
     law = cell.controller.law
     other_law = "trapezoid" if law == "averages" else "averages"
     other_controller = cell.controller.model_copy(update={"law": other_law})
@@ -174,6 +177,23 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
         remedy = "undecided without a trace of the controller"
         issues.append(Issue("note", "law-undecided", 0, sentence, remedy))
     return tuple(issues)
+
+
+def _stop_issues(chain: Chain, profile: Profile, cell: Cell) -> list[Issue]:
+    """What exact stops between moves cost against passing them: k + (v1 + v2)/(2·a) and the dwell, each."""
+    stops = np.flatnonzero(chain.stop[:-1])
+    speed_mm_s = chain.speed_mm_s * chain.scale
+    ramps = (speed_mm_s[stops] + speed_mm_s[stops + 1]) / (2.0 * cell.controller.acc_cp_m_s2 * MM_PER_M)
+    lost = cell.controller.k_s + ramps + chain.wait_s[stops]
+    if lost.sum() <= _WORTH_SAYING * profile.total_s:
+        return []
+    worst = int(stops[np.argmax(lost)])
+    sentence = (
+        f"{len(stops)} exact stops (rapid to feed, G61, dwells, M-codes) cost about {lost.sum():.1f} s of "
+        f"{profile.total_s:.1f} s, most at this line"
+    )
+    remedy = "use fewer retracts, G64 instead of G61, shorter dwells"
+    return [Issue("note", "exact-stops", int(chain.source_line[worst]), sentence, remedy)]
 
 
 def _with_orientation(
