@@ -108,3 +108,12 @@ def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
     mixed = wa[:, None] * a + wb[:, None] * b
     result: Floats = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
     return result
+
+
+def equal_runs(values: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return (first row of each run of equal rows (r,), run of each row (n,)) of ``values`` (n, c)."""
+    changes = np.zeros(len(values), dtype=np.bool_)
+    for column in values.T:
+        changes[1:] |= column[1:] != column[:-1]
+    changes[:1] = True
+    return np.flatnonzero(changes), np.cumsum(changes) - 1

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from gcode2krl.version import __version__
 
 Floats = NDArray[np.float64]
 _SLOWING_ROUNDS = 3
+_PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 
 
 def predict(
@@ -92,7 +94,10 @@ def targets_and_joints(
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     targets = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
     joints, findings = robot.follow(targets, cell, conditioning=False)
-    return replace(targets, issues=(*targets.issues, *findings)), replace(joints, issues=findings)
+    checked = replace(targets, issues=(*targets.issues, *findings))
+    rows = np.flatnonzero(targets.ptp)
+    _PTP_KNOWN[checked] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
+    return checked, replace(joints, issues=findings)
 
 
 def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:
@@ -170,8 +175,26 @@ def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
 
 
 def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
-    """Return the joints at the PTP targets alone, which is what a program needs; other rows are NaN."""
-    return robot.ptp_joints(targets, cell)
+    """Return the joints at the PTP targets alone, which is what a program needs; other rows are NaN.
+
+    Those of targets that were planned here are remembered as long as the targets live.
+    """
+    known = _PTP_KNOWN.get(targets)
+    if known is None or known[0] is not cell:
+        return robot.ptp_joints(targets, cell)
+    _, rows, q_rad, status, turn = known
+    count = len(targets)
+    nothing = np.full((count, 6), np.nan)
+    q, bits = nothing.copy(), np.zeros((2, count), dtype=np.int32)
+    q[rows], bits[:, rows] = q_rad, (status, turn)
+    return Joints(
+        q_rad=q,
+        qd_rad_s=nothing,
+        limit_margin_rad=nothing[:, 0],
+        sigma_min=nothing[:, 0],
+        status=bits[0],
+        turn=bits[1],
+    )
 
 
 def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats | None:

@@ -217,8 +217,9 @@ def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
         rows = targets.tool == number if (targets.tool != number).any() else slice(None)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
         chosen = rotation[rows]
-        first = chosen[:1] if (chosen == chosen[0]).all() else chosen
-        abc_deg[rows] = fr.abc_from_rotation(fr.rotation_from_quaternion(first) @ turn) * DEG_PER_RAD
+        first, run = fr.equal_runs(chosen)
+        turned = fr.rotation_from_quaternion(chosen[first]) @ turn
+        abc_deg[rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
     return targets.position_mm, abc_deg
 
 

@@ -171,10 +171,12 @@ def _differences(
     for number in np.unique(targets.tool[:count]):
         rows = np.flatnonzero(targets.tool[:count] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
-        abc, where = _distinct_rows(np.column_stack([program.abc_deg[rows], targets.rotation[rows]]))
+        both = np.column_stack([program.abc_deg[rows], targets.rotation[rows]])
+        first, run = fr.equal_runs(both)
+        abc = both[first]
         read = fr.rotation_from_abc(np.nan_to_num(abc[:, :3]) * RAD_PER_DEG) @ turn
         angle = fr.angle_between(fr.quaternion_from_rotation(read), abc[:, 3:])
-        rotation[rows] = angle[where] * DEG_PER_RAD
+        rotation[rows] = angle[run] * DEG_PER_RAD
     rotation[np.isnan(program.abc_deg[:count]).any(axis=1)] = np.nan
     joint_deg = np.abs(program.q_deg[:count] - joints.q_rad[:count] * DEG_PER_RAD).max(axis=1)
     good_home = home & (joint_deg <= JOINT_LIMIT_DEG)
@@ -183,14 +185,6 @@ def _differences(
         targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count])
     )
     return deviation, rotation, speed
-
-
-def _distinct_rows(values: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Return runs of equal rows as one row each, and the run of every row."""
-    changes = np.zeros(len(values), dtype=np.int64)
-    for column in values.T:
-        changes[1:] |= column[1:] != column[:-1]
-    return values[np.flatnonzero(np.concatenate([[1], changes[1:]]))], np.cumsum(changes)
 
 
 def _difference_issues(

@@ -6,6 +6,7 @@ two targets the line is sampled, because a limit or a singularity may lie on the
 
 import functools
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,7 @@ _MOST_PER_CHECK = 20
 _TURN_OR_MOVE = 'turn the tool about its axis ([frames] spin = "auto" or an angle), or move the part'
 _ANGLE_GRID_RAD = 1e-9
 _PTP_SAMPLES = 50
+_ROWS_A_PART = 100_000
 _PTP_TOLERANCE_MM = 0.01
 
 
@@ -91,7 +93,10 @@ def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
     chain = np.zeros(len(motion), dtype=np.bool_)
     chain[0] = True
     q = _best_branch(motion.position_mm, motion.rotation, motion.tool, chain, cell)
-    qd = np.gradient(q, motion.time_s, axis=0) if len(motion) > 1 else np.zeros_like(q)
+    qd = np.zeros_like(q)
+    if len(motion) > 2:
+        cycle_s = motion.time_s[1] - motion.time_s[0]
+        qd[1:-1] = (q[2:] - q[:-2]) / (2.0 * cycle_s)  # at both ends the robot rests
     changed = np.flatnonzero(np.diff(motion.tool)) if len(motion) > 1 else np.zeros(0, dtype=np.int64)
     qd[changed], qd[changed + 1] = 0.0, 0.0  # the flange rests while the tool changes
     return q, qd
@@ -101,8 +106,12 @@ def _joints(q: Floats, qd: Floats, tool: NDArray[np.int32], cell: Cell, conditio
     geometry = cell.robot.geometry.array()
     sigma = np.full(len(q), np.nan)
     for number in np.unique(tool) if conditioning else ():
-        rows = tool == number
-        sigma[rows] = smallest_singular_value(q[rows], geometry, cell.tool_matrix(int(number))[:3, 3])
+        rows = np.flatnonzero(tool == number)
+        tip = cell.tool_matrix(int(number))[:3, 3]
+        singular = functools.partial(smallest_singular_value, geometry=geometry, tool_position_mm=tip)
+        parts = np.array_split(rows, max(1, len(rows) // _ROWS_A_PART))
+        with ThreadPoolExecutor() as pool:  # the compiled loop releases the interpreter
+            sigma[rows] = np.concatenate(list(pool.map(singular, [q[part] for part in parts])))
     status, turn = status_turn(np.rint(q / _ANGLE_GRID_RAD) * _ANGLE_GRID_RAD + 0.0, geometry)
     return Joints(
         q_rad=q,
@@ -125,8 +134,8 @@ def sample_lines(targets: Targets, cell: Cell) -> Line:
     from_position[targets.ptp], from_rotation[targets.ptp] = position[targets.ptp], rotation[targets.ptp]
     length = np.linalg.norm(position - from_position, axis=1)
     angle = np.zeros(count)
-    if not (rotation == rotation[0]).all():
-        angle = fr.angle_between(rotation, from_rotation)
+    turning = functools.reduce(np.logical_or, (rotation != from_rotation).T)
+    angle[turning] = fr.angle_between(rotation[turning], from_rotation[turning])
     steps = np.maximum(1, np.ceil(np.maximum(length / STEP_MM, angle / STEP_RAD))).astype(np.int64)
     steps[targets.ptp] = 1
     steps[targets.home] = 0
