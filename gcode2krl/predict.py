@@ -163,6 +163,21 @@ def corner_errors(
     return error_mm, findings
 
 
+def corner_table(prediction: Prediction) -> dict[str, NDArray[Any]]:
+    """Return the blended corners as columns (c,): G-code line, distance, error and position in mm."""
+    chain = krc4.build_chain(prediction.targets, prediction.cell)
+    corners = np.flatnonzero(chain.blend_mm > 0)
+    x, y, z = chain.end_mm[corners].T
+    return {
+        "source_line": chain.source_line[corners],
+        "d_mm": chain.blend_mm[corners] * chain.scale[corners],
+        "error_mm": chain.corner_error_mm()[corners],
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+    }
+
+
 def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
     """Return the joints at each target, or at each sample of a Motion: one branch, KUKA's signs, S and T.
 

@@ -175,6 +175,9 @@ def test_the_command_writes_tables_and_pictures(run, tmp_path):
     assert done.code == 0, done.err
     result = json.loads(done.out)
     assert result["time_s"] > 60
+    assert 0 < result["corner_error_mm"] <= 0.02
+    corners = pl.read_csv(tmp_path / "out" / "corners.csv")
+    assert corners["error_mm"].max() == pytest.approx(result["corner_error_mm"])
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {
         "prediction.toml",

@@ -1,6 +1,7 @@
 """``gcode2krl predict part.nc -o prediction/``."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -35,7 +36,7 @@ def command(
         folder = _folder(part, output)
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        from gcode2krl.predict import predict_toolpath
+        from gcode2krl.predict import corner_table, predict_toolpath
 
         with console.progress("predicting", None):
             settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
@@ -43,6 +44,8 @@ def command(
                 toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings
             )
             files = prediction.save(folder, csv=csv)
+            corners = corner_table(prediction)
+            files.append(_save_corners(corners, folder))
             if plot:
                 files += _draw(prediction, folder)
     except Gcode2KrlError as error:
@@ -63,6 +66,7 @@ def command(
                 "moves": len(toolpath) - 1,
                 "time_s": float(motion.time_s[-1]),
                 "path_mm": float(motion.path_mm[-1]),
+                "corner_error_mm": float(corners["error_mm"].max(initial=0.0)),
                 "issues": issue_dicts(prediction.issues),
             }
         )
@@ -72,7 +76,19 @@ def command(
     console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")
     top, steepest = motion.speed_mm_s.max(), motion.acceleration_mm_s2.max()
     console.say(f"  speed up to {top:.1f} mm/s, acceleration up to {steepest:.0f} mm/s2")
+    console.say(
+        f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
+    )
     return 0
+
+
+def _save_corners(corners: dict[str, Any], folder: Path) -> Path:
+    """Write the table of corners as CSV."""
+    import polars as pl
+
+    file = folder / "corners.csv"
+    pl.DataFrame(corners).write_csv(file)
+    return file
 
 
 def _draw(prediction: Prediction, folder: Path) -> list[Path]:
