@@ -141,13 +141,15 @@ def corner_errors(
 ) -> tuple[Floats, tuple[Issue, ...]]:
     """Return the corner error (n,) in mm at the end of each move, and where a tolerance is not kept.
 
-    A tolerance is asked for by ``G64 P``, by ``tolerance_mm`` or by the cell, in this order.
+    A tolerance is asked for by ``G64 P``, by ``tolerance_mm`` or by the cell, in this order; ``G64 P`` does
+    not speak of motions that are added (approach, retract).
     """
     chain = krc4.build_chain(targets, cell)
     error_mm = chain.corner_error_mm()
     own = cell.controller.tolerance_mm
     below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
-    programmed = toolpath.tolerance_mm[chain.move] if len(chain.move) else np.zeros(0)
+    move = targets.move[chain.first + 1 : chain.first + 1 + len(error_mm)]
+    programmed = np.where(move >= 0, toolpath.tolerance_mm[move], np.nan)
     allowed = np.where(np.isnan(programmed), below, programmed)
     beyond = np.flatnonzero(error_mm > allowed * (1.0 + 1e-9))
     findings = tuple(

@@ -170,6 +170,19 @@ def test_a_tolerance_asked_for_is_kept(cell):
     assert {issue.code for issue in findings} == {"corner-tolerance"}
 
 
+def test_an_added_approach_is_not_held_to_the_tolerance_of_the_part(cell):
+    from gcode2krl.predict import corner_errors
+
+    head = "G21 T1 M6\nS9000 M3\nG64 P0.01\nG0 G43 H1 Z50\nX0 Y0\n"
+    toolpath = _toolpath(
+        f"{head}G1 Z0 F900\nX40\nG28 G91 Z0\nG90\nG0 X80 Y50 Z5\nG1 Z0\nX99\nG0 Z50\nM30\n", cell
+    )
+    targets = set_targets(toolpath, cell)
+    error_mm, findings = corner_errors(toolpath, targets, cell)
+    assert findings == ()
+    assert error_mm.max() > 0.01  # over the plane, by the cell's own CDIS
+
+
 def test_the_command_writes_tables_and_pictures(run, tmp_path):
     done = run("predict", TEST_PIECE, "-o", "out", "--csv", "--plot", "--json", "--dt", "0.004")
     assert done.code == 0, done.err

@@ -2,8 +2,9 @@
 
 import contextlib
 import os
+import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from gcode2krl.errors import NotUnderstoodError, input_error
@@ -15,33 +16,50 @@ def write_together(files: Mapping[Path, bytes]) -> None:
     Raises `NotUnderstoodError` where a folder does not exist or the disk refuses; nothing half-written stays.
     """
     temporary: dict[Path, Path] = {}
-    aside: dict[Path, Path] = {}
+    kept: dict[Path, Path] = {}
     try:
         for target, content in files.items():
             temporary[target] = _write_beside(target, content)
         for target, written in temporary.items():
             if target.exists():
-                old = written.with_suffix(".old")
-                target.replace(old)
-                aside[target] = old
+                kept[target] = _keep(target, written.with_suffix(".old"))
+        for target, written in temporary.items():
             written.replace(target)
     except OSError as error:
-        _restore(temporary, aside)
+        _restore(temporary, kept)
         raise unwritable(next(iter(files)), error.strerror or str(error)) from None
+    else:
+        _remove(kept.values())
     finally:
-        for leftover in (*temporary.values(), *aside.values()):
-            with contextlib.suppress(OSError):
-                leftover.unlink(missing_ok=True)
+        _remove(temporary.values())
 
 
-def _restore(temporary: Mapping[Path, Path], aside: Mapping[Path, Path]) -> None:
-    """Put the old files back, and take new ones away that have none."""
+def _keep(target: Path, place: Path) -> Path:
+    """Keep a file under a second name: a hard link, or a copy where the disk knows none."""
+    try:
+        place.hardlink_to(target)
+    except (OSError, NotImplementedError):
+        shutil.copyfile(target, place)
+    return place
+
+
+def _restore(temporary: Mapping[Path, Path], kept: Mapping[Path, Path]) -> None:
+    """Put the old files back and take new ones away; an old file that cannot be put back stays kept."""
     for target, written in temporary.items():
+        replaced = not written.exists()
         with contextlib.suppress(OSError):
-            if target in aside:
-                os.replace(aside[target], target)  # noqa: PTH105 - not the call that has just failed
-            elif not written.exists():
-                target.unlink(missing_ok=True)
+            if replaced and target in kept:
+                shutil.copyfile(kept[target], target)
+            elif replaced:
+                target.unlink()
+            if target in kept:
+                kept[target].unlink()
+
+
+def _remove(files: Iterable[Path]) -> None:
+    for file in files:
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
 
 
 def unwritable(target: Path, why: str) -> NotUnderstoodError:
