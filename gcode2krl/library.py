@@ -7,7 +7,7 @@ from typing import Any
 
 from gcode2krl.errors import input_error
 
-KINDS = ("robots", "controllers", "tools", "cells")
+KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
 def models_folder() -> Path:
@@ -18,7 +18,7 @@ def models_folder() -> Path:
 
 
 def names(kind: str) -> dict[str, Path]:
-    """Return model name → file for one kind (``robots``, ``controllers``, ``tools``, ``cells``)."""
+    """Return model name → file for one kind (one of `KINDS`)."""
     files = sorted((models_folder() / kind).glob("*.toml"))
     return {str(read_toml(file).get("model", file.stem)): file for file in files}
 

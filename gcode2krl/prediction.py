@@ -5,9 +5,10 @@ events) and a Parquet file a table: ``toolpath``, ``targets``, and ``motion`` wi
 side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_rad`` ….
 """
 
+import re
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.tables import Event, Joints, Motion, Table, Targets, Toolpath
+from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Table, Targets, Toolpath
 
 SCHEMA = "gcode2krl/prediction/1"
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
@@ -34,21 +35,14 @@ class Prediction:
     joints: Joints | None = None
     inputs: dict[str, Any] = field(default_factory=dict)
     """Program, its SHA-256, version and settings."""
-
-    @property
-    def forces(self) -> None:
-        """Cutting forces: None, their stage does not exist yet."""
-        return None
-
-    @property
-    def deflection(self) -> None:
-        """Deflection: None, its stage does not exist yet."""
-        return None
+    forces: Forces | None = None
+    deflection: Deflection | None = None
 
     @property
     def issues(self) -> tuple[Issue, ...]:
-        """All findings, of the targets (which carry those of the G-code) and of the motion."""
-        return (*self.targets.issues, *(self.motion.issues if self.motion is not None else ()))
+        """All findings, of the targets (which carry those of the G-code) and of every later stage."""
+        later = (self.motion, self.forces, self.deflection)
+        return (*self.targets.issues, *(issue for table in later if table for issue in table.issues))
 
     def save(self, folder: str | Path, csv: bool = False) -> list[Path]:
         """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files."""
@@ -70,8 +64,9 @@ class Prediction:
         }
         if self.motion is not None:
             tables["motion"] = dict(_columns(self.motion))
-            if self.joints is not None:
-                tables["motion"] |= dict(_columns(self.joints))
+            for beside in (self.joints, self.forces, self.deflection):
+                if beside is not None:
+                    tables["motion"] |= dict(_columns(beside))
         for name, columns in tables.items():
             frame = pl.DataFrame(columns)
             frame.write_parquet(place / f"{name}.parquet")
@@ -79,7 +74,7 @@ class Prediction:
             if csv:
                 frame.write_csv(place / f"{name}.csv")
                 yield place / f"{name}.csv"
-        record = {
+        record: dict[str, Any] = {
             "schema": SCHEMA,
             "inputs": self.inputs,
             "issues": [_issue_record(issue) for issue in self.issues],
@@ -87,6 +82,9 @@ class Prediction:
             "targets_events": [_event_record(event) for event in self.targets.events],
             "cell": as_toml(self.cell),
         }
+        for name, table in (("forces", self.forces), ("deflection", self.deflection)):
+            if table is not None:
+                record[f"{name}_relative_band"] = table.relative_band
         (place / "prediction.toml").write_bytes(tomli_w.dumps(record).encode("utf-8"))
         yield place / "prediction.toml"
 
@@ -120,15 +118,24 @@ class Prediction:
                 issues=issues,
             )
             motion = _table(Motion, found["motion"]) if "motion" in found else None
-            joints = (
-                _table(Joints, found["motion"]) if "motion" in found and "q1_rad" in found["motion"] else None
+            beside = found.get("motion", ())
+            joints = _table(Joints, beside) if "q1_rad" in beside else None
+            forces = (
+                _table(Forces, beside, relative_band=record.get("forces_relative_band", 0.0))
+                if "force_base_x_N" in beside
+                else None
+            )
+            deflection = (
+                _table(Deflection, beside, relative_band=record.get("deflection_relative_band", 0.0))
+                if "deflection_base_x_mm" in beside
+                else None
             )
         except (KeyError, ValueError, pl.exceptions.PolarsError) as error:
             raise input_error(
                 "prediction-columns", f"not the tables of a prediction: {error}", source=str(place)
             ) from None
         cell = cell_from_resolved(record["cell"], source=str(place / "prediction.toml"))
-        return cls(toolpath, targets, cell, motion, joints, record["inputs"])
+        return cls(toolpath, targets, cell, motion, joints, record["inputs"], forces, deflection)
 
 
 def _read_record(file: Path) -> dict[str, Any]:
@@ -157,12 +164,25 @@ def column_names(name: str, width: int) -> list[str]:
     return [f"{stem}{number}{unit}" for number in range(1, width + 1)]
 
 
+def _names_on_disk(spec: Field[Any], width: int) -> list[str]:
+    """Return a column's names; one whose width the data decide is counted from 0: ``phi_0_rad`` …."""
+    if spec.metadata["tail"] != (None,):
+        return column_names(spec.name, width)
+    stem, unit = spec.name.rsplit("_", 1)
+    return [f"{stem}_{number}_{unit}" for number in range(width)]
+
+
+def _counted(name: str, columns: list[str]) -> list[str]:
+    stem, unit = name.rsplit("_", 1)
+    return [column for column in columns if re.fullmatch(rf"{stem}_\d+_{unit}", column)]
+
+
 def _columns(table: Table) -> Iterator[tuple[str, Any]]:
     for spec in fields(table):
         if "tail" not in spec.metadata:
             continue
         values = getattr(table, spec.name)
-        names = column_names(spec.name, values.shape[1] if values.ndim == 2 else 0)
+        names = _names_on_disk(spec, values.shape[1] if values.ndim == 2 else 0)
         for number, name in enumerate(names):
             yield name, np.ascontiguousarray(values[:, number] if values.ndim == 2 else values)
 
@@ -173,7 +193,8 @@ def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
         if "tail" not in spec.metadata:
             continue
         tail = spec.metadata["tail"]
-        names = column_names(spec.name, tail[0] if tail else 0)
+        width = tail[0] if tail else 0
+        names = _names_on_disk(spec, len(_counted(spec.name, frame.columns)) if width is None else width)
         parts = [frame[name].to_numpy() for name in names]
         columns[spec.name] = np.stack(parts, axis=1) if tail else parts[0]
     return kind(**columns, **more)

@@ -32,8 +32,8 @@ class Event(NamedTuple):
     values: dict[str, Any]
 
 
-def _column(dtype: DTypeLike, *tail: int) -> Any:
-    """Declare a column of the given dtype and trailing shape."""
+def _column(dtype: DTypeLike, *tail: int | None) -> Any:
+    """Declare a column of the given dtype and trailing shape; None is a width that the data decide."""
     return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
 
 
@@ -50,8 +50,11 @@ class Table:
                 continue
             values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"]).view()
             rows = len(values) if rows < 0 else rows
-            if values.shape != (rows, *spec.metadata["tail"]):
-                wanted = (rows, *spec.metadata["tail"])
+            wanted = (rows, *spec.metadata["tail"])
+            fits = values.ndim == len(wanted) and all(
+                size in (None, found) for size, found in zip(wanted, values.shape, strict=True)
+            )
+            if not fits:
                 raise ValueError(
                     f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}"
                 )
@@ -175,3 +178,37 @@ class Joints(Table):
     """(m,) KUKA's S bits."""
     turn: Ints = _column(np.int32)
     """(m,) KUKA's T bits."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Forces(Table):
+    """Cutting forces along a Motion: means over one spindle revolution, on the tool."""
+
+    force_base_N: Floats = _column(np.float64, 3)
+    """(m, 3) along the axes of ``$BASE``; exactly zero in air."""
+    moment_base_Nmm: Floats = _column(np.float64, 3)
+    """(m, 3) about the tool tip, along the axes of ``$BASE``."""
+    peak_N: Floats = _column(np.float64)
+    """(m,) largest force of a revolution; for warnings."""
+    torque_Nmm: Floats = _column(np.float64)
+    """(m,) about the tool axis that the spindle must bring."""
+    a_p_mm: Floats = _column(np.float64)
+    """(m,) axial depth of cut."""
+    a_e_mm: Floats = _column(np.float64)
+    """(m,) width of cut normal to the feed."""
+    phi_rad: Floats = _column(np.float64, None)
+    """(m, 2k) entry and exit angles of the engagement arcs from the feed normal, NaN padded."""
+    relative_band: float = 0.0
+    """Half-width of the 90 % band of the forces, relative."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Deflection(Table):
+    """How far the tool tip bends away under the forces along a Motion."""
+
+    deflection_base_mm: Floats = _column(np.float64, 3)
+    """(m, 3) along the axes of ``$BASE``."""
+    correction_base_mm: Floats = _column(np.float64, 3)
+    """(m, 3) minus the deflection, projected normal to the feed (eq. 10 of Haehn & Weigold 2020)."""
+    relative_band: float = 0.0
+    """Half-width of the 90 % band of the deflection, relative: forces and stiffness."""

@@ -1,0 +1,1 @@
+"""Motion and stock to Forces: cutters, height field, engagement, force laws."""

@@ -1,0 +1,381 @@
+"""The sections of a cell file: what each table holds, in which unit, and what is allowed."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from gcode2krl import frames as fr
+from gcode2krl.units import RAD_PER_DEG
+
+Sure = Literal["verified", "checked", "memory", "assumption", "unknown"]
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+SixFloats = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+DataNumber = Annotated[int, Field(ge=1, le=32)]
+SignalNumber = Annotated[int, Field(ge=1, le=8192)]
+
+
+class Section(BaseModel):
+    """A table of the cell file: unknown keys are errors, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Provenance(Section):
+    """Where values come from and how sure they are."""
+
+    source: str = ""
+    sure: Sure = "assumption"
+
+
+class Frame(Section):
+    """A KUKA frame: position in mm and A, B, C in degrees (Rz·Ry·Rx)."""
+
+    x_mm: Finite = 0.0
+    y_mm: Finite = 0.0
+    z_mm: Finite = 0.0
+    a_deg: Finite = 0.0
+    b_deg: Finite = 0.0
+    c_deg: Finite = 0.0
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Return the homogeneous transform (4, 4)."""
+        abc = np.array([self.a_deg, self.b_deg, self.c_deg]) * RAD_PER_DEG
+        return fr.transform([self.x_mm, self.y_mm, self.z_mm], fr.rotation_from_abc(abc))
+
+
+class Geometry(Provenance):
+    """Lengths of an ortho-parallel arm with spherical wrist (b = 0), in mm."""
+
+    a1_mm: Finite
+    a2_mm: Finite
+    c1_mm: Finite
+    c2_mm: Positive
+    c3_mm: Positive
+    c4_mm: Positive
+
+    def array(self) -> NDArray[np.float64]:
+        """Return a1, a2, c1, c2, c3, c4 (6,) in mm."""
+        return np.array([self.a1_mm, self.a2_mm, self.c1_mm, self.c2_mm, self.c3_mm, self.c4_mm])
+
+
+class Limits(Provenance):
+    """Software limits of the joints, low and high, in degrees; None where no source is known."""
+
+    q_deg: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=6, max_length=6)] | None = None
+
+    @field_validator("q_deg")
+    @classmethod
+    def _ordered(
+        cls, pairs: tuple[tuple[float, float], ...] | None
+    ) -> tuple[tuple[float, float], ...] | None:
+        for number, (low, high) in enumerate(pairs or (), start=1):
+            if low >= high:
+                raise ValueError(f"A{number}: low {low} is not below high {high}")
+        return pairs
+
+
+class Speeds(Provenance):
+    """Largest joint speeds in degrees per second; None where no source is known."""
+
+    qd_deg_s: Annotated[tuple[Positive, ...], Field(min_length=6, max_length=6)] | None = None
+
+
+class Payload(Provenance):
+    """Rated payload and figures of the data sheet."""
+
+    mass_kg: Positive | None = None
+    reach_mm: Positive | None = None
+    repeatability_mm: Positive | None = None
+
+
+class Drives(Provenance):
+    """Gears, motors and masses, A1 to A6."""
+
+    gear_ratio: SixFloats | None = None
+    motor_inertia_kgm2: SixFloats | None = None
+    torque_constant_Nm_A: SixFloats | None = None
+    link_mass_kg: SixFloats | None = None
+    robot_mass_kg: Positive | None = None
+
+
+class Robot(Section):
+    """One robot model."""
+
+    model: str
+    trafo_name: str = ""
+    """What ``$TRAFONAME[]`` of the controller must contain; empty: the guard does not look."""
+    geometry: Geometry
+    limits: Limits = Limits()
+    speeds: Speeds = Speeds()
+    payload: Payload = Payload()
+    drives: Drives = Drives()
+    note: str = ""
+
+
+class Controller(Provenance):
+    """What the controller's planner is set to."""
+
+    model: str
+    k_s: NotNegative = 0.168
+    cycle_s: Positive = 0.012
+    advance: Annotated[int, Field(ge=0, le=5)] | Literal["unlimited"] = 3
+    cdis_mm: NotNegative = 0.1
+    tolerance_mm: Positive | None = None
+    vel_cp_m_s: Positive = 2.0
+    """Largest path speed the controller accepts ($VEL_MA.CP)."""
+    acc_cp_m_s2: Positive = 2.0
+    rapid_m_s: Positive = 0.2
+    vel_ori_deg_s: Positive = 200.0
+    acc_ori_deg_s2: Positive = 100.0
+    ptp_percent: Annotated[int, Field(ge=1, le=100)] = 20
+    law: Literal["averages", "trapezoid"] = "averages"
+
+
+class Tool(Provenance):
+    """A cutter in its holder."""
+
+    model: str = ""
+    kind: Literal["flat", "bull-nose", "ball", "tapered", "drill"] = "flat"
+    diameter_mm: Positive
+    """Largest diameter of the cutting part; of a tapered mill the one at the tip."""
+    teeth: Annotated[int, Field(ge=1, le=50)]
+    corner_radius_mm: NotNegative = 0.0
+    helix_deg: Annotated[float, Field(ge=0, lt=90)] = 30.0
+    length_mm: Positive | None = None
+    """From the gauge line of the spindle to the tip."""
+    flute_length_mm: Positive | None = None
+    """Length of the cutting edges along the axis; above it is the shank."""
+    taper_deg: Annotated[float, Field(ge=0, lt=80)] = 0.0
+    """Half angle of a tapered mill."""
+    point_deg: Annotated[float, Field(gt=10, lt=180)] | None = None
+    """Full angle of a drill's point."""
+    shank_diameter_mm: Positive | None = None
+    """Default: the cutter's diameter, which then cannot touch more than the edges have cut."""
+    stick_out_mm: Positive | None = None
+    """From the tip to the face of the holder; None: the holder is not checked."""
+    holder_diameter_mm: Positive | None = None
+    centre_cutting: bool = True
+    max_depth_mm: Positive | None = None
+    """Largest axial depth of cut; default: the flute length."""
+    max_force_N: Positive | None = None
+    """Largest mean force on the tool."""
+    max_rpm: Positive | None = None
+    tool_data: DataNumber | None = None
+    """Number of ``TOOL_DATA`` on the controller; without it ``$TOOL`` is written as a frame."""
+    frame: Frame | None = None
+    """TCP in the flange as the controller has it; without it from ``frames.tool`` and the length."""
+    axis: Axis | None = None
+    """Which axis of the controller's tool frame points from tip to holder."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.corner_radius_mm > self.diameter_mm / 2 + 1e-9:
+            raise ValueError("corner_radius_mm is larger than half the diameter")
+        if (
+            self.length_mm is not None
+            and self.flute_length_mm is not None
+            and self.length_mm < self.flute_length_mm
+        ):
+            raise ValueError(
+                f"length_mm {self.length_mm:g} is shorter than the flutes, {self.flute_length_mm:g} mm"
+            )
+        if self.tool_data is not None and self.axis is None:
+            raise ValueError('axis is required with tool_data: "+x", "-x", "+y", "-y", "+z" or "-z"')
+        if self.axis not in (None, "+z") and self.frame is None:
+            raise ValueError("axis other than +z needs frame, the TCP as the controller has it")
+        return self
+
+
+class Frames(Provenance):
+    """Where the work and the tool are."""
+
+    base: Frame = Frame()
+    """``$BASE`` in ``$ROBROOT``."""
+    base_data: DataNumber | None = None
+    """Number of ``BASE_DATA`` on the controller; without it ``$BASE`` is written as a frame."""
+    tool: Frame = Frame()
+    """TCP in the flange of a tool of ``tool_length_mm``; z points from tip to holder."""
+    tool_length_mm: NotNegative = 0.0
+    spin: Annotated[float, Field(ge=-360, le=360)] | Literal["auto"] = 0.0
+    """Angle in degrees about the tool axis, or ``auto``."""
+
+
+class Home(Section):
+    """Where the program starts and ends."""
+
+    q_deg: SixFloats
+
+
+class Clearance(Section):
+    """The plane above everything, in ``$BASE``; ``none`` where the cell has none."""
+
+    z_mm: Finite | Literal["none"]
+
+
+class Load(Provenance):
+    """Payload on the flange: mass, centre and inertia in the flange frame."""
+
+    mass_kg: NotNegative
+    x_mm: Finite = 0.0
+    y_mm: Finite = 0.0
+    z_mm: Finite = 0.0
+    jx_kgm2: NotNegative = 0.0
+    jy_kgm2: NotNegative = 0.0
+    jz_kgm2: NotNegative = 0.0
+
+
+class Spindle(Provenance):
+    """The spindle and its signals; numbers are ``$OUT``, ``$IN`` and ``$ANOUT`` of the controller."""
+
+    max_rpm: Positive
+    run_cw_output: SignalNumber
+    run_ccw_output: SignalNumber
+    speed_analog_output: Annotated[int, Field(ge=1, le=32)]
+    at_speed_input: SignalNumber | None = None
+    start_s: NotNegative = 5.0
+    """Waited after M3 where there is no at-speed input."""
+    stop_s: NotNegative = 5.0
+    flood_output: SignalNumber
+    mist_output: SignalNumber
+
+
+class GuardInput(Section):
+    """A controller input that must have a value before the first motion."""
+
+    number: SignalNumber
+    value: bool = True
+    meaning: str
+
+
+class LinearEdge(Section):
+    """Linear-edge force coefficients: K_c in N/mm², K_e in N/mm; None where the source has none."""
+
+    Ktc: Finite
+    Krc: Finite
+    Kac: Finite | None = None
+    Kte: Finite
+    Kre: Finite
+    Kae: Finite | None = None
+
+    def array(self) -> NDArray[np.float64]:
+        """Return Ktc, Krc, Kac, Kte, Kre, Kae (6,); what is not known is 0 (no axial force)."""
+        values = (self.Ktc, self.Krc, self.Kac or 0.0, self.Kte, self.Kre, self.Kae or 0.0)
+        return np.array(values)
+
+
+class Kienzle(Section):
+    """Kienzle's law: F_t = kc11·b·h^(1 - mc); the radial and axial forces are shares of it."""
+
+    kc11: Positive
+    """Specific cutting force at h = b = 1 mm in N/mm²."""
+    mc: Annotated[float, Field(ge=0, lt=1)]
+    radial_ratio: NotNegative = 0.4
+    axial_ratio: Finite = 0.2
+
+
+class Material(Provenance):
+    """What is cut, and its force law: one of `linear_edge` and `kienzle`."""
+
+    model: str = ""
+    name: str = ""
+    linear_edge: LinearEdge | None = None
+    kienzle: Kienzle | None = None
+    relative_band: Annotated[float, Field(ge=0, lt=1)] = 0.4
+    """Half-width of the 90 % band of forces, relative."""
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_law(self) -> Self:
+        if self.linear_edge is not None and self.kienzle is not None:
+            raise ValueError("give linear_edge or kienzle, not both")
+        return self
+
+
+class Stock(Section):
+    """The raw part in `$BASE`."""
+
+    box_mm: tuple[tuple[Finite, Finite, Finite], tuple[Finite, Finite, Finite]] | None = None
+    mesh: str | None = None
+    """STL, PLY or 3MF in mm, relative to the cell file."""
+    resolution_mm: Positive | None = None
+    """Cell size of the material removal; default: from the smallest tool."""
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if self.box_mm is not None and self.mesh is not None:
+            raise ValueError("give box_mm or mesh, not both")
+        if self.box_mm is not None:
+            for axis, low, high in zip("xyz", *self.box_mm, strict=True):
+                if low >= high:
+                    raise ValueError(f"box_mm: {axis} from {low:g} is not below {high:g}")
+        return self
+
+
+class VirtualJoint(Section):
+    """Stiffness of one elastic frame about its x, y and z axes (k_C, k_B, k_A) in N·mm/rad."""
+
+    k_c: Positive
+    k_b: Positive
+    k_a: Positive
+
+
+VIRTUAL_JOINTS = ("A1", "A2", "linked_arm", "A3", "arm", "A4", "A5", "A6", "sensor", "spindle")
+VirtualJointName = Literal["A1", "A2", "linked_arm", "A3", "arm", "A4", "A5", "A6", "sensor", "spindle"]
+
+
+class Compliance(Provenance):
+    """The virtual joints of robot and end effector; without all of them no deflection is predicted."""
+
+    virtual_joints: dict[VirtualJointName, VirtualJoint] = Field(default_factory=dict)
+    sensor_height_mm: NotNegative = 56.0
+    """From the flange face to the mounting face of spindle and holder; the sensor's joint is half-way."""
+    relative_band: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    """Half-width of the 90 % band of the stiffness, relative."""
+    robot_source: str = ""
+    robot_sure: Sure = "unknown"
+
+
+class Pilot(Section):
+    """How the program carries the pilot force."""
+
+    form: Literal["index", "values", "none"] = "index"
+    frame: Literal["tcp", "base"] = "tcp"
+    """Frame in which knots state force and deflection."""
+    lead_s: Positive = 0.040
+    """Least time between the announcement of a knot and the knot."""
+    tolerance_N: Positive | None = None
+    """Largest error of the knots' polyline; default: the larger of 10 N and 3 % of the peak."""
+    index_variable: str = "$SEN_PINT[1]"
+    hash_variable: str = "$SEN_PINT[2]"
+    value_variable: str = "$SEN_PREA"
+    max_active: Annotated[int, Field(ge=1, le=8)] = 8
+    """Triggers that may wait at the same time."""
+
+
+class Program(Section):
+    """How the KRL text is laid out."""
+
+    max_lines: Annotated[int, Field(ge=100)] = 5000
+    comment_every: Annotated[int, Field(ge=0)] = 50
+    """A comment with the G-code line every so many motions; 0 = only at events."""
+    warn_size_mb: Positive = 4.0
+    externals: tuple[str, ...] = ()
+    """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""
+    prologue: str = ""
+    """KRL (Jinja2) between the guard and the first motion."""
+    epilogue: str = ""
+    """KRL (Jinja2) after the last motion."""
+    memory_moves: Annotated[int, Field(ge=1)] = 30000
+    """LIN lines a controller surely holds."""
+
+
+class Verified(Section):
+    """Who confirmed that the cell file matches the real cell."""
+
+    by: Annotated[str, Field(min_length=1)]
+    date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
