@@ -46,6 +46,15 @@ class Leg:
     points_mm: np.ndarray
     speeds_mm_s: tuple[float, ...]
     dwell_s: float
+    acc_mm_s2: float = ACC_MM_S2
+
+
+def turning_leg(start_mm, end_mm, angle_deg, vel_ori_deg_s, acc_ori_deg_s2, speed_mm_s, dwell_s) -> Leg:
+    """A line on which the tool turns: the share of the angle done is the share of the way done."""
+    points = np.array([start_mm, end_mm], dtype=float)
+    mm_per_deg = np.linalg.norm(points[1] - points[0]) / angle_deg
+    speed = min(speed_mm_s, vel_ori_deg_s * mm_per_deg)
+    return Leg(points, (speed,), dwell_s, min(ACC_MM_S2, acc_ori_deg_s2 * mm_per_deg))
 
 
 def legs_of(text: str, start_mm=(100.0, 0.0, 100.0)) -> list[Leg]:
@@ -101,12 +110,12 @@ def path_of(leg: Leg, controller: Controller) -> tuple[np.ndarray, np.ndarray]:
         way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
     elif controller.law == "averages":
         total = lengths.sum()
-        t = grid(total / v[0] + v[0] / ACC_MM_S2 + controller.k_s)
-        way = averaged(t, np.minimum(v[0] * t, total), v[0] / ACC_MM_S2)
+        t = grid(total / v[0] + v[0] / leg.acc_mm_s2 + controller.k_s)
+        way = averaged(t, np.minimum(v[0] * t, total), v[0] / leg.acc_mm_s2)
     else:
         total = lengths.sum()
-        top = min(v[0], np.sqrt(ACC_MM_S2 * total))
-        rise = top / ACC_MM_S2
+        top = min(v[0], np.sqrt(leg.acc_mm_s2 * total))
+        rise = top / leg.acc_mm_s2
         level = (total - top * rise) / top
         t, speed = ramps([(0, 0), (rise, top), (rise + level, top), (2 * rise + level, 0)], controller)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])

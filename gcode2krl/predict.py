@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from gcode2krl import gcode, krc4, program, robot
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.krc4 import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Motion, Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
@@ -92,12 +94,28 @@ def targets_and_joints(
     """Return what `set_targets` returns, and the joints it was checked with (``sigma_min`` left NaN)."""
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
-    targets = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
+    return checked(program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm), cell)
+
+
+def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
+    """Return the targets with what the robot finds in them (reach, limits, singularities), and its joints."""
     joints, findings = robot.follow(targets, cell, conditioning=False)
-    checked = replace(targets, issues=(*targets.issues, *findings))
+    found = replace(targets, issues=(*targets.issues, *findings))
     rows = np.flatnonzero(targets.ptp)
-    _PTP_KNOWN[checked] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
-    return checked, replace(joints, issues=findings)
+    _PTP_KNOWN[found] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
+    return found, replace(joints, issues=findings)
+
+
+def controller_test_targets(
+    cell: Cell, origin_mm: tuple[float, float, float] | None = None, *, turning: bool = True
+) -> Targets:
+    """Return the targets of the controller's test program, with the lines that turn the tool or without.
+
+    Raises what `krc4.trial_program.controller_test_program` raises.
+    """
+    text = trial_program.controller_test_program(cell, origin_mm).encode("ascii")
+    targets = set_targets(gcode.read_stream(io.BytesIO(text), "test program", cell), cell)
+    return checked(trial_program.with_turning_lines(targets, cell), cell)[0] if turning else targets
 
 
 def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:

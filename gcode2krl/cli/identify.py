@@ -11,14 +11,14 @@ import numpy as np
 from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_other
-from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.tables import Toolpath
+from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from gcode2krl.krc4.identify import CornerFit, Estimate, Identification, Section
+    from gcode2krl.runs import ControllerTrace
 
 _MS_PER_S = 1000.0
 _MOST_SHOWN = 20
@@ -80,18 +80,23 @@ def _identify(
     from gcode2krl.runs import read_controller_trace
 
     trace = read_controller_trace(trace_path)
-    toolpath = _test_toolpath(cell) if part is None else read_part(part, cell, console, 0.01, False)
-    targets = set_targets(toolpath, cell, tolerance_mm)
+    if part is None:
+        return _identify_test(trace, cell, console)
+    targets = set_targets(read_part(part, cell, console, 0.01, False), cell, tolerance_mm)
     with console.progress("fitting", None):
         return identify_controller(trace, targets, cell)
 
 
-def _test_toolpath(cell: Cell) -> Toolpath:
-    from gcode2krl.gcode import read_stream
-    from gcode2krl.krc4.trial_program import controller_test_program
+def _identify_test(trace: "ControllerTrace", cell: Cell, console: Console) -> "Identification":
+    """Fit a trace of the test program: with the lines that turn the tool, else without."""
+    from gcode2krl.krc4.identify import identify_controller
+    from gcode2krl.predict import controller_test_targets
 
-    text = controller_test_program(cell).encode("ascii")
-    return read_stream(io.BytesIO(text), "test program", cell)
+    with console.progress("fitting", None):
+        try:
+            return identify_controller(trace, controller_test_targets(cell), cell)
+        except NotUnderstoodError:
+            return identify_controller(trace, controller_test_targets(cell, turning=False), cell)
 
 
 # --- words ----------------------------------------------------------------------------------------------
@@ -116,6 +121,13 @@ def _say(result: "Identification", trace: str, console: Console) -> None:
         )
     console.say(f"  law        {result.law} (2 log-likelihood ratio {result.law_evidence:+.0f})")
     console.say(f"  $ACC.CP    {result.acceleration_mm_s2:g} mm/s2, from the cell")
+    if result.turning_rms_mm is not None:
+        turning = (("VEL.ORI", result.vel_ori_deg_s, "deg/s"), ("ACC.ORI", result.acc_ori_deg_s2, "deg/s2"))
+        for name, value, unit in turning:
+            known = "not determined"
+            if value:
+                known = f"{value.value:.2f} {unit}, 90 % {value.low:.2f} .. {value.high:.2f}"
+            console.say(f"  ${name}   {known}")
     console.say(
         f"  residuals  {result.rms_mm:.4f} mm rms, at most {result.max_mm:.4f} mm; "
         f"noise at rest {result.noise_mm:.4f} mm"
@@ -141,22 +153,27 @@ def _corner_line(corner: "CornerFit") -> str:
 _KEYS = (
     "k_s", "k_interval_s", "k_cycles", "k_whole_cycles_s", "k_whole_cycles_inside", "cdis_mm",
     "cdis_interval_mm", "cdis_programmed_mm", "law", "law_evidence", "law_of_values", "acceleration_mm_s2",
+    "vel_ori_deg_s", "vel_ori_interval_deg_s", "acc_ori_deg_s2", "acc_ori_interval_deg_s2", "turning_rms_mm",
     "noise_mm", "rms_mm", "max_mm", "sections", "corners",
 )  # fmt: skip
 
 
 def _record(result: "Identification", files: list[Path]) -> dict[str, Any]:
-    cdis = result.cdis_mm
     values = (
         result.k_s.value, _interval(result.k_s), result.k_cycles, result.k_whole_s,
-        result.k_s.contains(result.k_whole_s), cdis.value if cdis else None,
-        _interval(cdis) if cdis else None, result.cdis_programmed_mm, result.law, result.law_evidence,
-        result.law_fitted, result.acceleration_mm_s2, result.noise_mm, result.rms_mm, result.max_mm,
-        [_section_record(section) for section in result.sections],
+        result.k_s.contains(result.k_whole_s), *_value_and_interval(result.cdis_mm),
+        result.cdis_programmed_mm, result.law, result.law_evidence, result.law_fitted,
+        result.acceleration_mm_s2, *_value_and_interval(result.vel_ori_deg_s),
+        *_value_and_interval(result.acc_ori_deg_s2), result.turning_rms_mm, result.noise_mm,
+        result.rms_mm, result.max_mm, [_section_record(section) for section in result.sections],
         [_corner_record(corner) for corner in result.corners],
     )  # fmt: skip
     record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
     return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+
+
+def _value_and_interval(estimate: "Estimate | None") -> tuple[float | None, list[float] | None]:
+    return (None, None) if estimate is None else (estimate.value, _interval(estimate))
 
 
 def _interval(estimate: "Estimate") -> list[float] | None:
@@ -204,6 +221,9 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
         values["cdis_mm"] = round(result.cdis_mm.value, 4)
     if result.law != "undecided":
         values["law"] = result.law
+    for key, found in (("vel_ori_deg_s", result.vel_ori_deg_s), ("acc_ori_deg_s2", result.acc_ori_deg_s2)):
+        if found is not None:
+            values[key] = round(found.value, 3)
     values["source"] = (
         f"identified from {Path(trace).name}: k {result.k_s.value:.5f} s, 90 % "
         f"{result.k_s.low:.5f} to {result.k_s.high:.5f}, residuals {result.rms_mm:.4f} mm rms"

@@ -6,12 +6,15 @@ import click
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, common_options, read_cell, require_other
-from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 
 @click.command("make-test")
 @click.argument("what", type=click.Choice(["controller"]))
-@click.option("-o", "--output", metavar="TEST.nc", required=True, help="Output. - is standard output.")
+@click.option(
+    "-o", "--output", metavar="TEST.src|TEST.nc", required=True,
+    help="Output: a KRL program, or its G-code. - is standard output (G-code).",
+)  # fmt: skip
 @common_options
 @click.option(
     "--at", nargs=3, type=float, metavar="X Y Z",
@@ -21,42 +24,66 @@ def command(
     what: str, output: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     at: tuple[float, float, float] | None,
 ) -> int:  # fmt: skip
-    """Write the G-code of a test program: air moves whose trace tells how the controller plans.
+    """Write a test program: air moves whose trace tells how the controller plans.
 
-    Translate it, run it with nothing below the tool and override 100 %, record the commanded position, and
-    hand the trace to `gcode2krl identify controller`. Reorientations cannot be written in three-axis G-code
-    and are not tested.
+    As .src it is complete. As .nc it is to be translated and lacks the lines that turn the tool, which
+    three-axis G-code cannot say. Run it with nothing below the tool and override 100 %, record the commanded
+    position, and hand the trace to `gcode2krl identify controller`.
     """
     console = Console(quiet or output == STANDARD, as_json)
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
-        text = _program(cell_path, at)
         if output == STANDARD:
-            click.echo(text, nl=False)
+            click.echo(_gcode(cell_path, at), nl=False)
             return 0
         file = Path(output)
         require_other(file, *((cell_path,) if cell_path else ()))
-        from gcode2krl.krl.files import write_together
-
-        write_together({file: text.encode("ascii")})
+        write = _write_krl if file.suffix.lower() == ".src" else _write_gcode
+        files, lines, issues = write(file, cell_path, at)
     except Gcode2KrlError as error:
         if not as_json:
             raise
         console.json({"files": [], "lines": None, "issues": issue_dicts(error.issues)})
         return error.exit_code
     if as_json:
-        console.json({"files": [str(file)], "lines": text.count("\n"), "issues": []})
+        console.json({"files": [str(name) for name in files], "lines": lines, "issues": issue_dicts(issues)})
         return 0
-    console.say(f"{file}: {text.count(chr(10))} lines of air moves")
-    console.say(
-        f"  next: gcode2krl {file} -o {file.with_suffix('.src')}, run it, record the commanded position,"
-    )
-    console.say(f"  then: gcode2krl identify controller trace.csv --part {file}")
+    console.findings(issues, file.name)
+    console.say(f"{', '.join(map(str, files))}: {lines} lines, air moves")
+    if file.suffix.lower() == ".src":
+        console.say("  next: run it, record the commanded position,")
+        console.say("  then: gcode2krl identify controller trace.csv")
+    else:
+        program = file.with_suffix(".src")
+        console.say(f"  next: gcode2krl {file} -o {program}, run it, record the commanded position,")
+        console.say(f"  then: gcode2krl identify controller trace.csv --part {file}")
     return 0
 
 
-def _program(cell_path: str | None, at: tuple[float, float, float] | None) -> str:
+def _write_krl(
+    file: Path, cell_path: str | None, at: tuple[float, float, float] | None
+) -> tuple[list[Path], int, tuple[Issue, ...]]:
+    """Write the program with the lines that turn the tool; returns files, lines and findings."""
+    from gcode2krl.krl import write_krl
+    from gcode2krl.predict import controller_test_targets
+
+    cell = read_cell(cell_path)
+    written = write_krl(controller_test_targets(cell, at), file, cell, options="test of the controller")
+    return list(written.files), sum(text.count(b"\n") for text in written.texts.values()), written.issues
+
+
+def _write_gcode(
+    file: Path, cell_path: str | None, at: tuple[float, float, float] | None
+) -> tuple[list[Path], int, tuple[Issue, ...]]:
+    from gcode2krl.krl.files import write_together
+
+    text = _gcode(cell_path, at)
+    write_together({file: text.encode("ascii")})
+    return [file], text.count("\n"), ()
+
+
+def _gcode(cell_path: str | None, at: tuple[float, float, float] | None) -> str:
     from gcode2krl.krc4.trial_program import controller_test_program
 
     return controller_test_program(read_cell(cell_path), at or None)

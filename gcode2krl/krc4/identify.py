@@ -9,8 +9,9 @@ Intervals hold for independent noise of any variance (White's estimator with lev
 MacKinnon & White 1985); they do not cover a controller that plans by another law, which shows as residuals
 above the noise of the standstills and is said.
 
-Assumptions: the acceleration is the programmed one and the override 100 %; orientation does not change; the
-model for unequal speeds, which is no measurement, is judged by the fit and takes no part in it.
+Assumptions: the acceleration is the programmed one and the override 100 %; the model for unequal speeds,
+which is no measurement, is judged by the fit and takes no part in it. Lines on which the tool turns take no
+part either: they give `$VEL.ORI` and `$ACC.ORI` afterwards, see `identify_turning`.
 """
 
 import math
@@ -35,6 +36,7 @@ from gcode2krl.krc4.identify_fit import (
     residual_of,
     slope_of,
 )
+from gcode2krl.krc4.identify_turning import fit_turning
 from gcode2krl.krc4.motion import build_chain
 from gcode2krl.krc4.profile import UNLIMITED
 from gcode2krl.runs import ControllerTrace, check_scale, resolution_mm
@@ -87,6 +89,8 @@ class Section:
     """(m, 3) of the fitted law."""
     corner_deg: float
     """Sharpest blended interior angle, 180 where there is none."""
+    turns: bool = False
+    """True where the tool turns on the way."""
 
     @property
     def rms_mm(self) -> float:
@@ -134,6 +138,11 @@ class Identification:
     """The law of the values: the decided one, else the cell's."""
     acceleration_mm_s2: float
     """Programmed, from the cell."""
+    vel_ori_deg_s: Estimate | None
+    """None where no line turns the tool at that limit."""
+    acc_ori_deg_s2: Estimate | None
+    turning_rms_mm: float | None
+    """Residuals of the lines on which the tool turns, one axis."""
     noise_mm: float
     """1-sigma of one axis at standstill, rounding included."""
     rms_mm: float
@@ -178,7 +187,7 @@ def identify_controller(trace: ControllerTrace, targets: Targets, cell: Cell) ->
     pieces, unmatched = cut_pieces(trace, targets, chain)
     controller = cell.controller
     in_view = UNLIMITED if controller.advance == "unlimited" else int(controller.advance)
-    settings = Settings(controller.acc_cp_m_s2 * MM_PER_M, in_view, controller.cycle_s)
+    settings = Settings(in_view, controller.cycle_s)
     fits = {law: fit_law(pieces, law, settings) for law in LAWS}
     evidence = _evidence(fits, pieces)
     law: Literal["averages", "trapezoid", "undecided"] = "undecided"
@@ -190,7 +199,7 @@ def identify_controller(trace: ControllerTrace, targets: Targets, cell: Cell) ->
     if law == "undecided":
         k_s = _union(k_s, _estimates(fits[_other(law_fitted)], pieces, settings)[0])
     _require_k(k_s, trace)
-    return _result(trace, pieces, unmatched, fit, law, evidence, k_s, ratio, settings)
+    return _result(trace, pieces, unmatched, fit, law, evidence, k_s, ratio, settings, cell)
 
 
 # --- what it means --------------------------------------------------------------------------------------
@@ -261,7 +270,7 @@ def _require_k(k_s: Estimate, trace: ControllerTrace) -> None:
 def _result(
     trace: ControllerTrace, pieces: list[Piece], unmatched: int, fit: Fit,
     law: Literal["averages", "trapezoid", "undecided"], evidence: float, k_s: Estimate, ratio: Estimate,
-    settings: Settings,
+    settings: Settings, cell: Cell,
 ) -> Identification:  # fmt: skip
     sections = tuple(_section(piece, fit, number, settings) for number, piece in enumerate(pieces))
     noise = _noise_at_rest(pieces, resolution_mm(trace.position_mm))
@@ -277,6 +286,7 @@ def _result(
     cdis = None
     if len(levels) and _determined(ratio):
         cdis = Estimate(*(float(levels[-1] * value) for value in (ratio.value, ratio.low, ratio.high)))
+    vel_ori, acc_ori, turning_rms = _turning(pieces, fit, settings, cell)
     result = Identification(
         k_s=k_s,
         k_cycles=max(1, round(k_s.value / settings.cycle_s)),
@@ -286,7 +296,10 @@ def _result(
         law=law,
         law_evidence=evidence,
         law_fitted=fit.law,
-        acceleration_mm_s2=settings.a_mm_s2,
+        acceleration_mm_s2=cell.controller.acc_cp_m_s2 * MM_PER_M,
+        vel_ori_deg_s=vel_ori,
+        acc_ori_deg_s2=acc_ori,
+        turning_rms_mm=turning_rms,
         noise_mm=noise,
         rms_mm=rms,
         max_mm=max(section.max_mm for section, piece in zip(sections, pieces, strict=True) if piece.fitted),
@@ -296,6 +309,21 @@ def _result(
         issues=(),
     )
     return replace(result, issues=tuple(_issues(result, trace, levels, sections)))
+
+
+def _turning(
+    pieces: list[Piece], fit: Fit, settings: Settings, cell: Cell
+) -> tuple[Estimate | None, Estimate | None, float | None]:
+    """Return `$VEL.ORI`, `$ACC.ORI` and the residuals of the lines that turn the tool."""
+    controller = cell.controller
+    programmed = (controller.vel_ori_deg_s, controller.acc_ori_deg_s2)
+    found = fit_turning(pieces, fit, programmed, controller.acc_cp_m_s2, settings)
+    if found is None:
+        return None, None, None
+    values, errors, rms = found
+    half = _QUANTILE_90 * errors
+    vel, acc = (_around(float(values[at]), float(half[at])) for at in (0, 1))
+    return vel if _determined(vel) else None, acc if _determined(acc) else None, rms
 
 
 def _section(piece: Piece, fit: Fit, number: int, settings: Settings) -> Section:
@@ -314,6 +342,7 @@ def _section(piece: Piece, fit: Fit, number: int, settings: Settings) -> Section
         position_mm=piece.position_mm,
         model_mm=modelled(piece, start, fit.k_s, piece.cdis_mm * fit.ratio, fit.law, settings),
         corner_deg=2.0 * math.acos(min(1.0, sharpest)) * DEG_PER_RAD,
+        turns=bool((piece.angle_rad > 0).any()),
     )
 
 
@@ -420,8 +449,20 @@ def _issues(
             "this line; the intervals do not cover that",
             "was the override 100 %, and $ACC.CP that of the cell?",
         )  # fmt: skip
+    if result.turning_rms_mm is not None:
+        if result.turning_rms_mm > limit + _FLOOR_MM:
+            yield Issue(
+                "note", "turning-misfit", 0,
+                f"lines that turn the tool leave (assumed model) {result.turning_rms_mm:.4f} mm rms",
+            )  # fmt: skip
+        if result.vel_ori_deg_s is None:
+            yield Issue(
+                "note", "not-determined", 0,
+                "$VEL.ORI is not determined: no line turns long enough to reach it",
+                "lower vel_ori_deg_s in the cell of the test program",
+            )  # fmt: skip
     for section in sections:
-        if not section.fitted and section.rms_mm > limit + _FLOOR_MM:
+        if not section.fitted and not section.turns and section.rms_mm > limit + _FLOOR_MM:
             yield Issue(
                 "note", "unequal-speeds", section.first_line,
                 f"the model for unequal speeds (an assumption) is {section.rms_mm:.4f} mm rms off here",

@@ -35,7 +35,6 @@ _MARGIN_SAMPLES = 8
 class Settings:
     """What is not fitted."""
 
-    a_mm_s2: float
     moves_in_view: int
     cycle_s: float
 
@@ -48,6 +47,11 @@ class Piece:
     end_mm: Floats
     length_mm: Floats
     speed_mm_s: Floats
+    acceleration_mm_s2: Floats
+    angle_rad: Floats
+    """(n,) by which the tool turns on the way."""
+    wanted_mm_s: Floats
+    """(n,) programmed speeds, before `$VEL.ORI`."""
     wait_s: Floats
     stop: NDArray[np.bool_]
     cdis_mm: Floats
@@ -72,7 +76,7 @@ class Piece:
         """Plan the section."""
         return plan_profile(
             self.length_mm, self.speed_mm_s, blend_mm, self.stop, self.wait_s,
-            settings.a_mm_s2, k_s, settings.moves_in_view, law == "averages",
+            self.acceleration_mm_s2, k_s, settings.moves_in_view, law == "averages",
         )  # fmt: skip
 
 
@@ -132,6 +136,7 @@ def _piece(
     length = np.array(chain.length_mm[rows])
     half = np.append(np.minimum(length[:-1], length[1:]) / 2.0, 0.0)
     speed = np.array(chain.speed_mm_s[rows])
+    angle = np.array(chain.angle_rad[rows])
     wait = np.array(chain.wait_s[rows])
     wait[-1] = 0.0
     index = np.arange(low, high)
@@ -141,13 +146,18 @@ def _piece(
         end_mm=np.array(chain.end_mm[rows]),
         length_mm=length,
         speed_mm_s=speed,
+        acceleration_mm_s2=np.array(chain.acceleration_mm_s2[rows]),
+        angle_rad=angle,
+        wanted_mm_s=np.array(targets.speed_mm_s[target_rows]),
         wait_s=wait,
         stop=stop,
         cdis_mm=np.array(targets.cdis_mm[target_rows]),
         half_mm=half,
         cos_half=np.array(chain.cos_half[rows]),
         source_line=np.array(chain.source_line[rows], dtype=np.int64),
-        fitted=bool((stop[:-1] | (speed[:-1] == speed[1:])).all()) and not targets.ptp[target_rows].any(),
+        fitted=bool((stop[:-1] | (speed[:-1] == speed[1:])).all())
+        and not targets.ptp[target_rows].any()
+        and not (angle > 0).any(),
         time_s=np.array(trace.time_s[low:high]),
         position_mm=np.array(trace.position_mm[low:high]),
         middle_s=0.5 * float(trace.time_s[last_still] + trace.time_s[first_still]),

@@ -36,6 +36,10 @@ class Chain:
     """(n,) lengths over ``scale``; a mere reorientation counts as the way it takes the time of."""
     speed_mm_s: Floats
     """(n,) programmed speeds over ``scale``."""
+    acceleration_mm_s2: Floats
+    """(n,) ``$ACC.CP``, or what ``$ACC.ORI`` leaves of it, over ``scale``."""
+    angle_rad: Floats
+    """(n,) angle that the tool turns by."""
     blend_mm: Floats
     """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop, or straight on."""
     stop: NDArray[np.bool_]
@@ -71,11 +75,11 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     length = np.linalg.norm(end - start, axis=1)
     rapid = cell.controller.rapid_m_s * MM_PER_M
     speed = np.where(targets.ptp[rows], rapid, targets.speed_mm_s[rows])
-    length, speed = _with_orientation(length, speed, from_rotation, to_rotation, cell)
+    length, speed, acceleration, angle = _with_orientation(length, speed, from_rotation, to_rotation, cell)
     d, cos_half = _blends(start, end, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
     d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
-    scale = _scales(length, speed, d, targets.cdis_mm[rows], stop, cell)
+    scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell)
     move = targets.move[rows]
     following = np.flatnonzero(move >= 0)
     owner = move[following[np.minimum(np.searchsorted(following, np.arange(len(move))), len(following) - 1)]]
@@ -87,6 +91,8 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         to_rotation=to_rotation,
         length_mm=length / scale,
         speed_mm_s=speed / scale,
+        acceleration_mm_s2=acceleration / scale,
+        angle_rad=angle,
         blend_mm=d,
         stop=stop,
         wait_s=targets.wait_s[rows],
@@ -108,7 +114,7 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
         chain.blend_mm,
         chain.stop,
         chain.wait_s,
-        controller.acc_cp_m_s2 * MM_PER_M / chain.scale,
+        chain.acceleration_mm_s2,
         controller.k_s,
         in_view,
         controller.law == "averages",
@@ -198,21 +204,32 @@ def _stop_issues(chain: Chain, profile: Profile, cell: Cell) -> list[Issue]:
 
 def _with_orientation(
     length: Floats, speed: Floats, from_rotation: Floats, to_rotation: Floats, cell: Cell
-) -> tuple[Floats, Floats]:
-    """Limit the speed by ``$VEL.ORI``; a reorientation on the spot gets the length it takes the time of."""
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return length, speed, acceleration and angle (n,) of moves, limited by ``$VEL.ORI`` and ``$ACC.ORI``.
+
+    Position and orientation share one time law: an angle w over a length l limits the speed to
+    ``$VEL.ORI``·l/w and the acceleration to ``$ACC.ORI``·l/w (assumption, the paper turns nothing). A
+    reorientation on the spot gets the length that it takes the time of.
+    """
+    controller = cell.controller
+    a_cp = np.full(len(length), controller.acc_cp_m_s2 * MM_PER_M)
     if len(length) == 0 or bool(
         (to_rotation == to_rotation[0]).all() and (from_rotation == to_rotation[0]).all()
     ):
-        return length, speed
+        return length, speed, a_cp, np.zeros(len(length))
     angle = fr.angle_between(from_rotation, to_rotation)
-    most_rad_s = cell.controller.vel_ori_deg_s * RAD_PER_DEG
     turning = angle > 1e-12
-    way = np.where(turning & (length * most_rad_s < angle * speed), angle * speed / most_rad_s, length)
-    on_spot = length < 1e-9
-    limited = np.where(
-        on_spot | ~turning, speed, np.minimum(speed, length * most_rad_s / np.where(turning, angle, 1.0))
+    most_rad_s, most_rad_s2 = controller.vel_ori_deg_s * RAD_PER_DEG, controller.acc_ori_deg_s2 * RAD_PER_DEG
+    on_spot = turning & (length < 1e-9)
+    length = np.where(on_spot, angle * speed / most_rad_s, length)
+    mm_per_rad = np.where(turning, length / np.where(turning, angle, 1.0), np.inf)
+    a_ori = most_rad_s2 * mm_per_rad
+    return (
+        length,
+        np.minimum(speed, most_rad_s * mm_per_rad),
+        np.where(on_spot, a_ori, np.minimum(a_cp, a_ori)),
+        angle,
     )
-    return np.where(on_spot, way, length), limited
 
 
 def _blends(start: Floats, end: Floats, length: Floats, cdis: Floats) -> tuple[Floats, Floats]:
@@ -234,8 +251,9 @@ def _blends(start: Floats, end: Floats, length: Floats, cdis: Floats) -> tuple[F
 
 
 def _scales(
-    length: Floats, speed: Floats, blend: Floats, cdis: Floats, stop: NDArray[np.bool_], cell: Cell
-) -> Floats:
+    length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
+    stop: NDArray[np.bool_], cell: Cell,
+) -> Floats:  # fmt: skip
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
     A corner takes a change of speed where |v2 - v1|/a + k <= T, its duration (design assumption, the paper is
@@ -245,7 +263,7 @@ def _scales(
     v1, v2 = speed[:-1], speed[1:]
     ratio = v2 / v1
     widest = np.minimum(cdis[:-1] / np.maximum(1.0, ratio), np.minimum(length[:-1], length[1:] / ratio) / 2)
-    a, k = cell.controller.acc_cp_m_s2 * MM_PER_M, cell.controller.k_s
+    a, k = np.minimum(acceleration[:-1], acceleration[1:]), cell.controller.k_s
     enough = np.abs(v2 - v1) / a + k <= 2.0 * widest / v1
     wide = (blend[:-1] > 0) & ~stop[:-1] & (v1 != v2) & enough
     advance = cell.controller.advance
@@ -254,7 +272,7 @@ def _scales(
         seen = (
             length[row + 1 :].sum() if advance == "unlimited" else length[row + 1 : row + 1 + advance].sum()
         )
-        if fastest * (fastest / a + k) / 2 > seen:
+        if fastest * (fastest / a[row] + k) / 2 > seen:
             continue
         chain_end = row + 1 + int(np.argmax(stop[row + 1 :]))
         scale[row + 1 : chain_end + 1] *= ratio[row]

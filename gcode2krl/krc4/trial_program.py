@@ -2,16 +2,20 @@
 
 Rest-to-rest sections, each ended by an exact stop and a dwell, so that a trace can be cut at its standstills:
 single lines of 1-50 mm at three speeds (they decide k and the law), two lines at unequal speeds, and
-corners of 30-170° (they decide the effective CDIS). Reorientations, which also belong to a complete test of
-the controller, cannot be written in three-axis G-code and are left out.
+corners of 30-170° (they decide the effective CDIS). Lines on which the tool turns cannot be said in
+three-axis G-code: `with_turning_lines` adds them to the targets, for a program that is written as KRL.
 """
 
 import math
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
+from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.tables import Targets
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, S_PER_MIN
 
 LENGTHS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -20,6 +24,8 @@ ANGLES_DEG = (30.0, 60.0, 90.0, 120.0, 150.0, 170.0)
 CDIS_MM = 5.0
 CORNER_LINE_MM = 40.0
 DWELL_S = 0.3
+TURNS = ((20.0, 5.0), (40.0, 10.0), (40.0, 20.0), (80.0, 30.0))
+"""Lines that turn the tool: length in mm and angle in degrees, there and back."""
 BELOW_CLEARANCE_MM = 40.0
 _SPINDLE_RPM = 1000.0
 _ROW_MM = 10.0
@@ -59,6 +65,38 @@ def controller_test_program(cell: Cell, origin_mm: tuple[float, float, float] | 
     return "\n".join(program.lines) + "\n"
 
 
+def with_turning_lines(targets: Targets, cell: Cell) -> Targets:
+    """Return the test program's targets with lines at its end on which the tool turns, there and back.
+
+    They begin and end where the last line ended, along x, turning about -y, which bends the wrist more;
+    each ends with an exact stop and a dwell. They carry row and line of the last programmed motion.
+    """
+    last = int(np.flatnonzero(targets.move >= 0)[-1])
+    count = 2 * len(TURNS)
+    turns = np.array(TURNS)
+    away = np.arange(count) % 2 == 0
+    position = np.repeat(targets.position_mm[last : last + 1], count, axis=0)
+    position[away, 0] += turns[:, 0]
+    rotation = np.repeat(targets.rotation[last : last + 1], count, axis=0)
+    own = fr.rotation_from_quaternion(rotation[away])
+    abc = np.zeros((len(turns), 3))
+    abc[:, 1] = -turns[:, 1] * RAD_PER_DEG
+    rotation[away] = fr.quaternion_from_rotation(fr.rotation_from_abc(abc) @ own)
+    speed = np.full(count, _speeds(cell)[-1])
+    added: dict[str, Any] = {"position_mm": position, "rotation": rotation, "speed_mm_s": speed}
+    columns: dict[str, Any] = {}
+    for spec in fields(targets):
+        if "tail" not in spec.metadata:
+            continue
+        values = getattr(targets, spec.name)
+        new = added.get(spec.name, np.repeat(values[last : last + 1], count, axis=0))
+        columns[spec.name] = np.concatenate([values[: last + 1], new, values[last + 1 :]])
+    events = tuple(
+        event._replace(row=event.row + count) if event.row >= last else event for event in targets.events
+    )
+    return replace(targets, **columns, events=events)
+
+
 def corner_tolerance_mm(angle_deg: float, cdis_mm: float = CDIS_MM) -> float:
     """Return the P of G64 that gives a CDIS at a corner: CDIS·cos(alpha/2)/2 (Bigliardi et al., eq. 1-3)."""
     exact = cdis_mm * math.cos(0.5 * angle_deg * RAD_PER_DEG) / 2.0
@@ -79,7 +117,7 @@ class _Writer:
             "%",
             "(TEST OF THE CONTROLLER: RECORD THE COMMANDED POSITION AT THE INTERPOLATION CYCLE)",
             "(AIR MOVES: NO WORK, NO CLAMPS BELOW THE TOOL, OVERRIDE 100 PERCENT)",
-            "(REORIENTATIONS CANNOT BE WRITTEN IN THREE-AXIS G-CODE AND ARE NOT TESTED)",
+            "(LINES THAT TURN THE TOOL ARE ONLY IN THE KRL FORM OF THIS TEST)",
             "G21 G90 G17 G40 G49 G80 G94",
             f"T{tool} M6",
             f"S{rpm:.0f} M3",

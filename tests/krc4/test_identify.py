@@ -16,7 +16,8 @@ from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.krc4 import identify
 from gcode2krl.krc4.identify import identify_controller
-from gcode2krl.krc4.trial_program import CDIS_MM, controller_test_program, corner_tolerance_mm
+from gcode2krl.krc4.trial_program import CDIS_MM, TURNS, controller_test_program, corner_tolerance_mm
+from gcode2krl.predict import controller_test_targets
 from gcode2krl.runs import ControllerTrace
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -52,6 +53,52 @@ def targets(text, cell):
     return targets_of(text, cell)
 
 
+# --- lines that turn the tool ---------------------------------------------------------------------------
+
+
+def turning_trace(text, cell, controller, vel_ori, acc_ori, seed=3):
+    rng = np.random.default_rng(seed)
+    start = np.array([100.0, 0.0, 60.0])
+    legs = bench.legs_of(text)
+    for length, angle in TURNS:
+        end = start + np.array([length, 0.0, 0.0])
+        for way in ((start, end), (end, start)):
+            legs.append(bench.turning_leg(*way, angle, vel_ori, acc_ori, 200.0, 0.3))
+    t, position = bench.simulate(legs, controller, rng, noise_mm=0.005)
+    return ControllerTrace(t, position, np.arange(len(t)) + 2, 0, "trace.csv")
+
+
+@pytest.mark.parametrize("law", ["averages", "trapezoid"])
+def test_turning_lines_give_the_limits_of_orientation(text, cell, law):
+    slow = {"vel_ori_deg_s": 30.0, "acc_ori_deg_s2": 150.0, "law": law}
+    own = cell.model_copy(update={"controller": cell.controller.model_copy(update=slow)})
+    trace = turning_trace(text, cell, Controller(law=law), vel_ori=24.0, acc_ori=110.0)
+    found = identify_controller(trace, controller_test_targets(own), own)
+    assert found.vel_ori_deg_s.value == pytest.approx(24.0, rel=1e-3)
+    assert found.acc_ori_deg_s2.value == pytest.approx(110.0, rel=5e-3)
+    assert found.k_s.contains(0.168)
+    assert found.turning_rms_mm < 0.01
+
+
+def test_turning_lines_that_never_reach_their_speed_leave_it_open(text, cell):
+    trace = turning_trace(text, cell, Controller(), vel_ori=200.0, acc_ori=100.0)
+    found = identify_controller(trace, controller_test_targets(cell), cell)
+    assert found.vel_ori_deg_s is None
+    assert found.acc_ori_deg_s2.value == pytest.approx(100.0, rel=0.01)
+    assert any("$VEL.ORI is not determined" in issue.message for issue in found.issues)
+
+
+def test_the_krl_form_has_the_turning_lines_and_its_trace_is_read(run, text, cell, tmp_path):
+    made = run("make-test", "controller", "-o", "test.src", "--json")
+    assert made.code == 0, made.err
+    source = Path("test.src").read_text("ascii")
+    assert all(f"B -{angle:.4f}" in source for _, angle in TURNS)
+    write_csv(turning_trace(text, cell, Controller(), 200.0, 100.0), Path("trace.csv"))
+    outcome = run("identify", "controller", "trace.csv", "--json")
+    record = json.loads(outcome.out)
+    assert record["acc_ori_deg_s2"] == pytest.approx(100.0, rel=0.01)
+
+
 # --- the program ----------------------------------------------------------------------------------------
 
 
@@ -82,8 +129,8 @@ def test_program_holds_what_it_promises(targets):
     assert sorted(set(np.round(np.degrees(np.arccos(cosine))))) == [30, 60, 90, 120, 150, 170]
 
 
-def test_reorientations_are_said_not_to_be_there(text):
-    assert "REORIENTATIONS CANNOT BE WRITTEN" in text
+def test_gcode_says_that_it_lacks_the_turning_lines(text):
+    assert "LINES THAT TURN THE TOOL ARE ONLY IN THE KRL FORM" in text
 
 
 @pytest.mark.parametrize("angle", [30.0, 90.0, 170.0])
