@@ -198,6 +198,8 @@ class Forces(Table):
     """(m,) width of cut normal to the feed."""
     phi_rad: Floats = _column(np.float64, None)
     """(m, 2k) entry and exit angles of the engagement arcs from the feed normal, NaN padded."""
+    tool: Ints = _column(np.int32)
+    """(m,) tool number that cuts."""
     relative_band: float = 0.0
     """Half-width of the 90 % band of the forces, relative."""
 

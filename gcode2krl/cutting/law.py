@@ -1,0 +1,102 @@
+"""How much force a chip takes: the material's law as numbers, the chip from speed and spindle, its limits."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gcode2krl.cutting.slices import KIENZLE, LINEAR_EDGE
+from gcode2krl.errors import input_error
+from gcode2krl.sections import Material
+from gcode2krl.units import MM_PER_M, RAD_PER_REV
+
+Floats = NDArray[np.float64]
+
+THIN_CHIP_MM = 0.005
+"""Below this largest chip an edge rubs and ploughs rather than cuts: an assumption, about the edge radius of
+a sharp carbide mill; the smallest chip that still comes off is 0.2-0.4 of that radius. Linear edge
+coefficients, fitted above it, then overestimate what cuts and say nothing about heat and wear."""
+
+THICK_CHIP_MM = 0.2
+"""Above this largest chip the linear edge sets of the library are extrapolated: fitted at 0.025-0.2 mm a
+tooth."""
+
+
+def law_array(material: Material) -> Floats:
+    """Return a material's force law (8,) as compiled code takes it (see `slices.arc_force`).
+
+    Raises an input error where the material has no law.
+    """
+    if material.kienzle is not None:
+        law = material.kienzle
+        values = (KIENZLE, law.kc11, law.mc, law.radial_ratio, law.axial_ratio, 0.0, 0.0, 0.0)
+        return np.array(values)
+    if material.linear_edge is None:
+        raise input_error(
+            "material-without-law",
+            f"[material] {material.model or material.name!r} has neither linear_edge nor kienzle",
+            "give one of them, or name a material of the library (`gcode2krl models list`)",
+        )
+    return linear_edge_law(material.linear_edge.array())
+
+
+def linear_edge_law(coefficients: ArrayLike) -> Floats:
+    """Return the law (8,) of Ktc, Krc, Kac in N/mm² and Kte, Kre, Kae in N/mm (6,)."""
+    six = np.asarray(coefficients, dtype=float)
+    if six.shape != (6,) or not np.isfinite(six).all():
+        raise input_error(
+            "force-input",
+            f"coefficients: found {six.tolist()}, allowed: six finite numbers Ktc, Krc, Kac, Kte, Kre, Kae",
+        )
+    return np.array([LINEAR_EDGE, *six, 0.0])
+
+
+def feed_per_tooth(speed_mm_s: ArrayLike, spindle_rad_s: ArrayLike, teeth: int) -> Floats:
+    """Return the feed per tooth f_z = 2·pi·v/(N·|omega|) in mm (n,), 0 where the spindle stands.
+
+    `speed_mm_s` is the predicted speed along the path, plunges included, not the programmed feed. Without
+    rotation there is no chip, so no force; moving through material then is a collision, found elsewhere.
+    """
+    speed, omega = np.broadcast_arrays(
+        np.abs(np.asarray(speed_mm_s, dtype=float)), np.abs(np.asarray(spindle_rad_s, dtype=float))
+    )
+    turning = omega > 0.0
+    per_tooth = RAD_PER_REV * speed / (teeth * np.where(turning, omega, 1.0))
+    return np.asarray(np.where(turning, per_tooth, 0.0))
+
+
+def contact_feed(f_z_mm: ArrayLike, advance_mm: ArrayLike) -> Floats:
+    """Return the feed per tooth (n,) limited to what the tool has advanced into virgin stock.
+
+    ``advance_mm`` (n,) is the path since the first contact; inf in a running cut. The tooth that meets
+    untouched material cannot take more than the tool has entered it: that is the real advance, never the
+    distance between two samples, which is many teeth long.
+    """
+    advance = np.maximum(np.asarray(advance_mm, dtype=float), 0.0)
+    return np.asarray(np.minimum(np.asarray(f_z_mm, dtype=float), advance))
+
+
+def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.0) -> Floats:
+    """Return the largest chip thickness (n,) in mm on a cylinder's edge and on the bottom over the arcs.
+
+    ``phi_rad`` (n, 2k), NaN pairs are none; 0 without an arc. To compare with `THIN_CHIP_MM`,
+    `THICK_CHIP_MM`.
+    """
+    arcs = np.atleast_2d(np.asarray(phi_rad, dtype=float))
+    start, end = arcs[:, 0::2], arcs[:, 1::2]
+    with np.errstate(invalid="ignore"):
+        engaged = end > start
+        crest = start + np.mod(
+            math.pi / 2 - start, 2.0 * math.pi
+        )  # first angle behind the start with sin = 1
+        sine = np.where(crest <= end, 1.0, np.maximum(np.sin(start), np.sin(end)))
+    sine = np.where(engaged, sine, -np.inf).max(axis=1, initial=-np.inf)
+    gamma = np.asarray(ramp_rad, dtype=float)
+    per_feed = np.maximum(np.maximum(sine, 0.0) * np.cos(gamma), np.where(sine > -np.inf, np.sin(gamma), 0.0))
+    return np.asarray(np.asarray(f_z_mm, dtype=float) * np.maximum(per_feed, 0.0))
+
+
+def spindle_power(torque_Nmm: ArrayLike, spindle_rad_s: ArrayLike) -> Floats:
+    """Return the cutting power (n,) in W: torque times speed of rotation, without losses of the spindle."""
+    torque = np.asarray(torque_Nmm, dtype=float)
+    return np.asarray(torque * np.abs(np.asarray(spindle_rad_s, dtype=float)) / MM_PER_M)
