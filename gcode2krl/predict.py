@@ -12,9 +12,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import gcode, krc4, program, robot
+from gcode2krl import compliance, gcode, krc4, program, robot
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.krc4 import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Motion, Targets, Toolpath
@@ -23,6 +23,7 @@ from gcode2krl.version import __version__
 
 Floats = NDArray[np.float64]
 _SLOWING_ROUNDS = 3
+_ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 
 
@@ -255,14 +256,46 @@ def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
 
 def _spin_of(cell: Cell) -> Callable[[Floats, Floats, NDArray[np.int32]], Floats | float]:
     spin = cell.frames.spin
-    if spin != "auto":
+    if not isinstance(spin, str):
         return lambda position, axis, tool: float(spin) * RAD_PER_DEG
+    if spin == "stiffest":
+        missing = compliance.missing_stiffness(cell)
+        if missing is not None:
+            raise NotUnderstoodError(missing, source=cell.name)
 
-    def automatic(position: Floats, axis: Floats, tool: NDArray[np.int32]) -> Floats | float:
+    def searched(position: Floats, axis: Floats, tool: NDArray[np.int32]) -> Floats | float:
         def quality(rows: NDArray[np.int64], spin_rad: float) -> Floats:
             rotation = program.tool_rotation(axis[rows], spin_rad)
             return robot.pose_quality(position[rows], rotation, tool[rows], cell)
 
+        def bending(rows: NDArray[np.int64], spin_rad: float) -> Floats:
+            rotation = program.tool_rotation(axis[rows], spin_rad)
+            return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
+
+        if spin == "stiffest":
+            return program.stiffest_spin(position, quality, bending)
         return program.smooth_spin(position, quality)
 
-    return automatic
+    return searched
+
+
+def _bending_mm(
+    position: Floats, rotation: Floats, axis: Floats, tool: NDArray[np.int32], cell: Cell
+) -> Floats:
+    """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
+
+    The root mean square over all directions across the axis; NaN where a branch cannot be.
+    """
+    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    result = np.full((len(position), 8), np.nan)
+    for number in np.unique(tool):
+        rows = np.flatnonzero(tool == number)
+        q = robot.inverse(position[rows], rotation[rows], cell, int(number)).reshape(-1, 6)
+        square = np.zeros(len(q))
+        for direction in (across[rows], np.cross(axis[rows], across[rows])):
+            load_N = np.repeat(_ACROSS_N * direction, 8, axis=0)
+            bent_mm, _ = compliance.deflection_of(q, load_N, np.zeros(3), np.zeros(3), cell, int(number))
+            square += np.einsum("ij,ij->i", bent_mm, bent_mm)
+        result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
+    return result

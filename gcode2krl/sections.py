@@ -201,8 +201,9 @@ class Frames(Provenance):
     tool: Frame = Frame()
     """TCP in the flange of a tool of ``tool_length_mm``; z points from tip to holder."""
     tool_length_mm: NotNegative = 0.0
-    spin: Annotated[float, Field(ge=-360, le=360)] | Literal["auto"] = 0.0
-    """Angle in degrees about the tool axis, or ``auto``."""
+    spin: Annotated[float, Field(ge=-360, le=360)] | Literal["auto", "stiffest"] = 0.0
+    """Angle in degrees about the tool axis; ``auto`` keeps away from limits and singularities, ``stiffest``
+    bends least under a load across the tool."""
 
 
 class Home(Section):
@@ -237,6 +238,8 @@ class Spindle(Provenance):
     run_ccw_output: SignalNumber
     speed_analog_output: Annotated[int, Field(ge=1, le=32)]
     at_speed_input: SignalNumber | None = None
+    max_power_W: Positive | None = None
+    max_torque_Nm: Positive | None = None
     start_s: NotNegative = 5.0
     """Waited after M3 where there is no at-speed input."""
     stop_s: NotNegative = 5.0
@@ -336,6 +339,8 @@ class Compliance(Provenance):
     """From the flange face to the mounting face of spindle and holder; the sensor's joint is half-way."""
     relative_band: Annotated[float, Field(ge=0, lt=1)] = 0.1
     """Half-width of the 90 % band of the stiffness, relative."""
+    modes_hz: tuple[Positive, ...] = ()
+    """Structural modes that a spindle speed or tooth passing should keep away from."""
     robot_source: str = ""
     robot_sure: Sure = "unknown"
 

@@ -2,7 +2,7 @@
 
 from gcode2krl.program.checks import check_toolpath
 from gcode2krl.program.orientation import tool_rotation
-from gcode2krl.program.spin import smooth_spin
+from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.targets import plan_targets
 
-__all__ = ["check_toolpath", "plan_targets", "smooth_spin", "tool_rotation"]
+__all__ = ["check_toolpath", "plan_targets", "smooth_spin", "stiffest_spin", "tool_rotation"]

@@ -2,7 +2,7 @@
 
 ``auto`` keeps away from joint limits and singularities. One angle for the whole program where one is good
 enough (the smoothest choice); otherwise an angle that changes slowly along the path, found by dynamic
-programming over a grid.
+programming over a grid. ``stiffest`` picks the angle that bends least, with the same care.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,10 @@ GOOD_ENOUGH = 0.3
 """Quality (1 = 30° from limits and singularities) at which a constant angle is taken."""
 STEP_MM = 25.0
 """Path over which a changing angle may move by one step of the grid."""
+STIFF_QUALITY = 0.15
+"""Least quality of a pose that is taken for its stiffness."""
+_WORTH_TURNING = 0.02
+"""Share of the mean deflection that a changing angle must save against a constant one."""
 _CHANGE_COST = 0.05
 _SAMPLES = 400
 
@@ -30,11 +34,8 @@ def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
     ``quality(rows, spin)`` gives (len(rows), branches): how far the worst of limits and singularities is,
     1 = 30° and more, 0 = at it, negative = impossible; the branch must be one for the whole program.
     """
-    rows = np.unique(np.linspace(0, len(position_mm) - 1, min(_SAMPLES, len(position_mm))).astype(np.int64))
-    extremes = [op(position_mm[:, k]) for k in range(3) for op in (np.argmin, np.argmax)]
-    rows = np.unique(np.concatenate([rows, extremes]))
-    spins = np.arange(-np.pi, np.pi - 1e-9, GRID_RAD)
-    spins = spins[np.argsort(np.abs(spins), kind="stable")]  # the smallest turn wins a tie
+    rows = _judged_rows(position_mm)
+    spins = _grid()
     table = np.stack([quality(rows, float(spin)) for spin in spins])  # (spins, rows, branches)
     worst = np.minimum(table.min(axis=1).max(axis=1), GOOD_ENOUGH + 0.1)
     best = int(np.argmax(np.round(worst, 2)))
@@ -45,12 +46,59 @@ def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
     return float(spins[best]) if changing is None else changing
 
 
+def stiffest_spin(position_mm: Floats, quality: Quality, bending: Quality) -> Floats | float:
+    """Return the spin in rad that bends least: one number, or (p,) where a changing angle saves more.
+
+    ``quality`` as in `smooth_spin`; ``bending(rows, spin)`` gives (len(rows), branches) in mm, any load, NaN
+    where the pose cannot be. One branch for the whole program.
+    """
+    rows, spins = _judged_rows(position_mm), _grid()
+    comfort = np.stack([quality(rows, float(spin)) for spin in spins])
+    bend_mm = np.stack([bending(rows, float(spin)) for spin in spins])
+    possible = (comfort >= STIFF_QUALITY) & np.isfinite(bend_mm)
+    constant = np.where(possible, bend_mm, np.inf).mean(axis=1)  # (spins, branches)
+    best = np.unravel_index(np.argmin(constant), constant.shape)
+    if not np.isfinite(constant[best]):
+        return smooth_spin(position_mm, quality)
+    order = np.argsort(spins)
+    path = _way(position_mm)
+    branch = int(best[1])
+    cost = np.where(possible, bend_mm / constant[best], 1e3)[order][:, :, branch]
+    total, track = _cheapest_track(cost, _allowed_steps(path, rows))
+    if total < (1.0 - _WORTH_TURNING) * len(rows):
+        spin: Floats = np.interp(path, path[rows], spins[order][track])
+        return spin
+    return float(np.round(spins[best[0]], 12) + 0.0)
+
+
+def _grid() -> Floats:
+    """Return the spins that are tried, the smallest turn first, so that it wins a tie."""
+    spins = np.arange(-np.pi, np.pi - 1e-9, GRID_RAD)
+    return spins[np.argsort(np.abs(spins), kind="stable")]
+
+
+def _judged_rows(position_mm: Floats) -> NDArray[np.int64]:
+    """Return rows spread over the program, its outermost points among them."""
+    rows = np.linspace(0, len(position_mm) - 1, min(_SAMPLES, len(position_mm))).astype(np.int64)
+    extremes = [op(position_mm[:, k]) for k in range(3) for op in (np.argmin, np.argmax)]
+    return np.unique(np.concatenate([rows, extremes]))
+
+
+def _way(position_mm: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm, axis=0), axis=1))])
+
+
+def _allowed_steps(path: Floats, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many steps of the grid the spin may take between judged rows."""
+    return np.maximum(1, ((path[rows[1:]] - path[rows[:-1]]) / STEP_MM).astype(np.int64))
+
+
 def _changing(position_mm: Floats, rows: NDArray[np.int64], spins: Floats, table: Floats) -> Floats | None:
     """Dynamic programming along the path, per branch; None where it is no better than a constant."""
     order = np.argsort(spins)
     spins, table = spins[order], table[order]
-    path = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm, axis=0), axis=1))])
-    allowed = np.maximum(1, ((path[rows[1:]] - path[rows[:-1]]) / STEP_MM).astype(int))
+    path = _way(position_mm)
+    allowed = _allowed_steps(path, rows)
     best_cost, best_track = np.inf, None
     for branch in range(table.shape[2]):
         cost_here = np.where(table[:, :, branch] > 0, 1.0 - np.minimum(table[:, :, branch], 1.0), 1e3)

@@ -1,0 +1,135 @@
+"""``gcode2krl identify sensor``: weight, centre of gravity and offsets of the force sensor."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import common_options, read_cell, require_other
+from gcode2krl.errors import Gcode2KrlError
+
+if TYPE_CHECKING:
+    from gcode2krl.compliance.estimate import Estimate
+    from gcode2krl.compliance.identify_sensor import SensorIdentification
+
+
+@click.command("sensor")
+@click.argument("poses")
+@common_options
+@click.option("-o", "--output", metavar="SENSOR.toml", help="Write the calibration for the online side.")
+@click.option(
+    "--gravity",
+    nargs=3,
+    type=float,
+    default=(0.0, 0.0, -1.0),
+    show_default=True,
+    metavar="X Y Z",
+    help="Direction of gravity in the robot root.",
+)
+@click.option(
+    "--noise-N",
+    "noise_N",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    metavar="N",
+    help="Known 1-sigma of a force component.",
+)
+@click.option("--noise-Nmm", "noise_Nmm", type=click.FloatRange(min=0.0), default=0.0, metavar="N·MM",
+              help="Known 1-sigma of a moment component.")  # fmt: skip
+def command(
+    poses: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool, output: str | None,
+    gravity: tuple[float, float, float], noise_N: float, noise_Nmm: float,
+) -> int:  # fmt: skip
+    """Fit weight, centre of gravity and offsets to readings of the unloaded force sensor.
+
+    POSES is CSV: fx_N, fy_N, fz_N, mx_Nmm, my_Nmm, mz_Nmm, and the orientation of the sensor in the robot
+    root as a_deg, b_deg, c_deg, as qx, qy, qz, qw, or as joint angles q1_deg to q6_deg. Three orientations
+    are the least; 20 and more (the paper takes 27) also give what remains, such as the pull of a hose pack.
+    """
+    console = Console(quiet, as_json)
+    files: list[Path] = []
+    try:
+        from gcode2krl.compliance.identify_sensor import identify_sensor
+        from gcode2krl.compliance.sensor_poses import read_poses
+
+        if output is not None:
+            require_other(Path(output), poses)
+        result = identify_sensor(read_poses(poses, read_cell(cell_path)), gravity, noise_N, noise_Nmm)
+        if output is not None:
+            files.append(_write(result, Path(output)))
+    except Gcode2KrlError as error:
+        if not as_json:
+            error.source = error.source or poses
+            raise
+        console.json({**dict.fromkeys(_KEYS), "files": [], "issues": issue_dicts(error.issues)})
+        return error.exit_code
+    if as_json:
+        console.json(_record(result, files))
+        return 0
+    console.findings(result.issues, poses)
+    _say(result, poses, console)
+    for file in files:
+        console.say(f"  wrote   {file}")
+    return 0
+
+
+def _write(result: "SensorIdentification", file: Path) -> Path:
+    from gcode2krl.compliance.sensor import calibration_toml
+    from gcode2krl.krl.files import write_together
+
+    write_together({file: calibration_toml(result.calibration).encode("utf-8")})
+    return file
+
+
+def _say(result: "SensorIdentification", poses: str, console: Console) -> None:
+    console.say(
+        f"{poses}: {result.poses} orientations, {result.level:.0%} intervals, along the sensor's axes"
+    )
+    console.say(f"  weight  {_words(result.weight_N, 2)} N")
+    for name, triple, digits, unit in (
+        ("centre", result.centre_mm, 2, "mm"),
+        ("force", result.force_offset_N, 2, "N offset"),
+        ("moment", result.moment_offset_Nmm, 0, "N·mm offset"),
+    ):
+        for axis, estimate in zip("xyz", triple, strict=True):
+            console.say(f"  {name if axis == 'x' else '':<7} {axis} {_words(estimate, digits)} {unit}")
+    for what, (before, after), unit, left_out in (
+        ("force", result.force_rms_N, "N", result.force_left_out_N),
+        ("moment", result.moment_rms_Nmm, "N·mm", result.moment_left_out_Nmm),
+    ):
+        words = f"  rest    {what} {before:.3g} {unit} rms"
+        if left_out is not None:
+            words += (
+                f", with ten quadratic terms {after:.3g}, at readings left out of their fit {left_out:.3g}"
+            )
+        console.say(words)
+
+
+def _words(estimate: "Estimate", digits: int) -> str:
+    return f"{estimate.value:10.{digits}f}  +- {estimate.high - estimate.value:.{digits}f}"
+
+
+_KEYS = (
+    "weight_N", "weight_interval_N", "centre_mm", "centre_interval_mm", "force_offset_N",
+    "force_offset_interval_N", "moment_offset_Nmm", "moment_offset_interval_Nmm", "poses", "level",
+    "force_noise_N", "moment_noise_Nmm", "force_rms_N", "moment_rms_Nmm", "force_left_out_N",
+    "moment_left_out_Nmm", "calibration",
+)  # fmt: skip
+
+
+def _record(result: "SensorIdentification", files: list[Path]) -> dict[str, Any]:
+    triples = (result.centre_mm, result.force_offset_N, result.moment_offset_Nmm)
+    values = (
+        result.weight_N.value, _interval(result.weight_N),
+        *(item for triple in triples for item in ([e.value for e in triple], [_interval(e) for e in triple])),
+        result.poses, result.level, result.force_noise_N, result.moment_noise_Nmm, list(result.force_rms_N),
+        list(result.moment_rms_Nmm), result.force_left_out_N, result.moment_left_out_Nmm,
+        result.calibration.model_dump(mode="json"),
+    )  # fmt: skip
+    record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
+    return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+
+
+def _interval(estimate: "Estimate") -> list[float]:
+    return [estimate.low, estimate.high]

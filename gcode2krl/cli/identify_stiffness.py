@@ -1,0 +1,149 @@
+"""``gcode2krl identify stiffness``: stiffness of the virtual joints from measuring cubes under load."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gcode2krl.cell import Cell
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import common_options, read_cell, require_other
+from gcode2krl.errors import Gcode2KrlError, input_error
+
+if TYPE_CHECKING:
+    from gcode2krl.compliance.estimate import Estimate
+    from gcode2krl.compliance.identify_stiffness import JointFit, StiffnessIdentification
+
+_FORMATS = ("png", "svg", "pdf")
+_UM_PER_MM = 1e3
+
+
+@click.command("stiffness")
+@click.argument("measurements")
+@common_options
+@click.option(
+    "--plot", metavar="FIGURE.png", help="Draw measured against model angles, residuals, intervals."
+)
+@click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the stiffness into this cell file.")
+def command(
+    measurements: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    plot: str | None, apply_to: str | None,
+) -> int:  # fmt: skip
+    """Fit the stiffness of the robot's joints and links to distances of measuring cubes.
+
+    MEASUREMENTS is the TOML head that describes cubes, lasers and load, or the CSV with the readings beside
+    it; docs/identification.md has the format. What the readings do not determine is named, not applied.
+    """
+    console = Console(quiet, as_json)
+    try:
+        result, files = _run(measurements, read_cell(cell_path), plot, apply_to, console)
+    except Gcode2KrlError as error:
+        if not as_json:
+            error.source = error.source or measurements
+            raise
+        console.json({**dict.fromkeys(_KEYS), "files": [], "issues": issue_dicts(error.issues)})
+        return error.exit_code
+    if as_json:
+        console.json(_record(result, files, read_cell(cell_path)))
+    else:
+        _say(result, read_cell(cell_path), console)
+        console.findings(result.issues, result.source)
+        for file in files:
+            console.say(f"  wrote  {file}")
+    return 1 if result.errors() else 0
+
+
+def _run(
+    measurements: str, cell: Cell, plot: str | None, apply_to: str | None, console: Console
+) -> "tuple[StiffnessIdentification, list[Path]]":
+    from gcode2krl.compliance.identify_stiffness import identify_stiffness
+    from gcode2krl.compliance.measurements import read_measurements
+
+    readings = read_measurements(measurements)
+    for output in (plot, apply_to):
+        if output is not None:
+            require_other(Path(output), measurements, readings.source)
+    with console.progress("fitting", None):
+        result = identify_stiffness(readings, cell)
+    files = []
+    if plot is not None:
+        files.append(_save_figure(result, Path(plot), cell))
+    if apply_to is not None and not result.errors():
+        from gcode2krl.cli.stiffness_apply import apply
+
+        files.append(apply(result, Path(apply_to), cell))
+    return result, files
+
+
+# --- words ----------------------------------------------------------------------------------------------
+
+
+def _say(result: "StiffnessIdentification", cell: Cell, console: Console) -> None:
+    console.say(f"{result.source}: stiffness in N·mm/rad, {result.level:.0%} intervals")
+    console.say("  joint       about  stiffness    interval                 in the cell  readings  noise µm")
+    for fit in result.joints:
+        for axis, estimate in enumerate(fit.k_Nmm_rad):
+            console.say(_line(fit, axis, estimate, cell))
+    for name, (k, origin) in result.known.items():
+        console.say(f"  {name} taken as known, {origin}: k_c {k.k_c:.3g}, k_b {k.k_b:.3g}, k_a {k.k_a:.3g}")
+
+
+def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -> str:
+    from gcode2krl.compliance.identify_stiffness import AXES, KEYS, in_cell
+
+    own = in_cell(cell, fit.joint, KEYS[axis])
+    head = f"  {fit.joint if axis == 0 else '':<11} {AXES[axis]} {KEYS[axis]}  "
+    tail = f"{own:11.3e}" if own else f"{'-':>11}"
+    if estimate is None:
+        return f"{head}{'not determined':<37} {tail}"
+    counts = f"  {len(fit.row):8d}  {fit.noise_mm * _UM_PER_MM:8.2f}" if axis == 0 else ""
+    return f"{head}{estimate.value:9.3e}    {estimate.low:9.3e} .. {estimate.high:9.3e}   {tail}{counts}"
+
+
+_KEYS = ("joints", "known", "level", "stated_noise_mm")
+
+
+def _record(result: "StiffnessIdentification", files: list[Path], cell: Cell) -> dict[str, Any]:
+    known = {
+        name: {"k_c": value.k_c, "k_b": value.k_b, "k_a": value.k_a, "source": origin}
+        for name, (value, origin) in result.known.items()
+    }
+    joints = {fit.joint: _joint_record(fit, cell) for fit in result.joints}
+    record = dict(zip(_KEYS, (joints, known, result.level, result.stated_noise_mm), strict=True))
+    return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+
+
+def _joint_record(fit: "JointFit", cell: Cell) -> dict[str, Any]:
+    from gcode2krl.compliance.identify_stiffness import KEYS, in_cell
+
+    record: dict[str, Any] = {"readings": len(fit.row), "noise_mm": fit.noise_mm, "known": list(fit.known)}
+    for axis, (key, estimate) in enumerate(zip(KEYS, fit.k_Nmm_rad, strict=True)):
+        largest = float(abs(fit.moment_Nmm[:, axis]).max(initial=0.0))
+        record[key] = {
+            "value": estimate.value if estimate else None,
+            "interval": [estimate.low, estimate.high] if estimate else None,
+            "cell": in_cell(cell, fit.joint, key),
+            "largest_moment_Nmm": largest,
+        }
+    return record
+
+
+# --- the figure -----------------------------------------------------------------------------------------
+
+
+def _save_figure(result: "StiffnessIdentification", file: Path, cell: Cell) -> Path:
+    from gcode2krl.cli.stiffness_figure import figure
+    from gcode2krl.krl.files import write_together
+    from gcode2krl.report.drawing import look
+
+    kind = file.suffix.lower().removeprefix(".")
+    if kind not in _FORMATS:
+        raise input_error(
+            "option-value", f"figure {file.name!r}: allowed endings {', '.join(_FORMATS)}", source=str(file)
+        )
+    picture = io.BytesIO()
+    with look():
+        figure(result, cell).savefig(picture, format=kind, dpi=130)
+    write_together({file: picture.getvalue()})
+    return file

@@ -1,0 +1,93 @@
+"""Writing identified stiffness into a cell file, with where it comes from and how sure it is."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gcode2krl import library
+from gcode2krl.cell import Cell, resolve_cell
+from gcode2krl.compliance.identify_stiffness import KEYS, JointFit, StiffnessIdentification
+from gcode2krl.errors import input_error
+from gcode2krl.krl.files import write_together
+from gcode2krl.sections import VIRTUAL_JOINTS
+
+_OF_END_EFFECTOR = ("sensor", "spindle")
+_OTHERS = "; others: "
+
+
+def apply(result: StiffnessIdentification, file: Path, cell: Cell) -> Path:
+    """Write the virtual joints into a cell file, its other keys kept; comments are lost.
+
+    What was stated as known goes with what was split off by it: only the sum of both was measured.
+
+    Raises
+    ------
+    NotUnderstoodError
+        The file is no cell file, or cannot be written.
+    """
+    import tomli_w
+
+    data = library.read_toml(file) if file.exists() else {}
+    section = data.get("compliance", {})
+    if not isinstance(section, dict) or not isinstance(section.get("virtual_joints", {}), dict):
+        raise input_error("cell-key", "compliance: found no table", "write [compliance]", source=str(file))
+    joints = {**section.get("virtual_joints", {}), **dict(_values(result))}
+    section = {**section, "virtual_joints": joints, **_robot(result, section, cell)}
+    data = {**data, "compliance": {**section, **_end_effector(result, section, cell)}}
+    resolve_cell(data, beside=file.parent, source=str(file))
+    write_together({file: tomli_w.dumps(data).encode("utf-8")})
+    return file
+
+
+def _values(result: StiffnessIdentification) -> Iterator[tuple[str, dict[str, float]]]:
+    for name, (value, origin) in result.known.items():
+        if origin == "stated":
+            yield name, {key: getattr(value, key) for key in KEYS}
+    for fit in result.joints:
+        values = zip(KEYS, fit.k_Nmm_rad, strict=True)
+        yield fit.joint, {key: float(f"{k.value:.4g}") for key, k in values if k is not None}
+
+
+def _robot(result: StiffnessIdentification, section: dict[str, Any], cell: Cell) -> dict[str, str]:
+    """Return source and sure of the robot's joints, where one of them was identified."""
+    names = [name for name in VIRTUAL_JOINTS if name not in _OF_END_EFFECTOR]
+    before = section.get("robot_source", cell.compliance.robot_source)
+    text, whole = _source(result, names, str(before))
+    sure = section.get("robot_sure", cell.compliance.robot_sure)
+    return {"robot_source": text, "robot_sure": "checked" if whole else str(sure)} if text else {}
+
+
+def _end_effector(result: StiffnessIdentification, section: dict[str, Any], cell: Cell) -> dict[str, str]:
+    """Return source and sure of sensor and spindle, where one of them was identified or stated."""
+    text, whole = _source(result, _OF_END_EFFECTOR, str(section.get("source", cell.compliance.source)))
+    sure = section.get("sure", cell.compliance.sure)
+    return {"source": text, "sure": "checked" if whole else str(sure)} if text else {}
+
+
+def _source(
+    result: StiffnessIdentification, names: list[str] | tuple[str, ...], before: str
+) -> tuple[str, bool]:
+    """Return where a group's joints come from, empty if none is new, and whether all were identified."""
+    fits = [fit for fit in result.joints if fit.joint in names]
+    stated = [name for name, (_, origin) in result.known.items() if origin == "stated" and name in names]
+    file = Path(result.source).name
+    words = []
+    if fits:
+        found = ", ".join(fit.joint for fit in fits)
+        words.append(
+            f"{found} identified from {file}, {result.level:.0%} intervals within {_widest(fits):.0%}"
+        )
+    split = [f"{fit.joint} split from {', '.join(fit.known)}" for fit in fits if fit.known]
+    words += split
+    if stated:
+        words.append(f"{', '.join(stated)} as stated in the head of {file}")
+    others = len(fits) + len(stated) < len(names)
+    if words and others and before:
+        words.append(_OTHERS.removeprefix("; ") + before.rpartition(_OTHERS)[2])
+    return "; ".join(words), len(fits) == len(names)
+
+
+def _widest(fits: list[JointFit]) -> float:
+    """Return how far the widest interval reaches from its value, as a share of it."""
+    found = [k for fit in fits for k in fit.k_Nmm_rad if k is not None]
+    return max(max(k.high - k.value, k.value - k.low) / k.value for k in found)

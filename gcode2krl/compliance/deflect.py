@@ -1,0 +1,40 @@
+"""The stage: Joints and Forces to Deflection."""
+
+import math
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.compliance.deflection import deflection_of, feed_direction
+from gcode2krl.tables import Deflection, Forces, Joints
+
+
+def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
+    """Return how far the tool tip bends away under the forces, and the correction normal to the feed.
+
+    The feed direction is that of the tip's velocity, from the joints and their speeds. The band joins those
+    of forces and stiffness as independent (root of the sum of squares; an assumption).
+
+    Parameters
+    ----------
+    joints, forces : tables of the same rows, from one Motion.
+    cell : its virtual joints.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the cell does not state the stiffness of every virtual joint.
+    ValueError
+        Where the tables differ in length.
+    """
+    if len(joints) != len(forces):
+        raise ValueError(f"joints have {len(joints)} rows, forces {len(forces)}")
+    feed = feed_direction(joints.q_rad, joints.qd_rad_s, cell, forces.tool)
+    deflection, correction = deflection_of(
+        joints.q_rad, forces.force_base_N, forces.moment_base_Nmm, feed, cell, forces.tool
+    )
+    return Deflection(
+        deflection_base_mm=deflection,
+        correction_base_mm=correction,
+        relative_band=math.hypot(forces.relative_band, cell.compliance.relative_band),
+    )
