@@ -21,6 +21,9 @@ _HOMES = {
     "solve_joints": "gcode2krl.predict",
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
+    "deflect": "gcode2krl.compliance",
+    "load_run": "gcode2krl.runs",
+    "Run": "gcode2krl.runs",
     "Gcode2KrlError": "gcode2krl.errors",
     "Issue": "gcode2krl.errors",
 }
@@ -29,8 +32,11 @@ __all__ = [
     "Gcode2KrlError",
     "Issue",
     "Prediction",
+    "Run",
     "__version__",
+    "deflect",
     "load_cell",
+    "load_run",
     "plan_motion",
     "predict",
     "read_gcode",
@@ -42,11 +48,13 @@ __all__ = [
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell, load_cell
+    from gcode2krl.compliance import deflect
     from gcode2krl.errors import Gcode2KrlError, Issue
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
     from gcode2krl.predict import plan_motion, predict, set_targets, solve_joints
     from gcode2krl.prediction import Prediction
+    from gcode2krl.runs import Run, load_run
 
 
 def __getattr__(name: str) -> Any:

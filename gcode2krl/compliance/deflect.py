@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from gcode2krl.cell import Cell
 from gcode2krl.compliance.deflection import deflection_of, feed_direction
 from gcode2krl.tables import Deflection, Forces, Joints

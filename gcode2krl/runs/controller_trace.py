@@ -1,4 +1,4 @@
-"""Measured runs: the controller's trace of the commanded position, read, checked and cut at standstills.
+"""The controller's trace of the commanded position, read, checked and cut at standstills.
 
 Columns as in ``controller.csv``: ``t_s``, ``x_cmd_mm``, ``y_cmd_mm``, ``z_cmd_mm``; others are left alone.
 """
@@ -6,21 +6,17 @@ Columns as in ``controller.csv``: ``t_s``, ``x_cmd_mm``, ``y_cmd_mm``, ``z_cmd_m
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.errors import NotUnderstoodError, input_error
-
-if TYPE_CHECKING:
-    import polars as pl
+from gcode2krl.runs.measured import LEAST_ROWS, TIME
+from gcode2krl.runs.tables import missing_column, read_sheet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-TIME = "t_s"
 POSITION = ("x_cmd_mm", "y_cmd_mm", "z_cmd_mm")
-LEAST_ROWS = 10
 _LONGEST_CYCLE_S = 1.0
 _METRES_SHOW_BELOW = 0.02
 """A trace that spans less than this share of the program on an axis is taken to be in another unit."""
@@ -57,25 +53,19 @@ def read_controller_trace(path: str | Path) -> ControllerTrace:
         Names file, row and column: unreadable file, missing column, what is not a number, time that does not
         rise or is not in seconds, fewer than 10 rows.
     """
-    file = Path(path)
-    frame, first_row = _read_frame(file)
-    missing = [name for name in (TIME, *POSITION) if name not in frame.columns]
+    sheet = read_sheet(path, (TIME, *POSITION))
+    missing = [name for name in (TIME, *POSITION) if name not in sheet.columns]
     if missing:
-        raise input_error(
-            "trace-column",
-            f"column {', '.join(missing)}: missing; the file has {', '.join(frame.columns[:12])}",
-            f"name the columns {TIME}, {', '.join(POSITION)}",
-            source=str(file),
-        )
-    values = np.stack([_numbers(frame[name], name, first_row, file) for name in (TIME, *POSITION)], axis=1)
+        raise missing_column(sheet, missing, f"name the columns {TIME}, {', '.join(POSITION)}")
+    values = np.stack([sheet.columns[name] for name in (TIME, *POSITION)], axis=1)
     complete = np.isfinite(values).all(axis=1)
-    row = np.flatnonzero(complete) + first_row
+    row = np.flatnonzero(complete) + sheet.first_row
     trace = ControllerTrace(
         time_s=np.ascontiguousarray(values[complete, 0]),
         position_mm=np.ascontiguousarray(values[complete, 1:]),
         row=row,
         dropped=int(np.count_nonzero(~complete)),
-        source=str(file),
+        source=sheet.source,
     )
     _check_rows(trace)
     _check_time(trace)
@@ -207,47 +197,6 @@ def _joined(runs: list[tuple[int, int]], position_mm: Floats, still_mm: float) -
         else:
             joined.append((first, last))
     return joined
-
-
-def _read_frame(file: Path) -> "tuple[pl.DataFrame, int]":
-    """Return the table, and the number of its first row in the file."""
-    import polars as pl
-
-    try:
-        with file.open("rb") as stream:
-            parquet = stream.read(4) == b"PAR1"
-        if parquet:
-            return pl.read_parquet(file), 1
-        return pl.read_csv(file, infer_schema=False), 2
-    except OSError as error:
-        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
-    except pl.exceptions.NoDataError:
-        raise input_error(
-            "trace-empty", "the file is empty", "export the trace with a header line", source=str(file)
-        ) from None
-    except pl.exceptions.PolarsError as error:
-        why = str(error).splitlines()[0]
-        raise input_error("trace-unreadable", f"not a table: {why}", source=str(file)) from None
-
-
-def _numbers(column: "pl.Series", name: str, first_row: int, file: Path) -> Floats:
-    """Return a column (n,) as numbers, NaN where empty; anything else is an error with its row."""
-    import polars as pl
-
-    text = column.cast(pl.String).str.strip_chars()
-    numbers = text.cast(pl.Float64, strict=False)
-    wrong = (numbers.is_null() & text.is_not_null() & (text != "")).arg_true()
-    for index in wrong.to_list():
-        if str(text[index]).casefold() in ("nan", "null", "none", "na"):
-            continue
-        raise input_error(
-            "trace-number",
-            f"row {index + first_row}, column {name}: {text[index]!r} is not a number",
-            "decimals with a point, columns separated by commas",
-            line=index + first_row,
-            source=str(file),
-        )
-    return numbers.fill_null(math.nan).to_numpy().astype(np.float64)
 
 
 def _check_rows(trace: ControllerTrace) -> None:

@@ -1,0 +1,152 @@
+"""A measured run: a folder with ``run.toml`` and what was recorded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from gcode2krl.cell import load_cell
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.runs.checks import check_columns, check_table, check_together, quantised
+from gcode2krl.runs.diadem import is_data_set
+from gcode2krl.runs.head import RunHead, read_head
+from gcode2krl.runs.krc_trace import read_krc_trace, recording_of
+from gcode2krl.runs.measured import Controller, Force, Measured, Tracker, build, columns_of
+from gcode2krl.runs.rsi_log import is_rsi_log, read_rsi_log
+from gcode2krl.runs.scan import Scan, read_scan
+from gcode2krl.runs.tables import Sheet, read_sheet
+
+AnyMeasured = TypeVar("AnyMeasured", bound=Measured)
+What = Literal["controller", "tracker", "force", "scan"]
+_ENDINGS = {"scan": (".csv", ".parquet", ".ply")}
+_RSI_NAMES = ("rsi.log", "rsi.xml", "rsi.txt", "rsi.csv")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What one run recorded; None where there is no file."""
+
+    name: str
+    folder: Path
+    head: RunHead
+    controller: Controller | None = None
+    tracker: Tracker | None = None
+    force: Force | None = None
+    scan: Scan | None = None
+    issues: tuple[Issue, ...] = ()
+
+    def path(self, key: Literal["cell", "program", "prediction"]) -> Path | None:
+        """Return a path that ``run.toml`` names, relative to the run's folder; None where it names none."""
+        value: str | None = getattr(self.head, key)
+        return None if value is None else self.folder / value
+
+
+def load_run(folder: str | Path, *, partial: bool = False) -> Run:
+    """Read and check a measured run.
+
+    Parameters
+    ----------
+    partial : joints may be missing in the commanded and actual angles (a log of some joints only).
+
+    Raises
+    ------
+    NotUnderstoodError
+        Names file, row and column: a file that cannot be read, a missing column, time that does not rise,
+        wrong units, swapped columns, tables that do not overlap.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise input_error(
+            "file-unreadable", "is no folder", "a run is a folder with run.toml", source=str(place)
+        )
+    head, issues = read_head(place / "run.toml")
+    files = {what: _file_of(what, place, head) for what in ("controller", "tracker", "force", "scan")}
+
+    def controller_sheet(file: Path) -> Sheet:
+        if is_data_set(file):
+            return read_krc_trace(file, _gear_ratio(place, head))
+        return read_rsi_log(file) if is_rsi_log(file) else _sheet(Controller)(file)
+
+    traced = files["controller"] is not None and is_data_set(files["controller"])  # joints as the drives gave
+    controller = _table(Controller, files["controller"], controller_sheet, head, partial or traced)
+    tracker = _table(Tracker, files["tracker"], _sheet(Tracker), head, partial)
+    force = _table(Force, files["force"], _sheet(Force), head, partial)
+    scan = read_scan(files["scan"]) if files["scan"] else None
+    check_together(controller, tracker, force)
+    check_columns(controller, tracker, head)
+    found = [issue for table in (controller, tracker, force, scan) if table for issue in table.issues]
+    found += [issue for table in (controller, tracker, force) if table for issue in quantised(table, head)]
+    issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]), *found)
+    return Run(place.resolve().name, place, head, controller, tracker, force, scan, issues)
+
+
+def _sheet(kind: type[Measured]) -> Callable[[Path], Sheet]:
+    return lambda file: read_sheet(file, columns_of(kind))
+
+
+def _table(
+    kind: type[AnyMeasured], file: Path | None, read: Callable[[Path], Sheet], head: RunHead, partial: bool
+) -> AnyMeasured | None:
+    if file is None:
+        return None
+    clock_s = getattr(head.clocks, f"{kind.__name__.lower()}_s")
+    table = build(kind, read(file), partial=partial, clock_s=clock_s)
+    check_table(table, head)
+    return table
+
+
+def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
+    """Return the file of a table: the one that ``[files]`` names, else the usual one, else None."""
+    named: str | None = getattr(head.files, what)
+    if named is not None:
+        if not (place / named).is_file():
+            raise input_error(
+                "file-unreadable", f"files.{what}: no file {named!r} there", source=str(place / "run.toml")
+            )
+        return place / named
+    usual = [place / f"{what}{ending}" for ending in _ENDINGS.get(what, (".csv", ".parquet"))]
+    found = [file for file in usual if file.is_file()]
+    if not found and what == "controller":
+        found = _controller_logs(place)
+    if len(found) > 1:
+        names = ", ".join(file.name for file in found)
+        remedy = f"keep one, or name it: [files] {what} = {found[0].name!r}"
+        raise input_error("run-files", f"{what}: several files: {names}", remedy, source=str(place))
+    return found[0] if found else None
+
+
+def _controller_logs(place: Path) -> list[Path]:
+    """Return one file of each KRC trace in a folder, and the RSI logs."""
+    traces: dict[str, Path] = {}
+    for file in sorted(place.glob("*.dat")):
+        if is_data_set(file):
+            traces.setdefault(recording_of(file), file)
+    return [*traces.values(), *(place / name for name in _RSI_NAMES if (place / name).is_file())]
+
+
+def _not_read(place: Path, controller: Path | None) -> list[Issue]:
+    """Return a note for each log of the controller that stands beside the table that was read."""
+    return [
+        Issue("note", "run-files", 0, f"{file.name}: not read, {controller.name} is")
+        for file in _controller_logs(place)
+        if controller is not None and file != controller and recording_of(file) != recording_of(controller)
+    ]
+
+
+def _gear_ratio(place: Path, head: RunHead) -> tuple[float, ...] | None:
+    """Return the gear ratios of the cell that ``run.toml`` names."""
+    if head.cell is None or not (place / head.cell).is_file():
+        return None
+    return load_cell(place / head.cell).robot.drives.gear_ratio
+
+
+def _paths(place: Path, head: RunHead) -> list[Issue]:
+    """Return a warning for each path of ``run.toml`` that leads nowhere."""
+    named = {key: getattr(head, key) for key in ("cell", "program", "prediction")}
+    return [
+        Issue(
+            "warning", "run-path", 0, f"run.toml: {key}: nothing at {value!r}", "relative to the run's folder"
+        )
+        for key, value in named.items()
+        if value is not None and not (place / value).exists()
+    ]

@@ -1,0 +1,181 @@
+"""A KRC trace → the columns of ``controller.csv``.
+
+One recording is several data sets, ``<name>_<module>.dat``: the interpolator's (``KRCIpo``: ``X_CmdIpo``,
+``AxisPos_CmdIpo1``, ``AxisPos_Act1``, …) and one a drive (``NextGenDrive#1``: Sollposition, Istposition,
+Iststrom, …, the axis standing in the file's name). Modules of other rates are put on the clock of the slowest
+by linear interpolation between their own, closer samples. Angles of the drives, which see the servo, replace
+those of the interpolator.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.runs.diadem import Channel, DataSet, is_data_set, read_data_set
+from gcode2krl.runs.drives import Angles, axis_angles
+from gcode2krl.runs.tables import Sheet
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M
+
+Floats = NDArray[np.float64]
+_UNITS = {
+    "deg": {"°": 1.0, "deg": 1.0, "grad": 1.0, "m°": 1e-3, "mdeg": 1e-3, "µ°": 1e-6, "rad": DEG_PER_RAD},
+    "mm": {"mm": 1.0, "m": MM_PER_M, "µm": 1e-3, "um": 1e-3},
+    "A": {"a": 1.0, "ma": 1e-3},
+    "Nm": {"nm": 1.0, "nmm": 1.0 / MM_PER_M, "mnm": 1e-3},
+}
+_COMMAND, _ACTUAL, _LAG = "q{}_cmd_deg", "q{}_act_deg", "lag{}_deg"
+
+
+@dataclass
+class _Module:
+    """One data set: its clock and its channels under the names of the columns."""
+
+    time_s: Floats
+    columns: dict[str, Floats] = field(default_factory=dict)
+    drive: bool = False
+
+
+def read_krc_trace(path: str | Path, gear_ratio: Sequence[float] | None = None) -> Sheet:
+    """Read all modules of a recording; ``path`` is any one of its ``.dat`` files.
+
+    Parameters
+    ----------
+    gear_ratio : (6,) for drives that state motor angles in a recording without the interpolator's angles;
+        sign and zero are then unknown.
+
+    Raises
+    ------
+    NotUnderstoodError
+        As in `read_data_set`, and where no channel is known.
+    """
+    file = Path(path)
+    issues: list[Issue] = []
+    unknown: list[str] = []
+    modules = [_module(read_data_set(each), issues, unknown) for each in modules_of(file)]
+    modules = [module for module in modules if module.columns and len(module.time_s) > 1]
+    if not modules:
+        raise input_error(
+            "krc-trace", f"no channel is known; the trace has {', '.join(unknown[:12])}",
+            "record AxisPos_CmdIpo, AxisPos_Act, X_CmdIpo …, or Sollposition and Istposition of the drives",
+            source=str(file),
+        )  # fmt: skip
+    others, drives = (_merged([m for m in modules if m.drive is drive]) for drive in (False, True))
+    if drives is not None:
+        words = _turn_to_axes(drives, others, gear_ratio)
+        issues += [Issue("warning", "krc-trace", 0, f"{file.name}: {text}") for text in words]
+    merged = _merged([module for module in (others, drives) if module is not None])
+    columns = {"t_s": merged.time_s, **merged.columns} if merged else {}
+    return Sheet(columns, (*columns, *unknown), 1, str(file), tuple(issues))
+
+
+def _merged(modules: list[_Module]) -> _Module | None:
+    """Return modules on the clock of the slowest; of two equal columns the later module's stays."""
+    if not modules:
+        return None
+    slowest = max(modules, key=lambda module: float(np.median(np.diff(module.time_s))))
+    result = _Module(slowest.time_s)
+    for module in modules:
+        for name, values in module.columns.items():
+            result.columns[name] = _at(slowest.time_s, module.time_s, values)
+    return result
+
+
+def _turn_to_axes(drives: _Module, others: _Module | None, gear_ratio: Sequence[float] | None) -> list[str]:
+    """Turn the drives' angles into those of the axes, in place; returns words about it."""
+    command = Angles(drives.time_s, _six(drives, _COMMAND))
+    wanted = Angles(others.time_s, _six(others, _COMMAND)) if others else None
+    *turned, words = axis_angles(command, _six(drives, _ACTUAL), wanted, gear_ratio)
+    for pattern, deg in zip((_COMMAND, _ACTUAL), turned, strict=True):
+        for number in range(1, 7):
+            drives.columns.pop(pattern.format(number), None)
+            if np.isfinite(deg[:, number - 1]).any():
+                drives.columns[pattern.format(number)] = deg[:, number - 1]
+    return words
+
+
+def _six(module: _Module, pattern: str) -> Floats:
+    """Return (n, 6) the columns of the six joints, NaN where there is none."""
+    none = np.full(len(module.time_s), np.nan)
+    return np.stack([module.columns.get(pattern.format(n), none) for n in range(1, 7)], axis=1)
+
+
+def modules_of(file: Path) -> list[Path]:
+    """Return the data sets of one recording, in order of their names."""
+    stem = recording_of(file)
+    beside = sorted(file.parent.glob("*.dat"))
+    return [each for each in beside if recording_of(each) == stem and is_data_set(each)] or [file]
+
+
+def recording_of(file: Path) -> str:
+    """Return the name of the recording that a file belongs to: what stands before the last underscore."""
+    return file.stem.rpartition("_")[0] or file.stem
+
+
+def _module(data: DataSet, issues: list[Issue], unknown: list[str]) -> _Module:
+    issues += data.issues
+    axis = re.search(r"#(\d)", data.file.stem)
+    module = _Module(data.time_s, drive=axis is not None)
+    named: dict[str, Channel] = {}
+    for channel in data.channels:
+        column = column_of(channel.name, axis[1] if axis else "")
+        if column == "" or (column in named and not channel.name.casefold().endswith("ipo")):
+            unknown.append(channel.name)
+        else:
+            named[column] = channel
+    for column, channel in named.items():
+        module.columns[column] = channel.values * _factor(channel, column, data.file, issues)
+    for number in range(1, 7):
+        lag, command = (
+            module.columns.pop(_LAG.format(number), None),
+            module.columns.get(_COMMAND.format(number)),
+        )
+        if lag is not None and command is not None:
+            module.columns.setdefault(_ACTUAL.format(number), command - lag)
+    return module
+
+
+def column_of(channel: str, axis: str) -> str:
+    """Return the column that a channel fills, "" where it is none; ``axis`` is that of the file's name."""
+    name = re.sub(r"\s+", "", channel).casefold()
+    number = re.search(r"_?a?([1-6])$", name)
+    digit = number[1] if number else axis
+    stem = name[: number.start()] if number else name
+    german = {
+        "sollposition": _COMMAND, "istposition": _ACTUAL, "positionsschleppfehler": _LAG,
+        "iststrom": "i{}_A", "istmoment": "tau{}_Nm",
+    }  # fmt: skip
+    if stem in german:
+        return german[stem].format(digit) if digit else ""
+    if re.fullmatch(r"axispos_(cmd|act)\w*", stem):
+        return f"q{digit}_{stem[8:11]}_deg" if digit else ""
+    cartesian = re.fullmatch(r"([xyzabc])_(cmd|act)\w*", name)
+    if cartesian:
+        return f"{cartesian[1]}_{cartesian[2]}_{'mm' if cartesian[1] in 'xyz' else 'deg'}"
+    return ""
+
+
+def _factor(channel: Channel, column: str, file: Path, issues: list[Issue]) -> float:
+    """Return what turns a channel's unit into that of its column."""
+    wanted = column.rpartition("_")[2]
+    unit = channel.unit.casefold().replace("μ", "µ").replace("\N{MASCULINE ORDINAL INDICATOR}", "°")
+    factor = _UNITS[wanted].get(unit)
+    if factor is None:
+        text = f"{file.name}: channel {channel.name} has the unit {channel.unit!r}, taken as {wanted}"
+        issues.append(Issue("warning", "trace-unit", 0, text))
+        return 1.0
+    return factor
+
+
+def _at(time_s: Floats, own_s: Floats, values: Floats) -> Floats:
+    """Return a channel at other times, NaN outside its own."""
+    if own_s is time_s or np.array_equal(own_s, time_s):
+        return values
+    result = np.interp(time_s, own_s, values)
+    slack = 1e-9 * max(1.0, float(np.abs(own_s).max(initial=0.0)))
+    result[(time_s < own_s[0] - slack) | (time_s > own_s[-1] + slack)] = np.nan
+    return result
