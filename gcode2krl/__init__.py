@@ -21,6 +21,7 @@ _HOMES = {
     "solve_joints": "gcode2krl.predict",
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
+    "cut": "gcode2krl.cutting",
     "deflect": "gcode2krl.compliance",
     "load_run": "gcode2krl.runs",
     "Run": "gcode2krl.runs",
@@ -34,6 +35,7 @@ __all__ = [
     "Prediction",
     "Run",
     "__version__",
+    "cut",
     "deflect",
     "load_cell",
     "load_run",
@@ -49,6 +51,7 @@ __all__ = [
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell, load_cell
     from gcode2krl.compliance import deflect
+    from gcode2krl.cutting import cut
     from gcode2krl.errors import Gcode2KrlError, Issue
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl

@@ -21,6 +21,7 @@ from gcode2krl.sections import (
     Clearance,
     Compliance,
     Controller,
+    EffectEntry,
     Frame,
     Frames,
     GuardInput,
@@ -63,6 +64,7 @@ class Cell(Section):
     compliance: Compliance = Compliance()
     pilot: Pilot = Pilot()
     spindle: Spindle
+    effects: tuple[EffectEntry, ...] = ()
     guard_inputs: tuple[GuardInput, ...] = ()
     program: Program = Program()
     m_code: dict[str, str] = Field(default_factory=dict)

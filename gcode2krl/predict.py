@@ -3,23 +3,26 @@
 import functools
 import hashlib
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import compliance, gcode, krc4, program, robot
+from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 from gcode2krl.krc4 import trial_program
 from gcode2krl.prediction import Prediction
-from gcode2krl.tables import Joints, Motion, Targets, Toolpath
+from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
+
+if TYPE_CHECKING:
+    from gcode2krl.effects import Applied
 
 Floats = NDArray[np.float64]
 _SLOWING_ROUNDS = 3
@@ -35,16 +38,50 @@ def predict(
     tolerance_mm: float | None = None,
     chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    forces: bool = True,
+    effects: "Sequence[str | Applied]" = (),
+    effect_folders: Sequence[str | Path] = (),
 ) -> Prediction:
-    """Run every stage there is on a part: G-code, targets, motion, joints.
+    """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
 
-    ``dt_s`` is the sample time, by default the controller's cycle. Raises `NotUnderstoodError` where the
+    ``dt_s`` is the sample time, by default the controller's cycle; ``forces`` False leaves out material
+    removal and what rests on it. A stage that cannot run (no material, unknown stiffness) leaves None and a
+    note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; a folder of
+    own effects is named in ``effect_folders``. Raises `NotUnderstoodError` where the
     G-code, the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
     """
     cell = cell if cell is not None else load_cell()
     toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
     settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
-    return predict_toolpath(toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance_mm, settings=settings)
+    prediction = predict_toolpath(
+        toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance_mm, settings=settings, forces=forces
+    )
+    return add_effects(prediction, effects, effect_folders)
+
+
+def add_effects(
+    prediction: Prediction, effects: "Sequence[str | Applied]" = (), folders: Sequence[str | Path] = ()
+) -> Prediction:
+    """Return a prediction with the effects of its cell and further ones, see `effects.with_effects`.
+
+    Raises `NotUnderstoodError` where an effect, its target or a parameter is not one of the library.
+    """
+    if not effects and not prediction.cell.effects:
+        return prediction
+    from gcode2krl.effects import from_cell, library, with_effects
+    from gcode2krl.effects.registry import resolve
+
+    known = library(folders)
+    cell = prediction.cell
+    applied = [*from_cell(cell, known), *resolve(effects, known, cell)]
+    changed = with_effects(prediction, applied, plan=_plan_anew(prediction))
+    named = [str(effect) if isinstance(effect, str) else repr(effect) for effect in effects]
+    return replace(changed, inputs={**changed.inputs, "effects": named})
+
+
+def _plan_anew(prediction: Prediction) -> Callable[[Targets, Cell], Motion]:
+    dt_s = float(prediction.inputs["dt_s"])
+    return lambda targets, cell: plan_motion(targets, cell, dt_s)
 
 
 def predict_toolpath(
@@ -54,12 +91,18 @@ def predict_toolpath(
     dt_s: float | None = None,
     tolerance_mm: float | None = None,
     settings: dict[str, Any] | None = None,
+    targets: Targets | None = None,
+    forces: bool = True,
 ) -> Prediction:
-    """Run every stage behind the G-code; see `predict`."""
+    """Run every stage behind the G-code; see `predict`. ``targets`` where they are known already."""
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
-    targets = set_targets(toolpath, cell, tolerance_mm)
+    if targets is None:
+        targets = set_targets(toolpath, cell, tolerance_mm)
     motion = plan_motion(targets, cell, dt_s)
     joints = solve_joints(motion, cell)
+    loads: tuple[Forces | None, Deflection | None, tuple[Issue, ...]] = (None, None, ())
+    if forces:
+        loads = forces_and_deflection(toolpath, motion, joints, cell)
     inputs: dict[str, Any] = {
         "program": toolpath.source,
         "version": __version__,
@@ -71,7 +114,27 @@ def predict_toolpath(
     source = Path(toolpath.source)
     if source.is_file():
         inputs["program_sha256"] = hashlib.sha256(source.read_bytes()).hexdigest()
-    return Prediction(toolpath, targets, cell, motion, joints, inputs)
+    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
+
+
+def forces_and_deflection(
+    toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell
+) -> tuple[Forces | None, Deflection | None, tuple[Issue, ...]]:
+    """Return forces and deflection, None where a stage cannot run, and the findings that say why.
+
+    Raises `NotUnderstoodError` where the stock that the cell names cannot be read.
+    """
+    if cell.material is None:
+        remedy = "give [material] in the cell"
+        return None, None, (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
+    try:
+        forces = cutting.cut(toolpath, motion, cell)
+    except RefusedError as error:
+        return None, None, tuple(replace(issue, severity="warning") for issue in error.issues)
+    missing = compliance.missing_stiffness(cell)
+    if missing is not None:
+        return forces, None, (replace(missing, severity="note"),)
+    return forces, compliance.deflect(joints, forces, cell), ()
 
 
 def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, input_error
@@ -20,6 +21,7 @@ from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Table, T
 
 SCHEMA = "gcode2krl/prediction/1"
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
+_ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)")
 _AXES = {3: "xyz", 4: "xyzw"}
 AnyTable = TypeVar("AnyTable", bound=Table)
 
@@ -37,12 +39,18 @@ class Prediction:
     """Program, its SHA-256, version and settings."""
     forces: Forces | None = None
     deflection: Deflection | None = None
+    skipped: tuple[Issue, ...] = ()
+    """Why a stage did not run."""
+    added: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    """Columns (m,) beside Motion that effects bring: ``q1_act_rad`` …, ``q1_load_rad`` …,
+    ``force_meas_x_N`` …."""
 
     @property
     def issues(self) -> tuple[Issue, ...]:
         """All findings, of the targets (which carry those of the G-code) and of every later stage."""
         later = (self.motion, self.forces, self.deflection)
-        return (*self.targets.issues, *(issue for table in later if table for issue in table.issues))
+        found = (issue for table in later if table is not None for issue in table.issues)
+        return (*self.targets.issues, *found, *self.skipped)
 
     def save(self, folder: str | Path, csv: bool = False) -> list[Path]:
         """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files."""
@@ -67,6 +75,7 @@ class Prediction:
             for beside in (self.joints, self.forces, self.deflection):
                 if beside is not None:
                     tables["motion"] |= dict(_columns(beside))
+            tables["motion"] |= self.added
         for name, columns in tables.items():
             frame = pl.DataFrame(columns)
             frame.write_parquet(place / f"{name}.parquet")
@@ -135,7 +144,10 @@ class Prediction:
                 "prediction-columns", f"not the tables of a prediction: {error}", source=str(place)
             ) from None
         cell = cell_from_resolved(record["cell"], source=str(place / "prediction.toml"))
-        return cls(toolpath, targets, cell, motion, joints, record["inputs"], forces, deflection)
+        added = {
+            name: beside[name].to_numpy() for name in getattr(beside, "columns", ()) if _ADDED.fullmatch(name)
+        }
+        return cls(toolpath, targets, cell, motion, joints, record["inputs"], forces, deflection, (), added)
 
 
 def _read_record(file: Path) -> dict[str, Any]:

@@ -384,3 +384,12 @@ class Verified(Section):
 
     by: Annotated[str, Field(min_length=1)]
     date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+
+
+class EffectEntry(Section):
+    """Something that the nominal model leaves out, as `gcode2krl diagnose --apply` writes it."""
+
+    name: str
+    target: str | None = None
+    parameters: dict[str, Finite | tuple[Finite, ...]] = Field(default_factory=dict)
+    source: str = ""

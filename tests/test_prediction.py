@@ -33,7 +33,7 @@ def prediction():
 def test_everything_comes_back(prediction, tmp_path):
     prediction.save(tmp_path / "p")
     loaded = Prediction.load(tmp_path / "p")
-    for name in ("toolpath", "targets", "motion", "joints"):
+    for name in ("toolpath", "targets", "motion", "joints", "forces", "deflection"):
         before, after = _columns(getattr(prediction, name)), _columns(getattr(loaded, name))
         assert set(before) == set(after)
         for column in before:
@@ -42,8 +42,8 @@ def test_everything_comes_back(prediction, tmp_path):
     assert loaded.toolpath.events == prediction.toolpath.events
     assert loaded.targets.events == prediction.targets.events
     assert set(loaded.issues) == set(prediction.issues)
-    assert loaded.forces is None
-    assert loaded.deflection is None
+    assert loaded.forces.relative_band == prediction.forces.relative_band > 0
+    assert loaded.deflection.relative_band == prediction.deflection.relative_band > 0
 
 
 def test_names_on_disk(prediction, tmp_path):

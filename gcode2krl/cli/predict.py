@@ -1,15 +1,20 @@
 """``gcode2krl predict part.nc -o prediction/``."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part
+from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.prediction import Prediction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 
 @click.command("predict")
@@ -21,13 +26,24 @@ from gcode2krl.prediction import Prediction
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
 )
 @click.option("--csv", is_flag=True, help="Write the tables as CSV too.")
-@click.option("--plot", is_flag=True, help="Draw path, speed and joints as PNG.")
+@click.option("--plot", is_flag=True, help="Draw path, speed, joints, forces and deflection as PNG.")
+@click.option("--part", "part_mesh", metavar="OUT.stl", help="Write what is left of the stock as a mesh.")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME:key=value,…",
+    help="Add an effect that the nominal model leaves out; may be repeated.",
+)
+@click.option("--effects", "effect_folders", multiple=True, metavar="FOLDER", help="Folder of own effects.")
+@click.option("--no-forces", is_flag=True, help="Leave out material removal, forces and deflection.")
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
-    dt_s: float | None, csv: bool, plot: bool,
+    dt_s: float | None, csv: bool, plot: bool, part_mesh: str | None, no_forces: bool,
+    effects: tuple[str, ...], effect_folders: tuple[str, ...],
 ) -> int:  # fmt: skip
-    """Predict what the controller will command: path, timing, joints.
+    """Predict what the robot will do: path, timing, joints, cutting forces, deflection.
 
     Findings that would refuse a program are only reported here.
     """
@@ -36,16 +52,19 @@ def command(
         folder = _folder(part, output)
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        from gcode2krl.predict import corner_table, predict_toolpath
+        from gcode2krl.predict import add_effects, corner_table, predict_toolpath
 
         with console.progress("predicting", None):
             settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
             prediction = predict_toolpath(
-                toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings
+                toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings, forces=not no_forces
             )
+            prediction = add_effects(prediction, effects, effect_folders)
             files = prediction.save(folder, csv=csv)
             corners = corner_table(prediction)
             files.append(_save_corners(corners, folder))
+            if part_mesh is not None:
+                files.append(_save_part(prediction, Path(part_mesh)))
             if plot:
                 files += _draw(prediction, folder)
     except Gcode2KrlError as error:
@@ -67,6 +86,14 @@ def command(
                 "time_s": float(motion.time_s[-1]),
                 "path_mm": float(motion.path_mm[-1]),
                 "corner_error_mm": float(corners["error_mm"].max(initial=0.0)),
+                "max_force_N": largest(prediction.forces.force_base_N)
+                if prediction.forces is not None
+                else None,
+                "max_deflection_mm": (
+                    largest(prediction.deflection.deflection_base_mm)
+                    if prediction.deflection is not None
+                    else None
+                ),
                 "issues": issue_dicts(prediction.issues),
             }
         )
@@ -79,7 +106,22 @@ def command(
     console.say(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
     )
+    for line in load_lines(prediction):
+        console.say(line)
     return 0
+
+
+def _save_part(prediction: Prediction, file: Path) -> Path:
+    """Write the part that is left as a mesh."""
+    from gcode2krl.cutting import remove
+    from gcode2krl.cutting.height_field import to_mesh
+
+    if prediction.motion is None:
+        raise AssertionError("predict_toolpath always plans a motion")
+    require_other(file)
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell).part
+    to_mesh(left).export(file)
+    return file
 
 
 def _save_corners(corners: dict[str, Any], folder: Path) -> Path:
@@ -104,6 +146,7 @@ def _draw(prediction: Prediction, folder: Path) -> list[Path]:
         "path": fig.path_figure(prediction.toolpath, prediction.targets, motion),
         "kinematics": fig.kinematics_figure(prediction.toolpath, motion),
         "joints": fig.joints_figure(motion, joints, limits, speeds),
+        **_load_figures(prediction),
     }
     return fig.save_figures(drawn, folder)
 
@@ -115,3 +158,51 @@ def _folder(part: str, output: str | None) -> Path:
     if folder.exists() and not folder.is_dir():
         raise input_error("output-unwritable", "this is a file", "name a folder", source=str(folder))
     return folder
+
+
+def _load_figures(prediction: Prediction) -> "dict[str, Figure]":
+    """Return the figures of forces and deflection, where they are known."""
+    from gcode2krl.report import load_figures as fig
+
+    toolpath, motion, forces = prediction.toolpath, prediction.motion, prediction.forces
+    deflection, joints = prediction.deflection, prediction.joints
+    if motion is None or forces is None:
+        return {}
+    size_N = np.linalg.norm(forces.force_base_N, axis=1)
+    drawn = {
+        "force": fig.force_figure(toolpath, motion, forces),
+        "force_path": fig.coloured_path_figure(motion, size_N, "force (N)", "Cutting force on the path"),
+    }
+    if deflection is None or joints is None:
+        return drawn
+    bent_mm = np.linalg.norm(deflection.deflection_base_mm, axis=1)
+    names, share_mm = _shares(prediction)
+    return {
+        **drawn,
+        "deflection": fig.deflection_figure(toolpath, motion, deflection),
+        "deflection_path": fig.coloured_path_figure(
+            motion, bent_mm, "deflection (mm)", "Deflection on the path"
+        ),
+        "deflection_joints": fig.share_figure(toolpath, motion, names, share_mm),
+    }
+
+
+def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], NDArray[np.float64]]":
+    """Return the virtual joints and how much of the deflection (m, 10) each causes, along the whole."""
+    from gcode2krl.compliance import joint_shares
+    from gcode2krl.sections import VIRTUAL_JOINTS
+
+    joints, forces, deflection = prediction.joints, prediction.forces, prediction.deflection
+    if joints is None or forces is None or deflection is None:
+        raise AssertionError("shares are asked for only where there is a deflection")
+    base = prediction.cell.base_matrix()[:3, :3]
+    shares = joint_shares(
+        joints.q_rad,
+        forces.force_base_N @ base.T,
+        forces.moment_base_Nmm @ base.T,
+        prediction.cell,
+        forces.tool,
+    )
+    whole = deflection.deflection_base_mm @ base.T
+    size = np.linalg.norm(whole, axis=1, keepdims=True)
+    return VIRTUAL_JOINTS, np.einsum("mjk,mk->mj", shares, whole / np.where(size > 0.0, size, 1.0))

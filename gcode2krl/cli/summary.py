@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints
@@ -49,7 +50,8 @@ def summary_lines(
     yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
-    yield "  not known  forces, deflection; collision and material removal are not checked"
+    yield from load_lines(prediction)
+    yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
 
 
 def _duration(seconds: float) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.cli.loads import largest
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
@@ -38,12 +39,21 @@ Floats = NDArray[np.float64]
     help="Parts of a long program.",
 )
 @click.option("--max-lines", type=click.IntRange(100), help="Motions in a part; default: the cell's.")
+@click.option(
+    "--no-forces", is_flag=True, help="Leave out material removal, forces, deflection and what rests on them."
+)
+@click.option(
+    "--pilot",
+    type=click.Choice(["index", "values", "none"]),
+    help="How the program carries the pilot force; default: the cell's, none on standard output.",
+)
 @click.option("--comment-every", type=click.IntRange(0), help="A G-code line number every so many motions.")
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
     name: str | None, allow: tuple[str, ...], strict: bool, no_guard: bool,
-    split: Literal["defs", "files"], max_lines: int | None, comment_every: int | None,
+    split: Literal["defs", "files"], max_lines: int | None, no_forces: bool,
+    pilot: Literal["index", "values", "none"] | None, comment_every: int | None,
 ) -> int:  # fmt: skip
     """Translate G-code into a KRL program, verify it, and say what it is.
 
@@ -57,7 +67,7 @@ def command(
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.krl import suggested_name, write_krl
-        from gcode2krl.predict import corner_errors, plan_motion, targets_and_joints
+        from gcode2krl.predict import corner_errors, predict_toolpath, targets_and_joints
 
         options = _words(
             tolerance=tolerance,
@@ -72,8 +82,7 @@ def command(
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
             targets = replace(targets, issues=(*targets.issues, *corner_issues))
             _refuse_early(targets, allow)
-            motion = plan_motion(targets, cell, cell.controller.cycle_s)
-            prediction = Prediction(toolpath, targets, cell, motion)
+            prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
             written = write_krl(
                 prediction,
                 file,
@@ -84,6 +93,7 @@ def command(
                 split=split,
                 options=options,
                 strict=strict,
+                pilot=pilot,
             )
     except Gcode2KrlError as error:
         if not as_json:
@@ -97,7 +107,8 @@ def command(
         return 0
     if as_json:
         figures = _figures(prediction, corner_mm)
-        console.json(_result(written.files, written.issues, figures, written.report.as_dict()))
+        pilot_figures = written.pilot.as_dict() if written.pilot is not None else None
+        console.json(_result(written.files, written.issues, figures, written.report.as_dict(), pilot_figures))
         return 0
     console.findings(written.issues, part)
     from gcode2krl.cli.summary import summary_lines
@@ -154,11 +165,13 @@ def _refuse_early(targets: Targets, allow: tuple[str, ...]) -> None:
 
 def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:
     """Return the figures of the contract that the stages give."""
-    motion = prediction.motion
+    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     return {
         "moves": len(prediction.toolpath) - 1,
         "time_s": float(motion.time_s[-1]) if motion is not None else None,
         "path_mm": float(motion.path_mm[-1]) if motion is not None else None,
+        "max_force_N": largest(forces.force_base_N) if forces is not None else None,
+        "max_deflection_mm": largest(deflection.deflection_base_mm) if deflection is not None else None,
         "corner_error_mm": float(corner_mm.max(initial=0.0)),
     }
 
@@ -168,6 +181,7 @@ def _result(
     issues: tuple[Issue, ...],
     figures: dict[str, Any] | None = None,
     verify: dict[str, Any] | None = None,
+    pilot: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the object of the contract; a figure whose stage did not run is null."""
     known = figures or {}
@@ -176,10 +190,10 @@ def _result(
         "moves": known.get("moves"),
         "time_s": known.get("time_s"),
         "path_mm": known.get("path_mm"),
-        "max_force_N": None,
-        "max_deflection_mm": None,
+        "max_force_N": known.get("max_force_N"),
+        "max_deflection_mm": known.get("max_deflection_mm"),
         "corner_error_mm": known.get("corner_error_mm"),
         "verify": verify or {"max_deviation_mm": None},
-        "pilot": {"knots": None, "max_error_N": None},
+        "pilot": pilot or {"knots": None, "max_error_N": None},
         "issues": issue_dicts(issues),
     }

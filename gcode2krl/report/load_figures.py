@@ -110,9 +110,7 @@ def share_figure(toolpath: Toolpath, motion: Motion, names: Sequence[str], share
     return figure
 
 
-def coloured_path_figure(
-    toolpath: Toolpath, motion: Motion, values: Floats, label: str, title: str
-) -> Figure:
+def coloured_path_figure(motion: Motion, values: Floats, label: str, title: str) -> Figure:
     """Draw the path from above and from the side, coloured by a quantity (m,); what is zero stays pale."""
     step = max(1, len(motion) // _MOST_SEGMENTS)
     points, shade = motion.position_mm[::step], _kept_peaks(values, step)

@@ -1,0 +1,7 @@
+"""Every effect the plant can have, in three shelves: of the library, of no library, slips of the set-up."""
+
+from tests.plant.effects import body, forces, joints, slips, timing, unknown
+from tests.plant.effects.registry import LIBRARY, SLIPS, UNKNOWN, Draw, Kind
+
+__all__ = ["LIBRARY", "SLIPS", "UNKNOWN", "Draw", "Kind"]
+SHELVES = (body, forces, joints, slips, timing, unknown)

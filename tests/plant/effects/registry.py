@@ -1,0 +1,97 @@
+"""How effects are declared and drawn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tests.plant.robot import Hooks
+from tests.plant.scene import JOINTS
+
+At = Callable[[float], tuple[dict, Hooks]]  # size -> parameters, hooks
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One effect: its sizes, what it needs, and how to build its forms."""
+
+    name: str
+    family: str
+    sizes: tuple[float, float]
+    signal: str  # where its size is judged: a name of truth.signals, scan, or any
+    needs: frozenset
+    same: Callable
+    hours: bool = False  # shows only between runs that are hours apart
+    others: list = field(default_factory=list)
+
+
+LIBRARY: dict[str, Kind] = {}
+UNKNOWN: dict[str, Kind] = {}
+SLIPS: dict[str, Kind] = {}
+
+
+def declare(shelf: dict, family: str, low: float, high: float, *, signal="any", needs=(), hours=False):
+    """Put a builder on a shelf under its own name; sizes from `low` to `high` are plausible."""
+
+    def keep(build):
+        name = build.__name__
+        shelf[name] = Kind(name, family, (low, high), signal, frozenset(needs), build, hours)
+        return build
+
+    return keep
+
+
+def other_form(name: str):
+    """Another form of the same physics; a name's forms are tried with equal chance."""
+
+    def keep(build):
+        LIBRARY[name].others.append(build)
+        return build
+
+    return keep
+
+
+class Draw:
+    """Random choices of one effect; `wanted` is a target that the caller insists on."""
+
+    def __init__(self, seed: int, wanted: str | None = None):
+        self.rng = np.random.default_rng(seed)
+        self.wanted = wanted
+
+    def target(self, names) -> str:
+        """One of the names, or the wanted one."""
+        picked = str(self.rng.choice(list(names)))
+        if self.wanted is not None and self.wanted not in names:
+            raise ValueError(f"{self.wanted} is not a target; allowed: {', '.join(names)}")
+        return self.wanted or picked
+
+    def joint(self) -> tuple[str, int]:
+        """Name and index of a joint."""
+        name = self.target(JOINTS)
+        return name, JOINTS.index(name)
+
+    def uniform(self, low: float, high: float) -> float:
+        """Between low and high."""
+        return float(self.rng.uniform(low, high))
+
+    def log_uniform(self, low: float, high: float) -> float:
+        """Between low and high, every factor of two alike."""
+        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+
+    def sign(self) -> float:
+        """-1 or 1."""
+        return float(self.rng.choice([-1.0, 1.0]))
+
+    def pick(self, values):
+        """One of the values."""
+        return values[int(self.rng.integers(len(values)))]
+
+    def direction(self) -> np.ndarray:
+        """A unit vector, all alike."""
+        v = self.rng.normal(size=3)
+        return v / np.linalg.norm(v)
+
+
+def numbers(**values) -> dict:
+    """Parameters as plain Python numbers and lists."""
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}

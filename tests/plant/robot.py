@@ -1,0 +1,238 @@
+"""One run of the plant: command, servo, gear, cut, bend, sense. Effects hook in between the stages.
+
+An effect is a set of hooks, one per stage, each a function that changes the `Run` in place: `world` before
+anything is planned, `command` after the commanded joints, `lags` before and `servo` after the servo, `gear`
+after the gear, `load` after the cut, `bend` before the structure gives way, `tip` and `sense` at the end.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tests.plant import arm as arms
+from tests.plant import chips, memory, path
+from tests.plant.scene import DEGREE, GEAR_RATIO, JOINT_ROW, GRAVITY_m_s2, World
+from tests.plant.waypoints import Waypoints
+
+STEP_s = 0.001
+SLOW = 4  # forces and bending every fourth sample
+TAIL_s = 0.25
+SIGN = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])  # the controller's angle about the hinge's z
+
+Hooks = dict[str, Callable[["Run"], None]]
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """What is never exact and never a cause: one robot and process (case) and one day (run)."""
+
+    stiffness: np.ndarray = field(default_factory=lambda: np.ones(10))
+    coefficients: np.ndarray = field(default_factory=lambda: np.ones(6))
+    gain: np.ndarray = field(default_factory=lambda: np.ones(3))
+    lag_s: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    play_deg: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    play_start: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    transmission_deg: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    phase: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    shift_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    turn_rad: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    clocks_s: dict = field(default_factory=dict)
+    force_zero_N: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+class Run:
+    """State of one run; arrays are per sample at `t_s` (fast) or `slow_s` (every fourth)."""
+
+    def __init__(self, way: Waypoints, world: World, mismatch: Mismatch, age_s: float = 0.0):
+        self.way, self.mismatch = way, mismatch
+        self.believed = world  # what the controller and the prediction think
+        self.world = world.but(stiffness_Nmm_rad=world.stiffness_Nmm_rad * mismatch.stiffness[:, None])
+        self.world = self.world.cutting(coefficients=world.cutter.coefficients * mismatch.coefficients)
+        self.age_s = age_s
+        self.zero_rad = np.zeros(6)  # true minus indicated angle
+        self.payload = []  # (kg, centre in the tool frame)
+        self.clocks = {name: (offset, 0.0) for name, offset in mismatch.clocks_s.items()}
+        self.jumps = {}  # table -> (time, seconds)
+        self.units = {}
+        self.depth_taper_mm = 0.0
+
+    def delay(self, table: str, offset_s: float, skew: float = 0.0) -> None:
+        """Add an offset and a skew to a table's clock."""
+        old = self.clocks.get(table, (0.0, 0.0))
+        self.clocks[table] = (old[0] + offset_s, old[1] + skew)
+
+    @property
+    def velocity_mm_s(self) -> np.ndarray:
+        """Velocity of the commanded path at the slow samples."""
+        return self.rates(self.place_mm)[::SLOW]
+
+    @staticmethod
+    def rates(x: np.ndarray) -> np.ndarray:
+        """Time derivative at the fast samples."""
+        return np.gradient(x, STEP_s, axis=0)
+
+
+def to_root(world: World, place_mm: np.ndarray) -> np.ndarray:
+    """`$BASE` to the robot's root."""
+    return place_mm @ world.base.axes.T + world.base.origin_mm
+
+
+def to_base(world: World, place_mm: np.ndarray) -> np.ndarray:
+    """The robot's root to `$BASE`."""
+    return (place_mm - world.base.origin_mm) @ world.base.axes
+
+
+def joints_for(world: World, place_mm: np.ndarray) -> np.ndarray:
+    """The controller's angles for an upright tool at places in `$BASE`."""
+    axes = np.broadcast_to(world.base.axes, (len(place_mm), 3, 3))
+    return arms.inverse(world, to_root(world, place_mm), axes)
+
+
+def _command(run: Run) -> None:
+    run.links = path.chains(run.way, run.believed)
+    run.t_s = np.arange(0.0, run.links[-1].end_s + TAIL_s, STEP_s)
+    run.slow_s = run.t_s[::SLOW]
+    run.place_mm = path.commanded(run.links, run.t_s, run.believed)
+    run.reported_mm = run.place_mm.copy()
+    run.q_cmd = joints_for(run.believed, run.place_mm)
+    run.lag_s = np.broadcast_to(run.mismatch.lag_s + run.world.lag_s, run.q_cmd.shape).copy()
+
+
+def _servo(run: Run) -> None:
+    run.q_act = np.empty_like(run.q_cmd)
+    for j in range(6):
+        run.q_act[:, j] = memory.lag(run.q_cmd[:, j].copy(), run.lag_s[:, j].copy(), STEP_s)
+
+
+def ripple(q_rad: np.ndarray, joint: int, amplitude_deg, harmonic: int, phase: float) -> np.ndarray:
+    """Transmission error of one joint, rad."""
+    return amplitude_deg * DEGREE * np.sin(harmonic * GEAR_RATIO[joint] * q_rad + phase)
+
+
+def slack(q_rad: np.ndarray, gap_deg, start: float) -> np.ndarray:
+    """What a play of ± gap/2 adds to an angle, rad."""
+    half = np.broadcast_to(np.asarray(gap_deg, float) * DEGREE / 2.0, q_rad.shape).copy()
+    return memory.play(q_rad.copy(), half, start) - q_rad
+
+
+def _gear(run: Run) -> None:
+    run.q_load = run.q_act.copy()
+    m = run.mismatch
+    for j in range(6):
+        q = run.q_act[:, j]
+        if m.play_deg[j] > 0.0:
+            run.q_load[:, j] += slack(q, m.play_deg[j], m.play_start[j])
+        if m.transmission_deg[j] > 0.0:
+            run.q_load[:, j] += ripple(q, j, m.transmission_deg[j], 1, m.phase[j])
+
+
+def chain_of(run: Run) -> np.ndarray:
+    """Which chain each slow sample belongs to."""
+    starts = np.array([c.start_s for c in run.links])
+    return np.clip(np.searchsorted(starts, run.slow_s, side="right") - 1, 0, None)
+
+
+def take_cut(run: Run) -> None:
+    owner = chain_of(run)
+    s = np.zeros(len(owner))
+    for i, chain in enumerate(run.links):
+        s[owner == i] = path.distance(chain, run.slow_s[owner == i])
+    run.pieces = chips.pieces(run.links, run.believed)
+    place = run.place_mm[::SLOW]
+    run.cut = chips.cut(place, run.velocity_mm_s, owner.astype(float), s, run.pieces, run.world)
+    turn = run.world.base.axes.T
+    run.force_N = run.cut.force_N @ turn  # along the root's axes
+    run.moment_Nmm = run.cut.moment_Nmm @ turn
+    contact = run.cut.depth_mm > 0.0
+    step = np.linalg.norm(np.diff(place, axis=0, prepend=place[:1]), axis=1)
+    run.metres_cut = np.cumsum(step * contact) / 1000.0
+
+
+def _weight(run: Run, arm, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment at the TCP of loads that the model has not."""
+    force, moment = np.zeros((len(q_rad), 3)), np.zeros((len(q_rad), 3))
+    if run.payload:
+        axes = arms.pose(arm, q_rad)[1]
+        for kg, centre in run.payload:
+            pull = np.array([0.0, 0.0, -GRAVITY_m_s2 * kg])
+            force += pull
+            moment += np.cross(axes @ np.asarray(centre), pull)
+    return force, moment
+
+
+def _structure(run: Run) -> None:
+    arm = arms.reference_pose(run.world)
+    run.arm = arm
+    q_true = run.q_load + run.zero_rad
+    slow = np.ascontiguousarray(q_true[::SLOW])
+    force, moment = _weight(run, arm, slow)
+    turning = arms.torques(arm, slow, run.force_N + force, run.moment_Nmm + moment)
+    angles = turning / run.world.stiffness_Nmm_rad
+    angles[:, JOINT_ROW, 2] += run.extra_rad * SIGN
+    rigid, _ = arms.pose(arm, slow)
+    bent, _ = arms.bent(arm, slow, angles)
+    run.twist_rad = angles[:, JOINT_ROW, 2] * SIGN  # about each joint, the controller's sign
+    run.bending_mm = bent - rigid
+    place, axes = arms.pose(arm, q_true)
+    run.tip_mm = to_base(run.world, place + fast(run, run.bending_mm))
+    run.tip_axes = run.world.base.axes.T @ axes
+
+
+def joint_torques(run: Run) -> np.ndarray:
+    """Moments about the six joints by the cut, the controller's sign, N·mm, at the slow samples."""
+    arm = arms.reference_pose(run.world)
+    slow = np.ascontiguousarray(run.q_load[::SLOW])
+    turning = arms.torques(arm, slow, run.force_N, run.moment_Nmm)
+    return turning[:, JOINT_ROW, 2] * SIGN
+
+
+def fast(run: Run, slow: np.ndarray) -> np.ndarray:
+    """Slow columns at the fast samples, straight in between."""
+    columns = [np.interp(run.t_s, run.slow_s, slow[:, k]) for k in range(slow.shape[1])]
+    return np.stack(columns, axis=1)
+
+
+def _frame(run: Run) -> None:
+    """The day's tracker frame: a small shift and turn about the middle of the work."""
+    run.tip_mm = run.tip_mm + run.mismatch.shift_mm + np.cross(run.mismatch.turn_rad, run.tip_mm)
+
+
+def _sense(run: Run) -> None:
+    """Force on the tool in the sensor's axes (those of the flange), gain and zero."""
+    flange = run.tip_axes[::SLOW] @ run.believed.tool.axes.T
+    run.sensor_axes = flange
+    along = run.force_N @ run.world.base.axes
+    run.sensed_N = np.einsum("nji,nj->ni", flange, along) * run.mismatch.gain + run.mismatch.force_zero_N
+    moment = run.moment_Nmm @ run.world.base.axes
+    run.sensed_Nmm = np.einsum("nji,nj->ni", flange, moment) * run.mismatch.gain
+
+
+def simulate(way: Waypoints, world: World, effects: list[Hooks], mismatch=None, age_s=0.0, number=0) -> Run:
+    """Drive the waypoints with these effects at work."""
+    run = Run(way, world, mismatch or Mismatch(), age_s)
+    run.number = number
+
+    def at(stage: str) -> None:
+        for hooks in effects:
+            if stage in hooks:
+                hooks[stage](run)
+
+    at("world")
+    _command(run)
+    at("command")
+    at("lags")
+    _servo(run)
+    at("servo")
+    _gear(run)
+    at("gear")
+    take_cut(run)
+    at("load")
+    run.extra_rad = np.zeros((len(run.slow_s), 6))
+    at("bend")
+    _structure(run)
+    at("tip")
+    _frame(run)
+    _sense(run)
+    at("sense")
+    return run
