@@ -1,0 +1,100 @@
+"""The rigid and the elastic arm along one run: tips, joint torques, deflection, all along ``$BASE``."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import robot
+from gcode2krl.cell import Cell
+from gcode2krl.compliance import chain, missing_stiffness, model
+from gcode2krl.frames import invert
+from gcode2krl.robot.kinematics import flange_pose
+from gcode2krl.units import MM_PER_M
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Rows = slice | NDArray[np.int64]
+
+
+def tool_rows(tool: Ints) -> Iterator[tuple[int, Rows]]:
+    """Yield each tool number and its rows."""
+    numbers = np.unique(tool)
+    for number in numbers:
+        yield int(number), slice(None) if len(numbers) == 1 else np.flatnonzero(tool == number)
+
+
+def tip_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell, tool: Ints) -> Floats:
+    """Return the tips (m, 3) in mm in ``$BASE`` of an arm of these lengths (6,)."""
+    flange_mm, rotation = flange_pose(q_rad, lengths_mm)
+    root = np.empty_like(flange_mm)
+    for number, rows in tool_rows(tool):
+        root[rows] = flange_mm[rows] + rotation[rows] @ cell.tool_matrix(number)[:3, 3]
+    to_base = invert(cell.base_matrix())
+    tips: Floats = root @ to_base[:3, :3].T + to_base[:3, 3]
+    return tips
+
+
+def tool_rotation(q_rad: Floats, cell: Cell, tool: Ints) -> Floats:
+    """Return the rotations (m, 3, 3) of the tool frame in ``$BASE``."""
+    _, rotation = flange_pose(q_rad, cell.robot.geometry.array())
+    turned = cell.base_matrix()[:3, :3].T @ rotation
+    for number, rows in tool_rows(tool):
+        turned[rows] = turned[rows] @ cell.tool_matrix(number)[:3, :3]
+    return turned
+
+
+def jacobian_base(q_rad: Floats, cell: Cell, tool: Ints) -> Floats:
+    """Return the Jacobian (m, 6, 6) of the tip along ``$BASE``: mm/rad over rad/rad."""
+    found = np.empty((len(q_rad), 6, 6))
+    for number, rows in tool_rows(tool):
+        found[rows] = robot.jacobian(q_rad[rows], cell, number)
+    to_base = cell.base_matrix()[:3, :3].T
+    if not np.array_equal(to_base, np.eye(3)):
+        found[:, :3] = to_base @ found[:, :3]
+        found[:, 3:] = to_base @ found[:, 3:]
+    return found
+
+
+def torque_Nm(jacobian: Floats, force_N: Floats, moment_Nmm: Floats) -> Floats:
+    """Return the joint torques (m, 6) in N·m of a load at the tip: Jᵀ·(F, M), positive with the angle."""
+    load = np.concatenate([force_N, moment_Nmm], axis=1)
+    torque: Floats = np.matmul(load[:, None, :], jacobian)[:, 0, :] / MM_PER_M
+    return torque
+
+
+def softness_of(cell: Cell) -> Floats | None:
+    """Return 1/k_C, 1/k_B, 1/k_A (10, 3) of the virtual joints; None where the cell does not state all."""
+    return None if missing_stiffness(cell) is not None else model.softness(cell)
+
+
+def bend(
+    q_rad: Floats,
+    force_N: Floats,
+    moment_Nmm: Floats,
+    softness: Floats | None,
+    cell: Cell,
+    tool: Ints,
+    turned: bool = False,
+) -> tuple[Floats, Floats]:
+    """Return how far the tip moves and turns under a load along ``$BASE``, eq. 1-9 of Haehn & Weigold 2020.
+
+    Both (m, 3), in mm and rad; the turn is zero unless ``turned``. Without stiffness nothing bends.
+    """
+    shift, turn = np.zeros((len(q_rad), 3)), np.zeros((len(q_rad), 3))
+    if softness is None or not (force_N.any() or moment_Nmm.any()):
+        return shift, turn
+    tips = model.tips(cell, tool, len(q_rad))
+    base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
+    chain.displaced_rows(
+        _frozen(q_rad), _frozen(force_N), _frozen(moment_Nmm), model.frames(cell), softness, base,
+        tips.position_mm, tips.tool, shift, turn if turned else turn[:0],
+    )  # fmt: skip
+    return shift, turn
+
+
+def _frozen(values: Floats) -> Floats:
+    """Return a contiguous read-only view, the one array type for which the kernel is compiled."""
+    array = np.ascontiguousarray(values, dtype=np.float64).view()
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,1 @@
+"""The effects of the library, a file each; every file defines ``EFFECT``."""

@@ -1,0 +1,48 @@
+"""Exact stops where the program has a rounded corner."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gcode2krl.effects.effect import Applied, Effect, Parameter
+from gcode2krl.effects.inputs import Inputs
+
+
+class AdvanceStop(Effect):
+    """Something stops the advance run: ``count`` approximated corners become exact stops of ``hold_s``.
+
+    Which ones is not known beforehand; they are taken evenly spread over the approximated corners. The count
+    is rounded to a whole number.
+    """
+
+    name = "advance_stop"
+    family = "timing"
+    links = frozenset({"timing", "path"})
+    needs = frozenset({"plan"})
+    parameters = (
+        Parameter(
+            "count", "", 0.0, 50.0, nominal=0.0, start=3.0, minimum=0.0,
+            source="each WAIT or output outside a TRIGGER is one",
+        ),
+        Parameter(
+            "hold_s", "s", 0.0, 5.0, nominal=None, start=0.1, grid=(0.0, 0.1, 0.5), minimum=0.0,
+            source="a mere stop, a cycle of the submit interpreter, a WAIT SEC",
+        ),
+    )  # fmt: skip
+
+    def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
+        """Return the inputs of the motion with these stops."""
+        count = round(applied["count"])
+        if count < 1 or inputs.targets is None:
+            return inputs
+        targets = inputs.targets
+        corners = np.flatnonzero(targets.cdis_mm > 0.0)
+        if len(corners) == 0:
+            return inputs
+        chosen = corners[((np.arange(count) + 0.5) / count * len(corners)).astype(int)]
+        cdis_mm, wait_s = np.array(targets.cdis_mm), np.array(targets.wait_s)
+        cdis_mm[chosen], wait_s[chosen] = 0.0, wait_s[chosen] + applied["hold_s"]
+        return inputs.replanned(replace(targets, cdis_mm=cdis_mm, wait_s=wait_s), inputs.cell)
+
+
+EFFECT = AdvanceStop()

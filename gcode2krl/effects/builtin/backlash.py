@@ -1,0 +1,36 @@
+"""Backlash of a gear."""
+
+import numpy as np
+
+from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter, every_joint
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.operators import play
+from gcode2krl.units import RAD_PER_DEG
+
+
+class Backlash(Effect):
+    """Play with memory between motor and arm: q_load - q_act within ± gap/2, changing only at its ends.
+
+    The run begins in the middle of the gap (an assumption, forgotten at the first reversal). Gravity that
+    preloads a gear is not in it.
+    """
+
+    name = "backlash"
+    family = "joint"
+    links = frozenset({"gear"})
+    targets = staticmethod(every_joint)
+    parameters = (
+        Parameter(
+            "gap_deg", "deg", 0.0, 0.1, nominal=0.0, start=0.01, linear=False, minimum=0.0,
+            source="reversal error of a large KUKA 0.3-1 arcmin; worn gears several times that",
+        ),
+    )  # fmt: skip
+
+    def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return what is behind the gear."""
+        q = np.array(q_load_rad)
+        q[:, applied.joint] = play(q[:, applied.joint], applied["gap_deg"] * RAD_PER_DEG / 2.0)
+        return q
+
+
+EFFECT = Backlash()

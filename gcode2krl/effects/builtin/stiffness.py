@@ -1,0 +1,33 @@
+"""A virtual joint is stiffer or softer than the model's."""
+
+import numpy as np
+
+from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter, every_virtual_joint
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.sections import VIRTUAL_JOINTS
+
+
+class Stiffness(Effect):
+    """True stiffness = ``scale``·the model's, about all three axes of one virtual joint."""
+
+    name = "stiffness"
+    family = "compliance"
+    links = frozenset({"mechanics"})
+    targets = staticmethod(every_virtual_joint)
+    parameters = (
+        Parameter(
+            "scale", "", 0.3, 3.0, nominal=1.0, start=0.8, linear=True, minimum=0.01,
+            source="identified within 8 % (Haehn & Weigold 2020); a worn bearing or another arm: factors",
+        ),
+    )  # fmt: skip
+
+    def softness(self, softness: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the softness with that joint's over ``scale``."""
+        if applied["scale"] == 1.0:
+            return softness
+        soft = np.array(softness)
+        soft[VIRTUAL_JOINTS.index(applied.target or "")] /= applied["scale"]
+        return soft
+
+
+EFFECT = Stiffness()

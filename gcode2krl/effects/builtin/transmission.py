@@ -1,0 +1,60 @@
+"""Periodic transmission error of a gear."""
+
+import math
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.effects.effect import JOINTS, Applied, Effect, Floats, Parameter, Target
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.units import RAD_PER_DEG
+
+
+class Transmission(Effect):
+    """Behind the gear: amplitude·sin(harmonic·gear ratio·q + phase) is added, q in rad of the motor side.
+
+    ``phase`` in rad; harmonic 1 is once a turn of the motor.
+    """
+
+    name = "transmission"
+    family = "joint"
+    links = frozenset({"gear"})
+    parameters = (
+        Parameter(
+            "amplitude_deg", "deg", 0.0, 0.02, nominal=0.0, start=0.004, linear=True, minimum=0.0,
+            source="1-60 arcsec at once and twice a turn of the motor",
+        ),
+        Parameter(
+            "harmonic", "", 0.1, 12.0, nominal=None, start=1.0, grid=(1.0, 2.0), minimum=0.0,
+            source="once and twice a turn of the motor are the strongest; tooth meshes are higher",
+        ),
+        Parameter(
+            "phase", "rad", -math.pi, math.pi, nominal=None, start=0.0, grid=(0.0, math.pi / 2.0),
+            source="any",
+        ),
+    )  # fmt: skip
+
+    def targets(self, cell: Cell) -> tuple[Target, ...]:
+        """Return the joints whose gear ratio the cell states."""
+        ratios = cell.robot.drives.gear_ratio
+        return () if ratios is None else tuple(j for j, n in zip(JOINTS, ratios, strict=True) if n != 0.0)
+
+    def why_not(self, cell: Cell, target: Target) -> str:
+        """Say that the gear ratio is missing."""
+        if target not in JOINTS or target in self.targets(cell):
+            return ""
+        return f"the gear ratio of {target} of {cell.robot.model} is not known: state robot.drives.gear_ratio"
+
+    def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return what is behind the gear."""
+        ratios = inputs.cell.robot.drives.gear_ratio
+        amplitude_rad = applied["amplitude_deg"] * RAD_PER_DEG
+        if ratios is None or amplitude_rad == 0.0:
+            return q_load_rad
+        q = np.array(q_load_rad)
+        turn = applied["harmonic"] * ratios[applied.joint] * q[:, applied.joint]
+        q[:, applied.joint] += amplitude_rad * np.sin(turn + applied["phase"])
+        return q
+
+
+EFFECT = Transmission()

@@ -1,0 +1,53 @@
+"""The controller's time law uses other constants than the cell states."""
+
+import math
+
+from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.inputs import Inputs
+
+_OWN = math.nan
+
+
+class VelocityRule(Effect):
+    """The controller's smoothing time k and path acceleration are really these; not given = as in the cell.
+
+    The motion is planned anew by the laws of `krc4` (Bigliardi et al. 2022), with the material removed anew
+    where forces are known: the chip follows the speed.
+    """
+
+    name = "velocity_rule"
+    family = "timing"
+    links = frozenset({"timing", "path"})
+    needs = frozenset({"plan"})
+    parameters = (
+        Parameter(
+            "k_s", "s", 0.0, 0.5, nominal=_OWN, start=0.2, minimum=0.0,
+            source="0.168 s measured on one KR 210 (Bigliardi et al. 2022); others unknown",
+        ),
+        Parameter(
+            "acc_cp_m_s2", "m/s2", 0.2, 10.0, nominal=_OWN, start=1.5, minimum=0.01,
+            source="$ACC.CP of programs 0.5-5 m/s2, drives of large arms up to 10",
+        ),
+    )  # fmt: skip
+
+    def nominal(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
+        """Return the cell's own constants."""
+        controller = inputs.cell.controller
+        return {"k_s": controller.k_s, "acc_cp_m_s2": controller.acc_cp_m_s2}
+
+    def start(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
+        """Return constants a fifth above and below the cell's."""
+        controller = inputs.cell.controller
+        return {"k_s": 1.2 * controller.k_s or 0.05, "acc_cp_m_s2": 0.8 * controller.acc_cp_m_s2}
+
+    def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
+        """Return the inputs of the motion with these constants."""
+        own = self.nominal(inputs)
+        used = {name: own[name] if math.isnan(applied[name]) else applied[name] for name in own}
+        if used == own or inputs.targets is None:
+            return inputs
+        controller = inputs.cell.controller.model_copy(update=used)
+        return inputs.replanned(inputs.targets, inputs.cell.model_copy(update={"controller": controller}))
+
+
+EFFECT = VelocityRule()

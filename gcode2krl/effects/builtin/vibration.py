@@ -1,0 +1,75 @@
+"""A structural mode that rings."""
+
+from types import MappingProxyType
+
+import numpy as np
+
+from gcode2krl.effects.effect import (
+    DIRECTION,
+    Applied,
+    Effect,
+    Floats,
+    Parameter,
+    Target,
+    Values,
+    direction_parameters,
+)
+from gcode2krl.effects.inputs import Inputs, gradient
+from gcode2krl.effects.operators import second_order
+from gcode2krl.units import RAD_PER_REV
+
+
+class Vibration(Effect):
+    """One mode along a direction n in ``$BASE``: u'' + 2·zeta·w·u' + w²·u = drive, tip += participation·n·u.
+
+    Driven by force, through the static deflection d(t) it takes part in, and by the commanded acceleration
+    a(t): u = H·(n·d - n·a/w²) - n·d with H the second-order lag of the mode, so that at rest under a steady
+    force nothing is added to the static model.
+    """
+
+    name = "vibration"
+    family = "compliance"
+    links = frozenset({"mechanics"})
+    vectors = MappingProxyType({"direction": DIRECTION})
+    direction = DIRECTION
+    parameters = (
+        Parameter(
+            "hz", "Hz", 3.0, 40.0, nominal=None, start=12.0, grid=(7.0, 10.0, 14.0, 19.0, 25.0), minimum=0.1,
+            source="modes of large arms 7-25 Hz",
+        ),
+        Parameter(
+            "damping", "", 0.005, 0.2, nominal=None, start=0.03, grid=(0.03,), minimum=0.0,
+            source="structural damping 1-6 %",
+        ),
+        Parameter(
+            "participation", "", 0.0, 3.0, nominal=0.0, start=0.5, linear=True, minimum=0.0,
+            source="share of the mode in the static deflection; above 1 where several act as one",
+        ),
+        *direction_parameters("any"),
+    )  # fmt: skip
+
+    def combined(
+        self, coefficients: Floats, inputs: Inputs, target: Target = None, shape: Values | None = None
+    ) -> dict[str, float]:
+        """Return the values whose squared direction has these shares: the effect goes with n·nᵀ."""
+        values = self.nominal(inputs, target) | dict(shape or {})
+        parts = np.maximum(np.asarray(coefficients, dtype=float), 0.0)
+        values["participation"] = float(parts.sum()) * self.start(inputs, target)["participation"]
+        if parts.sum() > 0.0:
+            values |= dict(zip(DIRECTION, np.sqrt(parts / parts.sum()).tolist(), strict=True))
+        return values
+
+    def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the tip with the mode's motion."""
+        if applied["participation"] == 0.0:
+            return tcp_mm
+        along, w_rad_s = applied.unit_vector(), RAD_PER_REV * applied["hz"]
+        static = deflection_mm @ along
+        acceleration = gradient(inputs.velocity_mm_s, inputs.time_s) @ along
+        damping = min(applied["damping"], 0.999)
+        drive = static - acceleration / w_rad_s**2
+        ringing = second_order(drive, inputs.time_s, applied["hz"], damping) - static
+        return tcp_mm + applied["participation"] * ringing[:, None] * along
+
+
+EFFECT = Vibration()

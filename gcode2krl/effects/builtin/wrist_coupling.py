@@ -1,0 +1,35 @@
+"""Axes of the wrist turn each other."""
+
+import numpy as np
+
+from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter
+from gcode2krl.effects.inputs import Inputs
+
+
+class WristCoupling(Effect):
+    """The controller's decoupling of the wrist is off: q5 += ratio·q4, q6 += ratio·(q4 + q5).
+
+    q4 and q5 on the right are the indicated ones; the wrist's encoders do not see it.
+    """
+
+    name = "wrist_coupling"
+    family = "joint"
+    links = frozenset({"mechanics"})
+    parameters = (
+        Parameter(
+            "ratio", "", -0.05, 0.05, nominal=0.0, start=0.001, linear=True,
+            source="couplings of hollow wrists are 1/50-1/200 before the controller takes them out",
+        ),
+    )  # fmt: skip
+
+    def joints(self, q_true_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the true joints."""
+        if applied["ratio"] == 0.0:
+            return q_true_rad
+        q = np.array(q_true_rad)
+        q[:, 4] += applied["ratio"] * q_true_rad[:, 3]
+        q[:, 5] += applied["ratio"] * (q_true_rad[:, 3] + q_true_rad[:, 4])
+        return q
+
+
+EFFECT = WristCoupling()

@@ -1,0 +1,116 @@
+"""The measuring chain of one run, nominal or with effects: what each instrument would see.
+
+`simulate` follows the physics: plan -> commanded joints -> motor side -> behind the gear -> true joints;
+cutting force -> load that bends the arm -> deflection -> tip; force -> sensor; at last the clocks.
+Where an input carries what was measured at a stage, the stages after it start from that, so that each link of
+the chain is judged on its measured input.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.effects import arm
+from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.signals import Signals
+
+Floats = NDArray[np.float64]
+
+
+def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool = False) -> Signals:
+    """Return what instruments would see with some effects at work, in the order of the physics.
+
+    With ``rotation`` the true orientation of the tool comes too. Effects of one stage follow each other in
+    the order given. Without effects the tip is the commanded one plus the nominal deflection.
+    """
+    for one in applied:
+        inputs = one.effect.replan(inputs, one)
+    q_cmd = inputs.q_cmd_rad
+    q_act = q_load = q_true = q_cmd
+    for one in applied:
+        q_act = one.effect.servo(q_act, inputs, one)
+    q_load = q_act if inputs.q_act_rad is None else inputs.q_act_rad
+    for one in applied:
+        q_load = one.effect.gear(q_load, inputs, one)
+    q_true = q_load if inputs.q_load_rad is None else inputs.q_load_rad
+    for one in applied:
+        q_true = one.effect.joints(q_true, inputs, one)
+
+    cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
+    for one in applied:
+        cut = one.effect.cut(cut, inputs, one)
+    bending = cut if inputs.load_base_N is None else (inputs.load_base_N, inputs.moment_base_Nmm)
+    for one in applied:
+        bending = one.effect.load(bending, inputs, one)
+
+    pose = _pose(inputs, applied, q_true, bending, rotation)
+    sensed = cut
+    for one in applied:
+        sensed = one.effect.sensor(sensed, inputs, one)
+    signals = Signals(
+        inputs=inputs,
+        q_cmd_rad=q_cmd,
+        q_act_rad=q_act,
+        q_load_rad=q_load,
+        force_base_N=cut[0],
+        moment_base_Nmm=cut[1],
+        force_meas_base_N=sensed[0],
+        moment_meas_base_Nmm=sensed[1],
+        **pose,
+    )
+    for one in applied:
+        signals = one.effect.instruments(signals, one)
+    return signals
+
+
+def _pose(
+    inputs: Inputs, applied: Sequence[Applied], q_true: Floats, load: Load, rotation: bool
+) -> dict[str, Any]:
+    """Return true joints, tip and, where asked for, orientation of the loaded arm."""
+    softness, lengths_mm = inputs.softness, inputs.lengths_mm
+    for one in applied:
+        softness = softness if softness is None else one.effect.softness(softness, inputs, one)
+        lengths_mm = one.effect.geometry(lengths_mm, inputs, one)
+    if q_true is inputs.q_cmd_rad and load[0] is inputs.force_base_N and softness is inputs.softness:
+        deflection = inputs.deflection_mm
+    else:
+        deflection, _ = arm.bend(q_true, *load, softness, inputs.cell, inputs.tool)
+    turns = [one for one in applied if type(one.effect).elastic is not Effect.elastic]
+    if turns:
+        torque = arm.torque_Nm(inputs.jacobian, *load)
+        angle = np.zeros_like(torque)
+        for one in turns:
+            angle = one.effect.elastic(angle, torque, inputs, one)
+        q_true = q_true + angle
+    tip = inputs.position_mm
+    if q_true is not inputs.q_cmd_rad or lengths_mm is not inputs.lengths_mm:
+        tip = tip + (arm.tip_mm(q_true, lengths_mm, inputs.cell, inputs.tool) - inputs._rigid_tip_mm)
+    tcp = tip + deflection
+    for one in applied:
+        tcp = one.effect.tcp(tcp, deflection, inputs, one)
+    found: dict[str, Any] = {"q_true_rad": q_true, "tcp_base_mm": tcp}
+    if rotation:
+        found["tcp_rotation"] = _orientation(inputs, applied, q_true, load, softness)
+    return found
+
+
+def _orientation(
+    inputs: Inputs, applied: Sequence[Applied], q_true: Floats, load: Load, softness: Floats | None
+) -> Floats:
+    """Return the true quaternions (m, 4) of the tool frame: arm, bending, then what frames add."""
+    _, bent_rad = arm.bend(q_true, *load, softness, inputs.cell, inputs.tool, turned=True)
+    turned = rotation_of(bent_rad) @ arm.tool_rotation(q_true, inputs.cell, inputs.tool)
+    for one in applied:
+        turned = one.effect.orientation(turned, inputs, one)
+    return fr.quaternion_from_rotation(turned)
+
+
+def rotation_of(vector_rad: Floats) -> Floats:
+    """Return the rotations (m, 3, 3) of rotation vectors (m, 3)."""
+    angle = np.linalg.norm(vector_rad, axis=1, keepdims=True)
+    half = np.sinc(angle / (2.0 * np.pi)) / 2.0  # sin(angle/2)/angle, right at 0 too
+    return fr.rotation_from_quaternion(np.concatenate([vector_rad * half, np.cos(angle / 2.0)], axis=1))

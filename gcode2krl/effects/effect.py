@@ -1,0 +1,293 @@
+"""What an effect is: a name, where it shows, its parameters, and one implementation as hooks of the chain.
+
+An effect is one physical thing that the nominal model leaves out. It overrides the hooks of the stages it
+touches; `chain.simulate` calls them in the order of the physics, each with the signal so far, and each
+returns the signal with the effect. A hook never changes an array it is given.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.sections import VIRTUAL_JOINTS
+
+if TYPE_CHECKING:
+    from gcode2krl.effects.inputs import Inputs
+    from gcode2krl.effects.signals import Signals
+
+Floats = NDArray[np.float64]
+Values = Mapping[str, float]
+Target = str | None
+Load = tuple[Floats, Floats]
+"""Force (m, 3) in N on the tool and moment (m, 3) in N·mm about its tip, along ``$BASE``."""
+
+LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
+JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
+NO_TARGET: tuple[Target, ...] = (None,)
+DIRECTION = ("direction_x", "direction_y", "direction_z")
+_DOWNSTREAM = {
+    "timing": "path",
+    "path": "servo",
+    "servo": "gear",
+    "gear": "mechanics",
+    "force": "mechanics",
+    "mechanics": "part",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect, in the unit that its name carries."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    """Plausible range: the bounds of a fit."""
+    nominal: float | None
+    """Value at which the effect is not there; NaN = the model's own value (see `Effect.nominal`), None = the
+    parameter only shapes an effect whose size another one gives."""
+    start: float
+    """A typical value: where a fit begins, and what a shape takes when it is not given."""
+    source: str
+    """Where the plausible range comes from."""
+    linear: bool = False
+    """True where the signals are proportional to (value - nominal), exactly or for small values."""
+    grid: tuple[float, ...] = ()
+    """Values of a shape from which a search should begin."""
+    minimum: float = -math.inf
+    """Below this the effect has no meaning; such a value is refused."""
+
+    @property
+    def is_shape(self) -> bool:
+        """Tell whether the parameter gives a form, not a size."""
+        return self.nominal is None
+
+
+@dataclass(frozen=True)
+class Applied:
+    """An effect at one target with the values of all its parameters."""
+
+    effect: "Effect"
+    target: Target = None
+    values: Values = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+    def vector(self, names: tuple[str, ...]) -> Floats:
+        """Return the values of some parameters as an array."""
+        return np.array([self.values[name] for name in names])
+
+    def unit_vector(self) -> Floats:
+        """Return the direction (3,) at length 1; zero where it has none."""
+        along = self.vector(self.effect.direction or DIRECTION)
+        length = float(np.linalg.norm(along))
+        return along / length if length > 0.0 else along
+
+    def __str__(self) -> str:
+        """Return the text that `registry.parse` reads, ``backlash:target=A2,gap_deg=0.02``."""
+        target = [] if self.target is None else [f"target={self.target}"]
+        values = [f"{name}={value!r}" for name, value in self.values.items() if math.isfinite(value)]
+        return f"{self.effect.name}:{','.join((*target, *values))}".rstrip(":")
+
+    @property
+    def label(self) -> str:
+        """Return name and target, ``backlash A2``."""
+        return self.effect.name if self.target is None else f"{self.effect.name} {self.target}"
+
+    @property
+    def joint(self) -> int:
+        """Return the index 0 to 5 of the target A1 to A6."""
+        return JOINTS.index(self.target or "")
+
+
+class Effect:
+    """Base of all effects: no hook does anything.
+
+    A library file defines ``EFFECT = SomeEffect()``. To build signatures a diagnosis uses `settings`, the
+    unit settings whose signals span the effect at a given shape, and `combined`, the values of a combination.
+    """
+
+    name: str = ""
+    family: str = ""
+    links: frozenset[str] = frozenset()
+    """Links of the measuring chain in which it shows when every signal is measured; see `visible_links`."""
+    kind: Literal["cause", "slip"] = "cause"
+    parameters: tuple[Parameter, ...] = ()
+    vectors: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    """Names under which several parameters may be given at once: ``direction`` -> its three components."""
+    needs: frozenset[str] = frozenset()
+    """What `Inputs.offers` must contain for the effect to be simulated: ``cut``, ``plan``."""
+    direction: tuple[str, str, str] | None = None
+    """Three parameters that are a direction only: their length does not matter, the size has its own."""
+
+    # What it is
+
+    def targets(self, cell: Cell) -> tuple[Target, ...]:
+        """Return what the effect can be at in this cell: ``(None,)`` where it has no target, () nowhere."""
+        return NO_TARGET
+
+    def why_not(self, cell: Cell, target: Target) -> str:
+        """Return why a target is not among `targets` of this cell, and what would make it one."""
+        return ""
+
+    def links_at(self, target: Target) -> frozenset[str]:
+        """Return the links in which the effect shows at this target."""
+        return self.links
+
+    def visible_links(self, examined: frozenset[str], target: Target = None) -> frozenset[str]:
+        """Return the examined links in which it shows; what is not measured adds to the next link downstream.
+
+        Without a load encoder, say, a backlash shows in the mechanics.
+        """
+        found = set()
+        for link in self.links_at(target):
+            here: str | None = link
+            while here is not None and here not in examined:
+                here = _DOWNSTREAM.get(here)
+            if here is not None:
+                found.add(here)
+        return frozenset(found)
+
+    # Its values
+
+    def parameter(self, name: str) -> Parameter:
+        """Return a parameter by name; raises KeyError."""
+        return {p.name: p for p in self.parameters}[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the parameters."""
+        return tuple(p.name for p in self.parameters)
+
+    def nominal(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
+        """Return the values at which the effect is not there, the model's own where they depend on the cell.
+
+        Shapes have their typical value.
+        """
+        return {p.name: p.start if p.nominal is None else p.nominal for p in self.parameters}
+
+    def start(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
+        """Return typical values with the effect."""
+        return {p.name: p.start for p in self.parameters}
+
+    def shapes(self) -> tuple[dict[str, float], ...]:
+        """Return the combinations of the shape parameters' grids; one empty one where there is no shape."""
+        shape = [p for p in self.parameters if p.is_shape and p.name not in (self.direction or ())]
+        grids = [[(p.name, value) for value in p.grid or (p.start,)] for p in shape]
+        return tuple(dict(combination) for combination in itertools.product(*grids))
+
+    def settings(
+        self, inputs: "Inputs", target: Target = None, shape: Values | None = None, size: float = 1.0
+    ) -> tuple[dict[str, float], ...]:
+        """Return values of all parameters whose signals, less the nominal ones, span the effect.
+
+        One a size parameter at nominal + ``size``·(start - nominal), the others nominal; where there is a
+        direction, one along each axis.
+        """
+        base = self.nominal(inputs, target) | dict(shape or {})
+        start = self.start(inputs, target)
+        found = []
+        for p in self._sizes():
+            value = base[p.name] + size * (start[p.name] - base[p.name])
+            for along in np.eye(3) if self.direction else (None,):
+                turned = {} if along is None else dict(zip(self.direction or (), along.tolist(), strict=True))
+                found.append(base | {p.name: float(value)} | turned)
+        return tuple(found)
+
+    def combined(
+        self, coefficients: Floats, inputs: "Inputs", target: Target = None, shape: Values | None = None
+    ) -> dict[str, float]:
+        """Return the values of a combination of `settings` (at size 1) with these coefficients."""
+        base = self.nominal(inputs, target) | dict(shape or {})
+        start = self.start(inputs, target)
+        parts = np.asarray(coefficients, dtype=float).reshape(-1, 3 if self.direction else 1)
+        for p, part in zip(self._sizes(), parts, strict=True):
+            length = float(np.linalg.norm(part)) if self.direction else float(part[0])
+            base[p.name] = base[p.name] + length * (start[p.name] - base[p.name])
+            if self.direction and length > 0.0:
+                base |= dict(zip(self.direction, (part / length).tolist(), strict=True))
+        return base
+
+    def _sizes(self) -> tuple[Parameter, ...]:
+        return tuple(p for p in self.parameters if not p.is_shape and p.name not in (self.direction or ()))
+
+    # What it does: the hooks, in the order in which `simulate` calls them
+
+    def replan(self, inputs: "Inputs", applied: Applied) -> "Inputs":
+        """Return the inputs of the motion that is really planned: timing, path, commanded joints."""
+        return inputs
+
+    def servo(self, q_act_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return the motor side joints (m, 6); ``q_act_rad`` comes in as what is commanded."""
+        return q_act_rad
+
+    def gear(self, q_load_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return the joints behind the gears (m, 6); ``q_load_rad`` comes in as the motor side."""
+        return q_load_rad
+
+    def joints(self, q_true_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return the joints as they truly are (m, 6); comes in as what encoders behind the gear would say."""
+        return q_true_rad
+
+    def cut(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+        """Return the true cutting force and moment on the tool."""
+        return load
+
+    def load(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+        """Return the load that bends the arm; comes in as the true cutting load, or the measured one."""
+        return load
+
+    def softness(self, softness: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return 1/k_C, 1/k_B, 1/k_A (10, 3) in rad/(N·mm) of the virtual joints."""
+        return softness
+
+    def elastic(self, angle_rad: Floats, torque_Nm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return what the axes turn by beyond the linear model (m, 6), under joint torques (m, 6) in N·m."""
+        return angle_rad
+
+    def geometry(self, lengths_mm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return a1, a2, c1, c2, c3, c4 (6,) of the arm in mm."""
+        return lengths_mm
+
+    def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return the tool tip (m, 3) in mm in ``$BASE``, deflection included."""
+        return tcp_mm
+
+    def orientation(self, rotation: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+        """Return the rotations (m, 3, 3) of the tool frame in ``$BASE``; called where they are asked for."""
+        return rotation
+
+    def sensor(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+        """Return force and moment as the sensor states them, turned to the axes of ``$BASE``."""
+        return load
+
+    def instruments(self, signals: "Signals", applied: Applied) -> "Signals":
+        """Return the signals with what belongs to the instruments: clocks, units, the finished part."""
+        return signals
+
+
+def direction_parameters(source: str) -> tuple[Parameter, ...]:
+    """Return the three components of a direction, along z where nothing is given."""
+    return tuple(
+        Parameter(name, "", -1.0, 1.0, nominal=None, start=float(name == DIRECTION[2]), source=source)
+        for name in DIRECTION
+    )
+
+
+def every_joint(cell: Cell) -> tuple[Target, ...]:
+    """Return A1 to A6."""
+    return JOINTS
+
+
+def every_virtual_joint(cell: Cell) -> tuple[Target, ...]:
+    """Return the virtual joints whose stiffness the cell states."""
+    return tuple(name for name in VIRTUAL_JOINTS if name in cell.compliance.virtual_joints)

@@ -1,0 +1,195 @@
+"""What the measuring chain of one run starts from: what is planned, where the arm stands, what is cut."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl import robot
+from gcode2krl.cell import Cell
+from gcode2krl.effects import arm
+from gcode2krl.effects.effect import Load
+from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.tables import Forces, Motion, Targets, Toolpath
+from gcode2krl.units import S_PER_MIN
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Cut = Callable[[Motion, Cell], Forces]
+Plan = Callable[[Targets, Cell], Motion]
+_S_PER_H = 60.0 * S_PER_MIN
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Inputs:
+    """One run's nominal chain, m samples; `inputs_of` makes it from a prediction."""
+
+    cell: Cell
+    time_s: Floats
+    move: Ints
+    source_line: Ints
+    path_mm: Floats
+    tool: Ints
+    spindle_rad_s: Floats
+    q_cmd_rad: Floats
+    """(m, 6) commanded joints."""
+    position_mm: Floats
+    """(m, 3) commanded tip in ``$BASE``: that of ``q_cmd_rad`` for the controller's own kinematics."""
+    rotation: Floats
+    """(m, 4) commanded quaternion x, y, z, w of the tool frame."""
+    force_base_N: Floats
+    """(m, 3) nominal cutting force on the tool; zero where none is known."""
+    moment_base_Nmm: Floats
+    """(m, 3) about the tip."""
+    hours: float = 0.0
+    """Since the earliest of the runs started."""
+    q_act_rad: Floats | None = None
+    """(m, 6) measured motor side, in place of the model's for all that follows."""
+    q_load_rad: Floats | None = None
+    """(m, 6) measured behind the gear."""
+    load_base_N: Floats | None = None
+    """(m, 3) measured force that bends the arm."""
+    toolpath: Toolpath | None = None
+    motion: Motion | None = None
+    targets: Targets | None = None
+    forces: Forces | None = None
+    """What was cut nominally, with its arcs of engagement."""
+    cut: Cut | None = None
+    """Removes the material again, along another motion or in a changed cell."""
+    plan: Plan | None = None
+    """Plans the motion again, with other targets or in a changed cell."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @cached_property
+    def tool_rotation(self) -> Floats:
+        """(m, 3, 3) commanded rotations of the tool frame in ``$BASE``."""
+        return fr.rotation_from_quaternion(self.rotation)
+
+    @cached_property
+    def sensor_rotation(self) -> Floats:
+        """(m, 3, 3) rotations of the force sensor in ``$BASE``; its axes are those of the flange."""
+        turned = np.empty((len(self), 3, 3))
+        for number, rows in arm.tool_rows(self.tool):
+            turned[rows] = self.tool_rotation[rows] @ self.cell.tool_matrix(number)[:3, :3].T
+        return turned
+
+    @cached_property
+    def gravity(self) -> Floats:
+        """(3,) unit vector downwards along ``$BASE``, of a robot that stands upright."""
+        down: Floats = self.cell.base_matrix()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+        return down
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """(m, 6, 6) of the tip at the commanded joints, along ``$BASE``."""
+        return arm.jacobian_base(self.q_cmd_rad, self.cell, self.tool)
+
+    @cached_property
+    def lengths_mm(self) -> Floats:
+        """(6,) a1, a2, c1, c2, c3, c4 of the arm."""
+        return self.cell.robot.geometry.array()
+
+    @cached_property
+    def softness(self) -> Floats | None:
+        """(10, 3) of the virtual joints in rad/(N·mm); None where the cell does not state all."""
+        return arm.softness_of(self.cell)
+
+    @cached_property
+    def deflection_mm(self) -> Floats:
+        """(m, 3) nominal deflection under the nominal load."""
+        load = (self.force_base_N, self.moment_base_Nmm)
+        return arm.bend(self.q_cmd_rad, *load, self.softness, self.cell, self.tool)[0]
+
+    @cached_property
+    def velocity_mm_s(self) -> Floats:
+        """(m, 3) of the commanded tip along ``$BASE``; central differences."""
+        return gradient(self.position_mm, self.time_s)
+
+    @cached_property
+    def run_hours(self) -> Floats:
+        """(m,) hours since the earliest of the runs started."""
+        return self.hours + self.time_s / _S_PER_H
+
+    @cached_property
+    def _rigid_tip_mm(self) -> Floats:
+        return arm.tip_mm(self.q_cmd_rad, self.lengths_mm, self.cell, self.tool)
+
+    @property
+    def offers(self) -> frozenset[str]:
+        """What effects may rely on: ``cut`` where material can be removed again, ``plan`` for the motion."""
+        there = {
+            "cut": self.cut is not None and self.motion is not None and self.forces is not None,
+            "plan": self.plan is not None and self.targets is not None and self.toolpath is not None,
+        }
+        return frozenset(name for name, is_there in there.items() if is_there)
+
+    def recut(self, cell: Cell | None = None, shift_mm: Floats | None = None) -> Load:
+        """Return the cutting load in another cell, or with the tool's path shifted (3,) against the stock.
+
+        Raises an input error where the prediction has no forces.
+        """
+        if self.cut is None or self.motion is None or self.forces is None:
+            raise _not_here("how the part is cut", "predict the forces of the part first")
+        motion = self.motion
+        if shift_mm is not None:
+            motion = replace(motion, position_mm=motion.position_mm + shift_mm)
+        forces = self.cut(motion, self.cell if cell is None else cell)
+        return forces.force_base_N, forces.moment_base_Nmm
+
+    def replanned(self, targets: Targets, cell: Cell) -> "Inputs":
+        """Return the inputs of other targets, or of a controller as in another cell, on their own time."""
+        if self.plan is None:
+            raise _not_here("how the motion is planned", "predict the part first")
+        return self.moved(self.plan(targets, cell), targets)
+
+    def moved(self, motion: Motion, targets: Targets | None = None) -> "Inputs":
+        """Return the inputs along another motion of the same program; measured signals keep their times."""
+        if self.toolpath is None:
+            raise _not_here("the program's moves", "predict the part first")
+        forces = self.cut(motion, self.cell) if self.cut is not None and self.forces is not None else None
+        nothing = np.zeros((len(motion), 3))
+        return replace(
+            self,
+            time_s=motion.time_s,
+            move=motion.move,
+            source_line=self.toolpath.source_line[motion.move],
+            path_mm=motion.path_mm,
+            tool=motion.tool,
+            spindle_rad_s=self.toolpath.spindle_rad_s[motion.move],
+            q_cmd_rad=robot.follow_motion(motion, self.cell).q_rad,
+            position_mm=motion.position_mm,
+            rotation=motion.rotation,
+            force_base_N=nothing if forces is None else forces.force_base_N,
+            moment_base_Nmm=nothing if forces is None else forces.moment_base_Nmm,
+            forces=forces,
+            motion=motion,
+            targets=self.targets if targets is None else targets,
+            q_act_rad=self._at(self.q_act_rad, motion.time_s),
+            q_load_rad=self._at(self.q_load_rad, motion.time_s),
+            load_base_N=self._at(self.load_base_N, motion.time_s),
+        )
+
+    def _at(self, values: Floats | None, time_s: Floats) -> Floats | None:
+        return None if values is None else resampled(values, self.time_s, time_s)
+
+
+def resampled(values: Floats, time_s: Floats, at_s: Floats) -> Floats:
+    """Return the columns of (m, c) at other times, linearly between samples; the ends are held."""
+    return np.stack([np.interp(at_s, time_s, column) for column in values.T], axis=1)
+
+
+def gradient(values: Floats, time_s: Floats) -> Floats:
+    """Return the time derivative (m, c) by central differences; 0 for a single sample."""
+    if len(time_s) < 2:
+        return np.zeros_like(values)
+    slope: Floats = np.gradient(values, time_s, axis=0)
+    return slope
+
+
+def _not_here(what: str, remedy: str) -> NotUnderstoodError:
+    return input_error("effect-impossible", f"this effect needs to know {what}", remedy)

@@ -1,0 +1,15 @@
+"""A weight on the arm as a load at the tip."""
+
+import numpy as np
+
+from gcode2krl.effects.effect import Floats, Load
+from gcode2krl.effects.inputs import Inputs
+
+GRAVITY_M_S2 = 9.80665
+"""Standard gravity (CGPM 1901)."""
+
+
+def with_weight(load: Load, inputs: Inputs, mass_kg: float, lever_mm: Floats) -> Load:
+    """Return the load with a weight whose centre is ``lever_mm`` (m, 3) from the tip, along ``$BASE``."""
+    weight_N = mass_kg * GRAVITY_M_S2 * inputs.gravity
+    return load[0] + weight_N, load[1] + np.cross(lever_mm, weight_N)

@@ -1,0 +1,229 @@
+"""Cutting force, sensor and part: each effect against its stated form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gcode2krl.cutting import cut, no_forces
+from gcode2krl.effects import inputs_of, parse, simulate
+from gcode2krl.effects.apply import remembered
+from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.sections import Kienzle, Stock
+
+
+def run(inputs, known, *texts):
+    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
+
+
+def with_material(cell, **change):
+    return cell.model_copy(update={"material": cell.material.model_copy(update=change)})
+
+
+def edges(cell, **factors):
+    law = cell.material.linear_edge
+    change = {name: (getattr(law, name) or 0.0) * factor for name, factor in factors.items()}
+    return with_material(cell, linear_edge=law.model_copy(update=change))
+
+
+PARTS = {"tangential": ("Ktc", "Kte"), "radial": ("Krc", "Kre"), "axial": ("Kac", "Kae")}
+
+
+@pytest.mark.parametrize("part_name", PARTS)
+def test_force_scale_is_the_cut_with_scaled_coefficients(part, milling, known, part_name):
+    signals = run(milling, known, f"force_scale:target={part_name},scale=1.35")
+    scaled = edges(part.cell, **dict.fromkeys(PARTS[part_name], 1.35))
+    wanted = cut(part.toolpath, part.motion, scaled)
+    np.testing.assert_allclose(signals.force_base_N, wanted.force_base_N, atol=1e-9)
+    np.testing.assert_allclose(signals.moment_base_Nmm, wanted.moment_base_Nmm, atol=1e-6)
+    assert np.abs(signals.force_base_N - part.forces.force_base_N).max() > 0.5
+    np.testing.assert_array_equal(signals.force_meas_base_N, signals.force_base_N)
+
+
+def test_force_scale_under_kienzle(part, known):
+    law = Kienzle(kc11=700.0, mc=0.25, radial_ratio=0.4, axial_ratio=0.2)
+    cell = with_material(part.cell, linear_edge=None, kienzle=law)
+    forces = cut(part.toolpath, part.motion, cell)
+    inputs = inputs_of(replace(part, cell=cell, forces=forces))
+    together = run(inputs, known, *(f"force_scale:target={name},scale=1.5" for name in PARTS))
+    np.testing.assert_allclose(together.force_base_N, 1.5 * forces.force_base_N, atol=1e-9)
+    radial = run(inputs, known, "force_scale:target=radial,scale=1.5")
+    more = law.model_copy(update={"radial_ratio": 0.6})
+    wanted = cut(part.toolpath, part.motion, with_material(cell, kienzle=more))
+    np.testing.assert_allclose(radial.force_base_N, wanted.force_base_N, atol=1e-9)
+    with pytest.raises(NotUnderstoodError, match="no linear edge coefficients"):
+        parse("edge_force:scale=2", known, cell)
+
+
+def test_edge_force(part, milling, known):
+    signals = run(milling, known, "edge_force:scale=2.5")
+    wanted = cut(part.toolpath, part.motion, edges(part.cell, Kte=2.5, Kre=2.5, Kae=2.5))
+    np.testing.assert_allclose(signals.force_base_N, wanted.force_base_N, atol=1e-9)
+
+
+def test_the_tip_follows_the_true_force(milling, known):
+    signals = run(milling, known, "edge_force:scale=2.5")
+    moved = np.abs(signals.tcp_base_mm - simulate(milling).tcp_base_mm).max()
+    assert moved > 0.05
+
+
+def test_tool_wear(swinging, known):
+    signals = run(swinging, known, "tool_wear:growth_per_m=0.2")
+    step = np.diff(swinging.path_mm, prepend=0.0)
+    metres, factor = 0.0, []
+    for length, force in zip(step, swinging.force_base_N, strict=True):
+        metres += length / 1000.0 if force.any() else 0.0
+        factor.append(1.0 + 0.2 * metres)
+    wanted = swinging.force_base_N * np.array(factor)[:, None]
+    np.testing.assert_allclose(signals.force_base_N, wanted, rtol=1e-12)
+    assert factor[-1] > 1.05
+
+
+@pytest.mark.parametrize("offset_mm", [1.5, -0.75])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_stock_offset_is_the_cut_of_a_block_that_lies_elsewhere(part, milling, known, axis, offset_mm):
+    signals = run(milling, known, f"stock_offset:target={axis},offset_mm={offset_mm}")
+    shift = offset_mm * np.eye(3)["xy".index(axis)]
+    box = tuple(tuple(np.add(corner, shift)) for corner in part.cell.stock.box_mm)
+    block = Stock(box_mm=box, resolution_mm=part.cell.stock.resolution_mm)
+    wanted = cut(part.toolpath, part.motion, part.cell.model_copy(update={"stock": block}))
+    apart = np.abs(signals.force_base_N - wanted.force_base_N).max(axis=1)
+    assert np.quantile(apart, 0.99) < 1e-6  # rounding decides whether a last sliver is there: some samples
+    assert np.abs(signals.force_base_N - part.forces.force_base_N).max() > 10.0
+
+
+def test_tool_diameter(part, milling, known):
+    signals = run(milling, known, "tool_diameter:offset_mm=0.4")
+    tool = part.cell.tool[1]
+    larger = {**part.cell.tool, 1: tool.model_copy(update={"diameter_mm": tool.diameter_mm + 0.4})}
+    wanted = cut(part.toolpath, part.motion, part.cell.model_copy(update={"tool": larger}))
+    np.testing.assert_allclose(signals.force_base_N, wanted.force_base_N, atol=1e-9)
+    assert signals.radius_offset_mm == pytest.approx(0.2)
+
+
+def idle_edge_force(runout, f_z, teeth, a_p, k_te, k_re, k_ae, start, end):
+    """Edge force of idle teeth by walking each tooth over the arc, feed, normal, axial in N."""
+    radius = runout * np.cos(2 * np.pi * np.arange(teeth) / teeth)
+    width = (end - start) / 20000
+    phi = start + (np.arange(20000) + 0.5) * width
+    total = np.zeros(3)
+    for tooth in range(teeth):
+        left = np.full(len(phi), np.inf)  # what the teeth before have left of the chip
+        for back in range(1, 4 * teeth + 1):
+            own = back * f_z * np.sin(phi) + radius[tooth] - radius[(tooth - back) % teeth]
+            left = np.minimum(left, own)
+        idle = left <= 0.0
+        feed = np.sum((-k_te * np.cos(phi) - k_re * np.sin(phi))[idle])
+        normal = np.sum((k_te * np.sin(phi) - k_re * np.cos(phi))[idle])
+        total += np.array([feed, normal, k_ae * np.count_nonzero(idle)])
+    return total * a_p * width / (2 * np.pi)
+
+
+@pytest.mark.parametrize("runout_mm", [0.005, 0.02, 0.08])
+@pytest.mark.parametrize(("start", "end"), [(0.0, np.pi), (0.0, np.pi / 2), (np.pi / 2, np.pi)])
+def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, start, end):
+    """A straight cut along +x with 13,000 rpm, 25 mm/s: f_z = 0.0385 mm with three teeth."""
+    count, tool = 5, part.cell.tool[1]
+    rows = slice(100, 100 + count)
+    motion = replace(
+        part.motion,
+        **{name: getattr(part.motion, name)[rows] for name in vars(part.motion) if name != "issues"},
+    )
+    straight = np.array(motion.position_mm)
+    straight[:] = np.arange(count)[:, None] * [0.3, 0.0, 0.0]
+    motion = replace(motion, position_mm=straight, speed_mm_s=np.full(count, 25.0))
+    phi = np.full((count, 2), np.nan)
+    phi[:, 0], phi[:, 1] = start, end
+    forces = replace(no_forces(motion), a_p_mm=np.full(count, 2.0), phi_rad=phi)
+    whole = inputs_of(part)
+    inputs = replace(
+        whole, motion=motion, forces=forces, time_s=motion.time_s, tool=motion.tool,
+        position_mm=straight, rotation=motion.rotation, spindle_rad_s=np.full(count, 13000 * np.pi / 30),
+        q_cmd_rad=whole.q_cmd_rad[rows], path_mm=whole.path_mm[rows], move=whole.move[rows],
+        source_line=whole.source_line[rows], force_base_N=np.zeros((count, 3)),
+        moment_base_Nmm=np.zeros((count, 3)),
+    )  # fmt: skip
+    signals = run(inputs, known, f"runout:runout_mm={runout_mm}")
+    law, f_z = part.cell.material.linear_edge, 25.0 / (13000 / 60) / tool.teeth
+    feed, normal, axial = idle_edge_force(
+        runout_mm, f_z, tool.teeth, 2.0, law.Kte, law.Kre, law.Kae or 0.0, start, end
+    )
+    wanted = -np.array([feed, normal, -axial])  # +x, its left is +y, axial is downwards
+    np.testing.assert_allclose(signals.force_base_N, np.tile(wanted, (count, 1)), atol=0.05)
+
+
+def flange(inputs):
+    """Rotation of the flange in $BASE from the joints, by the tool's own."""
+    tool = inputs.cell.tool_matrix(1)[:3, :3]
+    return Rotation.from_quat(inputs.rotation).as_matrix() @ tool.T
+
+
+def test_force_offset_is_along_the_flange(swinging, known):
+    signals = run(swinging, known, "force_offset:fx_N=5,fy_N=-3,fz_N=8")
+    wanted = np.einsum("nij,j->ni", flange(swinging), [5.0, -3.0, 8.0])
+    np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
+    np.testing.assert_array_equal(signals.force_base_N, swinging.force_base_N)
+    np.testing.assert_array_equal(signals.tcp_base_mm, simulate(swinging).tcp_base_mm)
+
+
+def test_force_drift(swinging, known):
+    later = replace(swinging, hours=2.0)
+    signals = run(later, known, "force_drift:N_per_h=4,direction=3/0/4")
+    along = np.einsum("nij,j->ni", flange(swinging), [0.6, 0.0, 0.8])
+    wanted = 4.0 * (2.0 + swinging.time_s / 3600.0)[:, None] * along
+    np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
+
+
+def test_tool_weight(swinging, known):
+    signals = run(swinging, known, "tool_weight:weight_N=40")
+    apart = signals.force_meas_base_N - swinging.force_base_N
+    np.testing.assert_allclose(apart, np.tile([0.0, 0.0, -40.0], (len(apart), 1)), atol=1e-12)
+
+
+def test_hose_pack(swinging, known):
+    h0, slope = [10.0, 0.0, -5.0], [[30.0, 0.0, 5.0], [0.0, -20.0, 0.0], [7.0, 0.0, 40.0]]
+    numbers = "/".join(str(value) for row in slope for value in row)
+    signals = run(swinging, known, f"hose_pack:h0_N=10/0/-5,H_N_rad={numbers}")
+    pose = Rotation.from_quat(swinging.rotation)
+    pull = np.array(h0) + (pose * pose[0].inv()).as_rotvec() @ np.array(slope).T
+    wanted = np.einsum("nij,nj->ni", flange(swinging), pull)
+    np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
+
+
+def test_force_delay(swinging, known):
+    signals = run(swinging, known, "force_delay:delay_s=0.03")
+    np.testing.assert_allclose(
+        signals.force_meas_base_N[10:, 0],
+        np.interp(swinging.time_s[10:] - 0.03, swinging.time_s, swinging.force_base_N[:, 0]),
+    )
+    np.testing.assert_array_equal(signals.force_base_N, swinging.force_base_N)
+    assert not signals.clocks
+
+
+def test_without_forces_there_is_a_word_about_it(part, known):
+    bare = inputs_of(replace(part, forces=None, deflection=None))
+    assert bare.offers == {"plan"}
+    with pytest.raises(NotUnderstoodError, match="how the part is cut"):
+        run(bare, known, "force_scale:target=radial,scale=2")
+    assert run(bare, known, "tool_diameter:offset_mm=1").radius_offset_mm == 0.5
+
+
+def test_the_material_is_removed_once(part):
+    calls = []
+
+    def count(motion, cell):
+        calls.append(cell.name)
+        return cut(part.toolpath, motion, cell)
+
+    inputs = inputs_of(part, cut=count)
+    for _ in range(3):
+        inputs.recut(edges(part.cell, Kte=2.0))
+    assert len(calls) == 1
+    inputs.recut(edges(part.cell, Kte=3.0))
+    inputs.recut(shift_mm=np.array([0.1, 0.0, 0.0]))
+    assert len(calls) == 3
+    few = remembered(count, most=1)
+    for cell in (part.cell, edges(part.cell, Kte=2.0), part.cell):
+        few(part.motion, cell)
+    assert len(calls) == 6

@@ -1,0 +1,201 @@
+"""Timing and joints: each effect against its stated form."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+
+from gcode2krl import robot
+from gcode2krl.compliance import deflection_of
+from gcode2krl.effects import inputs_of, parse, simulate
+from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.gcode import read_stream
+from gcode2krl.predict import predict_toolpath
+
+DEG = np.pi / 180.0
+
+
+def run(inputs, known, *texts):
+    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
+
+
+def standing(q, inputs):
+    """The tip of joints q, bent by the run's load there."""
+    load = (inputs.force_base_N, inputs.moment_base_Nmm)
+    return robot.forward(q, inputs.cell)[0] + deflection_of(q, *load, np.zeros(3), inputs.cell, 1)[0]
+
+
+def test_servo_lag(swinging, known):
+    signals = run(swinging, known, "servo_lag:target=A3,tau_s=0.03")
+    q, t = swinging.q_cmd_rad[:, 2], swinging.time_s
+    fine = np.arange(0.0, t[-1], 1e-4)
+    x, y = np.interp(fine, t, q), np.empty(len(fine))
+    y[0] = x[0]
+    for i in range(1, len(fine)):  # implicit Euler
+        y[i] = (y[i - 1] + 1e-4 / 0.03 * x[i]) / (1.0 + 1e-4 / 0.03)
+    np.testing.assert_allclose(signals.q_act_rad[:-1, 2], np.interp(t[:-1], fine, y), atol=3e-6)
+    others = [0, 1, 3, 4, 5]
+    np.testing.assert_array_equal(signals.q_act_rad[:, others], swinging.q_cmd_rad[:, others])
+    np.testing.assert_array_equal(signals.q_load_rad, signals.q_act_rad)
+    np.testing.assert_allclose(signals.tcp_base_mm, standing(signals.q_act_rad, swinging), atol=1e-9)
+
+
+def test_backlash_is_a_play_with_memory(swinging, known):
+    gap = 0.04 * DEG
+    signals = run(swinging, known, "backlash:target=A2,gap_deg=0.04")
+    np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
+    apart = (signals.q_load_rad - signals.q_act_rad)[:, 1]
+    rising = np.gradient(swinging.q_cmd_rad[:, 1]) > 0
+    long_enough = np.abs(swinging.q_cmd_rad[:, 1] - np.median(swinging.q_cmd_rad[:, 1])) < 2.0 * DEG
+    settled = long_enough & (swinging.time_s > 3.0)
+    np.testing.assert_allclose(apart[settled], np.where(rising, -gap / 2, gap / 2)[settled], atol=1e-12)
+    assert np.abs(apart).max() <= gap / 2 + 1e-15
+
+
+def test_friction(swinging, known):
+    signals = run(swinging, known, "friction:target=A4,spike_deg=0.02,decay_s=0.2")
+    apart = (signals.q_act_rad - swinging.q_cmd_rad)[:, 3]
+    speed = np.gradient(swinging.q_cmd_rad[:, 3], swinging.time_s)
+    turns = swinging.time_s[1:][np.diff(np.sign(speed)) != 0]
+    first = swinging.time_s < turns[0] - 0.02
+    assert not apart[first].any()
+    for turn, following in zip(turns, [*turns[1:], np.inf], strict=True):
+        rows = (swinging.time_s > turn + 0.03) & (swinging.time_s < following - 0.03)
+        wanted = -np.sign(speed) * 0.02 * DEG * np.exp(-(swinging.time_s - turn) / 0.2)
+        np.testing.assert_allclose(apart[rows], wanted[rows], rtol=0.08)
+    assert len(turns) > 3
+
+
+def test_transmission(swinging, known):
+    text = "transmission:target=A1,amplitude_deg=0.005,harmonic=2,phase=0.7"
+    signals = run(swinging, known, text)
+    ratio = swinging.cell.robot.drives.gear_ratio[0]
+    wanted = 0.005 * DEG * np.sin(2.0 * ratio * swinging.q_cmd_rad[:, 0] + 0.7)
+    np.testing.assert_allclose((signals.q_load_rad - swinging.q_cmd_rad)[:, 0], wanted, atol=1e-15)
+
+
+def test_transmission_follows_the_motor_not_the_command(swinging, known):
+    signals = run(
+        swinging, known, "servo_lag:target=A1,tau_s=0.05", "transmission:target=A1,amplitude_deg=0.005"
+    )
+    ratio = swinging.cell.robot.drives.gear_ratio[0]
+    wanted = 0.005 * DEG * np.sin(ratio * signals.q_act_rad[:, 0])
+    np.testing.assert_allclose((signals.q_load_rad - signals.q_act_rad)[:, 0], wanted, atol=1e-15)
+
+
+def test_transmission_needs_the_gear_ratio(cell, known):
+    drives = cell.robot.drives.model_copy(update={"gear_ratio": None})
+    without = cell.model_copy(update={"robot": cell.robot.model_copy(update={"drives": drives})})
+    with pytest.raises(NotUnderstoodError, match=r"gear ratio of A1 .* is not known"):
+        parse("transmission:target=A1,amplitude_deg=0.005", known, without)
+    with pytest.raises(NotUnderstoodError, match="A9"):
+        parse("transmission:target=A9,amplitude_deg=0.005", known, cell)
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_mastering(swinging, known, joint):
+    signals = run(swinging, known, f"mastering:target=A{joint + 1},offset_deg=0.1")
+    for shown in (signals.q_cmd_rad, signals.q_act_rad, signals.q_load_rad):
+        np.testing.assert_array_equal(shown, swinging.q_cmd_rad)
+    q = np.array(swinging.q_cmd_rad)
+    q[:, joint] += 0.1 * DEG
+    np.testing.assert_allclose(signals.tcp_base_mm, standing(q, swinging), atol=1e-9)
+    moved = np.linalg.norm(signals.tcp_base_mm - simulate(swinging).tcp_base_mm, axis=1)
+    assert moved.max() > 0.1
+
+
+def test_wrist_coupling(swinging, known):
+    signals = run(swinging, known, "wrist_coupling:ratio=0.002")
+    q = np.array(swinging.q_cmd_rad)
+    q4, q5 = q[:, 3].copy(), q[:, 4].copy()
+    q[:, 4] += 0.002 * q4
+    q[:, 5] += 0.002 * (q4 + q5)
+    np.testing.assert_allclose(signals.q_true_rad, q, atol=1e-15)
+    np.testing.assert_array_equal(signals.q_load_rad, swinging.q_cmd_rad)
+
+
+def test_link_length(swinging, known):
+    geometry = swinging.cell.robot.geometry
+    for name in ("a1", "a2", "c1", "c2", "c3", "c4"):
+        signals = run(swinging, known, f"link_length:target={name},mm=2")
+        longer = geometry.model_copy(update={f"{name}_mm": getattr(geometry, f"{name}_mm") + 2.0})
+        robot_ = swinging.cell.robot.model_copy(update={"geometry": longer})
+        position, _ = robot.forward(swinging.q_cmd_rad, swinging.cell.model_copy(update={"robot": robot_}))
+        moved = signals.tcp_base_mm - simulate(swinging).tcp_base_mm
+        np.testing.assert_allclose(moved, position - swinging.position_mm, atol=1e-9)
+
+
+@pytest.mark.parametrize("target", ["tracker", "force", "controller", "q_load", "q_cmd"])
+def test_clock(swinging, known, target):
+    signals = run(swinging, known, f"clock:target={target},offset_s=0.05,skew=0.001")
+    stamped = {
+        "tracker": ("tcp_base_mm",),
+        "force": ("force_meas_base_N", "moment_meas_base_Nmm"),
+        "controller": ("q_cmd_rad", "q_act_rad", "q_load_rad"),
+        "q_load": ("q_load_rad",),
+        "q_cmd": ("q_cmd_rad",),
+    }
+    everything = {name for names in stamped.values() for name in names}
+    for name in everything:
+        values, seen = getattr(signals, name), signals.seen(name)
+        if name not in stamped[target]:
+            np.testing.assert_array_equal(seen, values)
+            continue
+        t_true = swinging.time_s[100]
+        stamp = t_true * 1.001 + 0.05  # t_table = t·(1 + skew) + offset
+        np.testing.assert_allclose(signals.seen(name, np.array([stamp]))[0], values[100], rtol=1e-9)
+
+
+def test_clocks_of_table_and_column_add_up(swinging, known):
+    signals = run(
+        swinging, known, "clock:target=controller,offset_s=0.02", "clock:target=q_load,offset_s=0.03"
+    )
+    seen = signals.seen("q_load_rad", np.array([1.0]))
+    np.testing.assert_allclose(seen, signals.seen("q_act_rad", np.array([0.97])), atol=1e-12)
+
+
+def test_the_nominal_constants_plan_the_nominal_motion(milling):
+    again = milling.replanned(milling.targets, milling.cell)
+    np.testing.assert_allclose(again.position_mm, milling.position_mm, atol=1e-12)
+    np.testing.assert_allclose(again.force_base_N, milling.force_base_N, atol=1e-9)
+    np.testing.assert_array_equal(again.source_line, milling.source_line)
+
+
+def test_velocity_rule(cell, known):
+    """A move over L from rest to rest lasts L/v + v/a + k (Bigliardi et al. 2022, law of two averages)."""
+    text = b"G21 G90 G61\nT1 M6\nG0 X0 Y0 Z0\nG1 X50 F3000\nY30\nX0\nM30\n"
+    toolpath = read_stream(io.BytesIO(text), "part.nc", cell)
+    inputs = inputs_of(predict_toolpath(toolpath, cell))
+    nominal = 130.0 / 50.0 + 3 * (50.0 / 2000.0 + 0.168)
+    assert inputs.time_s[-1] == pytest.approx(nominal, abs=0.013)
+    slow = run(inputs, known, "velocity_rule:k_s=0.4,acc_cp_m_s2=0.5")
+    assert slow.time_s[-1] == pytest.approx(130.0 / 50.0 + 3 * (50.0 / 500.0 + 0.4), abs=0.013)
+    late = run(inputs, known, "velocity_rule:k_s=0.4")
+    assert late.time_s[-1] == pytest.approx(nominal + 3 * (0.4 - 0.168), abs=0.013)
+    same = run(inputs, known, f"velocity_rule:acc_cp_m_s2={cell.controller.acc_cp_m_s2}")
+    assert same.inputs is inputs
+
+
+def _rests(inputs, least_s):
+    """How often the commanded motion stands still for so long."""
+    edges = np.flatnonzero(np.diff(inputs.motion.speed_mm_s < 0.05, prepend=False, append=False))
+    lengths_s = (edges[1::2] - edges[::2]) * 0.012
+    return int(np.count_nonzero(lengths_s >= least_s))
+
+
+def test_corner(milling, known):
+    signals = run(milling, known, "corner:cdis_mm=2")
+    vertex = np.array([0.0, 40.0, -3.0])  # 90 degrees: the corner is d·cos(45)/2 off
+    off = np.linalg.norm(signals.inputs.position_mm - vertex, axis=1).min()
+    assert off == pytest.approx(2.0 * math.cos(math.pi / 4) / 2.0, abs=0.02)
+    assert len(signals.time_s) == len(signals.tcp_base_mm)
+
+
+def test_advance_stop(milling, known):
+    signals = run(milling, known, "advance_stop:count=2,hold_s=0.5")
+    assert _rests(milling, 0.4) == 0
+    assert _rests(signals.inputs, 0.49) == 2
+    assert signals.time_s[-1] - milling.time_s[-1] > 1.0
+    none = run(milling, known, "advance_stop:count=0,hold_s=0.5")
+    assert none.inputs is milling
