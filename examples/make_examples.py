@@ -54,17 +54,16 @@ BLOCK_HALF_WIDTH_Y_MM = 100.0
 OVERRUN_MM = 20.0  # from the block's edge to the tool's centre where the tool stands in air
 GROOVE_DEPTH_MM = 8.95
 GROOVES_ALONG_X_AT_Y_MM = (-80.0, -50.0)
-GROOVE_ALONG_Y_AT_X_MM = 200.0
-GROOVE_ALONG_Y_START_MM = 15.0
-GROOVE_ALONG_Y_ENTRY_MM = 60.0  # one leg of the zigzag entry, 4.3 degrees
+GROOVE_ALONG_Y_AT_X_MM = 150.0  # between the ramps
 RAMPS_AT_Y_MM = -20.0
-RAMP_LENGTH_MM = 130.0  # 3.9 degrees
+RAMP_LENGTH_MM = 130.0  # up: 3.9 degrees
+RAMP_DOWN_DEPTH_MM = 2.25  # 1 degree: the tool's bottom hardly cuts
 POCKET_CENTRE_MM = (75.0, 50.0)
 POCKET_DEPTH_MM = 6.0
 POCKET_PATH_RADIUS_MM = 22.0  # pocket 60 mm, tool 16 mm
-POCKET_STEPOVER_MM = 6.0  # a turn of the spiral
-HELIX_RADIUS_MM = 4.0  # below the tool's radius: no core is left
-HELIX_PITCH_MM = 1.0  # 2.3 degrees
+POCKET_STEPOVER_MM = 7.5  # a turn of the spiral
+HELIX_RADIUS_MM = 7.0  # below the tool's radius: no core is left
+HELIX_PITCH_MM = 0.5  # 0.7 degrees
 
 FAR_X_MM, FAR_Y_MM = BLOCK_LENGTH_X_MM + OVERRUN_MM, BLOCK_HALF_WIDTH_Y_MM + OVERRUN_MM
 TO_DEPTH = f"G1 Z{-GROOVE_DEPTH_MM:.3f} F{FEED}"
@@ -78,21 +77,16 @@ def groove_along_x(y: float) -> list[str]:
 
 
 def groove_along_y() -> list[str]:
-    """Full slot that begins inside the block, so that it crosses no other groove."""
-    x, start, depth = GROOVE_ALONG_Y_AT_X_MM, GROOVE_ALONG_Y_START_MM, GROOVE_DEPTH_MM
-    cuts = [
-        TO_TOP,
-        f"G1 Y{start + GROOVE_ALONG_Y_ENTRY_MM:.3f} Z{-depth / 2:.3f}",
-        f"G1 Y{start:.3f} Z{-depth:.3f}",
-        f"G1 Y{FAR_Y_MM:.3f}",
-    ]
-    return feature("GROOVE ALONG +Y, ZIGZAG ENTRY, OUT THROUGH THE FAR SIDE", x, start, cuts)
+    """Full slot that begins in the last groove along x, so that the tool goes down in air."""
+    cuts = [TO_DEPTH, f"G1 Y{FAR_Y_MM:.3f}"]
+    x, y = GROOVE_ALONG_Y_AT_X_MM, GROOVES_ALONG_X_AT_Y_MM[-1]
+    return feature("GROOVE ALONG +Y, OUT OF THE LAST ONE AND THROUGH THE FAR SIDE", x, y, cuts)
 
 
 def ramps() -> list[str]:
-    """One ramp from full depth at the near side up to the top, one down to full depth at the far side."""
+    """One ramp from full depth at the near side up to the top, a flat one down at the far side."""
     up = [TO_DEPTH, "G1 X0.000", f"G1 X{RAMP_LENGTH_MM:.3f} Z0.000"]
-    down = [TO_TOP, f"G1 X{BLOCK_LENGTH_X_MM:.3f} Z{-GROOVE_DEPTH_MM:.3f}", f"G1 X{FAR_X_MM:.3f}"]
+    down = [TO_TOP, f"G1 X{BLOCK_LENGTH_X_MM:.3f} Z{-RAMP_DOWN_DEPTH_MM:.3f}", f"G1 X{FAR_X_MM:.3f}"]
     return [
         *feature("ASCENDING RAMP", -OVERRUN_MM, RAMPS_AT_Y_MM, up),
         *feature("DESCENDING RAMP", BLOCK_LENGTH_X_MM - RAMP_LENGTH_MM, RAMPS_AT_Y_MM, down),

@@ -12,6 +12,7 @@ from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_other
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
+from gcode2krl.units import MS_PER_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from gcode2krl.krc4.identify import CornerFit, Estimate, Identification, Section
     from gcode2krl.runs import ControllerTrace
 
-_MS_PER_S = 1000.0
 _MOST_SHOWN = 20
 
 
@@ -102,7 +102,7 @@ def _identify_test(trace: "ControllerTrace", cell: Cell, console: Console) -> "I
 
 
 def _say(result: "Identification", trace: str, console: Console) -> None:
-    k, cycle_ms = result.k_s, result.cycle_s * _MS_PER_S
+    k, cycle_ms = result.k_s, result.cycle_s * MS_PER_S
     inside = "inside" if k.contains(result.k_whole_s) else "outside"
     taken = "taken" if result.k_best_s == result.k_whole_s else "not taken"
     fitted = sum(section.fitted for section in result.sections)

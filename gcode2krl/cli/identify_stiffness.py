@@ -10,13 +10,13 @@ from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.units import UM_PER_MM
 
 if TYPE_CHECKING:
     from gcode2krl.compliance.estimate import Estimate
     from gcode2krl.compliance.identify_stiffness import JointFit, StiffnessIdentification
 
 _FORMATS = ("png", "svg", "pdf")
-_UM_PER_MM = 1e3
 
 
 @click.command("stiffness")
@@ -97,7 +97,7 @@ def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -
     tail = f"{own:11.3e}" if own else f"{'-':>11}"
     if estimate is None:
         return f"{head}{'not determined':<37} {tail}"
-    counts = f"  {len(fit.row):8d}  {fit.noise_mm * _UM_PER_MM:8.2f}" if axis == 0 else ""
+    counts = f"  {len(fit.row):8d}  {fit.noise_mm * UM_PER_MM:8.2f}" if axis == 0 else ""
     return f"{head}{estimate.value:9.3e}    {estimate.low:9.3e} .. {estimate.high:9.3e}   {tail}{counts}"
 
 

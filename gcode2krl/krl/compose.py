@@ -11,13 +11,15 @@ from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
-from gcode2krl.krl.number_text import fixed, motion_lines
+from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
+from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
 
 Floats = NDArray[np.float64]
 NEWLINE = b"\r\n"
+SIDECAR = ".pilot.csv"
 DECLARATIONS = """DECL KRLMSG_T GK_MSG
 DECL KRLMSGPAR_T GK_PAR[3]
 DECL KRLMSGOPT_T GK_OPT
@@ -44,16 +46,36 @@ class Layout:
     """Declarations inside the .src, no .dat (standard output)."""
     options: str = ""
     allowed: tuple[str, ...] = ()
+    forces: bool = False
+    """True where material removal and cutting forces have been predicted."""
 
 
-def compose(targets: Targets, joints: Joints, cell: Cell, name: str, layout: Layout) -> dict[str, bytes]:
-    """Return file name → bytes of the program ``name``: ``.src``, ``.dat`` and, split, ``name_001.src`` …"""
-    writer = _Composer(targets, joints, cell, name, layout)
+def compose(
+    targets: Targets,
+    joints: Joints,
+    cell: Cell,
+    name: str,
+    layout: Layout,
+    pilot: PilotText | None = None,
+) -> dict[str, bytes]:
+    """Return file name → bytes of the program ``name``.
+
+    ``.src``, ``.dat``, split ``name_001.src`` …, and ``.pilot.csv`` where there is a pilot force.
+    """
+    writer = _Composer(targets, joints, cell, name, layout, pilot)
     return writer.files()
 
 
 class _Composer:
-    def __init__(self, targets: Targets, joints: Joints, cell: Cell, name: str, layout: Layout) -> None:
+    def __init__(
+        self,
+        targets: Targets,
+        joints: Joints,
+        cell: Cell,
+        name: str,
+        layout: Layout,
+        pilot: PilotText | None,
+    ) -> None:
         self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
         self.source = st.ascii_text(_file_name(targets.source), 40)
         self.position, self.abc_deg = written_poses(targets, cell)
@@ -64,6 +86,11 @@ class _Composer:
             text = st.event_statements(event, cell)
             self.events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
         self.guarded_pose = False
+        self.pilot = pilot
+        self.checksum = 0
+        if pilot is not None:
+            self.triggers, self.trigger_start = pilot.before(len(targets))
+            self.checksum = self._checksum(pilot)
 
     def files(self) -> dict[str, bytes]:
         """Compose the main program and its subprograms."""
@@ -129,6 +156,24 @@ class _Composer:
         return motion_lines(
             self.position[rows], self.abc_deg[rows], self.speed_m_s[rows], self.targets.cdis_mm[rows],
             self.targets.source_line[rows], self.state, self.cell.program.comment_every,
+            self._triggers_before(start, end),
+        )  # fmt: skip
+
+    def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Return the text of the triggers of rows start..end, and where that of each row begins."""
+        if self.pilot is None:
+            return NOTHING_BEFORE
+        first = self.trigger_start[start : end + 1]
+        return self.triggers[first[0] : first[-1]], first - first[0]
+
+    def _checksum(self, pilot: PilotText) -> int:
+        if pilot.stated is not None:
+            return pilot.stated
+        targets, home = self.targets, self.targets.home[:, None]
+        q_deg = self.joints.q_rad * DEG_PER_RAD
+        return checksum(
+            np.where(home, np.nan, self.position), np.where(home, np.nan, self.abc_deg),
+            np.where(home, q_deg, np.nan), targets.ptp, targets.speed_mm_s, targets.cdis_mm, pilot.rows,
         )  # fmt: skip
 
     def _around(self, row: int) -> bytes:
@@ -176,6 +221,9 @@ class _Composer:
             options=st.ascii_text(self.layout.options, 200),
             allowed=self.layout.allowed,
             guard=self.layout.guard,
+            forces=self.layout.forces,
+            pilot=self.pilot,
+            pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
             frame_checks=checks,
             declarations="\n".join(declarations),
             message_setup=MESSAGE_SETUP,
@@ -189,18 +237,23 @@ class _Composer:
 
     def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
         parts: dict[str, bytes] = {}
+        needs = f" {SUBPROGRAM}(".encode("ascii")
+        called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
         for name, motions in subprograms:
             needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
             text = [_text(f"DEF {name}( )\n{needed}"), motions, _text("END")]
             if self.layout.split == "files":
                 head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
-                parts[f"{name}.src"] = b"".join([head, *text])
+                own = called if needs in motions else []  # a local subprogram is known in its file only
+                parts[f"{name}.src"] = b"".join([head, *text, *own])
             else:
                 main += [NEWLINE, *text]
-        files = {f"{self.name}.src": b"".join(main), **parts}
+        files = {f"{self.name}.src": b"".join([*main, *called]), **parts}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
             files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
+        if self.pilot is not None and self.pilot.sidecar:
+            files[f"{self.name}{SIDECAR}"] = self.pilot.file(self.checksum)
         return files
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 BYTES_PER_TARGET = 240
+NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
 
 
 def motion_lines(
@@ -20,15 +21,20 @@ def motion_lines(
     source_line: NDArray[np.int32],
     state: Floats,
     comment_every: int,
+    before: tuple[NDArray[np.uint8], NDArray[np.int64]] = NOTHING_BEFORE,
 ) -> bytes:
     """Return the KRL text (CRLF) of a run of LIN motions.
 
     Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
     only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
-    last comment; it is updated.
+    last comment; it is updated. ``before`` is text to stand right before motions, and where in it that of
+    each motion begins (p + 1,).
     """
-    buffer = np.empty(BYTES_PER_TARGET * len(position_mm), dtype=np.uint8)
-    size = _lines(position_mm, abc_deg, speed_m_s, cdis_mm, source_line, state, comment_every, buffer)
+    text, start = before
+    buffer = np.empty(BYTES_PER_TARGET * len(position_mm) + len(text), dtype=np.uint8)
+    size = _lines(
+        position_mm, abc_deg, speed_m_s, cdis_mm, source_line, state, comment_every, text, start, buffer
+    )
     return buffer[:size].tobytes()
 
 
@@ -37,6 +43,27 @@ def fixed(value: float, decimals: int) -> str:
     buffer = np.empty(40, dtype=np.uint8)
     size = _fixed(buffer, 0, float(value), decimals)
     return buffer[:size].tobytes().decode("ascii")
+
+
+def in_decimals(values: Floats, decimals: int) -> NDArray[np.int64]:
+    """Return numbers (n,) as whole numbers of their last decimal, by the same rule; NaN is 0."""
+    whole = np.empty(len(values), dtype=np.int64)
+    _in_decimals(np.ascontiguousarray(values), decimals, whole)
+    return whole
+
+
+@njit(cache=True)
+def _in_decimals(values, decimals, whole):
+    unit = 1
+    for _ in range(9 - decimals):
+        unit *= 10
+    for i in range(len(values)):
+        value = values[i]
+        if np.isnan(value):
+            whole[i] = 0
+            continue
+        scaled = (np.int64(np.rint(abs(value) * 1e9)) + unit // 2) // unit
+        whole[i] = -scaled if value < 0 else scaled
 
 
 @njit(cache=True)
@@ -96,7 +123,7 @@ _CRLF = np.frombuffer(b"\r\n", dtype=np.uint8).copy()
 
 
 @njit(cache=True)
-def _lines(position, abc, speed, cdis, source_line, state, comment_every, buffer):
+def _lines(position, abc, speed, cdis, source_line, state, comment_every, text, start, buffer):
     at = 0
     for i in range(len(position)):
         state[2] += 1
@@ -115,6 +142,8 @@ def _lines(position, abc, speed, cdis, source_line, state, comment_every, buffer
             at = _put(buffer, at, _CDIS)
             at = _fixed(buffer, at, cdis[i], 3)
             at = _put(buffer, at, _CRLF)
+        if len(text) > 0:
+            at = _put(buffer, at, text[start[i] : start[i + 1]])
         at = _put(buffer, at, _LIN)
         at = _fixed(buffer, at, position[i, 0], 3)
         for k in range(5):

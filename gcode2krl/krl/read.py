@@ -14,6 +14,7 @@ from gcode2krl.krl import scan as sc
 from gcode2krl.units import MM_PER_M
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
 _DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
@@ -29,6 +30,23 @@ class Statement(NamedTuple):
     text: str
     file: str
     line: int
+
+
+class ReadTriggers(NamedTuple):
+    """The triggers of the two forms in which a pilot force is announced, a row each."""
+
+    motion: Ints
+    """(k,) number of motions before it: the row of the motion that carries it."""
+    distance: Floats
+    delay_ms: Floats
+    written: Floats
+    """(k, 4) what it writes, NaN behind the first where that is one number."""
+    calls: NDArray[np.bool_]
+    """(k,) True where it calls a subprogram with four numbers, False where it assigns one."""
+    names: tuple[str, ...]
+    """What is written or called, each name once."""
+    line: NDArray[np.int32]
+    file_of: NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -53,6 +71,9 @@ class KrlProgram:
     """Names of the files; ``file_of`` (p,) points into it."""
     file_of: NDArray[np.int32]
     statements: tuple[Statement, ...]
+    triggers: ReadTriggers
+    uncalled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Statements of the subprograms that only triggers can call, by file and name."""
     declarations: tuple[Statement, ...] = ()
     """Declarations of the main program."""
     issues: tuple[Issue, ...] = ()
@@ -103,8 +124,8 @@ class _Reader:
         self.names = tuple(texts)
         self.scanned = [sc.scan_krl(text) for text in texts.values()]
         self.issues: list[Issue] = []
-        self.blocks: dict[str, _Block] = {}
-        self.order: list[str] = []
+        self.blocks: dict[tuple[int, str], _Block] = {}
+        self.executed: set[tuple[int, str]] = set()
         self.declarations: list[Statement] = []
         self.def_lines: dict[str, int] = {}
         for index in range(len(self.names)):
@@ -113,10 +134,10 @@ class _Reader:
     def read(self) -> KrlProgram:
         for index in range(len(self.names)):
             self._text_rules(index)
-        if not self.order:
+        if not self.blocks:
             raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
-        main_name = self.order[0]
-        runs = list(self._execute(main_name, 0))
+        main = next(iter(self.blocks))
+        runs = list(self._execute(main, 0))
         if not runs:
             runs = [_Block(0, 0, 0)]
         kind = np.concatenate([self.scanned[f].kind[a:b] for f, a, b in runs])
@@ -157,7 +178,7 @@ class _Reader:
         pose[joint_rows] = np.nan
         guard = b"(--no-guard)" not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
-            name=main_name,
+            name=main[1],
             position_mm=pose[:, 0:3],
             abc_deg=pose[:, 3:6],
             status_turn=pose[:, 6:8],
@@ -170,12 +191,56 @@ class _Reader:
             file=self.names,
             file_of=file_of[rows],
             statements=statements,
+            triggers=self._triggers(kind, value, blend, before, line, file_of),
+            uncalled={
+                f"{self.names[key[0]]}/{key[1]}": self._texts_of(block)
+                for key, block in self.blocks.items()
+                if key not in self.executed
+            },
             declarations=tuple(self.declarations),
             issues=tuple(self.issues),
             guard=guard,
-            def_line=self.def_lines[main_name],
+            def_line=self.def_lines[main[1]],
             texts=self.texts,
         )
+
+    def _triggers(
+        self,
+        kind: NDArray[np.int8],
+        value: Floats,
+        blend: NDArray[np.int8],
+        before: Ints,
+        line: NDArray[np.int32],
+        file_of: NDArray[np.int32],
+    ) -> ReadTriggers:
+        rows = np.flatnonzero(kind == sc.TRIGGER)
+        values = value[rows]
+        return ReadTriggers(
+            motion=before[rows].astype(np.int64),
+            distance=values[:, sc.DISTANCE],
+            delay_ms=values[:, sc.DELAY],
+            written=values[:, sc.WRITTEN : sc.WRITTEN + 4],
+            calls=blend[rows] == sc.CALLS,
+            names=self._names_written(values[:, sc.NAME :].astype(np.int64), file_of[rows]),
+            line=line[rows],
+            file_of=file_of[rows],
+        )
+
+    def _names_written(self, place: Ints, file_of: NDArray[np.int32]) -> tuple[str, ...]:
+        """Return the names that stand at first bytes and lengths (k, 2), each once."""
+        found: set[str] = set()
+        for file in np.unique(file_of).tolist():
+            data = np.frombuffer(self.texts[self.names[file]], dtype=np.uint8)
+            own = place[file_of == file]
+            for size in np.unique(own[:, 1]).tolist():
+                first = own[own[:, 1] == size, 0]
+                letters = data[first[:, None] + np.arange(size)]
+                found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
+        return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
+
+    def _texts_of(self, block: "_Block") -> tuple[str, ...]:
+        rows = range(block.start, block.end)
+        return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
     def _statement(self, file: int, row: int) -> str:
         a, b = self.scanned[file].span[row]
@@ -203,19 +268,26 @@ class _Reader:
                 if not name:
                     self._issue("krl-structure", int(scanned.line[row]), "END without DEF", file)
                     continue
-                if name in self.blocks:
+                if (file, name) in self.blocks:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
-                self.blocks.setdefault(name, _Block(file, start, int(row)))
-                self.order.append(name)
+                self.blocks.setdefault((file, name), _Block(file, start, int(row)))
                 name = ""
         if name:
             self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
-            self.blocks.setdefault(name, _Block(file, start, len(scanned.kind)))
-            self.order.append(name)
+            self.blocks.setdefault((file, name), _Block(file, start, len(scanned.kind)))
 
-    def _execute(self, name: str, depth: int) -> Iterator[_Block]:
+    def _called(self, file: int, name: str) -> tuple[int, str] | None:
+        """Return the subprogram that a file means by a name: its own, else the one a file is named after."""
+        name = name.upper()
+        if (file, name) in self.blocks:
+            return file, name
+        others = (k for k, other in enumerate(self.names) if Path(other).stem.upper() == name)
+        return next(((k, name) for k in others if (k, name) in self.blocks), None)
+
+    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[_Block]:
         """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
-        file, start, end = self.blocks[name]
+        self.executed.add(block)
+        file, start, end = self.blocks[block]
         scanned = self.scanned[file]
         at = start
         for row in np.flatnonzero(scanned.kind[start:end] == sc.OTHER) + start:
@@ -230,13 +302,13 @@ class _Reader:
                     )
                 yield _Block(file, at, int(row))
                 at = int(row) + 1
-            elif call and call.group(1).upper() in self.blocks:
+            elif call and (called := self._called(file, call.group(1))):
                 yield _Block(file, at, int(row))
                 at = int(row) + 1
                 if depth > 20:
                     self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
                     return
-                yield from self._execute(call.group(1).upper(), depth + 1)
+                yield from self._execute(called, depth + 1)
         yield _Block(file, at, end)
 
     def _last_declaration(self, file: int, start: int, end: int) -> int:

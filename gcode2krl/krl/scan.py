@@ -9,7 +9,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER, PTP_AXES = 0, 1, 2, 3, 4, 5, 6
+LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER, PTP_AXES, TRIGGER = 0, 1, 2, 3, 4, 5, 6, 7
+ASSIGNS, CALLS = 1, 2
+"""What a trigger does, in ``blend``: write one number to a variable, or call with four and ``PRIO=-1``."""
+DISTANCE, DELAY, WRITTEN, NAME = 0, 1, 2, 6
+"""Columns of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
 KEYS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
 """Columns of a Cartesian target; of ``PTP_AXES`` the first six are A1 to A6."""
 LONGEST_LINE = 471
@@ -25,7 +29,8 @@ class Scanned(NamedTuple):
     span: NDArray[np.int64]
     """(k, 2) first and last byte of the statement."""
     value: NDArray[np.float64]
-    """(k, 8) components by `KEYS`, NaN where absent; a lone number stands in column 0."""
+    """(k, 8) components by `KEYS`, NaN where absent; a lone number stands in column 0. Of a trigger see
+    above; other triggers than those two are ``OTHER``."""
     blend: NDArray[np.int8]
     """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
     too_long: int
@@ -54,6 +59,11 @@ _LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
 )
 
 
+_TRIGGER_WORDS = tuple(
+    np.frombuffer(word, dtype=np.uint8).copy()
+    for word in (b"TRIGGER", b"WHEN", b"DISTANCE", b"=", b"DELAY", b"=", b"DO")
+)
+_PRIO_WORDS = tuple(np.frombuffer(word, dtype=np.uint8).copy() for word in (b"PRIO", b"="))
 _SEC_WORD = np.frombuffer(b"SEC", dtype=np.uint8).copy()
 _DWELL_WORD = np.frombuffer(b"DWELL", dtype=np.uint8).copy()
 _FOLD_WORD = np.frombuffer(b";FOLD", dtype=np.uint8).copy()
@@ -152,6 +162,50 @@ def _components(data, at, end, value):
 
 
 @njit(cache=True)
+def _trigger(data, at, end, value):
+    """Read ``TRIGGER WHEN DISTANCE=0 DELAY=7 DO …`` into value; return what it does, 0 for anything else."""
+    for k in range(len(_TRIGGER_WORDS)):
+        if not _starts(data, at, end, _TRIGGER_WORDS[k]):
+            return 0
+        at = _blank(data, at + len(_TRIGGER_WORDS[k]), end)
+        if k == 3 or k == 5:
+            at, number = _number(data, at, end)
+            value[DISTANCE if k == 3 else DELAY] = number
+            if np.isnan(number):
+                return 0
+            at = _blank(data, at, end)
+    first = at
+    while at < end and data[at] != 61 and data[at] != 40 and data[at] != 59:  # = ( ;
+        at += 1
+    last = at
+    while last > first and (data[last - 1] == 32 or data[last - 1] == 9):
+        last -= 1
+    value[NAME], value[NAME + 1] = first, last - first
+    if at >= end or last == first or data[at] == 59:
+        return 0
+    calls = data[at] == 40
+    for k in range(4 if calls else 1):
+        at, number = _number(data, _blank(data, at + 1, end), end)
+        at = _blank(data, at, end)
+        value[WRITTEN + k] = number
+        if np.isnan(number) or (calls and (at >= end or data[at] != (44 if k < 3 else 41))):
+            return 0
+    if calls:
+        at = _blank(data, at + 1, end)
+        for k in range(len(_PRIO_WORDS)):
+            if not _starts(data, at, end, _PRIO_WORDS[k]):
+                return 0
+            at = _blank(data, at + len(_PRIO_WORDS[k]), end)
+        at, number = _number(data, at, end)
+        at = _blank(data, at, end)
+        if number != -1.0:
+            return 0
+    if at < end and data[at] != 59:
+        return 0
+    return CALLS if calls else ASSIGNS
+
+
+@njit(cache=True)
 def _scan(data, kind, line, span, value, blend):
     n = len(data)
     at = 0
@@ -211,6 +265,10 @@ def _scan(data, kind, line, span, value, blend):
                 second = _blank(data, begin + 4, end)
                 if second > begin + 4 and _starts(data, second, end, _SEC_WORD):
                     setting, behind = WAIT_SEC, second + 3
+            else:
+                does = _trigger(data, begin, end, value[count])
+                if does > 0:
+                    kind[count], blend[count] = TRIGGER, does
             if setting >= 0:
                 kind[count] = setting
                 behind = _blank(data, behind, end)

@@ -12,12 +12,18 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import Issue
-from gcode2krl.krl.compose import Layout, compose, turn_bits
-from gcode2krl.krl.names import name_problem
+from gcode2krl.krl.compose import SIDECAR, Layout, compose, turn_bits
+from gcode2krl.krl.pieces import pieces_in, split
+from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
+from gcode2krl.krl.pilot_plan import pilot_forces
+from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
-from gcode2krl.predict import set_targets, solve_joints
+from gcode2krl.krl.rules import in_file, rule_issues
+from gcode2krl.pilot import knot_rows, read_pilot
+from gcode2krl.predict import plan_motion, set_targets, solve_joints
+from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets, Toolpath
-from gcode2krl.units import DEG_PER_RAD, MM_PER_M, RAD_PER_DEG, S_PER_MIN
+from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, S_PER_MIN
 
 Floats = NDArray[np.float64]
 POSITION_LIMIT_MM = 0.002
@@ -27,39 +33,7 @@ JOINT_LIMIT_DEG = 0.001
 CDIS_LIMIT_MM = 0.0006
 WAIT_LIMIT_S = 0.0006
 _MOST_PER_CHECK = 20
-_FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
-_KNOWN_WORDS = frozenset(
-    [
-        "BAS",
-        "HALT",
-        "WAIT",
-        "IF",
-        "THEN",
-        "ELSE",
-        "ENDIF",
-        "WHILE",
-        "ENDWHILE",
-        "FOR",
-        "ENDFOR",
-        "LOOP",
-        "ENDLOOP",
-        "REPEAT",
-        "UNTIL",
-        "SWITCH",
-        "CASE",
-        "DEFAULT",
-        "ENDSWITCH",
-        "RETURN",
-        "PULSE",
-        "INTERRUPT",
-        "GLOBAL",
-        "TRIGGER",
-        "CONTINUE",
-    ]
-)
-_MOTION_WORDS = frozenset(
-    ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
-)
+_REMEDY = "translate again"
 
 
 @dataclass(frozen=True)
@@ -76,6 +50,8 @@ class VerifyReport:
     intended: int
     worst: tuple[dict[str, Any], ...] = ()
     issues: tuple[Issue, ...] = field(default=())
+    pilot: PilotFigures | None = None
+    """None without a pilot force."""
 
     @property
     def ok(self) -> bool:
@@ -92,24 +68,67 @@ class VerifyReport:
             "intended": self.intended,
             "ok": self.ok,
             "worst": list(self.worst),
+            **({"pilot": self.pilot.as_dict()} if self.pilot is not None else {}),
         }
 
 
 def verify_krl(
-    path: str | Path, toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
+    path: str | Path,
+    toolpath: Toolpath,
+    cell: Cell,
+    tolerance_mm: float | None = None,
+    *,
+    prediction: Prediction | None = None,
 ) -> VerifyReport:
     """Read a program back and compare it with what the G-code and the cell ask for.
 
-    ``tolerance_mm`` must be the one the program was made with. Raises `NotUnderstoodError` where a file
-    cannot be read or the G-code has no motion.
+    ``tolerance_mm`` must be the one the program was made with. A pilot force is compared with the sidecar
+    beside the program and carried out along the Motion of ``prediction``, or along one planned here; with
+    ``prediction`` its targets (which may be compensated) are what is intended, and the knots are compared
+    with its forces. Raises `NotUnderstoodError` where a file cannot
+    be read or the G-code has no motion.
     """
     program = read_krl(path)
-    targets = set_targets(toolpath, cell, tolerance_mm)
+    targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)
     joints = solve_joints(targets, cell)
-    layout = Layout(guard=program.guard)
-    expected = compose(targets, joints, cell, program.name, layout)
+    issues = _data_issues(Path(path), program)
+    pilot = _pilot_of(program, Path(path), cell)
+    case: PilotCase | None = None
+    if pilot is not None:
+        if prediction is not None:
+            motion, force_N, _ = pilot_forces(prediction)
+            case = PilotCase(pilot, motion, force_N)
+        else:
+            case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s))
+        pieces = pieces_in(
+            program.position_mm, program.ptp, program.cdis_mm, targets, cell, POSITION_LIMIT_MM
+        )
+        targets, joints, _ = split(targets, joints, pieces, cell)
+    elif len(program.triggers.motion):
+        issues.append(_no_sidecar(program, Path(path)))
+    expected = compose(targets, joints, cell, program.name, Layout(guard=program.guard), pilot)
     intended = read_texts(expected, f"{program.name}.src")
-    return compare(program, targets, joints, cell, intended, _data_issues(Path(path), program))
+    return compare(program, targets, joints, cell, intended, issues, case)
+
+
+def _pilot_of(program: KrlProgram, path: Path, cell: Cell) -> PilotText | None:
+    """Return the pilot force that belongs to a program; None where the program has none, or no sidecar."""
+    variable = _normal(cell.pilot.hash_variable)
+    announced = any(_normal(statement.text).startswith(f"{variable}=") for statement in program.statements)
+    sidecar = path.with_suffix(SIDECAR)
+    if not sidecar.is_file() or not (announced or len(program.triggers.motion)):
+        return None
+    knots, header = read_pilot(sidecar)
+    stated = checksum_of(program, knot_rows(knots))  # a piece is known no better than as it was read
+    return PilotText(knots, header, cell.pilot.hash_variable, stated=stated)
+
+
+def _no_sidecar(program: KrlProgram, path: Path) -> Issue:
+    name = path.with_suffix(SIDECAR).name
+    sentence = f"{name} is missing: the triggers of the program are not known to fit"
+    return Issue(
+        "error", "pilot-sidecar", int(program.triggers.line[0]), sentence, "keep it beside the program"
+    )
 
 
 def compare(
@@ -119,10 +138,14 @@ def compare(
     cell: Cell,
     intended: KrlProgram | None = None,
     more_issues: Sequence[Issue] = (),
+    pilot: PilotCase | None = None,
 ) -> VerifyReport:
-    """Compare a program as read with the intended targets; with ``intended``, also what is between them."""
+    """Compare a program as read with the intended targets.
+
+    With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force.
+    """
     issues = [*program.issues, *more_issues]
-    issues += _rules(program, cell)
+    issues += rule_issues(program, cell)
     if len(program.ptp) != len(targets):
         issues.append(
             Issue(
@@ -130,7 +153,7 @@ def compare(
                 "verify-count",
                 _first_difference(program, targets),
                 f"{len(program.ptp)} motions read, {len(targets)} intended",
-                "translate again",
+                _REMEDY,
             )
         )
     count = min(len(program.ptp), len(targets))
@@ -140,6 +163,11 @@ def compare(
         issues += _statement_issues(program.statements, intended.statements, program)
         own, wanted = (_own_declarations(p.declarations) for p in (program, intended))
         issues += _statement_issues(own, wanted, program)
+        issues += _uncalled_issues(program, intended)
+    figures: PilotFigures | None = None
+    if pilot is not None and len(program.ptp) == len(targets):
+        figures, found = check_pilot(program, pilot, targets, cell)
+        issues += found
     order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
     worst = tuple(
         {
@@ -158,6 +186,7 @@ def compare(
         intended=len(targets),
         worst=worst,
         issues=tuple(issues),
+        pilot=figures,
     )
 
 
@@ -218,14 +247,9 @@ def _difference_issues(
         for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK]:
             text = sentence.format(amount[row]) if amount is not None else sentence
             gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
-            text = _in_file(program, program.file[program.file_of[row]]) + text + gcode
-            issues.append(Issue("error", code, int(program.line[row]), text, "translate again"))
+            text = in_file(program, program.file[program.file_of[row]]) + text + gcode
+            issues.append(Issue("error", code, int(program.line[row]), text, _REMEDY))
     return issues
-
-
-def _in_file(program: KrlProgram, file: str) -> str:
-    """Return the words that name a file other than the main one."""
-    return "" if file == program.file[0] else f"{file}: "
 
 
 def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, ...]:
@@ -242,11 +266,11 @@ def _data_issues(path: Path, program: KrlProgram) -> list[Issue]:
     if inside:
         return []
     if not data.is_file():
-        return [Issue("error", "krl-data", 0, f"{data.name} is missing", "translate again")]
+        return [Issue("error", "krl-data", 0, f"{data.name} is missing", _REMEDY)]
     named = re.search(r"^\s*DEFDAT\s+(\w+)", data.read_text("ascii", "replace"), re.IGNORECASE | re.MULTILINE)
     if named is None or named.group(1).upper() != program.name:
         text = f"{data.name} is not the data list of {program.name}"
-        return [Issue("error", "krl-data", program.def_line, text, "translate again")]
+        return [Issue("error", "krl-data", program.def_line, text, _REMEDY)]
     return []
 
 
@@ -263,85 +287,20 @@ def _statement_issues(
     here = read[min(at, len(read) - 1)] if read else Statement(0, "", program.file[0], 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
-    text = f"{_in_file(program, here.file)}found {have[:60]!r}, intended {want[:60]!r}"
+    text = f"{in_file(program, here.file)}found {have[:60]!r}, intended {want[:60]!r}"
     remedy = "translate again, with the cell it was made with"
     return [Issue("error", "verify-statement", here.line, text, remedy)]
 
 
-def _rules(program: KrlProgram, cell: Cell) -> list[Issue]:
-    """Rules that a controller would enforce."""
-    issues = []
-    problem = name_problem(program.name)
-    if problem:
-        issues.append(Issue("error", "krl-name", 0, f"program name {program.name!r}: {problem}"))
-    if len(program.ptp) == 0:
-        return [*issues, Issue("error", "krl-no-motion", 0, "the program has no motion")]
-    if not program.ptp[0]:
-        issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
-    cartesian = np.isnan(program.q_deg).all(axis=1)
-    incomplete = cartesian & (
-        np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1)
+def _uncalled_issues(program: KrlProgram, intended: KrlProgram) -> list[Issue]:
+    """Compare the subprograms that triggers call, whatever file they stand in."""
+    found, wanted = (
+        {(key.split("/")[-1], texts) for key, texts in p.uncalled.items()} for p in (program, intended)
     )
-    incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
-    incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
-    for row in np.flatnonzero(incomplete)[:_MOST_PER_CHECK]:
-        issues.append(
-            Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
-        )
-    speed = program.speed_mm_s / MM_PER_M
-    for row in np.flatnonzero(
-        ~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6)))
-    )[:_MOST_PER_CHECK]:
-        issues.append(
-            Issue(
-                "error",
-                "krl-velocity",
-                int(program.line[row]),
-                f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}",
-            )
-        )
-    issues += _statement_rules(program, cell)
-    return issues
-
-
-def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
-    issues = []
-    known = _KNOWN_WORDS | {external.split("(")[0].strip().upper() for external in cell.program.externals}
-    starts = 0
-    for statement in program.statements:
-        word = _FIRST_WORD.match(statement.text)
-        first = word.group(0).upper() if word else statement.text[:10]
-        rest = statement.text[len(first) :].lstrip()
-        if "#INITMOV" in statement.text.upper():
-            starts += 1
-        if first in _MOTION_WORDS:
-            issues.append(
-                Issue(
-                    "error",
-                    "krl-motion-unknown",
-                    statement.line,
-                    f"{first} is a motion this program does not write",
-                )
-            )
-        elif rest.startswith("(") and first not in known:
-            issues.append(
-                Issue(
-                    "error",
-                    "krl-call-undeclared",
-                    statement.line,
-                    f"{first} is called but not declared",
-                    "add it to [program] externals of the cell",
-                )
-            )
-        elif not (first.startswith("$") or first in known or rest[:1] in ("=", ".", "[", "(")):
-            issues.append(
-                Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}")
-            )
-    if starts != 1:
-        issues.append(
-            Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once")
-        )
-    return issues[:_MOST_PER_CHECK]
+    return [
+        Issue("error", "verify-statement", program.def_line, f"subprogram {name} is not as intended", _REMEDY)
+        for name, _ in sorted(found ^ wanted)
+    ]
 
 
 def _first_difference(program: KrlProgram, targets: Targets) -> int:

@@ -9,9 +9,11 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.krl.compose import Layout, compose
+from gcode2krl.krl.compose import SIDECAR, Layout, compose
 from gcode2krl.krl.files import write_together
 from gcode2krl.krl.names import name_problem, suggested_name
+from gcode2krl.krl.pilot_check import PilotFigures
+from gcode2krl.krl.pilot_plan import PilotPlan, plan_pilot
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import released
 from gcode2krl.krl.verify import VerifyReport, compare
@@ -19,6 +21,8 @@ from gcode2krl.predict import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
+
+PilotForm = Literal["index", "values", "none"]
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,13 @@ class WrittenProgram:
     """File name → bytes."""
     report: VerifyReport
     issues: tuple[Issue, ...]
+    targets: Targets
+    """As written: with the pieces that the pilot force needs."""
+
+    @property
+    def pilot(self) -> PilotFigures | None:
+        """Figures of the pilot force, None where the program has none."""
+        return self.report.pilot
 
 
 def write_krl(
@@ -45,8 +56,9 @@ def write_krl(
     split: Literal["defs", "files"] = "defs",
     options: str = "",
     strict: bool = False,
+    pilot: PilotForm | None = None,
 ) -> WrittenProgram:
-    """Write a KRL program: ``.src`` and ``.dat`` (and parts), all together or not at all.
+    """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``), all together or not at all.
 
     Parameters
     ----------
@@ -60,6 +72,8 @@ def write_krl(
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
     options : words for the header.
     strict : warnings refuse the program too.
+    pilot : how the program carries the pilot force, by default as the cell says where the prediction has
+        forces, and not without a path; ``index`` needs the sidecar beside the program.
 
     Raises
     ------
@@ -75,23 +89,51 @@ def write_krl(
     program_name, issues = _program_name(file, name)
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
-    layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow))
-    texts = compose(targets, joints, cell, program_name, layout)
+    plan = _pilot_plan(source, pilot, joints, file is not None)
+    text, case = None, None
+    if plan is not None:
+        issues += released(plan.issues, (), strict)
+        targets, joints, text, case = plan.targets, plan.joints, plan.text, plan.case
+    known = isinstance(source, Prediction) and source.forces is not None
+    layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow), known)
+    texts = compose(targets, joints, cell, program_name, layout, text)
     issues += released(_size_issues(texts, targets, cell), (), strict)
-    report = compare(read_texts(texts, f"{program_name}.src"), targets, joints, cell)
+    report = compare(read_texts(texts, f"{program_name}.src"), targets, joints, cell, pilot=case)
     if not report.ok:
         raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
     written: dict[Path, bytes] = {}
     if file is not None:
         written = {_place(file, part, program_name): text for part, text in texts.items()}
         write_together(written)
-    return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues))
+    return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues), targets)
+
+
+def _pilot_plan(
+    source: Targets | Prediction, form: PilotForm | None, joints: Joints, sidecar: bool
+) -> PilotPlan | None:
+    """Return the pilot force to write, None where there is none to write or it is not wanted."""
+    if isinstance(source, Targets):
+        if form in ("index", "values"):
+            sentence = f"pilot {form}: Targets have no forces"
+            raise input_error("option-value", sentence, "give write_krl a prediction with forces")
+        return None
+    if form is None:
+        form = source.cell.pilot.form if sidecar and source.forces is not None else "none"
+    if form == "none":
+        return None
+    if form == "index" and not sidecar:
+        sentence = "--pilot index needs the sidecar .pilot.csv, which standard output cannot carry"
+        raise input_error("option-value", sentence, "give -o part.src, or --pilot values")
+    return plan_pilot(source, joints, form, sidecar)
 
 
 def _place(file: Path, part: str, program_name: str) -> Path:
     if part == f"{program_name}.src":
         return file
-    return file.with_suffix(".dat") if part == f"{program_name}.dat" else file.with_name(part)
+    for suffix in (".dat", SIDECAR):
+        if part == f"{program_name}{suffix}":
+            return file.with_suffix(suffix)
+    return file.with_name(part)
 
 
 def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]]:
@@ -122,7 +164,7 @@ def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]
 
 
 def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
-    size_mb = sum(len(text) for text in texts.values()) / BYTES_PER_MB
+    size_mb = sum(len(text) for name, text in texts.items() if not name.endswith(SIDECAR)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []

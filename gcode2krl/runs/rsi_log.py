@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs.tables import Sheet, read_sheet
+from gcode2krl.units import MS_PER_S
 
 Floats = NDArray[np.float64]
-_S_PER_MS = 1e-3
 _LONGEST_TELEGRAM = 16384
 _LARGEST_LOG = 1_000_000_000
 _ELEMENT = re.compile(rb"<(\w{1,32})((?:\s+\w{1,32}\s*=\s*\"[^\"<>]{0,64}\")+)\s*/?>")
@@ -78,7 +78,7 @@ def _from_telegrams(file: Path) -> Sheet:
         raise _wrong(file, f"no telegram can be read ({bad} malformed)", "log <Rob …> … </Rob> as received")
     _refuse_restart(order, file)
     names = sorted({name for values in (*rows.values(), *answers.values()) for name in values})
-    columns = {"t_s": _S_PER_MS * np.array([ipoc - order[0] for ipoc in order], dtype=np.float64)}
+    columns = {"t_s": np.array([ipoc - order[0] for ipoc in order], dtype=np.float64) / MS_PER_S}
     for name in names:
         cells = (rows[i].get(name, answers.get(i, {}).get(name, np.nan)) for i in order)
         columns[name] = np.fromiter(cells, dtype=np.float64, count=len(order))
@@ -138,7 +138,7 @@ def _from_csv(file: Path) -> Sheet:
     ipoc = columns.pop("ipoc")
     known = ipoc[np.isfinite(ipoc)]
     _refuse_restart(known.tolist(), file)
-    columns["t_s"] = _S_PER_MS * (ipoc - (known[0] if len(known) else 0.0))
+    columns["t_s"] = (ipoc - (known[0] if len(known) else 0.0)) / MS_PER_S
     issues = tuple(_findings(file, columns, 0, 0))
     columns.pop("delay", None)
     rest = tuple(name for name in sheet.names if name not in wanted)

@@ -1,0 +1,181 @@
+"""``gcode2krl identify force run/``: cutting-force coefficients from a measured run."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell, resolve_cell
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import require_other
+from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.prediction import Prediction
+from gcode2krl.units import MS_PER_S
+
+if TYPE_CHECKING:
+    from gcode2krl.cutting.identify_force import ForceFit
+    from gcode2krl.runs import Run
+
+Floats = NDArray[np.float64]
+
+
+@click.command("force")
+@click.argument("run_folder", metavar="RUN")
+@click.option("--prediction", metavar="FOLDER", help="Prediction of the program; default: that of run.toml.")
+@click.option("--plot", metavar="FIGURE.png", help="Draw measured and fitted forces.")
+@click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the coefficients into this cell file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
+@click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
+def command(
+    run_folder: str, prediction: str | None, plot: str | None, apply_to: str | None, as_json: bool,
+    quiet: bool, verbose: bool,
+) -> int:  # fmt: skip
+    """Fit the six coefficients of the linear edge law to the measured force of a run.
+
+    RUN is a folder with run.toml and force.csv. The cutter's engagement comes from the prediction's stock and
+    motion; zero and delay of the sensor are fitted along. What the run does not determine is refused by name.
+    """
+    console = Console(quiet, as_json)
+    try:
+        for output in (plot, apply_to):
+            if output is not None:
+                require_other(Path(output))
+        run, predicted = _inputs(run_folder, prediction)
+        with console.progress("fitting", None):
+            fit = _fit(run, predicted)
+        files = [_save_figure(fit, Path(plot))] if plot is not None else []
+        if not as_json:
+            _say(fit, run_folder, console)
+        fit.require_all(run_folder)
+        if apply_to is not None:
+            files.append(_apply(fit, Path(apply_to), run, predicted.cell))
+    except Gcode2KrlError as error:
+        if not as_json:
+            error.source = error.source or run_folder
+            raise
+        console.json({"coefficients": None, "files": [], "issues": issue_dicts(error.issues)})
+        return error.exit_code
+    if as_json:
+        console.json(_record(fit, files))
+    for file in files:
+        console.say(f"  wrote      {file}")
+    return 0
+
+
+def _inputs(run_folder: str, prediction: str | None) -> "tuple[Run, Prediction]":
+    from gcode2krl.runs import load_run
+
+    run = load_run(run_folder)
+    if run.force is None:
+        raise input_error(
+            "run-force", "the run has no force.csv", "record t_s, fx_N, fy_N, fz_N", source=run_folder
+        )
+    place = Path(prediction) if prediction is not None else run.path("prediction")
+    if place is None:
+        raise input_error(
+            "run-prediction", "run.toml names no prediction", "give --prediction FOLDER", source=run_folder
+        )
+    predicted = Prediction.load(place)
+    if predicted.motion is None:
+        raise input_error(
+            "prediction-motion", "the prediction has no motion", "predict again", source=str(place)
+        )
+    return run, predicted
+
+
+def _fit(run: "Run", predicted: Prediction) -> "ForceFit":
+    from gcode2krl import frames as fr
+    from gcode2krl.cutting import force_basis
+    from gcode2krl.cutting.identify_force import fit_force
+
+    motion, force, cell = predicted.motion, run.force, predicted.cell
+    if motion is None or force is None:
+        raise AssertionError("checked before")
+    basis = force_basis(predicted.toolpath, motion, cell)
+    frame = run.head.frames.force
+    if frame != "base":
+        turned = fr.rotation_from_quaternion(motion.rotation)
+        if frame == "sensor":
+            flange_in_tool = cell.tool_matrix(int(motion.tool[0]))[:3, :3].T
+            turned = turned @ flange_in_tool
+        basis = np.einsum("mba,mbc->mac", turned, basis)
+    return fit_force(motion.time_s, basis, force.time_s, force.force_N)
+
+
+def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
+    from gcode2krl.cutting.identify_force import NAMES
+
+    console.say(f"{run_folder}: {fit.samples} samples in cut")
+    units = ("N/mm2",) * 3 + ("N/mm",) * 3
+    for name, value, half, unit, known in zip(NAMES, fit.value, fit.half, units, fit.determined, strict=True):
+        words = f"{value:9.2f} +- {half:.2f} {unit}" if known else f"{'':9} not determined"
+        console.say(f"  {name}        {words}")
+    zero = ", ".join(f"{value:.1f}" for value in fit.zero_N)
+    console.say(f"  zero       {zero} N; delay {fit.delay_s * MS_PER_S:.1f} ms")
+    console.say(
+        f"  residual   {fit.rms_N:.2f} N rms in cut; forces known to +- {fit.relative_band:.1%} (90 %)"
+    )
+
+
+def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
+    from gcode2krl.cutting.identify_force import NAMES
+
+    coefficients = {
+        name: {"value": float(value), "low": float(value - half), "high": float(value + half)}
+        for name, value, half in zip(NAMES, fit.value, fit.half, strict=True)
+    }
+    return {
+        "coefficients": coefficients, "zero_N": fit.zero_N.tolist(), "delay_s": fit.delay_s,
+        "rms_N": fit.rms_N, "relative_band": fit.relative_band, "samples": fit.samples,
+        "files": [str(file) for file in files], "issues": [],
+    }  # fmt: skip
+
+
+def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
+    """Write the coefficients as ``[material]`` into a cell file, its other keys kept; comments are lost."""
+    import tomli_w
+
+    from gcode2krl import library
+    from gcode2krl.cutting.identify_force import NAMES
+    from gcode2krl.krl.files import write_together
+
+    data = library.read_toml(file) if file.exists() else {}
+    material = cell.material
+    data["material"] = {
+        "name": material.name if material is not None else "",
+        "linear_edge": {name: round(float(value), 3) for name, value in zip(NAMES, fit.value, strict=True)},
+        "relative_band": min(0.99, round(fit.relative_band, 4)),
+        "source": f"identified from {run.name}: {fit.samples} samples in cut, residual {fit.rms_N:.1f} N rms",
+        "sure": "checked",
+    }
+    resolve_cell(data, beside=file.parent, source=str(file))
+    write_together({file: tomli_w.dumps(data).encode("utf-8")})
+    return file
+
+
+def _save_figure(fit: "ForceFit", file: Path) -> Path:
+    from matplotlib.figure import Figure
+
+    from gcode2krl.krl.files import write_together
+    from gcode2krl.report.drawing import BLUE, GREY, VERMILION, look, thin
+
+    picture = io.BytesIO()
+    with look():
+        figure = Figure(figsize=(11.0, 7.0), layout="constrained")
+        for axis, axes in enumerate(figure.subplots(3, 1, sharex=True)):
+            axes.plot(*thin(fit.time_s, fit.measured_N[:, axis]), color=BLUE, lw=0.9, label="measured")
+            axes.plot(*thin(fit.time_s, fit.fitted_N[:, axis]), color=VERMILION, lw=0.9, label="fitted")
+            rest = fit.measured_N[:, axis] - fit.fitted_N[:, axis]
+            axes.plot(*thin(fit.time_s, rest), color=GREY, lw=0.6, label="rest")
+            axes.set_ylabel(f"F{'xyz'[axis]} (N)")
+        axes.set_xlabel("Time (s)")
+        handles, names = axes.get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=3)
+        figure.suptitle("Measured force and the fitted law")
+        figure.savefig(picture, format=file.suffix.lower().removeprefix(".") or "png", dpi=130)
+    write_together({file: picture.getvalue()})
+    return file

@@ -1,0 +1,204 @@
+"""What the removal of material finds: collisions, cuts that the tool or the spindle cannot take."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
+from gcode2krl.errors import Issue
+from gcode2krl.sections import Tool
+from gcode2krl.tables import Forces
+from gcode2krl.units import MM_PER_M, RAD_PER_REV, S_PER_MIN
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+MOST_PER_KIND = 20
+_CONTACT_MM = 0.01
+"""Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
+_NEAR_MODE = 0.15
+"""Share of a mode's frequency within which a spindle or tooth harmonic is noted."""
+_HARMONICS = 3
+_SHORT_S = 0.1
+"""A chip that is too thin for less than this is an entry, an exit or a corner."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What is known of each sample (m rows) beside its forces."""
+
+    source_line: NDArray[np.int32]
+    rapid: Bools
+    spindle_rad_s: Floats
+    f_z_mm: Floats
+    ramp_rad: Floats
+    cycle_s: float
+    centre_mm: Floats
+    """Material below the middle of a descending tool."""
+    overlap_mm: Floats
+    """(m, 3) how far rapid, shank and holder are in the material."""
+
+
+def findings_of(cut: Cut, forces: Forces, cell: Cell, guessed: bool) -> tuple[Issue, ...]:
+    """Return the findings, by line. Collisions are errors, warnings where the stock is guessed."""
+    severity: Literal["error", "warning"] = "warning" if guessed else "error"
+    found = [
+        *_collisions(cut, forces, cell, severity),
+        *_spindle(cut, forces, severity),
+        *_plunges(cut, forces, cell, severity),
+        *_limits(cut, forces, cell),
+        *_chips(cut, forces),
+        *_modes(cut, forces, cell),
+    ]
+    if guessed:
+        remedy = "give [stock] box_mm or mesh in the cell"
+        sentence = "the stock is guessed from the feed moves: its findings are warnings"
+        found.append(Issue("note", "stock-guessed", 0, sentence, remedy))
+    return tuple(sorted(found, key=lambda issue: issue.line))
+
+
+def _collisions(
+    cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]
+) -> Iterator[Issue]:
+    kinds = (
+        ("rapid-in-stock", "rapid move through material, {depth:.2f} mm deep", "retract first, or use G1"),
+        (
+            "shank-in-stock",
+            "the shank of T{tool} touches material, {depth:.2f} mm above its edges",
+            "use a tool with longer flutes, or cut in shallower steps",
+        ),
+        (
+            "holder-in-stock",
+            "the holder of T{tool} touches material, {depth:.2f} mm deep",
+            "let the tool stick out further, or cut in shallower steps",
+        ),
+    )
+    for column, (code, sentence, remedy) in enumerate(kinds):
+        depth = cut.overlap_mm[:, column]
+        for row in _starts(depth > _CONTACT_MM):
+            worst = row + int(np.argmax(depth[row : _end(depth > _CONTACT_MM, row)]))
+            words = sentence.format(depth=float(depth[worst]), tool=int(forces.tool[row]))
+            yield Issue(severity, code, int(cut.source_line[row]), words, remedy)
+
+
+def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) -> Iterator[Issue]:
+    engaged = np.isfinite(forces.phi_rad[:, 0]) & ~cut.rapid
+    for row in _starts(engaged & (cut.spindle_rad_s == 0.0)):
+        sentence = f"T{forces.tool[row]} cuts material while the spindle stands"
+        yield Issue(severity, "spindle-off", int(cut.source_line[row]), sentence, "M3 with S before the cut")
+    for row in _starts(engaged & (cut.spindle_rad_s < 0.0)):
+        sentence = f"T{forces.tool[row]} cuts with M4: a right-hand tool turns the wrong way"
+        yield Issue("error", "spindle-direction", int(cut.source_line[row]), sentence, "use M3")
+
+
+def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]) -> Iterator[Issue]:
+    unable = np.array([not cell.tool[int(number)].centre_cutting for number in _tools(forces)])
+    number = np.searchsorted(_tools(forces), forces.tool)
+    into = (cut.centre_mm > _CONTACT_MM) & unable[number]
+    for row in _starts(into):
+        sentence = f"T{forces.tool[row]} plunges into material and does not cut at its centre"
+        remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"
+        yield Issue(severity, "plunge", int(cut.source_line[row]), sentence, remedy)
+
+
+def _limits(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
+    size = np.linalg.norm(forces.force_base_N, axis=1)
+    for number in _tools(forces).tolist():
+        tool: Tool = cell.tool[number]
+        own = forces.tool == number
+        deepest = tool.max_depth_mm
+        if deepest is not None:
+            yield from _beyond(
+                cut, own, forces.a_p_mm, deepest * (1.0 + 1e-6) + _CONTACT_MM, "depth-limit",
+                f"T{number} cuts {{value:.2f}} mm deep, allowed {deepest:g}", "cut in shallower steps",
+            )  # fmt: skip
+        if tool.max_force_N is not None:
+            yield from _beyond(
+                cut, own, size, tool.max_force_N, "force-limit",
+                f"T{number} is loaded with {{value:.0f}} N, allowed {tool.max_force_N:g}",
+                "lower F or the depth of cut",
+            )  # fmt: skip
+    spindle = cell.spindle
+    if spindle.max_torque_Nm is not None:
+        yield from _beyond(
+            cut, None, forces.torque_Nmm / MM_PER_M, spindle.max_torque_Nm, "spindle-torque",
+            f"cutting takes {{value:.2f}} Nm, the spindle has {spindle.max_torque_Nm:g}",
+            "lower F or the depth of cut",
+        )  # fmt: skip
+    if spindle.max_power_W is not None:
+        yield from _beyond(
+            cut, None, spindle_power(forces.torque_Nmm, cut.spindle_rad_s), spindle.max_power_W,
+            "spindle-power", f"cutting takes {{value:.0f}} W, the spindle has {spindle.max_power_W:g}",
+            "lower F or the depth of cut",
+        )  # fmt: skip
+
+
+def _beyond(
+    cut: Cut, own: Bools | None, values: Floats, most: float, code: str, sentence: str, remedy: str
+) -> Iterator[Issue]:
+    beyond = values > most if own is None else own & (values > most)
+    for row in _starts(beyond):
+        worst = float(values[row : _end(beyond, row)].max())
+        yield Issue("warning", code, int(cut.source_line[row]), sentence.format(value=worst), remedy)
+
+
+def _chips(cut: Cut, forces: Forces) -> Iterator[Issue]:
+    """Chips outside the range of the coefficients: once each, with the share of the time in cut."""
+    cutting = np.flatnonzero(np.isfinite(forces.phi_rad[:, 0]) & (cut.f_z_mm > 0.0))
+    if not len(cutting):
+        return
+    chip = largest_chip(forces.phi_rad[cutting], cut.f_z_mm[cutting], cut.ramp_rad[cutting])
+    for wrong, code, words in (
+        (
+            chip < THIN_CHIP_MM,
+            "chip-thin",
+            f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut",
+        ),
+        (chip > THICK_CHIP_MM, "chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
+    ):
+        if np.count_nonzero(wrong) * cut.cycle_s < max(_SHORT_S, 0.05 * len(cutting) * cut.cycle_s):
+            continue
+        row = int(cutting[np.argmax(wrong)])
+        share = np.count_nonzero(wrong) / len(cutting)
+        sentence = f"{words}, in {share:.0%} of the time in cut, first at this line"
+        yield Issue("note", code, int(cut.source_line[row]), sentence, "change F or the spindle speed")
+
+
+def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
+    """A note where spindle or tooth passing meets a structural mode; stability itself is not predicted."""
+    cutting = np.isfinite(forces.phi_rad[:, 0])
+    pairs = np.unique(np.stack([np.abs(cut.spindle_rad_s[cutting]), forces.tool[cutting]], axis=1), axis=0)
+    for speed, number in pairs:
+        teeth = cell.tool[int(number)].teeth
+        turns_hz = float(speed) / RAD_PER_REV
+        for mode in cell.compliance.modes_hz:
+            for order in sorted({*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}):
+                if abs(order * turns_hz - mode) <= _NEAR_MODE * mode:
+                    row = int(np.argmax(cutting & (np.abs(cut.spindle_rad_s) == speed)))
+                    what = "the spindle" if order % teeth else "tooth passing"
+                    yield Issue(
+                        "note", "near-mode", int(cut.source_line[row]),
+                        f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{int(number)} ({what}) is near the "
+                        f"mode at {mode:g} Hz; stability is not predicted",
+                        "change the spindle speed",
+                    )  # fmt: skip
+                    break
+
+
+def _tools(forces: Forces) -> NDArray[np.int32]:
+    return np.unique(forces.tool)
+
+
+def _starts(wrong: Bools) -> list[int]:
+    """Return where stretches begin, at most `MOST_PER_KIND`."""
+    begins = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
+    return [int(row) for row in begins[:MOST_PER_KIND]]
+
+
+def _end(wrong: Bools, start: int) -> int:
+    """Return the row behind a stretch."""
+    rest = np.flatnonzero(~wrong[start:])
+    return start + int(rest[0]) if len(rest) else len(wrong)

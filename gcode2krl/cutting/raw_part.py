@@ -1,0 +1,249 @@
+"""The raw part as a height field: a block by numbers, a mesh, or a guess from the program.
+
+A guess is the box of the feed moves in the plane, widened by the tool's radius; its bottom is the lowest feed
+point, its top the lower of the lowest rapid that stays at its height and the highest end of a feed move.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
+from gcode2krl.errors import input_error
+from gcode2krl.sections import Tool
+from gcode2krl.tables import Toolpath
+
+if TYPE_CHECKING:
+    import trimesh
+
+Floats = NDArray[np.float64]
+_FLAT_MM = 1e-9
+_METRES_MM = 1.0
+"""A mesh smaller than this in every direction is taken to be in metres."""
+_LARGEST_MM = 20_000.0
+_COARSEST_OF_DIAMETER = 20.0
+"""Cells across the smallest tool below which a field is too coarse to mean anything."""
+
+
+def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: list[Tool]) -> HeightField:
+    """Return the raw part before the first cut, in the frame of the field.
+
+    Parameters
+    ----------
+    to_field : (3, 3) rotation from ``$BASE`` to the field, whose z is the tool axis.
+    tools : those that the program uses; the smallest gives the resolution where the cell does not.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where a mesh cannot be read or the field would be too large.
+    """
+    stock = cell.stock
+    own_mm = stock.resolution_mm if stock is not None else None
+    if stock is not None and stock.mesh is not None:
+        mesh = load_mesh(Path(stock.mesh))
+        mesh.apply_transform(np.block([[to_field, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
+        return _from_mesh(mesh, _resolution(mesh.bounds, tools, own_mm))
+    if stock is not None and stock.box_mm is not None:
+        box = np.array(stock.box_mm)
+        if np.allclose(to_field, np.eye(3)):
+            return block(box, _resolution(box, tools, own_mm))
+        corners = np.array(np.meshgrid(*box.T)).reshape(3, -1).T @ to_field.T
+        bounds = np.array([corners.min(axis=0), corners.max(axis=0)])
+        return _from_mesh(_turned_box(box, to_field), _resolution(bounds, tools, own_mm))
+    box = guessed_box(toolpath, to_field, max(tool.diameter_mm for tool in tools) / 2.0)
+    return block(box, _resolution(box, tools, own_mm), guessed=True)
+
+
+def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float) -> Floats:
+    """Return the low and the high corner (2, 3) of the stock that the program seems to expect."""
+    known = toolpath.is_position()
+    position = toolpath.position_mm @ to_field.T
+    feed = known & ~toolpath.rapid & np.isfinite(toolpath.feed_mm_s) & ~toolpath.machine
+    feed[0] = False
+    ends = position[feed]
+    if not len(ends):
+        here = position[known][:1] if known.any() else np.zeros((1, 3))
+        return np.array([here[0] - radius_mm, here[0] + [radius_mm, radius_mm, 0.0]])
+    starts = position[np.flatnonzero(feed) - 1]
+    starts = starts[known[np.flatnonzero(feed) - 1]]
+    low, high = (op(np.concatenate([starts, ends])[:, :2], axis=0) for op in (np.min, np.max))
+    rise = np.diff(position[:, 2], prepend=position[:1, 2])
+    level = known & toolpath.rapid & ~toolpath.machine & (np.abs(rise) <= _FLAT_MM)
+    level[0] = False
+    moved = np.linalg.norm(np.diff(position[:, :2], axis=0, prepend=position[:1, :2]), axis=1) > _FLAT_MM
+    lowest_rapid = position[level & moved, 2].min(initial=np.inf)
+    bottom = float(ends[:, 2].min())
+    top = max(min(float(lowest_rapid), float(ends[:, 2].max())), bottom)
+    return np.array([[*(low - radius_mm), bottom], [*(high + radius_mm), top]])
+
+
+def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:
+    """Return a block (2, 3) as a field whose cells of about ``cell_mm`` fill it without rest."""
+    low, high = box_mm
+    count = np.maximum(1, np.ceil((high[:2] - low[:2]) / cell_mm - 1e-9)).astype(np.int64)
+    size = (high[:2] - low[:2]) / count
+    height = np.full((count[1], count[0]), high[2], dtype=np.float32)
+    return HeightField(height, low[:2].copy(), size, float(low[2]), guessed)
+
+
+def load_mesh(file: Path) -> "trimesh.Trimesh":
+    """Return the mesh of a raw part in mm.
+
+    Raises `NotUnderstoodError` where there is no file, it is no mesh, it has holes or its unit is not mm.
+    """
+    import trimesh
+
+    remedy = "export a closed solid as STL, PLY or 3MF in mm"
+    if not file.is_file():
+        raise input_error("file-unreadable", "cannot read the stock: no such file", remedy, source=str(file))
+    try:
+        mesh: Any = trimesh.load(file, force="mesh")
+    except Exception as error:  # what a reader of a foreign format raises is not known
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise input_error("stock-mesh", f"not a mesh: {why}", remedy, source=str(file)) from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise input_error("stock-mesh", "the mesh has no faces", remedy, source=str(file))
+    if not np.isfinite(mesh.vertices).all():
+        raise input_error("stock-mesh", "the mesh has points that are not numbers", remedy, source=str(file))
+    span = float(np.ptp(mesh.bounds, axis=0).max())
+    if span < _METRES_MM:
+        sentence = f"the mesh is {span:.4g} mm large, so probably in metres"
+        raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
+    if span > _LARGEST_MM:
+        sentence = f"the mesh is {span:.0f} mm large, so probably not in mm"
+        raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
+    if not mesh.is_watertight:
+        raise input_error("stock-mesh", "the mesh is not closed", remedy, source=str(file))
+    solid: trimesh.Trimesh = mesh
+    return solid
+
+
+def to_mesh(field: HeightField, most_cells: int = 250_000) -> "trimesh.Trimesh":
+    """Return what is left as a closed mesh, in the frame of the field.
+
+    Its surface runs from cell middle to cell middle, so a wall leans by one cell. A field of more than
+    ``most_cells`` cells is made coarser first (the highest of joined cells counts). Undercuts are filled.
+    """
+    import trimesh
+
+    tops, x, y = _coarser(field, most_cells)
+    rows, columns = tops.shape
+    solid = tops > field.bottom_mm
+    filled = solid[:-1, :-1] | solid[1:, :-1] | solid[:-1, 1:] | solid[1:, 1:]
+    grid_x, grid_y = np.meshgrid(x, y)
+    points = np.concatenate(
+        [
+            np.stack([grid_x, grid_y, tops], axis=-1).reshape(-1, 3),
+            np.stack([grid_x, grid_y, np.full_like(tops, field.bottom_mm)], axis=-1).reshape(-1, 3),
+        ]
+    )
+    number = np.arange(rows * columns).reshape(rows, columns)
+    number_below = np.where(solid, number + rows * columns, number)  # where nothing is left, both are one
+    top = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1)[filled]
+    below = np.stack(
+        [number_below[1:, :-1], number_below[1:, 1:], number_below[:-1, 1:], number_below[:-1, :-1]], axis=-1
+    )[filled]
+    squares = np.concatenate([top, below, *_sides(number, number_below, filled)])
+    faces = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]])
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])
+    mesh = trimesh.Trimesh(points, faces[distinct], process=False)
+    mesh.remove_unreferenced_vertices()
+    return mesh
+
+
+def _coarser(field: HeightField, most_cells: int) -> tuple[Floats, Floats, Floats]:
+    """Return heights at cell middles with a border on the edges of the field (r, c), and their x and y."""
+    rows, columns = field.height_mm.shape
+    step = max(1, math.ceil(math.sqrt(rows * columns / most_cells)))
+    padded = np.full((-(-rows // step) * step, -(-columns // step) * step), -np.inf)
+    padded[:rows, :columns] = field.height_mm
+    tops = padded.reshape(padded.shape[0] // step, step, padded.shape[1] // step, step).max(axis=(1, 3))
+    tops = np.pad(np.maximum(tops, field.bottom_mm), 1, mode="edge")
+    places = []
+    for count, size, origin in zip((columns, rows), field.cell_mm, field.origin_mm, strict=True):
+        edges = np.minimum(np.arange(0, count + step, step), count) * size + origin
+        middles = 0.5 * (edges[:-1] + edges[1:])
+        places.append(np.concatenate([edges[:1], middles, edges[-1:]]))
+    return tops, places[0], places[1]
+
+
+def _sides(
+    top: NDArray[np.int64], below: NDArray[np.int64], filled: NDArray[np.bool_]
+) -> Iterator[NDArray[np.int64]]:
+    """Yield the walls (f, 4) along the border of the field; elsewhere top and bottom meet."""
+    for first, second, border in (
+        ((0, slice(None, -1)), (0, slice(1, None)), filled[0]),
+        ((-1, slice(1, None)), (-1, slice(None, -1)), filled[-1]),
+        ((slice(1, None), 0), (slice(None, -1), 0), filled[:, 0]),
+        ((slice(None, -1), -1), (slice(1, None), -1), filled[:, -1]),
+    ):
+        yield np.stack([below[first], below[second], top[second], top[first]], axis=-1)[border]
+
+
+def _turned_box(box: Floats, to_field: Floats) -> "trimesh.Trimesh":
+    import trimesh
+
+    mesh: trimesh.Trimesh = trimesh.creation.box(bounds=box)
+    mesh.apply_transform(np.block([[to_field, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
+    return mesh
+
+
+def _from_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> HeightField:
+    """Return the field of what is seen from above: each triangle raises the cells whose middle it covers."""
+    field = block(np.array(mesh.bounds), cell_mm)
+    height = np.full(field.height_mm.shape, -np.inf)
+    _raise_to(np.ascontiguousarray(mesh.triangles, dtype=np.float64), field.origin_mm, field.cell_mm, height)
+    return HeightField(
+        height.astype(np.float32), field.origin_mm, field.cell_mm, float(mesh.bounds[0, 2]), False
+    )
+
+
+def _raise_to(triangles: Floats, origin_mm: Floats, cell_mm: Floats, height: Floats) -> None:
+    """Raise cells (in place) to the triangles (t, 3, 3) over their middles."""
+    for a, b, c in triangles:
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(area) < 1e-12:
+            continue  # seen from above a wall is a line
+        low = np.floor((np.min([a, b, c], axis=0)[:2] - origin_mm) / cell_mm - 0.5).astype(int)
+        high = np.ceil((np.max([a, b, c], axis=0)[:2] - origin_mm) / cell_mm + 0.5).astype(int)
+        j0, i0 = np.maximum(low, 0)
+        j1, i1 = np.minimum(high, height.shape[::-1])
+        if j1 <= j0 or i1 <= i0:
+            continue
+        x = origin_mm[0] + (np.arange(j0, j1) + 0.5) * cell_mm[0]
+        y = origin_mm[1] + (np.arange(i0, i1) + 0.5)[:, None] * cell_mm[1]
+        u = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
+        v = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
+        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9)
+        z = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2])
+        part = height[i0:i1, j0:j1]
+        np.maximum(part, np.where(inside, z, -np.inf), out=part)
+
+
+def _resolution(bounds: Floats, tools: list[Tool], own_mm: float | None) -> float:
+    """Return the cell size: the user's, else a share of the smallest tool, if need be a larger one."""
+    width, depth = (float(size) for size in bounds[1, :2] - bounds[0, :2])
+    smallest = min(tool.diameter_mm for tool in tools)
+    least = math.sqrt(max(width * depth, 1e-12) / MAX_CELLS)
+    if own_mm is not None:
+        if own_mm < least:
+            raise input_error(
+                "stock-resolution",
+                f"resolution_mm {own_mm:g}: {width:.0f} x {depth:.0f} mm would be more than "
+                f"{MAX_CELLS / 1e6:.0f} million cells",
+                f"at least {least:.3f}, or a smaller stock",
+            )
+        return own_mm
+    if least > smallest / _COARSEST_OF_DIAMETER:
+        raise input_error(
+            "stock-large",
+            f"the stock of {width:.0f} x {depth:.0f} mm is too large for a tool of {smallest:g} mm",
+            "state a smaller [stock], or resolution_mm",
+        )
+    return max(least, smallest / CELLS_PER_DIAMETER)

@@ -1,0 +1,100 @@
+"""A long LIN in collinear pieces, so that triggers find motions to stand before; the way stays the same."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell
+from gcode2krl.tables import Joints, Table, Targets
+from gcode2krl.tool_tips import motion_starts
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Additional ends of motions (q), in the order in which they are passed."""
+
+    row: Rows
+    """(q,) row of Targets whose motion is cut."""
+    share: Floats
+    """(q,) share of that motion at which it is cut."""
+    cdis_mm: Floats
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
+def split(targets: Targets, joints: Joints, pieces: Pieces, cell: Cell) -> tuple[Targets, Joints, Rows]:
+    """Return targets and joints with the pieces as rows, each before the row whose motion it cuts.
+
+    A piece has that row's speed, tool and line, is no row of the Toolpath and does not stop. Its joints are
+    those of the row, and only fill the table. The third result (p,) says where the rows have gone.
+    """
+    count = np.bincount(pieces.row, minlength=len(targets)) + 1
+    order = np.repeat(np.arange(len(targets)), count)
+    own = np.cumsum(count) - 1
+    new = np.ones(len(order), dtype=np.bool_)
+    new[own] = False
+    start, from_rotation = (column[pieces.row] for column in motion_starts(targets, cell))
+    way = targets.position_mm[pieces.row] - start
+    rows = _taken(targets, order)
+    rows["position_mm"][new] = start + pieces.share[:, None] * way
+    rows["rotation"][new] = fr.slerp(from_rotation, targets.rotation[pieces.row], pieces.share)
+    rows["cdis_mm"][new], rows["wait_s"][new], rows["move"][new] = pieces.cdis_mm, 0.0, -1
+    events = tuple(event._replace(row=int(own[event.row])) for event in targets.events)
+    return replace(targets, events=events, **rows), replace(joints, **_taken(joints, order)), own
+
+
+def _taken(table: Table, rows: Rows) -> dict[str, Any]:
+    """Return the columns of a table at rows."""
+    return {spec.name: getattr(table, spec.name)[rows] for spec in fields(table) if "tail" in spec.metadata}
+
+
+def pieces_in(
+    position_mm: Floats,
+    ptp: NDArray[np.bool_],
+    cdis_mm: Floats,
+    targets: Targets,
+    cell: Cell,
+    limit_mm: float,
+) -> Pieces:
+    """Return what a program says more than its targets: blended motions that end on the way of others."""
+    start_mm, _ = motion_starts(targets, cell)
+    row = np.full(len(position_mm), -1, dtype=np.int64)
+    share = np.zeros(len(position_mm))
+    _align(position_mm, ptp, cdis_mm, targets.position_mm, targets.ptp, start_mm, limit_mm, row, share)
+    more = np.flatnonzero(row >= 0)
+    return Pieces(row[more], share[more], cdis_mm[more])
+
+
+@njit(cache=True, nogil=True)
+def _align(
+    position: Floats, ptp: NDArray[np.bool_], cdis: Floats, target: Floats, target_ptp: NDArray[np.bool_],
+    start: Floats, limit: float, row: Rows, share: Floats,
+) -> None:  # fmt: skip
+    """Walk both in step; a motion that ends on the way to the next target belongs to it."""
+    at, before = 0, 0.0
+    for i in range(len(position)):
+        if at >= len(target):
+            return
+        off2, along, way2, beside2 = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            off2 += (position[i, c] - target[at, c]) ** 2
+            way2 += (target[at, c] - start[at, c]) ** 2
+            along += (position[i, c] - start[at, c]) * (target[at, c] - start[at, c])
+        if not (ptp[i] or target_ptp[at] or off2 <= limit * limit) and way2 > 0.0 and cdis[i] > 0.0:
+            along /= way2
+            for c in range(3):
+                beside2 += (start[at, c] + along * (target[at, c] - start[at, c]) - position[i, c]) ** 2
+            if before < along < 1.0 and beside2 <= limit * limit:
+                row[i], share[i] = at, along
+                before = along
+                continue
+        at += 1
+        before = 0.0

@@ -1,0 +1,199 @@
+"""The pilot force of a program that was read: its triggers carried out along the predicted motion."""
+
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import krc4
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue
+from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.read import KrlProgram
+from gcode2krl.krl.triggers import most_active, view
+from gcode2krl.krl.windows import Windows, windows_of
+from gcode2krl.pilot import Knots, force_at, in_contact
+from gcode2krl.pilot.sidecar import NOT_YET
+from gcode2krl.tables import Motion, Targets
+from gcode2krl.units import MS_PER_S
+
+Floats = NDArray[np.float64]
+_ROUNDING_S = 0.001
+"""A delay is written in whole ms."""
+_MOST_PER_CHECK = 20
+_REMEDY = "translate again"
+
+
+@dataclass(frozen=True)
+class PilotFigures:
+    """What the pilot force of a program is like; None where it cannot be known."""
+
+    knots: int
+    tolerance_N: float | None
+    max_error_N: float | None
+    """Largest distance of the predicted force to the knots' polyline."""
+    rms_error_N: float | None
+    min_lead_s: float | None
+    """Least time by which a knot is announced ahead, carried out along the predicted motion."""
+    max_active: int
+    """Largest number of triggers that wait at the same time."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures for ``--json``."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class PilotCase:
+    """What the pilot force of a program is checked against."""
+
+    text: PilotText
+    motion: Motion
+    force_N: Floats | None = None
+    """(m, 3) predicted, in the pilot frame, where known."""
+    windows: Windows | None = None
+    """When the motions run, where known already."""
+
+
+def check_pilot(
+    program: KrlProgram, case: PilotCase, targets: Targets, cell: Cell
+) -> tuple[PilotFigures, list[Issue]]:
+    """Carry out the triggers of a program along a Motion, and compare with the knots of its sidecar.
+
+    ``targets`` are those of the program, motion by motion. What is not as the sidecar says, or not as the
+    controller can do it, is an error.
+    """
+    pilot, knots = case.text, case.text.knots
+    error_N, rms_N = _errors_of(knots, case.motion, case.force_N)
+    issues = [*_checksum_issues(program, pilot), *_form_issues(program, pilot)]
+    lead_s: float | None = None
+    windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
+    if len(program.triggers.motion) == len(knots) > 0 and len(windows.row):
+        lead, found = _timing(program, pilot, windows, cell)
+        issues += found
+        lead_s = float(lead.min())
+    active = most_active(program.triggers.motion, view(cell))
+    if active > cell.pilot.max_active:
+        sentence = f"{active} triggers wait at the same time, allowed are {cell.pilot.max_active}"
+        issues.append(_issue(program, 0, "pilot-active", sentence))
+    if error_N is not None and error_N > knots.tolerance_N and not knots.issues:
+        sentence = f"the knots are {error_N:.1f} N off the forces, allowed are {knots.tolerance_N:.1f} N"
+        issues.append(Issue("error", "pilot-error", 0, sentence, _REMEDY))
+    figures = PilotFigures(len(knots), _known(knots.tolerance_N), error_N, rms_N, lead_s, active)
+    return figures, issues
+
+
+def checksum_of(program: KrlProgram, rows: bytes) -> int:
+    """Return the checksum of a program that was read, with the rows of its sidecar."""
+    return checksum(
+        program.position_mm,
+        program.abc_deg,
+        program.q_deg,
+        program.ptp,
+        program.speed_mm_s,
+        program.cdis_mm,
+        rows,
+    )
+
+
+def _checksum_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
+    """Check that the program and its sidecar state the checksum of what was read, before any motion."""
+    right = checksum_of(program, pilot.rows)
+    set_to = re.compile(re.escape(pilot.hash_variable) + r"=(\d+)", re.IGNORECASE)
+    found = [(set_to.fullmatch(re.sub(r"\s+", "", s.text)), s) for s in program.statements]
+    stated = [(int(match[1]), s) for match, s in found if match]
+    issues = []
+    if len(stated) != 1 or stated[0][1].motion > 0 or stated[0][0] != right:
+        line = stated[0][1].line if stated else program.def_line
+        sentence = f"{pilot.hash_variable} must be set once, before the first motion, to {right}"
+        issues.append(Issue("error", "pilot-checksum", line, sentence, _REMEDY))
+    if pilot.header.checksum not in (NOT_YET, right):
+        sentence = f"the sidecar is of another program: checksum {pilot.header.checksum}, here {right}"
+        issues.append(Issue("error", "pilot-checksum", 0, sentence, _REMEDY))
+    return issues
+
+
+def _known(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def _errors_of(knots: Knots, motion: Motion, force_N: Floats | None) -> tuple[float | None, float | None]:
+    """Return the largest and the RMS distance of forces to the ramps that the online side makes of knots.
+
+    The figures of the compression count the ramps along the path as well; the larger ones are returned.
+    """
+    if force_N is None:
+        return _known(knots.max_error_N), _known(knots.rms_error_N)
+    off = force_N - force_at(knots, motion.time_s)
+    square = np.einsum("ij,ij->i", off, off)
+    acting = in_contact(force_N)
+    mean = float(np.mean(square[acting])) if acting.any() else 0.0
+    figures = np.sqrt([float(square.max(initial=0.0)), mean])
+    figures = np.fmax(figures, [knots.max_error_N, knots.rms_error_N])
+    return float(figures[0]), float(figures[1])
+
+
+def _issue(program: KrlProgram, row: int, code: str, sentence: str) -> Issue:
+    """Return an error at the trigger of a row."""
+    line = int(program.triggers.line[row]) if row < len(program.triggers.line) else 0
+    file = program.file[program.triggers.file_of[row]] if line else program.file[0]
+    place = "" if file == program.file[0] else f"{file}: "
+    return Issue("error", code, line, place + sentence, _REMEDY)
+
+
+def _form_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
+    """Check that there is a trigger for each knot, in order, that writes what the sidecar says."""
+    read, header, knots = program.triggers, pilot.header, pilot.knots
+    count = len(read.motion)
+    if count != len(knots):
+        return [
+            _issue(program, count, "pilot-count", f"{count} triggers, the sidecar has {len(knots)} knots")
+        ]
+    if count == 0:
+        return []
+    by_index = header.form == "index"
+    name = (header.variable if by_index else SUBPROGRAM).upper()
+    if read.names != (name,) or (read.calls == by_index).any():
+        row = int(np.argmax(read.calls == by_index))
+        sentence = f"triggers write to {', '.join(read.names)}, the sidecar says {name}"
+        return [_issue(program, row, "pilot-form", sentence)]
+    if by_index:
+        wrong = read.written[:, 0] != np.arange(count)
+    else:
+        said = np.column_stack([knots.force_N, knots.lead_s])
+        wrong = ~(np.abs(read.written - said) <= 1e-9 + 1e-12 * np.abs(said)).all(axis=1)
+    wrong |= (read.distance != 0.0) | (read.delay_ms < 0.0) | (read.delay_ms != np.rint(read.delay_ms))
+    return [
+        _issue(program, row, "pilot-knot", f"the trigger of knot {row} is not as in the sidecar")
+        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK].tolist()
+    ]
+
+
+def _timing(
+    program: KrlProgram, pilot: PilotText, windows: Windows, cell: Cell
+) -> tuple[Floats, list[Issue]]:
+    """Return the leads (k,) in s by which knots are really announced, and what is wrong with them."""
+    read, knots = program.triggers, pilot.knots
+    window = np.searchsorted(windows.row, read.motion)
+    window = np.minimum(window, len(windows.row) - 1)
+    carried = windows.row[window] == read.motion
+    fire_s = windows.begin_s[window] + read.delay_ms / MS_PER_S
+    outside = ~carried | (fire_s > windows.end_s[window] + _ROUNDING_S)
+    lead_s = knots.time_s - fire_s
+    cycle_s, least_s = cell.controller.cycle_s, np.minimum(knots.lead_s, pilot.header.lead_s)
+    together = np.diff(fire_s, prepend=-np.inf) < cycle_s - _ROUNDING_S
+    together |= np.diff(knots.time_s, prepend=-np.inf) < cycle_s * (1.0 - 1e-3)
+    checks = (
+        ("pilot-window", outside, "its instant is not within the motion that carries it"),
+        ("pilot-lead", ~(lead_s >= least_s - _ROUNDING_S), "announced too late"),
+        ("pilot-lead", ~(np.abs(lead_s - knots.lead_s) <= cycle_s), "its lead is not that of the sidecar"),
+        ("pilot-cycle", together, f"within one cycle of {cycle_s:g} s with the knot before"),
+    )
+    issues = []
+    for code, wrong, what in checks:
+        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK].tolist():
+            sentence = f"knot {row}, {lead_s[row]:.3f} s ahead: {what}"
+            issues.append(_issue(program, row, code, sentence))
+    return lead_s, issues

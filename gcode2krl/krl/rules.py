@@ -1,0 +1,149 @@
+"""Rules that a controller would enforce on any program, whatever it was made from."""
+
+import re
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue
+from gcode2krl.krl.names import name_problem
+from gcode2krl.krl.read import KrlProgram
+from gcode2krl.units import MM_PER_M
+
+_MOST_PER_CHECK = 20
+_FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
+_KNOWN_WORDS = frozenset(
+    [
+        "BAS",
+        "HALT",
+        "WAIT",
+        "IF",
+        "THEN",
+        "ELSE",
+        "ENDIF",
+        "WHILE",
+        "ENDWHILE",
+        "FOR",
+        "ENDFOR",
+        "LOOP",
+        "ENDLOOP",
+        "REPEAT",
+        "UNTIL",
+        "SWITCH",
+        "CASE",
+        "DEFAULT",
+        "ENDSWITCH",
+        "RETURN",
+        "PULSE",
+        "INTERRUPT",
+        "GLOBAL",
+        "TRIGGER",
+        "CONTINUE",
+    ]
+)
+_WITHOUT_STOP = re.compile(r"(TRIGGER\b|CONTINUE\b|\$(VEL|ACC|APO|ORI_TYPE)\b)", re.IGNORECASE)
+"""Statements known to leave the advance run alone."""
+_MOTION_WORDS = frozenset(
+    ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
+)
+
+
+def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
+    """Return what a controller would refuse, or do other than a blended program asks for."""
+    issues = []
+    problem = name_problem(program.name)
+    if problem:
+        issues.append(Issue("error", "krl-name", 0, f"program name {program.name!r}: {problem}"))
+    if len(program.ptp) == 0:
+        return [*issues, Issue("error", "krl-no-motion", 0, "the program has no motion")]
+    if not program.ptp[0]:
+        issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
+    cartesian = np.isnan(program.q_deg).all(axis=1)
+    incomplete = cartesian & (
+        np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1)
+    )
+    incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
+    incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
+    for row in np.flatnonzero(incomplete)[:_MOST_PER_CHECK]:
+        issues.append(
+            Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
+        )
+    speed = program.speed_mm_s / MM_PER_M
+    for row in np.flatnonzero(
+        ~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6)))
+    )[:_MOST_PER_CHECK]:
+        issues.append(
+            Issue(
+                "error",
+                "krl-velocity",
+                int(program.line[row]),
+                f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}",
+            )
+        )
+    issues += _statement_rules(program, cell)
+    return [*issues, *_blend_issues(program)]
+
+
+def _blend_issues(program: KrlProgram) -> list[Issue]:
+    """Nothing between a blended motion and the next may stop the advance run, and with it the robot."""
+    blended = np.concatenate([[False], program.cdis_mm > 0])
+    stopping = [
+        statement
+        for statement in program.statements
+        if blended[statement.motion] and not _WITHOUT_STOP.match(statement.text)
+    ]
+    return [
+        Issue(
+            "error",
+            "krl-blend-broken",
+            statement.line,
+            in_file(program, statement.file) + f"{statement.text[:40]!r} breaks a blended corner",
+            "use a TRIGGER, or stop there",
+        )
+        for statement in stopping[:_MOST_PER_CHECK]
+    ]
+
+
+def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
+    issues = []
+    known = _KNOWN_WORDS | {external.split("(")[0].strip().upper() for external in cell.program.externals}
+    starts = 0
+    for statement in program.statements:
+        word = _FIRST_WORD.match(statement.text)
+        first = word.group(0).upper() if word else statement.text[:10]
+        rest = statement.text[len(first) :].lstrip()
+        if "#INITMOV" in statement.text.upper():
+            starts += 1
+        if first in _MOTION_WORDS:
+            issues.append(
+                Issue(
+                    "error",
+                    "krl-motion-unknown",
+                    statement.line,
+                    f"{first} is a motion this program does not write",
+                )
+            )
+        elif rest.startswith("(") and first not in known:
+            issues.append(
+                Issue(
+                    "error",
+                    "krl-call-undeclared",
+                    statement.line,
+                    f"{first} is called but not declared",
+                    "add it to [program] externals of the cell",
+                )
+            )
+        elif not (first.startswith("$") or first in known or rest[:1] in ("=", ".", "[", "(")):
+            issues.append(
+                Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}")
+            )
+    if starts != 1:
+        issues.append(
+            Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once")
+        )
+    return issues[:_MOST_PER_CHECK]
+
+
+def in_file(program: KrlProgram, file: str) -> str:
+    """Return the words that name a file other than the main one."""
+    return "" if file == program.file[0] else f"{file}: "

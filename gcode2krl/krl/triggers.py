@@ -1,0 +1,106 @@
+"""Which trigger announces a knot: the motion that carries it and its delay, and how many wait at a time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.krl.windows import Windows
+from gcode2krl.units import MS_PER_S
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Triggers:
+    """A row per knot (k): ``TRIGGER WHEN DISTANCE=0 DELAY=delay`` before the motion ``row``."""
+
+    row: Rows
+    """(k,) row of Targets; -1 where no motion is left that could carry the trigger."""
+    delay_ms: Rows
+    fire_s: Floats
+    """(k,) instant in the time of the Motion; NaN without a motion."""
+
+
+def place_triggers(
+    deadline_s: Floats, earliest_s: Floats, windows: Windows, cell: Cell, *, spread: bool = False
+) -> Triggers:
+    """Return the latest triggers at or before deadlines (k,), rising, a cycle apart and in whole ms.
+
+    Each instant lies within the motion that carries it; one in a corner moves to the nearest earlier one
+    that can be reached. Where that would be before ``earliest_s`` (k,), the start of a section, triggers
+    follow each other from there as early as they can, and later than their deadline. ``spread`` moves
+    triggers to earlier motions where too many would wait at the same time.
+    """
+    count = len(deadline_s)
+    window = np.full(count, -1, dtype=np.int64)
+    delay = np.zeros(count, dtype=np.int64)
+    if len(windows.row) == 0:
+        return Triggers(window, delay, np.full(count, np.nan))
+    _place(
+        deadline_s, earliest_s, windows.row, windows.begin_s, windows.end_s, cell.controller.cycle_s,
+        cell.pilot.max_active, view(cell) if spread else 0, window, delay,
+    )  # fmt: skip
+    found = window >= 0
+    fire_s = windows.begin_s[window] + delay / MS_PER_S
+    return Triggers(np.where(found, windows.row[window], -1), delay, np.where(found, fire_s, np.nan))
+
+
+def view(cell: Cell) -> int:
+    """Return how many motions in a row have their triggers waiting at the same time.
+
+    While one motion runs, the advance run has read ``$ADVANCE`` more and what stands before the next.
+    """
+    advance = 5 if cell.controller.advance == "unlimited" else cell.controller.advance
+    return advance + 2 if advance else 1
+
+
+def most_active(row: Rows, in_view: int) -> int:
+    """Return the largest number of triggers (at rising rows) within so many motions in a row."""
+    waiting = np.searchsorted(row, row + in_view, side="left") - np.arange(len(row))
+    return int(waiting.max(initial=0))
+
+
+@njit(cache=True, nogil=True)
+def _place(
+    deadline: Floats, earliest: Floats, row: Rows, begin: Floats, end: Floats, cycle: float, most: int,
+    in_view: int, window: Rows, delay: Rows,
+) -> None:  # fmt: skip
+    count = len(deadline)
+    limit = np.inf
+    for j in range(count - 1, -1, -1):  # the latest that can be reached
+        latest = min(deadline[j], limit)
+        w = np.searchsorted(begin, latest + 1e-9, side="right") - 1
+        other = window[j + most] if in_view > 0 and j + most < count else -1
+        if other >= 0:  # they must not be in view at the same time
+            w = min(w, np.searchsorted(row, row[other] - in_view, side="right") - 1)
+            latest = min(latest, end[w]) if w >= 0 else -np.inf
+        if w < 0 or latest < earliest[j] - 1e-9:
+            limit = min(latest, earliest[j]) - cycle
+            continue
+        ms = max(0, int(np.floor((min(latest, end[w]) - begin[w]) * MS_PER_S + 1e-6)))
+        fire = begin[w] + ms / MS_PER_S
+        if fire < earliest[j] - 1e-9:
+            limit = earliest[j] - cycle
+            continue
+        window[j], delay[j] = w, ms
+        limit = fire - cycle
+    last = -np.inf
+    for j in range(count):  # at the start of a section: one after the other
+        fire = begin[window[j]] + delay[j] / MS_PER_S if window[j] >= 0 else -np.inf
+        wanted = max(earliest[j], last + cycle)
+        if fire < wanted - 1e-9:
+            w = np.searchsorted(end, wanted - 1e-9, side="left")
+            window[j] = -1
+            while w < len(end) and window[j] < 0:
+                ms = max(0, int(np.ceil((wanted - begin[w]) * MS_PER_S - 1e-6)))
+                fire = begin[w] + ms / MS_PER_S
+                if fire <= end[w] + 1e-9:
+                    window[j], delay[j] = w, ms
+                w += 1
+            if window[j] < 0:
+                return
+        last = fire

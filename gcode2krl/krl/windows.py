@@ -1,0 +1,184 @@
+"""When each motion of a program runs, by the predicted Motion, and at which instants a trigger can act.
+
+A trigger of KRL stands before the motion that carries it; with ``DISTANCE=0`` its delay counts from the start
+of that motion. Instants within the approximation of a corner belong to neither motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.krc4 import Chain
+from gcode2krl.tables import Motion, Targets
+from gcode2krl.units import MM_PER_M
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+COUNTS_FROM_END_OF_ARC = True
+"""At an approximated start point ``DISTANCE=0`` switches where the approximation ends, not where it begins
+(KUKA's documentation as remembered; not confirmed by a trace)."""
+_SAME_PATH = 1e-3
+_AT_REST_MM = 1e-6
+
+
+@dataclass(frozen=True)
+class Windows:
+    """The LIN motions (w) that can carry triggers, in the order in which they run."""
+
+    row: Rows
+    """(w,) row of Targets."""
+    begin_s: Floats
+    """(w,) instant from which a delay counts, in the time of the Motion."""
+    end_s: Floats
+    """(w,) last instant of the motion, before the approximation of its end."""
+    begin_mm: Floats
+    """(w,) path of the Motion at ``begin_s``; the motion is straight from there to ``end_mm``."""
+    end_mm: Floats
+    head_mm: Floats
+    """(w,) part of the motion that belongs to the corner at its start."""
+    tail_mm: Floats
+    section_s: Floats
+    """(c,) instants at which the robot starts anew after a standstill whose length nobody knows (M-codes,
+    tool changes, PTP), the program's start being the first."""
+
+    def earliest_s(self, time_s: Floats) -> Floats:
+        """Return the start of the section to which instants (k,) belong."""
+        section = np.searchsorted(self.section_s, time_s + 1e-9, side="right") - 1
+        return np.asarray(self.section_s[np.maximum(section, 0)])
+
+
+def windows_of(targets: Targets, chain: Chain, motion: Motion, cell: Cell) -> Windows:
+    """Return the windows of a program's LIN motions.
+
+    ``chain`` is that of ``targets``. Path and time of the Motion are taken as they are, so a slower robot or
+    an effect on the motion is followed. Raises `RefusedError` where the Motion is not that of the targets.
+    """
+    straight_mm, head_mm, tail_mm = _straight_parts(chain, targets)
+    arc_mm = _arc_lengths(chain, head_mm, tail_mm)
+    arrive_mm = np.cumsum(straight_mm) + np.concatenate([[0.0], np.cumsum(arc_mm)])
+    leave_mm = arrive_mm - straight_mm
+    total, path = float(arrive_mm[-1]) if len(arrive_mm) else 0.0, float(motion.path_mm[-1])
+    if abs(total - path) > _SAME_PATH * max(total, 1.0):
+        raise RefusedError(
+            Issue("error", "pilot-motion", 0, f"the motion is {path:.3f} mm long, the program {total:.3f} mm",
+                  "predict again")
+        )  # fmt: skip
+    scale = path / total if total > 0 else 1.0
+    arrive_mm, leave_mm = arrive_mm * scale, leave_mm * scale
+    stops = np.concatenate([[True], chain.stop])
+    clock = _Clock(motion, cell)
+    end_s = clock.arrival(arrive_mm, stops[1:])
+    begin_s = clock.departure(leave_mm if COUNTS_FROM_END_OF_ARC else _arc_starts(arrive_mm), stops[:-1])
+    rows = chain.first + 1 + np.arange(len(straight_mm))
+    carries = ~targets.ptp[rows] & (straight_mm + head_mm + tail_mm > 0)
+    begin_s, end_s = begin_s[carries], end_s[carries]
+    begin_s = np.maximum.accumulate(begin_s)
+    return Windows(
+        row=rows[carries],
+        begin_s=begin_s,
+        end_s=np.maximum(end_s, begin_s),
+        begin_mm=leave_mm[carries],
+        end_mm=arrive_mm[carries],
+        head_mm=head_mm[carries],
+        tail_mm=tail_mm[carries],
+        section_s=_sections(targets, chain, clock, leave_mm),
+    )
+
+
+def _arc_starts(arrive_mm: Floats) -> Floats:
+    """Return the path (n,) at which the arc at the start of each move begins."""
+    return np.concatenate([[0.0], arrive_mm[:-1]])
+
+
+def _straight_parts(chain: Chain, targets: Targets) -> tuple[Floats, Floats, Floats]:
+    """Return (n,) lengths in mm of the straight part of each move, and of its parts in corners."""
+    way = chain.end_mm - chain.start_mm
+    length = np.sqrt(np.einsum("ij,ij->i", way, way))
+    head, tail = np.zeros(len(length)), np.zeros(len(length))
+    if len(length) > 1:
+        corner = chain.blend_mm[:-1] > 0
+        rows = slice(chain.first + 1, chain.first + len(length))
+        half = np.minimum(length[:-1], length[1:]) / 2.0
+        on = np.where(chain.stop[:-1], 0.0, np.minimum(targets.cdis_mm[rows], half))  # straight on: no corner
+        tail[:-1] = np.where(corner, chain.blend_mm[:-1] * chain.scale[:-1], on)
+        head[1:] = np.where(corner, chain.blend_mm[:-1] * chain.scale[1:], on)
+    return np.maximum(length - head - tail, 0.0), head, tail
+
+
+def _arc_lengths(chain: Chain, head_mm: Floats, tail_mm: Floats) -> Floats:
+    """Return the lengths (n - 1,) of the parabolas between moves: B' = 2·((1 - t)·p + t·q), p and q its legs.
+
+    The integral of |p + t·(q - p)| from 0 to 1, in closed form with the root of b·((t + m)² + r2).
+    """
+    way = chain.end_mm - chain.start_mm
+    size = np.maximum(np.sqrt(np.einsum("ij,ij->i", way, way)), 1e-300)
+    unit = way / size[:, None]
+    p, q = unit[:-1] * tail_mm[:-1, None], unit[1:] * head_mm[1:, None]
+    pp, pq, qq = (np.einsum("ij,ij->i", a, b) for a, b in ((p, p), (p, q), (q, q)))
+    b = pp - 2.0 * pq + qq
+    bends = b > 1e-12 * (pp + qq)
+    b = np.where(bends, b, 1.0)
+    m = np.where(bends, (pq - pp) / b, 0.0)
+    r2 = np.maximum(pp / b - m * m, 1e-300)
+    root0, root1 = np.sqrt(m * m + r2), np.sqrt((1.0 + m) ** 2 + r2)
+    r = np.sqrt(r2)
+    area = (1.0 + m) * root1 - m * root0 + r2 * (np.arcsinh((1.0 + m) / r) - np.arcsinh(m / r))
+    return np.asarray(np.where(bends, np.sqrt(b) * area, np.sqrt(pp) + np.sqrt(qq)))
+
+
+def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats) -> Floats:
+    """Return the instants (c,) at which the program starts anew."""
+    count = len(leave_mm)
+    unknown = np.zeros(len(targets) + 1, dtype=np.bool_)
+    unknown[[event.row for event in targets.events]] = True
+    unknown[:-1] |= targets.ptp
+    unknown[:-2] |= targets.ptp[1:]
+    if count == 0:
+        return np.zeros(1)
+    vertex = np.union1d(np.flatnonzero(unknown[chain.first : chain.first + count]), [0])
+    return clock.departure(leave_mm[vertex], np.ones(len(vertex), dtype=np.bool_))
+
+
+class _Clock:
+    """Path to time of a Motion, with its standstills."""
+
+    def __init__(self, motion: Motion, cell: Cell) -> None:
+        self.time_s, self.path_mm, self.speed = motion.time_s, motion.path_mm, motion.speed_mm_s
+        self.acceleration = motion.acceleration_mm_s2
+        k_s = cell.controller.k_s
+        self.jerk = cell.controller.acc_cp_m_s2 * MM_PER_M / k_s if k_s > 0 else np.inf
+
+    def arrival(self, path_mm: Floats, at_rest: NDArray[np.bool_]) -> Floats:
+        """Return the instants (n,) at which a path is reached; at rest it is where the motion ends."""
+        after = np.searchsorted(self.path_mm, path_mm - _AT_REST_MM, side="left")
+        after = np.clip(after, 1, len(self.time_s) - 1)
+        stopping = self.time_s[after - 1] + self._from_rest(after - 1)
+        return np.where(at_rest, np.minimum(stopping, self.time_s[after]), self._between(path_mm, after))
+
+    def departure(self, path_mm: Floats, at_rest: NDArray[np.bool_]) -> Floats:
+        """Return the instants (n,) at which a path is left; at rest it is where the motion begins."""
+        after = np.searchsorted(self.path_mm, path_mm + _AT_REST_MM, side="right")
+        after = np.clip(after, 1, len(self.time_s) - 1)
+        starting = self.time_s[after] - self._from_rest(after)
+        return np.where(at_rest, np.maximum(starting, self.time_s[after - 1]), self._between(path_mm, after))
+
+    def _from_rest(self, sample: Rows) -> Floats:
+        """Return how long before a sample the motion began: v = J·t²/2 at first, then v = a·(t - a/(2·J))."""
+        v, a = self.speed[sample], self.acceleration[sample]
+        return np.where(a > 0, v / np.where(a > 0, a, 1.0) + a / (2.0 * self.jerk), 0.0)
+
+    def _between(self, path_mm: Floats, after: Rows) -> Floats:
+        """Return the instants (n,) between two samples, at an acceleration that is constant in between."""
+        before = after - 1
+        way = self.path_mm[after] - self.path_mm[before]
+        part = np.clip(path_mm - self.path_mm[before], 0.0, way)
+        v0, v1 = self.speed[before], self.speed[after]
+        moves = (way > 0) & (v0 + v1 > 0)
+        safe = np.where(moves, way, 1.0)
+        v = np.sqrt(np.maximum(v0 * v0 + (v1 * v1 - v0 * v0) * part / safe, 0.0))
+        share = np.where(moves, part / safe * (v0 + v1) / np.where(v0 + v > 0, v0 + v, 1.0), 1.0)
+        step_s = self.time_s[after] - self.time_s[before]
+        return np.asarray(self.time_s[before] + np.clip(share, 0.0, 1.0) * step_s)

@@ -1,0 +1,275 @@
+"""Knots of the pilot force: cutting forces as a sparse polyline along the path.
+
+Cutting forces along a Motion are compressed to few knots between which an online controller ramps linearly
+(pilot control: Haehn & Weigold 2020, section 2.3). Before the first knot and behind the last the pilot is
+zero. `krl` announces the knots in the program, `online` reads them.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.errors import Issue
+from gcode2krl.tables import Bools, Floats, Ints, Table, _column
+
+Rows = NDArray[np.int64]
+LEAST_TOLERANCE_N = 10.0
+TOLERANCE_SHARE = 0.03
+"""The default tolerance: the larger of 10 N and this share of the largest force."""
+CYCLE_S = 0.012
+FORCE_DECIMALS, DEFLECTION_DECIMALS = 2, 5
+TIME_DECIMALS, PATH_DECIMALS, LEAD_DECIMALS = 6, 6, 4
+_WRITTEN_N = 0.1
+"""Kept free of the tolerance for the decimals in which knots are written."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Knots(Table):
+    """Knots of the pilot force, counted from 0, rounded to the decimals in which they are written."""
+
+    line: Ints = _column(np.int32)
+    """(k,) line of the G-code."""
+    path_mm: Floats = _column(np.float64)
+    """(k,) arc length along the predicted path."""
+    time_s: Floats = _column(np.float64)
+    lead_s: Floats = _column(np.float64)
+    """(k,) time by which a knot is announced ahead; NaN until the announcements are placed."""
+    force_N: Floats = _column(np.float64, 3)
+    """(k, 3) on the tool, in the pilot frame."""
+    deflection_mm: Floats = _column(np.float64, 3)
+    """(k, 3) that the force causes, in the pilot frame; NaN where it is not known."""
+    tolerance_N: float = math.nan
+    max_error_N: float = math.nan
+    """Largest distance of a sample's force to the polyline."""
+    rms_error_N: float = math.nan
+    """Root of the mean square of that distance over the samples with a force."""
+
+
+def knots_of(
+    time_s: Floats,
+    path_mm: Floats,
+    force_N: Floats,
+    deflection_mm: Floats | None = None,
+    breaks: Rows | None = None,
+    *,
+    line: Ints | None = None,
+    tolerance_N: float | None = None,
+    cycle_s: float = CYCLE_S,
+) -> Knots:
+    """Compress forces along a path to the knots of a polyline.
+
+    Parameters
+    ----------
+    time_s, path_mm : (m,) rising time and arc length of the samples.
+    force_N : (m, 3), exactly zero in air.
+    deflection_mm : (m, 3) in the same frame, or None.
+    breaks : samples with a force that become knots in any case (changes of direction).
+    line : (m,) lines of the G-code, for the knots and for the words of a finding.
+    tolerance_N : largest distance of a sample to the polyline; default max(10 N, 3 % of the largest force).
+    cycle_s : no two knots are nearer to each other; those that are wanted nearer are merged.
+
+    Returns
+    -------
+    Knots, without their lead. The last sample before a contact and the first behind it are knots; between
+    them a Ramer-Douglas-Peucker polyline (Douglas & Peucker 1973) in the three components. Its distance
+    counts for both ways to draw the polyline, linear in the path and linear in time (they differ where the
+    speed changes), and the larger error is the one that is stated. A change within one cycle cannot be
+    followed; a tolerance not kept for it is a finding in ``issues``.
+    """
+    acting = in_contact(force_N)
+    lines = np.zeros(len(time_s), dtype=np.int32) if line is None else line
+    size = np.sqrt(np.einsum("ij,ij->i", force_N, force_N))
+    if tolerance_N is None:
+        tolerance_N = max(LEAST_TOLERANCE_N, TOLERANCE_SHARE * float(size.max(initial=0.0)))
+    least_s = cycle_s * (1.0 - 1e-6)
+    kept = _always_kept(time_s, acting, np.zeros(0, dtype=np.int64) if breaks is None else breaks, least_s)
+    inner_N = tolerance_N - min(_WRITTEN_N, 0.05 * tolerance_N)
+    force = np.ascontiguousarray(force_N)
+    _thin(time_s, path_mm, force, kept, inner_N, least_s)
+    rows = np.flatnonzero(kept)
+    knot_force = _rounded(force[rows], FORCE_DECIMALS)
+    knot_time, knot_path = _rounded(time_s[rows], TIME_DECIMALS), _rounded(path_mm[rows], PATH_DECIMALS)
+    error = np.zeros(len(time_s))
+    _errors(time_s, path_mm, force, rows, knot_time, knot_path, knot_force, error)
+    largest = float(error.max(initial=0.0))
+    touched = error[acting]
+    issues: tuple[Issue, ...] = ()
+    if largest > tolerance_N:
+        issues = (_too_steep(largest, tolerance_N, cycle_s, int(lines[np.argmax(error)])),)
+    return Knots(
+        line=lines[rows],
+        path_mm=knot_path,
+        time_s=knot_time,
+        lead_s=np.full(len(rows), np.nan),
+        force_N=knot_force,
+        deflection_mm=_deflection_at(rows, deflection_mm),
+        tolerance_N=tolerance_N,
+        max_error_N=largest,
+        rms_error_N=float(np.sqrt(np.mean(touched**2))) if len(touched) else 0.0,
+        issues=issues,
+    )
+
+
+def in_contact(force_N: Floats) -> Bools:
+    """Mark the samples (m,) at which a force acts."""
+    x, y, z = force_N.T
+    return np.asarray((x != 0.0) | (y != 0.0) | (z != 0.0))
+
+
+def force_at(knots: Knots, time_s: Floats) -> Floats:
+    """Return the pilot force (n, 3) in N at times (n,): linear in time between knots, zero outside."""
+    if len(knots) == 0:
+        return np.zeros((len(time_s), 3))
+    force = np.stack([np.interp(time_s, knots.time_s, column) for column in knots.force_N.T], axis=1)
+    written_s = 0.5 * 10.0**-TIME_DECIMALS
+    force[(time_s < knots.time_s[0] - written_s) | (time_s > knots.time_s[-1] + written_s)] = 0.0
+    return force
+
+
+def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints, cell: Cell) -> Floats:
+    """Return vectors (m, 3) along ``$BASE`` in the frame in which the cell wants its knots.
+
+    ``tcp`` is the tool frame as the controller has it (``[tool] axis`` says which of its axes points from
+    tip to holder), at the commanded pose with quaternions ``rotation`` (m, 4) of the inner tool frame.
+    """
+    if cell.pilot.frame == "base":
+        return vector_base
+    first, run = fr.equal_runs(np.column_stack([rotation, tool]))
+    turned = fr.rotation_from_quaternion(rotation[first])
+    for number in np.unique(tool[first]).tolist():
+        turned[tool[first] == number] @= controller_axes(cell.tool[number].axis or "+z")[:3, :3].T
+    if len(first) == 1 and (turned == np.eye(3)).all():
+        return vector_base
+    if len(first) == 1:
+        return np.asarray(np.einsum("ij,ni->nj", turned[0], vector_base))
+    return np.asarray(np.einsum("nij,ni->nj", turned[run], vector_base))
+
+
+def _deflection_at(rows: Rows, deflection_mm: Floats | None) -> Floats:
+    if deflection_mm is None:
+        return np.full((len(rows), 3), np.nan)
+    return _rounded(deflection_mm[rows], DEFLECTION_DECIMALS)
+
+
+def _rounded(values: Floats, decimals: int) -> Floats:
+    """Round to decimals, without a negative zero; first to 1e-9, so that processors agree."""
+    return np.asarray(np.round(np.round(values, 9), decimals) + 0.0)
+
+
+def _too_steep(error_N: float, tolerance_N: float, cycle_s: float, line: int) -> Issue:
+    sentence = (
+        f"the pilot force is {error_N:.0f} N off here, {tolerance_N:.0f} N are allowed: it changes within "
+        f"one cycle of {cycle_s:g} s"
+    )
+    return Issue(
+        "warning", "pilot-cycle", line, sentence, "predict with --dt equal to the controller's cycle"
+    )
+
+
+def _always_kept(time_s: Floats, acting: Bools, breaks: Rows, least_s: float) -> Bools:
+    """Mark the samples (m,) at which a contact begins or ends and those of ``breaks``, a cycle apart."""
+    kept = np.zeros(len(time_s), dtype=np.bool_)
+    change = np.flatnonzero(acting[1:] != acting[:-1])
+    ends = [row for row in (0, len(acting) - 1) if len(acting) and acting[row]]
+    contacts = np.union1d(change + ~acting[change + 1], ends).astype(np.int64)  # the sample without force
+    kept[contacts[_spaced(time_s[contacts], least_s)]] = True
+    contacts = np.flatnonzero(kept)
+    inner = np.unique(breaks[acting[breaks]])
+    if len(contacts) and len(inner):
+        behind = np.searchsorted(contacts, inner)
+        after_s = time_s[contacts[np.minimum(behind, len(contacts) - 1)]] - time_s[inner]
+        before_s = time_s[inner] - time_s[contacts[np.maximum(behind - 1, 0)]]
+        inner = inner[(np.abs(after_s) >= least_s) & (np.abs(before_s) >= least_s)]
+    kept[inner[_spaced(time_s[inner], least_s)]] = True
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _spaced(time: Floats, least: float) -> Bools:
+    """Mark the times (k,) that are at least so far behind the last marked one."""
+    marked = np.zeros(len(time), dtype=np.bool_)
+    last = -np.inf
+    for i in range(len(time)):
+        if time[i] - last >= least:
+            marked[i] = True
+            last = time[i]
+    return marked
+
+
+@njit(cache=True, nogil=True)
+def _thin(time: Floats, path: Floats, force: Floats, kept: Bools, tolerance: float, least: float) -> None:
+    """Ramer-Douglas-Peucker between the samples that are kept: marks those the polyline needs besides.
+
+    The right ends of the open spans wait on a stack; a span is split at its farthest sample that is a cycle
+    away from both ends.
+    """
+    rows = np.flatnonzero(kept)
+    ends = np.empty(len(time), dtype=np.int64)
+    for k in range(len(rows) - 1):
+        a, depth = rows[k], 1
+        ends[0] = rows[k + 1]
+        while depth > 0:
+            b = ends[depth - 1]
+            worst, at = tolerance * tolerance, -1
+            for i in range(a + 1, b):
+                if time[i] - time[a] < least or time[b] - time[i] < least:
+                    continue
+                off = _off2(time, path, force, i, time[a], time[b], path[a], path[b], force[a], force[b])
+                if off > worst:
+                    worst, at = off, i
+            if at >= 0:
+                kept[at] = True
+                ends[depth] = at
+                depth += 1
+            else:
+                a = b
+                depth -= 1
+
+
+@njit(cache=True, nogil=True)
+def _errors(
+    time: Floats,
+    path: Floats,
+    force: Floats,
+    rows: Rows,
+    knot_time: Floats,
+    knot_path: Floats,
+    knot_force: Floats,
+    error: Floats,
+) -> None:
+    """Write the distance (m,) of each sample to the polyline; outside the knots the pilot is zero."""
+    k, last = -1, len(rows) - 1
+    for i in range(len(time)):
+        while k < last and rows[k + 1] <= i:
+            k += 1
+        if k < 0 or k >= last:
+            size = 0.0
+            at_last = k >= 0 and rows[last] == i
+            for c in range(3):
+                size += (force[i, c] - (knot_force[last, c] if at_last else 0.0)) ** 2
+        else:
+            size = _off2(
+                time, path, force, i, knot_time[k], knot_time[k + 1], knot_path[k], knot_path[k + 1],
+                knot_force[k], knot_force[k + 1],
+            )  # fmt: skip
+        error[i] = math.sqrt(size)
+
+
+@njit(cache=True, nogil=True)
+def _off2(
+    time: Floats, path: Floats, force: Floats, i: int, ta: float, tb: float, sa: float, sb: float,
+    fa: Floats, fb: Floats,
+) -> float:  # fmt: skip
+    """Return the square of a sample's distance to the chord, linear in time or in the path, the larger."""
+    by_time = min(max((time[i] - ta) / (tb - ta), 0.0), 1.0)
+    by_path = min(max((path[i] - sa) / (sb - sa), 0.0), 1.0) if sb - sa > 1e-6 else by_time
+    first, second = 0.0, 0.0
+    for c in range(3):
+        first += (force[i, c] - fa[c] - by_time * (fb[c] - fa[c])) ** 2
+        second += (force[i, c] - fa[c] - by_path * (fb[c] - fa[c])) ** 2
+    return max(first, second)
