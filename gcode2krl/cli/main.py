@@ -12,7 +12,17 @@ from gcode2krl.version import __version__
 
 _COMMANDS = {
     name: name.replace("-", "_")
-    for name in ("translate", "predict", "verify", "identify", "make-test", "models")
+    for name in (
+        "translate",
+        "predict",
+        "verify",
+        "diagnose",
+        "identify",
+        "online",
+        "stiffness-map",
+        "make-test",
+        "models",
+    )
 }
 _OWN_OPTIONS = ("-h", "--help", "--version")
 

@@ -40,6 +40,10 @@ Floats = NDArray[np.float64]
 )
 @click.option("--max-lines", type=click.IntRange(100), help="Motions in a part; default: the cell's.")
 @click.option(
+    "--compensate", type=click.Choice(["offline"]), help="Move the targets against the predicted deflection."
+)
+@click.option("--compensate-plot", metavar="FIGURE.png", help="Draw the path before and after it.")
+@click.option(
     "--no-forces", is_flag=True, help="Leave out material removal, forces, deflection and what rests on them."
 )
 @click.option(
@@ -53,6 +57,7 @@ def command(
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
     name: str | None, allow: tuple[str, ...], strict: bool, no_guard: bool,
     split: Literal["defs", "files"], max_lines: int | None, no_forces: bool,
+    compensate: Literal["offline"] | None, compensate_plot: str | None,
     pilot: Literal["index", "values", "none"] | None, comment_every: int | None,
 ) -> int:  # fmt: skip
     """Translate G-code into a KRL program, verify it, and say what it is.
@@ -67,7 +72,7 @@ def command(
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.krl import suggested_name, write_krl
-        from gcode2krl.predict import corner_errors, predict_toolpath, targets_and_joints
+        from gcode2krl.predict import corner_errors, predict_toolpath, solve_joints, targets_and_joints
 
         options = _words(
             tolerance=tolerance,
@@ -83,6 +88,11 @@ def command(
             targets = replace(targets, issues=(*targets.issues, *corner_issues))
             _refuse_early(targets, allow)
             prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
+            if compensate == "offline":
+                from gcode2krl.cli.compensation import compensated
+
+                prediction = compensated(prediction, compensate_plot)
+                joints = solve_joints(prediction.targets, cell)
             written = write_krl(
                 prediction,
                 file,

@@ -1,5 +1,7 @@
 """``gcode2krl verify part.src part.nc``."""
 
+from typing import Literal
+
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
@@ -12,9 +14,13 @@ from gcode2krl.errors import Gcode2KrlError
 @click.argument("part", metavar="PART.nc")
 @common_options
 @gcode_options
+@click.option(
+    "--compensate", type=click.Choice(["offline"]), help="The program was made with --compensate offline."
+)
 def command(
     program: str, part: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
+    compensate: Literal["offline"] | None,
 ) -> int:  # fmt: skip
     """Read a KRL program back and compare it with its G-code.
 
@@ -26,7 +32,13 @@ def command(
 
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        report = verify_krl(program, toolpath, cell, tolerance)
+        prediction = None
+        if compensate == "offline":
+            from gcode2krl.cli.compensation import compensated
+            from gcode2krl.predict import predict_toolpath
+
+            prediction = compensated(predict_toolpath(toolpath, cell, tolerance_mm=tolerance), None)
+        report = verify_krl(program, toolpath, cell, tolerance, prediction=prediction)
     except Gcode2KrlError as error:
         if not as_json:
             raise

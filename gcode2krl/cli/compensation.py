@@ -1,0 +1,63 @@
+"""``--compensate offline``: the prediction with targets moved against its own deflection."""
+
+import io
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gcode2krl.cli.inputs import require_other
+from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.prediction import Prediction
+from gcode2krl.tables import Motion
+
+if TYPE_CHECKING:
+    from gcode2krl.compensate import Compensated
+
+
+def compensated(prediction: Prediction, plot: str | None) -> Prediction:
+    """Return the prediction of the compensated program; ``plot`` draws the path before and after.
+
+    Raises
+    ------
+    RefusedError
+        Where there is no deflection, or it is not sure enough to move a robot by it.
+    """
+    from gcode2krl.compensate import compensate, keeping_forces
+
+    motion, forces = prediction.motion, prediction.forces
+    if motion is None or forces is None or prediction.deflection is None:
+        raise RefusedError(
+            Issue("error", "no-deflection", 0, "--compensate offline: there is no predicted deflection",
+                  "state material, stock and stiffness in the cell; leave out --no-forces")
+        )  # fmt: skip
+    toolpath, cell = prediction.toolpath, prediction.cell
+    done = compensate(
+        toolpath, prediction.targets, cell, keeping_forces(toolpath, prediction.targets, motion, forces, cell)
+    )
+    motion, joints, forces, deflection = done.evaluated
+    if plot is not None:
+        _draw(done, motion, Path(plot))
+    return replace(
+        prediction,
+        targets=done.targets,
+        motion=motion,
+        joints=joints,
+        forces=forces,
+        deflection=deflection,
+        inputs={**prediction.inputs, "compensate": "offline", **done.figures},
+    )
+
+
+def _draw(done: "Compensated", motion: Motion, file: Path) -> None:
+    """Draw the bent path without and with the correction."""
+    from gcode2krl.krl.files import write_together
+    from gcode2krl.report.compensation_figure import compensation_figure
+    from gcode2krl.report.drawing import look
+
+    require_other(file)
+    picture = io.BytesIO()
+    before, after = ((one.intended_mm, one.offset_mm, one.cuts) for one in (done.before, done.after))
+    with look():
+        figure = compensation_figure(before, after, motion.position_mm)
+        figure.savefig(picture, format=file.suffix.lower().removeprefix(".") or "png", dpi=130)
+    write_together({file: picture.getvalue()})
