@@ -238,7 +238,7 @@ def main() -> None:
         return
     _table(verdicts, options.verbose)
     _clean_table(outcomes)
-    print("\nlater, needs material (not looked at here): " + "; ".join(LATER))
+    print("\nnot looked at here: " + "; ".join(LATER))
     count = figures["mistakes"]
     print(f"\nrefused            {figures['refused']} of {count}")
     print(f"with right line    {figures['right_line']} of {count}")

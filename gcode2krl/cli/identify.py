@@ -4,7 +4,7 @@ from importlib import import_module
 
 import click
 
-_WHAT = ("controller", "stiffness", "sensor")
+_WHAT = ("controller", "stiffness", "sensor", "force")
 
 
 class _Identify(click.Group):
@@ -22,4 +22,4 @@ class _Identify(click.Group):
 
 @click.command("identify", cls=_Identify)
 def command() -> None:
-    """Fit the cell to measurements: controller, stiffness, sensor."""
+    """Fit the cell to measurements: controller, stiffness, sensor, cutting force."""

@@ -114,7 +114,7 @@ def command(
 def _save_part(prediction: Prediction, file: Path) -> Path:
     """Write the part that is left as a mesh."""
     from gcode2krl.cutting import remove
-    from gcode2krl.cutting.height_field import to_mesh
+    from gcode2krl.cutting.raw_part import to_mesh
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")

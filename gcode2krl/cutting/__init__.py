@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from gcode2krl.cutting.cut import Removal, cut, force_basis, no_forces, remove
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
 from gcode2krl.kernel_cache import drop_stale
 
 drop_stale(Path(__file__).parent)  # compiled kernels are looked up when they are first called
 
-__all__ = ["Load", "cutting_load", "mean_force"]
+__all__ = ["Load", "Removal", "cut", "cutting_load", "force_basis", "mean_force", "no_forces", "remove"]

@@ -1,0 +1,383 @@
+"""``gcode2krl online``: the twin, the RSI server, and the replay of a recorded run."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.online.settings import Online
+from gcode2krl.prediction import Prediction
+
+TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
+"""As the test piece's file states it."""
+_MS = 1000.0
+
+
+@click.group("online")
+def command() -> None:
+    """Compensate online: the twin, the RSI server, replay.
+
+    Python is not a hard real-time controller: this is the reference against which a PLC version is checked.
+    """
+
+
+@command.command("simulate")
+@click.argument("part", required=False)
+@common_options
+@gcode_options
+@click.option("--lead-ms", type=float, metavar="MS", help="How far ahead the pilot force is taken.")
+@click.option("--threshold-N", "threshold_N", type=float, metavar="N", help="Trust the measurement below.")
+@click.option("--blend-ms", type=float, metavar="MS", help="Time to go over to the pilot.")
+@click.option("--filter-ms", type=float, metavar="MS", help="Delay of low-pass and average together.")
+@click.option("--robot-delay-ms", type=float, metavar="MS", help="Dead time and lag of the robot together.")
+@click.option("--feed-scale", type=float, default=1.0, show_default=True, help="Real speed over predicted.")
+@click.option("--pilot-scale", type=float, metavar="X", help="Pilot force over the true one.")
+@click.option("--sensor-gain", type=float, metavar="X", help="Measured force over the true one.")
+@click.option("--late-ms", type=float, metavar="MS", help="Cutter enters and leaves later than predicted.")
+@click.option("--noise-N", "noise_N", type=float, metavar="N", help="1-sigma of the force sensor.")
+@click.option("--backlash-deg", type=float, metavar="DEG", help="Play of every drive.")
+@click.option("--plot", type=click.Path(), metavar="FOLDER", help="Draw deviation maps and force signals.")
+def simulate_command(
+    part: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    tolerance: float | None, chord_tolerance: float, block_delete: bool, plot: str | None, **options: Any,
+) -> int:  # fmt: skip
+    """Run a part on the twin: how much of the deflection the compensator takes away.
+
+    Predicted forces are the truth; what the compensator knows of it is late, noisy and a little wrong.
+    Without PART the test piece of Haehn & Weigold 2020.
+    """
+    console = Console(quiet, as_json)
+    cell = read_cell(cell_path)
+    settings = _changed(_settings(cell), options)
+    world_values = _world_values(options)
+    prediction = _predicted(part, cell, settings, console, tolerance, chord_tolerance, block_delete)
+    from gcode2krl.online.judge import judged as judge
+    from gcode2krl.online.outcome import as_json as outcome_json
+    from gcode2krl.online.outcome import findings, simulate_all
+    from gcode2krl.online.twin import World, twin_of
+
+    twin = twin_of(prediction, settings, World(**world_values))
+    judged = judge(prediction, settings.memory_s)
+    with console.progress("simulating", None):
+        runs = simulate_all(twin)
+    motion = prediction.motion
+    lines = prediction.toolpath.source_line[motion.move] if motion is not None else np.zeros(0, np.int32)
+    outcome = outcome_json(twin, runs, judged, lines)
+    issues = [*prediction.issues, *findings(twin, runs, judged)]
+    files = _draw(prediction, twin, runs, judged, outcome, Path(plot)) if plot is not None else []
+    if as_json:
+        console.json({**outcome, "files": [str(file) for file in files], "issues": issue_dicts(issues)})
+        return 0
+    console.findings(issues, part or "test piece", notes=False)
+    console.say(f"{part or 'test piece'}: largest deviation normal to the feed of what stays on the part")
+    for case, words in _WORDS.items():
+        value = outcome[f"{case}_mm"]
+        console.say(f"  {words:<42} {'-' if value is None else f'{value:.3f} mm'}")
+    if outcome["reduction_percent"] is not None:
+        console.say(f"  with pilot {outcome['reduction_percent']:.0f} % less")
+    for file in files:
+        console.say(f"  {file}")
+    return 0
+
+
+_WORDS = {
+    "uncompensated": "without compensation",
+    "cartesian": "Cartesian, measured force alone",
+    "pilot": "Cartesian with pilot",
+    "axis": "axis-specific with pilot, drives with play",
+}
+
+
+def _settings(cell: Cell) -> Online:
+    """Return the ``[online]`` section."""
+    return Online()
+
+
+def _changed(settings: Online, options: dict[str, Any]) -> Online:
+    """Return the settings with the options of the command line laid over them."""
+    changes: dict[str, Any] = {}
+    for name, key in (("lead_ms", "lead_s"), ("blend_ms", "blend_s")):
+        if options[name] is not None:
+            changes[key] = options[name] / _MS
+    if options["threshold_N"] is not None:
+        changes["threshold_N"] = options["threshold_N"]
+    if options["filter_ms"] is not None:
+        share = options["filter_ms"] / (_MS * settings.filter_s)
+        if not share > 0.0:
+            raise input_error("option-value", f"--filter-ms {options['filter_ms']:g}: allowed above 0")
+        changes |= {"lowpass_hz": settings.lowpass_hz / share, "average_s": settings.average_s * share}
+    if options["robot_delay_ms"] is not None and settings.lead_s is None and "lead_s" not in changes:
+        changes["robot_delay_s"] = options["robot_delay_ms"] / _MS
+    return _valid(settings, changes)
+
+
+def _valid(settings: Online, changes: dict[str, Any]) -> Online:
+    from pydantic import ValidationError
+
+    try:
+        return Online.model_validate({**settings.model_dump(), **changes})
+    except ValidationError as error:
+        detail = error.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in detail["loc"])
+        found, allowed = detail["input"], detail["msg"].removeprefix("Input should be ")
+        raise input_error("option-value", f"{key}: found {found}, allowed: {allowed}") from None
+
+
+def _world_values(options: dict[str, Any]) -> dict[str, Any]:
+    """Return what the options say of the twin's world."""
+    named = ("feed_scale", "pilot_scale", "sensor_gain", "noise_N", "backlash_deg")
+    values = {name: float(options[name]) for name in named if options[name] is not None}
+    if options["robot_delay_ms"] is not None:
+        half_s = 0.5 * options["robot_delay_ms"] / _MS
+        values |= {"dead_s": half_s, "lag_s": half_s}
+    if options["late_ms"] is not None:
+        values["late_s"] = options["late_ms"] / _MS
+    for name, value in values.items():
+        least_ok = value > 0.0 if name == "feed_scale" else value >= 0.0 or name == "late_s"
+        if not (np.isfinite(value) and least_ok):
+            raise input_error("option-value", f"{name}: found {value:g}, allowed: a number above 0")
+    return values
+
+
+def _predicted(
+    part: str | None, cell: Cell, settings: Online, console: Console,
+    tolerance: float | None, chord_tolerance: float, block_delete: bool,
+) -> Prediction:  # fmt: skip
+    """Return the prediction of a part at the cycle of the settings; of a prediction's folder, as it is."""
+    if part is not None and Path(part).is_dir():
+        return Prediction.load(part)
+    if part is None:
+        part = str(_test_piece())
+        if cell.stock is None:
+            from gcode2krl.sections import Stock
+
+            cell = cell.model_copy(update={"stock": Stock(box_mm=TEST_PIECE_STOCK)})
+    from gcode2krl.predict import predict_toolpath
+
+    try:
+        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        with console.progress("predicting", None):
+            return predict_toolpath(toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance)
+    except Gcode2KrlError as error:
+        error.source = error.source or part
+        raise
+
+
+def _test_piece() -> Path:
+    """Return the test piece: that of the installed package, or of the checkout."""
+    from gcode2krl import library
+
+    root = Path(library.__file__).parent
+    found = [
+        p
+        for p in (root / "models" / "test_piece.nc", root.parent / "examples" / "test_piece.nc")
+        if p.is_file()
+    ]
+    if not found:
+        raise input_error("file-unreadable", "the test piece is not installed", "name a part")
+    return found[0]
+
+
+def _draw(
+    prediction: Prediction, twin: Any, runs: Any, judged: Any, outcome: dict[str, Any], folder: Path
+) -> list[Path]:
+    from gcode2krl.online.surface import surface_of
+    from gcode2krl.report.figures import save_figures
+    from gcode2krl.report.twin_figures import Map, Signals, deviation_figure, signal_figure
+
+    if not folder.parent.is_dir():
+        raise input_error(
+            "output-unwritable", f"the folder {str(folder.parent)!r} does not exist", "create it"
+        )
+    maps = {
+        words.capitalize() if words[0] != "C" else words: Map(
+            *surface_of(prediction, runs[case], judged), outcome[f"{case}_mm"]
+        )
+        for case, words in _WORDS.items()
+    }
+    run = runs["pilot"]
+    device = run.device
+    needed = np.linalg.norm(run.error_mm - run.shift_mm, axis=1)
+    signals = Signals(
+        run.time_s, run.force_N, device.measured[:, :3], device.estimate_N, device.load[:, :3], device.weight,
+        needed, np.linalg.norm(run.shift_mm, axis=1), twin.settings.threshold_N,
+    )  # fmt: skip
+    worst = np.where(judged.counts, runs["cartesian"].normal_mm, 0.0)
+    around_s = float(run.time_s[int(np.argmax(worst))]) if len(worst) else 0.0
+    drawn = {"deviation": deviation_figure(maps), "signals": signal_figure(signals, around_s)}
+    return save_figures(drawn, folder)
+
+
+@command.command("replay")
+@click.argument("run", type=click.Path())
+@common_options
+@click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that ran.")
+@click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")
+@click.option("-o", "--output", type=click.Path(), metavar="FILE", help="Write a row a cycle as CSV.")
+def replay_command(
+    run: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    sidecar: str | None, tool: int, output: str | None,
+) -> int:  # fmt: skip
+    """Send a recorded run through the compensator: what would it have done?"""
+    console = Console(quiet, as_json)
+    cell = read_cell(cell_path)
+    from gcode2krl.online.replay import as_json as replay_json
+    from gcode2krl.online.replay import columns, replay
+    from gcode2krl.runs import load_run
+
+    knots, header = _pilot(sidecar)
+    result = replay(load_run(run), cell, _settings(cell), tool=tool, knots=knots, header=header)
+    found = replay_json(result)
+    if output is not None:
+        import polars as pl
+
+        require_other(Path(output), run)
+        pl.DataFrame(columns(result)).write_csv(output)
+    if as_json:
+        console.json({**found, "issues": issue_dicts(result.issues)})
+        return 0
+    console.findings(result.issues, run, notes=False)
+    console.say(f"{run}: {found['cycles']} cycles, {found['time_s']:.1f} s")
+    most_mm, most_N = found["max_correction_mm"], found["max_force_N"]
+    console.say(f"  largest correction {most_mm:.3f} mm, largest force {most_N:.0f} N")
+    if found["before_mm"] is not None:
+        before, after = found["before_mm"], found["after_mm"]
+        console.say(f"  deviation normal to the feed {before:.3f} mm, left {after:.3f} mm")
+    console.say(f"  pilot in {found['pilot_cycles']} cycles; {_gates(found['gate_cycles'])}")
+    return 0
+
+
+@command.command("serve")
+@common_options
+@click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that will run.")
+@click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")
+@click.option("--mode", type=click.Choice(["cartesian", "axis"]), help="What is corrected.")
+@click.option("--address", metavar="IP", help="Where to listen; default: loopback.")
+@click.option("--port", type=int, metavar="N", help="UDP port; default: 49152.")
+@click.option("--cycle-ms", type=click.Choice(["4", "12"]), help="#IPO_FAST or #IPO.")
+@click.option("--most-mm", type=float, metavar="MM", help="Largest correction; 0.001 = none to speak of.")
+@click.option("-o", "--output", type=click.Path(), metavar="FOLDER", help="Record the run there.")
+@click.option("--files", type=click.Path(), metavar="FOLDER", help="Write the controller's files, and end.")
+@click.option("--name", default="GK_RSI", show_default=True, help="Name of the controller's files.")
+def serve_command(
+    cell_path: str | None, as_json: bool, quiet: bool, verbose: bool, sidecar: str | None, tool: int,
+    output: str | None, files: str | None, name: str, **options: Any,
+) -> int:  # fmt: skip
+    """Answer a controller's RSI telegrams with corrections. Not a safety function, not hard real time.
+
+    Listens on loopback unless --address is given, talks to one controller, and stays at zero until the robot
+    has shown in air that it takes corrections as absolute. The force comes in the telegram (element Force).
+    """
+    console = Console(quiet, as_json)
+    cell = read_cell(cell_path)
+    settings = _link_changed(_settings(cell), options)
+    knots, header = _pilot(sidecar)
+    form = header.form if header is not None else "none"
+    if files is not None:
+        written = _controller_files(settings, form, name, Path(files))
+        if as_json:
+            console.json({"files": [str(file) for file in written]})
+        for file in written:
+            console.say(str(file))
+        return 0
+    from gcode2krl.online.compensator import compensator
+    from gcode2krl.online.recorder import Recorder
+    from gcode2krl.online.server import open_socket, serve
+    from gcode2krl.online.session import Phase
+
+    calibration = None
+    if settings.calibration is not None:
+        from gcode2krl.compliance.sensor import read_calibration
+
+        calibration = read_calibration(settings.calibration)
+    device = compensator(
+        cell, settings, tool=tool, load_frame="sensor", calibration=calibration, knots=knots, header=header
+    )
+    with open_socket(device) as socket, Recorder(Path(output) if output else None, _RUN_HEAD) as recorder:
+        address, port = socket.getsockname()
+        console.hint(f"listening on {address}:{port}; Ctrl-C ends it. This is not a safety function.")
+        try:
+            session, statistics = serve(
+                device, socket, recorder,
+                told=lambda now: console.hint(f"  {now.phase.value} {now.reason}".rstrip()),
+            )  # fmt: skip
+        except KeyboardInterrupt:
+            console.hint("stopped: the controller's own time-out stops the robot")
+            return 130
+    found = {
+        **statistics.as_dict(),
+        "phase": session.phase.value,
+        "reason": session.reason,
+        "lost": session.lost,
+        "ignored": session.ignored,
+        "log_dropped": recorder.dropped,
+        "log_unwritten": recorder.unwritten,
+    }
+    if as_json:
+        console.json(found)
+    else:
+        console.say("\n".join(f"  {key} {value}" for key, value in found.items()))
+    whole = recorder.dropped == recorder.unwritten == 0
+    return 0 if session.phase is Phase.CLOSED and session.reason == "silence" and whole else 1
+
+
+_RUN_HEAD = """\
+[frames]
+force = "sensor"
+
+[channels]
+rsi = true
+correction = "absolute"
+"""
+
+
+def _pilot(sidecar: str | None) -> Any:
+    """Return knots and header of a sidecar, None where there is none."""
+    if sidecar is None:
+        return None, None
+    from gcode2krl.pilot import read_pilot
+
+    return read_pilot(sidecar)
+
+
+def _gates(cycles: dict[str, int]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in cycles.items())
+
+
+def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
+    """Return the settings with the options of `serve` laid over them."""
+    link = {key: options[key] for key in ("address", "port") if options[key] is not None}
+    changes: dict[str, Any] = {"link": {**settings.link.model_dump(), **link}}
+    if options["mode"] is not None:
+        changes["mode"] = options["mode"]
+    if options["cycle_ms"] is not None:
+        changes["cycle_s"] = float(options["cycle_ms"]) / _MS
+    if options["most_mm"] is not None:
+        changes["most_mm"] = options["most_mm"]
+    return _valid(settings, changes)
+
+
+def _controller_files(settings: Online, form: Any, name: str, folder: Path) -> list[Path]:
+    """Write what belongs into the controller's folder ``SensorInterface``."""
+    from gcode2krl.online.krl_files import ethernet_xml, file_names, signal_flow_xml
+
+    ethernet, flow = file_names(name)
+    texts = {
+        ethernet: ethernet_xml(settings, form),
+        flow: signal_flow_xml(settings, form, ethernet),
+    }
+    written = []
+    try:
+        folder.mkdir(exist_ok=True)
+        for file_name, text in texts.items():
+            (folder / file_name).write_text(text, encoding="ascii", newline="\r\n")
+            written.append(folder / file_name)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise input_error("output-unwritable", f"cannot write: {why}", source=str(folder)) from None
+    return written

@@ -1,0 +1,187 @@
+"""Engagement and mean force along a motion, by cutting it out of a height field.
+
+The field is divided into strips, one a thread. Each strip removes every sweep that comes near it, in the order of
+time, and reads the samples that stand in it; what a sample reads never depends on the division, so any number of
+threads gives the same result to the last bit.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
+from gcode2krl.cutting.height_field import HeightField
+from gcode2krl.cutting.reading import ARCS, Cutters, Result, cut_strip
+from gcode2krl.cutting.removal import BALL, FLAT, OTHER, Grid, Path
+from gcode2krl.sections import Tool
+
+Floats = NDArray[np.float64]
+_BINS = 16
+_FEWEST_BINS = 96
+_MOST_WALL_BINS = 960
+_MOST_RING_BINS = 256
+_CELLS_PER_BAND = 4.0
+_FEWEST_BANDS, _MOST_BANDS = 6, 12
+_BOTTOM_BANDS = 4
+_MARGIN_CELLS = 4
+_SPARE_CELLS = 64
+_FEW_SAMPLES = 2000
+"""So few samples are not worth a second thread."""
+
+
+def engage(
+    field: HeightField, position_mm: Floats, tool: NDArray[np.int32], rapid: NDArray[np.bool_], f_z_mm: Floats,
+    tools: Sequence[Tool], law: Floats, threads: int | None = None,
+) -> Result:  # fmt: skip
+    """Cut a motion out of a field, which changes; return engagement and mean force of every sample.
+
+    Each sample is read at its own position, before the sweep that leads to it is removed. Forces are means over a
+    revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge; the moment is
+    that of heights above the tip times lateral forces, and the torque.
+
+    Parameters
+    ----------
+    position_mm : (n, 3) tips in the frame of the field, whose z is the tool axis.
+    tool : (n,) row of ``tools``; where it changes no sweep leads on.
+    rapid : (n,) True where the sweep that leads to the sample must not meet material.
+    f_z_mm : (n,) feed per tooth along the path.
+    law : (8,) force law as in `slices.arc_force`.
+    threads : how many; default: all cores.
+
+    Notes
+    -----
+    Material is a height field: exact heights over the middle of cells, walls left by a cutter's rim to a
+    twentieth of a cell, edges of a mesh to half a cell. The tool axis does not tilt. Ways between samples are
+    straight.
+    """
+    position = np.ascontiguousarray(position_mm, dtype=np.float64)
+    tool = np.ascontiguousarray(tool, dtype=np.int32)
+    count = len(position)
+    result = _air(count)
+    if count == 0:
+        return result
+    cell_mm = float(field.cell_mm.max())
+    first = np.concatenate([[True], tool[1:] != tool[:-1]])
+    path = Path(position, tool, np.ascontiguousarray(rapid, dtype=np.bool_), first, outlines_of(tools))
+    cutters = _cutters(tools, cell_mm)
+    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    way_mm = np.concatenate([[0.0], np.cumsum(steps)])
+    feed = np.ascontiguousarray(f_z_mm, dtype=np.float64)
+    longest_mm = float(steps.max(initial=0.0)) + 2.0 * float(path.outlines[:, 0].max())
+    index = np.arange(int(longest_mm / field.cell_mm.min()) + _SPARE_CELLS, dtype=np.float32)
+    widest_mm = float(max(path.outlines[:, 0].max(), cutters.above[:, ::2].max()))
+    halo_mm = widest_mm + _MARGIN_CELLS * cell_mm  # how far a sample looks
+    axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))
+    bounds = _bounds(position[:, axis], halo_mm, threads)
+
+    def cut(strip: int) -> _Piece:
+        low, high = bounds[strip], bounds[strip + 1]
+        begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
+        own_begin, own_end = field.cells(axis, low, high)
+        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(count, np.float32)
+        reach_mm = halo_mm + float(path.outlines[:, 0].max())
+        cut_strip(grid, path, cutters, law, feed, way_mm, low, high, axis, reach_mm, index, rapid_mm, result)
+        return grid, own_begin, own_end, own_begin - begin, rapid_mm
+
+    with ThreadPoolExecutor(len(bounds) - 1) as pool:
+        pieces = list(pool.map(cut, range(len(bounds) - 1)))
+    for grid, begin, end, skip, rapid_mm in pieces:
+        field.take_back(grid, axis, begin, end, skip)
+        np.maximum(result.overlap_mm[:, 0], rapid_mm, out=result.overlap_mm[:, 0])
+    return result
+
+
+_Piece = tuple[Grid, int, int, int, NDArray[np.float32]]
+
+
+def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:
+    """Return the borders of strips with equally many samples each, none narrower than sense makes."""
+    strips = min(threads or os.cpu_count() or 1, max(1, int(np.ptp(along_mm) / (2.0 * halo_mm))))
+    if threads is None and len(along_mm) < _FEW_SAMPLES:
+        strips = 1
+    inner = np.quantile(along_mm, np.linspace(0.0, 1.0, strips + 1)[1:-1])
+    return [-math.inf, *(float(border) for border in inner), math.inf]
+
+
+def outlines_of(tools: Sequence[Tool]) -> Floats:
+    """Return `removal.Path.outlines` (t, 7) of tools."""
+    return np.array([_outline(shape_of(tool)) for tool in tools])
+
+
+def _outline(shape: Shape) -> tuple[float, ...]:
+    """Return radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
+    widens = shape.radius_mm > shape.arc_radius_mm + 1e-9
+    steep = math.tan(shape.kappa_rad) if widens else 0.0
+    ball = shape.bottom_mm == 0.0 and shape.corner_mm > 0.0 and not widens
+    kind = BALL if ball else FLAT if shape.corner_mm == 0.0 and not widens else OTHER
+    return (
+        shape.radius_mm, shape.bottom_mm, shape.corner_mm, shape.arc_radius_mm, shape.arc_top_mm, steep, kind
+    )  # fmt: skip
+
+
+def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
+    """Return what the kernels need of tools on a field of a cell size."""
+    listed = [_bands(tool, cell_mm) for tool in tools]
+    bands = np.zeros((len(tools), max(len(one) for one in listed), 7))
+    for row, one in zip(bands, listed, strict=True):
+        row[: len(one)] = one
+    radius = outlines_of(tools)[:, 0]
+    around = 2.0 * math.pi * radius / cell_mm
+    return Cutters(
+        bands=bands,
+        count=np.array([len(one) for one in listed], dtype=np.int32),
+        wall_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_WALL_BINS)),
+        ring_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_RING_BINS)),
+        teeth=np.array([float(tool.teeth) for tool in tools]),
+        lag_mm=1.25 * np.sqrt(radius * cell_mm) + cell_mm,  # see `reading`
+        above=np.array([_above(tool) for tool in tools]),
+    )
+
+
+def _round_up(bins: Floats) -> NDArray[np.int32]:
+    return (_BINS * np.ceil(bins / _BINS)).astype(np.int32)
+
+
+def _bands(tool: Tool, cell_mm: float) -> Floats:
+    """Return the edge in bands (s, 7) from the axis outwards, as fine as cells can tell."""
+    shape = shape_of(tool)
+    long_mm = shape.corner_mm * shape.kappa_rad
+    if shape.radius_mm > shape.arc_radius_mm + 1e-9:
+        long_mm = math.inf
+    count = int(np.clip(long_mm / (_CELLS_PER_BAND * cell_mm), _FEWEST_BANDS, _MOST_BANDS))
+    parts = []
+    for edge in (bottom_of(tool, _BOTTOM_BANDS), slices_of(tool, count)):
+        cos = np.where(np.abs(edge.cos_kappa) < 1e-9, 0.0, edge.cos_kappa)
+        half = 0.5 * edge.db_mm * cos
+        low, high = edge.radius_mm - half, edge.radius_mm + half
+        parts.append(np.stack([edge.z_low_mm, edge.z_high_mm, low, high, edge.sin_kappa, cos, edge.db_mm], axis=1))
+    bands = np.concatenate(parts)
+    bands[1:, 2] = bands[:-1, 3]  # a ring between two bands is read once
+    return bands
+
+
+def _above(tool: Tool) -> tuple[float, float, float, float]:
+    """Return radius and lower end of shank and holder; radius 0 where it is not known."""
+    shank = tool.shank_diameter_mm / 2.0 if tool.shank_diameter_mm is not None else 0.0
+    known = tool.holder_diameter_mm is not None and tool.stick_out_mm is not None
+    holder = (tool.holder_diameter_mm or 0.0) / 2.0 if known else 0.0
+    return shank, shape_of(tool).flute_mm, holder, tool.stick_out_mm or 0.0
+
+
+def _air(count: int) -> Result:
+    """Return the result of samples that cut nothing."""
+    return Result(
+        force_N=np.zeros((count, 3)),
+        moment_Nmm=np.zeros((count, 3)),
+        torque_Nmm=np.zeros(count),
+        a_p_mm=np.zeros(count),
+        a_e_mm=np.zeros(count),
+        phi_rad=np.full((count, 2 * ARCS), np.nan),
+        ramp_rad=np.zeros(count),
+        centre_mm=np.zeros(count, np.float32),
+        overlap_mm=np.zeros((count, 3), np.float32),
+    )
