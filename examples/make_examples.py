@@ -56,14 +56,12 @@ GROOVE_DEPTH_MM = 8.95
 GROOVES_ALONG_X_AT_Y_MM = (-80.0, -50.0)
 GROOVE_ALONG_Y_AT_X_MM = 150.0  # between the ramps
 RAMPS_AT_Y_MM = -20.0
-RAMP_LENGTH_MM = 130.0  # up: 3.9 degrees
-RAMP_DOWN_DEPTH_MM = 2.25  # 1 degree: the tool's bottom hardly cuts
+RAMP_LENGTH_MM = 130.0  # 3.9 degrees
 POCKET_CENTRE_MM = (75.0, 50.0)
 POCKET_DEPTH_MM = 6.0
 POCKET_PATH_RADIUS_MM = 22.0  # pocket 60 mm, tool 16 mm
-POCKET_STEPOVER_MM = 7.5  # a turn of the spiral
-HELIX_RADIUS_MM = 7.0  # below the tool's radius: no core is left
-HELIX_PITCH_MM = 0.5  # 0.7 degrees
+POCKET_STEPOVER_MM = 6.0  # a turn of the spiral
+POCKET_FIRST_RADIUS_MM = 4.0
 
 FAR_X_MM, FAR_Y_MM = BLOCK_LENGTH_X_MM + OVERRUN_MM, BLOCK_HALF_WIDTH_Y_MM + OVERRUN_MM
 TO_DEPTH = f"G1 Z{-GROOVE_DEPTH_MM:.3f} F{FEED}"
@@ -84,12 +82,12 @@ def groove_along_y() -> list[str]:
 
 
 def ramps() -> list[str]:
-    """One ramp from full depth at the near side up to the top, a flat one down at the far side."""
+    """Two ramps from full depth in air up to the top: no flat bottom has to cut on the way down."""
     up = [TO_DEPTH, "G1 X0.000", f"G1 X{RAMP_LENGTH_MM:.3f} Z0.000"]
-    down = [TO_TOP, f"G1 X{BLOCK_LENGTH_X_MM:.3f} Z{-RAMP_DOWN_DEPTH_MM:.3f}", f"G1 X{FAR_X_MM:.3f}"]
+    back = [TO_DEPTH, f"G1 X{BLOCK_LENGTH_X_MM:.3f}", f"G1 X{BLOCK_LENGTH_X_MM - RAMP_LENGTH_MM:.3f} Z0.000"]
     return [
-        *feature("ASCENDING RAMP", -OVERRUN_MM, RAMPS_AT_Y_MM, up),
-        *feature("DESCENDING RAMP", BLOCK_LENGTH_X_MM - RAMP_LENGTH_MM, RAMPS_AT_Y_MM, down),
+        *feature("RAMP ALONG +X", -OVERRUN_MM, RAMPS_AT_Y_MM, up),
+        *feature("RAMP ALONG -X", FAR_X_MM, RAMPS_AT_Y_MM, back),
     ]
 
 
@@ -100,11 +98,9 @@ def pocket_arc(x_from_centre: float, radius_mm: float, z: float = -POCKET_DEPTH_
 
 
 def circular_pocket() -> list[str]:
-    """Helix to depth, spiral of half circles, wall, out on a quarter circle."""
-    (x, y), radius, wall, leave_mm = POCKET_CENTRE_MM, HELIX_RADIUS_MM, POCKET_PATH_RADIUS_MM, 5.0
-    turns = round(POCKET_DEPTH_MM / HELIX_PITCH_MM)
-    cuts = [TO_TOP, *(pocket_arc(radius, -radius, -turn * HELIX_PITCH_MM) for turn in range(1, turns + 1))]
-    cuts.append(pocket_arc(radius, -radius))
+    """In from the groove along y, spiral of half circles, wall, out on a quarter circle."""
+    (x, y), radius, wall, leave_mm = POCKET_CENTRE_MM, POCKET_FIRST_RADIUS_MM, POCKET_PATH_RADIUS_MM, 5.0
+    cuts = [f"G1 Z{-POCKET_DEPTH_MM:.3f} F{FEED}", f"G1 X{x + radius:.3f}", pocket_arc(radius, -radius)]
     side, reached = 1, radius
     while reached < wall:
         grown = reached + POCKET_STEPOVER_MM / 2
@@ -112,7 +108,9 @@ def circular_pocket() -> list[str]:
         side, reached = -side, grown
     cuts.append(pocket_arc(wall, -wall))
     cuts.append(f"G3 X{x + wall - leave_mm:.3f} Y{y + leave_mm:.3f} I{-leave_mm:.3f} J0.000")
-    return feature("CIRCULAR POCKET D60, 6 MM DEEP", x + radius, y, [*cuts, "G1 Z0.000"])
+    return feature(
+        "CIRCULAR POCKET D60, 6 MM DEEP, IN FROM THE GROOVE", GROOVE_ALONG_Y_AT_X_MM, y, [*cuts, "G1 Z0.000"]
+    )
 
 
 def test_piece() -> list[str]:

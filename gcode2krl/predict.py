@@ -75,7 +75,7 @@ def add_effects(
     cell = prediction.cell
     applied = [*from_cell(cell, known), *resolve(effects, known, cell)]
     changed = with_effects(prediction, applied, plan=_plan_anew(prediction))
-    named = [str(effect) if isinstance(effect, str) else repr(effect) for effect in effects]
+    named = [str(effect) for effect in effects]
     return replace(changed, inputs={**changed.inputs, "effects": named})
 
 

@@ -1,6 +1,8 @@
 """Compiled kernels are never older than their sources."""
 
 import os
+import subprocess
+import sys
 
 from gcode2krl.kernel_cache import drop_stale
 
@@ -21,3 +23,22 @@ def test_a_kernel_older_than_a_source_beside_it_is_dropped(tmp_path):
 
 def test_a_folder_without_kernels_is_left_alone(tmp_path):
     assert drop_stale(tmp_path) == 0
+
+
+QUICK_START = """
+import sys
+import gcode2krl.gcode
+assert "numba.np.arraymath" in sys.modules
+assert "scipy.linalg" not in sys.modules, "SciPy's linear algebra costs every start 0.2 s"
+import numpy as np
+from numba import njit
+product = njit(lambda a, b: np.dot(a, b))
+assert product(np.eye(3), np.arange(9.0).reshape(3, 3))[2, 1] == 7.0
+import scipy.linalg.cython_blas
+"""
+
+
+def test_numba_starts_without_linear_algebra_and_finds_it_when_asked():
+    """In a process of its own, because whatever the tests have imported stays imported."""
+    result = subprocess.run([sys.executable, "-c", QUICK_START], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr

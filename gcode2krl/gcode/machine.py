@@ -63,12 +63,13 @@ _A, _D, _F, _H, _I, _J, _K, _L, _P, _Q, _R, _S, _T, _X, _Y, _Z = (ord(c) - 65 fo
 _OTHER_AXES = tuple(ord(c) - 65 for c in "ABCUVWE")
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def run(words, start, state, rows, counts, events, found, options, offsets, offset_known, tool_length):
     """Execute blocks from word ``start`` on; return the word at which to go on.
 
-    ``words`` = letter, value, extra, line; ``counts`` (5,) = rows, events, findings, marks, dropped findings;
-    ``options`` (2,) = chord tolerance in mm, block delete. Stops early where a buffer is nearly full.
+    ``words`` = letter, value, extra, line; ``counts`` (6,) = rows in the buffer, events, findings, marks,
+    dropped findings, rows handed over before; ``options`` (2,) = chord tolerance in mm, block delete. Stops
+    early where a buffer is nearly full.
     """
     letter, line = words[0], words[3]
     s = state[0]
@@ -77,8 +78,8 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
     g_in_group = np.empty(GROUPS, dtype=np.int64)
     m_codes = np.empty(4, dtype=np.int64)
     n = len(letter)
-    before = state.copy()
-    used_before = counts.copy()
+    before = np.empty_like(state)
+    used_before = np.empty_like(counts)
     i = start
     while i < n and not s.ended:
         j = i
@@ -90,7 +91,7 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
             i = j
             continue
         before[0] = state[0]
-        used_before[:] = counts
+        _copy(counts, used_before)
         if not _gather(words, i, j, s, rows, counts, events, found, options, has, word, g_in_group, m_codes):
             i = j
             continue
@@ -112,11 +113,18 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
         )
         if not done:  # an arc needs more rows than are left: as if the block had not begun
             state[0] = before[0]
-            counts[:] = used_before
+            _copy(used_before, counts)
             break
         s.blocks += 1
         i = j
     return i
+
+
+@njit(cache=True)
+def _copy(source, target):
+    """Copy numbers; an assignment to ``target[:]`` would take seconds to compile."""
+    for k in range(len(source)):
+        target[k] = source[k]
 
 
 @njit(cache=True)
@@ -179,7 +187,7 @@ def _report(found, counts, number, line, a, b):
 @njit(cache=True)
 def _event(s, rows, events, counts, kind, line, a, b):
     row = events[counts[1]]
-    row.row, row.kind, row.line, row.a, row.b = counts[0] - 1, kind, line, a, b
+    row.row, row.kind, row.line, row.a, row.b = counts[5] + counts[0] - 1, kind, line, a, b
     row.dwell = rows[counts[0] - 1].dwell
     counts[1] += 1
 

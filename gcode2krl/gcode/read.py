@@ -2,14 +2,16 @@
 
 import os
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, NotUnderstoodError, Severity, input_error
 from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.findings import make_issue
 from gcode2krl.gcode.state import (
     EVENT_COOLANT,
@@ -27,7 +29,13 @@ if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
 
 CHORD_TOLERANCE_MM = 0.01
-_PIECE_BYTES = 8_000_000
+_PIECE_BYTES = 1_000_000
+_ROOM = 1.25
+"""Rows to make room for, over the lines that a file of its size has by its first piece."""
+_BUFFER_ROWS = 8192
+"""Rows between the interpreter and the table: they stay in the processor's cache."""
+_MOST_REST_BYTES = 8_000_000
+"""How much behind the program's end is looked at for lines that are not read."""
 _MOST_ISSUES = 1000
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _INCH_DECIMALS = 4
@@ -106,16 +114,35 @@ def read_stream(
     offsets, offset_known = _work_offsets(cell)
     interpreter = _Interpreter(name, chord_tolerance_mm, block_delete, offsets, offset_known, lengths)
     size = _size_of(stream)
-    head = b""
-    for first_line, text in _pieces(stream, name):
-        head = head or text[:4000].tobytes()
-        interpreter.feed(scan(text, first_line), text, size)
-        if progress is not None:
-            progress(len(text))
+    head, rest_bytes = b"", 0
+    for first_line, text, words in _scanned(_pieces(stream, name)):
+        if not interpreter.ended:
+            head = head or text[:4000].tobytes()
+            interpreter.feed(words, text, size)
+            if progress is not None:
+                progress(len(text))
         if interpreter.ended:
-            interpreter.check_rest(text, first_line)
-            break
+            rest_bytes += len(text)
+            if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
+                break
     return interpreter.finish(head)
+
+
+def _scanned(
+    pieces: Iterator[tuple[int, NDArray[np.uint8]]],
+) -> Iterator[tuple[int, NDArray[np.uint8], Words]]:
+    """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
+
+    def scan_next() -> tuple[int, NDArray[np.uint8], Words] | None:
+        piece = next(pieces, None)
+        return None if piece is None else (*piece, scan(piece[1], piece[0]))
+
+    with ThreadPoolExecutor(1) as pool:
+        scanned = scan_next()
+        while scanned is not None:
+            ahead = pool.submit(scan_next)
+            yield scanned
+            scanned = ahead.result()
 
 
 def _size_of(stream: BinaryIO) -> int:
@@ -145,7 +172,7 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
         if first:
             first = False
             block = block.removeprefix(_BYTE_ORDER_MARK)
-            if not block.strip():
+            if len(block) < _PIECE_BYTES and not block.strip():
                 raise input_error("empty", "the file is empty", "export the program again", source=name)
             _reject_binary(block, name)
         at_end = not block
@@ -179,11 +206,6 @@ def _reject_binary(block: bytes, name: str) -> None:
         raise input_error("binary-file", "this is not a text file", remedy, source=name)
 
 
-class _Buffers(NamedTuple):
-    rows: NDArray[np.void]
-    events: NDArray[np.void]
-
-
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
@@ -198,8 +220,10 @@ class _Interpreter:
     ) -> None:
         self.name = name
         self.state = initial_state()
-        self.counts = np.zeros(5, dtype=np.int64)
-        self.buffers = _Buffers(np.zeros(4096, dtype=machine.ROW), np.zeros(256, dtype=machine.EVENT))
+        self.counts = np.zeros(6, dtype=np.int64)
+        self.rows = np.zeros(_BUFFER_ROWS, dtype=machine.ROW)
+        self.events = np.zeros(256, dtype=machine.EVENT)
+        self.columns = Columns()
         self.found = np.zeros(_MOST_ISSUES, dtype=machine.FOUND)
         self.options = np.array([chord_tolerance_mm, float(block_delete)])
         self.offsets, self.offset_known, self.tool_length = offsets, offset_known, tool_length
@@ -213,7 +237,7 @@ class _Interpreter:
         return bool(self.state["ended"][0])
 
     def _start_row(self) -> None:
-        row = self.buffers.rows[0]
+        row = self.rows[0]
         row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
         row["offset_tool"] = -1
         row["rapid"], row["line"] = 1, 0
@@ -227,36 +251,40 @@ class _Interpreter:
         first_message = len(self.messages)
         words.value[words.letter == ord("(")] += first_message
         self.messages += [_decode(text[a:b]) for a, b in words.message_span]
-        lines = int(words.line[-1] - words.line[0]) + 1 if len(words.line) else 0
-        whole = int(1.02 * lines * size / len(text)) if self.counts[0] == 1 else 0
-        self._reserve(max(lines, whole))
+        if not self.columns.count and len(words.line):
+            lines = int(words.line[-1] - words.line[0]) + 1
+            self.columns.reserve(int(_ROOM * lines * max(1.0, size / len(text))))
         at = 0
         while True:
+            before = at
             at = machine.run(
-                columns, at, self.state, *self.buffers[:1], self.counts, self.buffers.events, self.found,
+                columns, at, self.state, self.rows, self.counts, self.events, self.found,
                 self.options, self.offsets, self.offset_known, self.tool_length,
             )  # fmt: skip
             if at >= len(words.letter) or self.ended:
                 return
-            self._reserve(len(self.buffers.rows))
+            self._make_room(stuck=at == before)
 
-    def _reserve(self, rows: int) -> None:
-        """Make room for about so many more rows, and for events."""
-        have = self.buffers
-        free = len(have.rows) - self.counts[0]
-        wanted_rows = have.rows if free >= rows + 8 else _grown(have.rows, int(self.counts[0]) + rows + 4096)
-        full = self.counts[1] + 64 > len(have.events)
-        wanted_events = _grown(have.events, 2 * len(have.events)) if full else have.events
-        self.buffers = _Buffers(wanted_rows, wanted_events)
+    def _make_room(self, *, stuck: bool) -> None:
+        """Hand all rows but the last, which may still change, to the table; grow what is too small."""
+        done = int(self.counts[0]) - 1
+        if stuck and done == 0:  # an arc that is longer than the buffer
+            self.rows = _grown(self.rows)
+        self.columns.append(self.rows[:done])
+        self.rows[0] = self.rows[done]
+        self.counts[0], self.counts[5] = 1, self.counts[5] + done
+        if self.counts[1] + machine.EVENTS_PER_BLOCK > len(self.events):
+            self.events = _grown(self.events)
 
-    def check_rest(self, text: NDArray[np.uint8], first_line: int) -> None:
-        """Remember the first line of code behind the program's end, so that it is reported."""
+    def check_rest(self, text: NDArray[np.uint8], first_line: int) -> bool:
+        """Remember the first line of code behind the program's end, so that it is reported; tell if any."""
         lines = text.tobytes().splitlines()
-        behind = int(self.state["end_line"][0]) - first_line + 1
+        behind = max(0, int(self.state["end_line"][0]) - first_line + 1)
         for number, line in enumerate(lines[behind:], start=first_line + behind):
             if line.strip() not in (b"", b"%", b"\x1a"):
                 self.rest_line = number
-                return
+                return True
+        return False
 
     def finish(self, head: bytes) -> Toolpath:
         """Raise the errors that were found, or return the table."""
@@ -323,24 +351,11 @@ class _Interpreter:
         return Issue("warning", "unit-unnamed", 0, "no G20 or G21; read as mm", "write G21 at the start")
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
-        rows = self.buffers.rows[: self.counts[0]]
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(rows), 3))
+        self.columns.append(self.rows[: self.counts[0]])
+        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (self.columns.count, 3))
         return Toolpath(
-            position_mm=np.stack([rows["x"], rows["y"], rows["z"]], axis=1),
+            **self.columns.finished(),
             axis=axis,
-            rapid=rows["rapid"].astype(np.bool_),
-            feed_mm_s=rows["feed"].copy(),
-            spindle_rad_s=rows["spindle"].copy(),
-            tool=rows["tool"].copy(),
-            exact_stop=rows["exact_stop"].astype(np.bool_),
-            tolerance_mm=rows["tolerance"].copy(),
-            dwell_s=rows["dwell"].copy(),
-            source_line=rows["line"].copy(),
-            arc=rows["arc"].copy(),
-            machine=rows["machine"].astype(np.bool_),
-            known=np.stack([rows["known_x"], rows["known_y"], rows["known_z"]], axis=1).astype(np.bool_),
-            length_offset_mm=rows["length_offset"].copy(),
-            length_offset_tool=rows["offset_tool"].copy(),
             events=(*self._events(), *self._stopped_by_end()),
             issues=issues,
             source=self.name,
@@ -348,7 +363,7 @@ class _Interpreter:
 
     def _stopped_by_end(self) -> Iterator[Event]:
         """The program's end stops spindle and coolant (RS274/NGC, M2 and M30)."""
-        state, row = self.state[0], int(self.counts[0]) - 1
+        state, row = self.state[0], self.columns.count - 1
         line = int(state["end_line"])
         if state["direction"]:
             yield Event(row, "spindle", {"rpm": 0.0, "m": 5, "line": line, "implied": True})
@@ -359,12 +374,12 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
-        for event, plain in zip(self.buffers.events, self._plain_events(), strict=False):
+        for event, plain in zip(self.events, self._plain_events(), strict=False):
             dwell_s = float(event["dwell"])
             yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
 
     def _plain_events(self) -> Iterator[Event]:
-        for event in self.buffers.events[: self.counts[1]]:
+        for event in self.events[: self.counts[1]]:
             row, kind, a, b, line = (
                 int(event["row"]),
                 int(event["kind"]),
@@ -390,8 +405,8 @@ class _Interpreter:
                 yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
 
 
-def _grown(array: NDArray[np.void], size: int) -> NDArray[np.void]:
-    larger = np.empty(max(size, len(array) * 3 // 2), dtype=array.dtype)
+def _grown(array: NDArray[np.void]) -> NDArray[np.void]:
+    larger = np.zeros(2 * len(array), dtype=array.dtype)
     larger[: len(array)] = array
     return larger
 

@@ -54,7 +54,7 @@ def _is_message(text, i, end):
     return (text[i] | 32) == 109 and (text[i + 1] | 32) == 115 and (text[i + 2] | 32) == 103
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan(text, first_line, letters, values, lines, extras, spans):
     n = len(text)
     i = 0

@@ -174,9 +174,9 @@ def modelled(
     """Return the positions (m, 3) of a section that starts at ``start_s``."""
     blend = piece.blend_mm(cdis_mm)
     profile = piece.profile(k_s, blend, law, settings)
-    return sample(piece.time_s - start_s, profile, piece.start_mm, piece.end_mm, piece.length_mm, blend, k_s)[
-        0
-    ]
+    time_s = piece.time_s - start_s
+    moves = (piece.start_mm, piece.end_mm, piece.length_mm, blend)
+    return sample(time_s, profile, *moves, k_s).position_mm
 
 
 def residual_of(piece: Piece, fit: Fit, number: int, settings: Settings) -> Floats:

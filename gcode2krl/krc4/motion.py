@@ -10,6 +10,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample, sample_times
+from gcode2krl.parts import edges, in_parts
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.tool_tips import motion_starts
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
@@ -70,23 +71,20 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     programmed = np.flatnonzero(targets.move >= 0)
     first, last = int(programmed[0]), int(programmed[-1])
     rows = slice(first + 1, last + 1)
-    start, from_rotation = (column[rows] for column in motion_starts(targets, cell))
+    start, from_rotation = motion_starts(targets, cell, rows)
     end, to_rotation = targets.position_mm[rows], targets.rotation[rows]
-    length = np.linalg.norm(end - start, axis=1)
+    size = _sizes(start, end)
     rapid = cell.controller.rapid_m_s * MM_PER_M
     speed = np.where(targets.ptp[rows], rapid, targets.speed_mm_s[rows])
-    length, speed, acceleration, angle = _with_orientation(length, speed, from_rotation, to_rotation, cell)
-    d, cos_half = _blends(start, end, length, targets.cdis_mm[rows])
+    length, speed, acceleration, angle = _with_orientation(size, speed, from_rotation, to_rotation, cell)
+    d, cos_half = _blends(start, end, size, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
     d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
     scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell)
-    move = targets.move[rows]
-    following = np.flatnonzero(move >= 0)
-    owner = move[following[np.minimum(np.searchsorted(following, np.arange(len(move))), len(following) - 1)]]
     return Chain(
         first=first,
-        start_mm=np.ascontiguousarray(start),
-        end_mm=np.ascontiguousarray(end),
+        start_mm=start,
+        end_mm=end,
         from_rotation=from_rotation,
         to_rotation=to_rotation,
         length_mm=length / scale,
@@ -96,12 +94,34 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         blend_mm=d,
         stop=stop,
         wait_s=targets.wait_s[rows],
-        move=owner if len(move) else move,
+        move=_owners(targets.move[rows]),
         source_line=targets.source_line[rows],
         tool=targets.tool[rows],
         cos_half=cos_half,
         scale=scale,
     )
+
+
+def _owners(move: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the row of the Toolpath (n,) of each motion; what is added has that of the one it leads to."""
+    own = np.array(move)
+    added, programmed = np.flatnonzero(move < 0), np.flatnonzero(move >= 0)
+    if len(added) and len(programmed):
+        after = np.minimum(np.searchsorted(programmed, added), len(programmed) - 1)
+        own[added] = move[programmed[after]]
+    return own
+
+
+def _sizes(start: Floats, end: Floats) -> Floats:
+    """Return the lengths (n,) of the moves in space."""
+    size = np.empty(len(end))
+
+    def part(first: int, behind: int) -> None:
+        x, y, z = (end[first:behind] - start[first:behind]).T
+        np.sqrt(x * x + y * y + z * z, out=size[first:behind])
+
+    in_parts(part, edges(len(size)))
+    return size
 
 
 def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Floats | None = None) -> Profile:
@@ -135,26 +155,22 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
     if len(chain.length_mm) == 0:
         return _standstill(targets, chain)
     time = sample_times(profile, dt_s)
-    position, figures, row, part = sample(
+    found = sample(
         time, profile, chain.start_mm, chain.end_mm, chain.length_mm, chain.blend_mm, cell.controller.k_s
     )
-    blend = chain.blend_mm
-    inside = part * chain.length_mm[row]
-    before = np.where(row > 0, blend[row - 1], 0.0)
-    move = chain.move[row]
+    move = chain.move[found.move]
     move[0] = targets.move[chain.first]
-    corner = (inside > chain.length_mm[row] - blend[row]) | (inside < before)
     return Motion(
         time_s=time,
-        position_mm=position,
-        rotation=_rotations(chain, row, part),
-        speed_mm_s=figures[:, 0],
-        acceleration_mm_s2=figures[:, 1],
-        jerk_mm_s3=figures[:, 2],
-        path_mm=figures[:, 3],
+        position_mm=found.position_mm,
+        rotation=_rotations(chain, found.move, found.part),
+        speed_mm_s=found.speed_mm_s,
+        acceleration_mm_s2=found.acceleration_mm_s2,
+        jerk_mm_s3=found.jerk_mm_s3,
+        path_mm=found.path_mm,
         move=move,
-        corner=corner,
-        tool=chain.tool[row],
+        corner=found.corner,
+        tool=chain.tool[found.move],
     )
 
 
@@ -213,9 +229,7 @@ def _with_orientation(
     """
     controller = cell.controller
     a_cp = np.full(len(length), controller.acc_cp_m_s2 * MM_PER_M)
-    if len(length) == 0 or bool(
-        (to_rotation == to_rotation[0]).all() and (from_rotation == to_rotation[0]).all()
-    ):
+    if _one_orientation(from_rotation, to_rotation):
         return length, speed, a_cp, np.zeros(len(length))
     angle = fr.angle_between(from_rotation, to_rotation)
     turning = angle > 1e-12
@@ -232,21 +246,22 @@ def _with_orientation(
     )
 
 
-def _blends(start: Floats, end: Floats, length: Floats, cdis: Floats) -> tuple[Floats, Floats]:
+def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floats) -> tuple[Floats, Floats]:
     """Return (d, cos(alpha/2)) at the end of each move: d = min(CDIS, L1/2, L2/2), 0 at the last."""
-    count = len(length)
-    d, cos_half = np.zeros(count), np.zeros(count)
-    if count < 2:
-        return d, cos_half
-    way = end - start
-    size = np.linalg.norm(way, axis=1)
-    product = size[:-1] * size[1:]
-    real = product > 0
-    cos_turn = np.clip(np.einsum("ij,ij->i", way[:-1], way[1:]) / np.where(real, product, 1.0), -1.0, 1.0)
-    cos_half[:-1] = np.where(real, np.sqrt((1.0 - cos_turn) / 2.0), 0.0)
-    d[:-1] = np.where(
-        real & (cos_turn > -1.0 + 1e-12), np.minimum(cdis[:-1], np.minimum(length[:-1], length[1:]) / 2), 0.0
-    )
+    d, cos_half = np.zeros(len(size)), np.zeros(len(size))
+
+    def part(first: int, behind: int) -> None:
+        here, after = slice(first, behind), slice(first + 1, behind + 1)
+        way = end[first : behind + 1] - start[first : behind + 1]
+        product = size[here] * size[after]
+        real = product > 0
+        dot = np.einsum("ij,ij->i", way[:-1], way[1:])
+        cos_turn = np.clip(dot / np.where(real, product, 1.0), -1.0, 1.0)
+        cos_half[here] = np.where(real, np.sqrt((1.0 - cos_turn) / 2.0), 0.0)
+        widest = np.minimum(cdis[here], np.minimum(length[here], length[after]) / 2)
+        d[here] = np.where(real & (cos_turn > -1.0 + 1e-12), widest, 0.0)
+
+    in_parts(part, edges(max(len(size) - 1, 0)))
     return d, cos_half
 
 
@@ -260,36 +275,71 @@ def _scales(
     silent), and where the look-ahead lets the faster of the two be reached.
     """
     scale = np.ones(len(length))
-    v1, v2 = speed[:-1], speed[1:]
-    ratio = v2 / v1
-    widest = np.minimum(cdis[:-1] / np.maximum(1.0, ratio), np.minimum(length[:-1], length[1:] / ratio) / 2)
-    a, k = np.minimum(acceleration[:-1], acceleration[1:]), cell.controller.k_s
-    enough = np.abs(v2 - v1) / a + k <= 2.0 * widest / v1
-    wide = (blend[:-1] > 0) & ~stop[:-1] & (v1 != v2) & enough
-    advance = cell.controller.advance
-    for row in np.flatnonzero(wide):
-        fastest = max(v1[row], v2[row])
-        seen = (
-            length[row + 1 :].sum() if advance == "unlimited" else length[row + 1 : row + 1 + advance].sum()
-        )
-        if fastest * (fastest / a[row] + k) / 2 > seen:
-            continue
-        chain_end = row + 1 + int(np.argmax(stop[row + 1 :]))
-        scale[row + 1 : chain_end + 1] *= ratio[row]
-        blend[row] = widest[row]
+    rows = _wide_corners(length, speed, acceleration, blend, cdis, stop, cell)
+    a, k = np.minimum(acceleration[rows], acceleration[rows + 1]), cell.controller.k_s
+    fastest = np.maximum(speed[rows], speed[rows + 1])
+    rows = rows[fastest * (fastest / a + k) / 2 <= _in_view(length, rows, cell)]
+    if not len(rows):
+        return scale
+    ratio = speed[rows + 1] / speed[rows]
+    blend[rows] = _widest(length, ratio, cdis, rows)
+    scale[rows + 1] = ratio
+    ends = np.append(np.flatnonzero(stop), len(length) - 1)
+    chain_end = ends[np.searchsorted(ends, rows + 1)]
+    for last in np.unique(chain_end):
+        moves = slice(rows[chain_end == last][0] + 1, last + 1)
+        scale[moves] = np.cumprod(scale[moves])
     blend[:-1] /= scale[:-1]
     return scale
 
 
+def _wide_corners(
+    length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
+    stop: NDArray[np.bool_], cell: Cell,
+) -> NDArray[np.int64]:  # fmt: skip
+    """Return the moves with a corner behind them that is long enough for the change of speed there."""
+
+    def part(first: int, behind: int) -> NDArray[np.int64]:
+        here = slice(first, behind)
+        changing = (blend[here] > 0) & ~stop[here] & (speed[here] != speed[first + 1 : behind + 1])
+        rows = np.flatnonzero(changing) + first
+        v1, v2 = speed[rows], speed[rows + 1]
+        widest = _widest(length, v2 / v1, cdis, rows)
+        a = np.minimum(acceleration[rows], acceleration[rows + 1])
+        return rows[np.abs(v2 - v1) / a + cell.controller.k_s <= 2.0 * widest / v1]
+
+    return np.concatenate(in_parts(part, edges(max(len(length) - 1, 0))) or [np.zeros(0, dtype=np.int64)])
+
+
+def _widest(length: Floats, ratio: Floats, cdis: Floats, rows: NDArray[np.int64]) -> Floats:
+    """Return the distance before the corners behind some moves, where speeds of this ratio meet there."""
+    lines = np.minimum(length[rows], length[rows + 1] / ratio) / 2
+    return np.minimum(cdis[rows] / np.maximum(1.0, ratio), lines)
+
+
+def _in_view(length: Floats, rows: NDArray[np.int64], cell: Cell) -> Floats:
+    """Return the length of the moves behind the corners of some moves that the look-ahead knows."""
+    way = np.concatenate([[0.0], np.cumsum(length)]) if len(rows) else np.zeros(1)
+    advance = cell.controller.advance
+    seen = len(length) if advance == "unlimited" else rows + 1 + advance
+    return way[np.minimum(seen, len(way) - 1)] - way[np.minimum(rows + 1, len(way) - 1)]
+
+
 def _rotations(chain: Chain, row: NDArray[np.int64], part: Floats) -> Floats:
     """Orientation goes with the position along each move (``$ORI_TYPE = #VAR``)."""
-    constant = bool(
-        (chain.to_rotation == chain.to_rotation[0]).all()
-        and (chain.from_rotation == chain.to_rotation[0]).all()
-    )
-    if constant:
+    if _one_orientation(chain.from_rotation, chain.to_rotation):
         return np.broadcast_to(chain.to_rotation[0], (len(row), 4))
     return fr.slerp(chain.from_rotation[row], chain.to_rotation[row], part)
+
+
+def _one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
+    """Tell whether the tool never turns."""
+
+    def same(start: int, end: int) -> bool:
+        first = to_rotation[0]
+        return bool((to_rotation[start:end] == first).all() and (from_rotation[start:end] == first).all())
+
+    return all(in_parts(same, edges(len(to_rotation))))
 
 
 def _standstill(targets: Targets, chain: Chain) -> Motion:

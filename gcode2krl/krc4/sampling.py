@@ -1,14 +1,40 @@
-"""From the planned pieces to samples: the last moving average, corners, positions and their derivatives."""
+"""From the planned pieces to samples: the last moving average, corners, positions and their derivatives.
+
+Three passes over the samples: the time law at each (rows by themselves), the move each is in (one after the
+other, because a standstill must not fall back behind a corner by rounding), the place in space (rows by
+themselves again).
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from gcode2krl.krc4.profile import Profile
+from gcode2krl.parts import edges, in_parts
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+
+class Samples(NamedTuple):
+    """The path and its time law at m sample times."""
+
+    position_mm: Floats
+    """(m, 3) inside a corner on the parabola."""
+    speed_mm_s: Floats
+    acceleration_mm_s2: Floats
+    jerk_mm_s3: Floats
+    path_mm: Floats
+    """(m,) arc length along the blended path."""
+    move: Ints
+    part: Floats
+    """(m,) share of the move that is done."""
+    corner: Bools
+    """(m,) True inside an approximated corner."""
 
 
 def sample_times(profile: Profile, dt_s: float) -> Floats:
@@ -25,26 +51,65 @@ def sample(
     length_mm: Floats,
     blend_mm: Floats,
     k_s: float,
-) -> tuple[Floats, Floats, NDArray[np.int64], Floats]:
-    """Return positions (m, 3), figures (m, 4) = speed, acceleration, jerk, arc length, move (m,), part (m,).
+) -> Samples:
+    """Return the motion at rising times (m,) along moves (n,); ``blend_mm`` belongs to the end of each."""
+    count = len(time_s)
+    moves = _Moves(*(_read_only(column) for column in (start_mm, end_mm, length_mm, blend_mm)))
+    move, begins = np.empty(count, dtype=np.int64), _sums(length_mm)
+    law = tuple(np.empty((4, count)))  # speed, acceleration, jerk and path
+    part, corner, position = np.empty(count), np.empty(count, dtype=np.bool_), np.empty((count, 3))
+    pieces = profile[:5]
 
-    ``part`` is the share of the move that is done; inside a corner the position lies on
-    the parabola. ``blend_mm`` (n,) belongs to the end of each move.
-    """
-    position, figures = np.empty((len(time_s), 3)), np.empty((len(time_s), 4))
-    move, part = np.empty(len(time_s), dtype=np.int64), np.empty(len(time_s))
-    pieces = (
-        profile.time_s,
-        profile.path_mm,
-        profile.speed_mm_s,
-        profile.acceleration_mm_s2,
-        profile.integral_mm_s,
-    )
-    _sample(time_s, pieces, start_mm, end_mm, length_mm, blend_mm, k_s, position, figures, move, part)
-    return position, figures, move, part
+    def law_of(start: int, end: int) -> None:
+        ends = [time_s[start], time_s[start] - k_s]
+        first = np.maximum(np.searchsorted(profile.time_s, ends, side="right") - 1, 0)
+        _law(time_s[start:end], pieces, k_s, first[0], first[1], tuple(row[start:end] for row in law))
+
+    def place(start: int, end: int) -> None:
+        rows = slice(start, end)
+        figures = tuple(row[rows] for row in law)
+        _place(move[rows], moves, begins, way, saved, figures, position[rows], part[rows], corner[rows])
+
+    in_parts(law_of, edges(count))
+    _moves(law[3], begins, move)
+    way, saved = _way_to_moves(moves)
+    in_parts(place, edges(count))
+    speed, acceleration, jerk, path = law
+    return Samples(position, speed, acceleration, jerk, path, move, part, corner)
 
 
-@njit(cache=True)
+class _Moves(NamedTuple):
+    """The moves (n) as the kernels see them."""
+
+    start: Floats
+    end: Floats
+    length: Floats
+    blend: Floats
+
+
+def _read_only(column: Floats) -> Floats:
+    """Return a contiguous, read-only view or copy: one type, so that a kernel is compiled once."""
+    view = np.ascontiguousarray(column, dtype=np.float64).view()
+    view.flags.writeable = False
+    return view
+
+
+def _sums(values: Floats) -> Floats:
+    """Return the sum (n + 1,) of the values before each, and of all."""
+    sums = np.zeros(len(values) + 1)
+    np.cumsum(values, out=sums[1:])
+    return sums
+
+
+def _way_to_moves(moves: _Moves) -> tuple[Floats, Floats]:
+    """Return the length of all moves before each move, and how much shorter their corners are, (n + 1,)."""
+    count = len(moves.length)
+    size, saving = np.zeros(count + 1), np.zeros(count + 1)
+    in_parts(lambda start, end: _savings(moves, start, end, size[1:], saving[1:]), edges(count))
+    return np.cumsum(size, out=size), np.cumsum(saving, out=saving)
+
+
+@njit(cache=True, nogil=True)
 def arc_length(tau, uu, uw, ww):
     """Length of the parabola's share tau, in units of 2·d: the integral of |(1 - t)·u + t·w| from 0 to tau.
 
@@ -62,7 +127,7 @@ def arc_length(tau, uu, uw, ww):
     return math.sqrt(bend) * value
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _at(pieces, at, t):
     """Return (piece, path, speed, acceleration, integral) at a time; before the start everything is 0."""
     time, path, speed, acceleration, integral = pieces
@@ -77,16 +142,9 @@ def _at(pieces, at, t):
     return at, s, speed[at] + acceleration[at] * dt, acceleration[at], area
 
 
-@njit(cache=True)
-def _sample(time, pieces, start, end, length, blend, k, position, figures, move, part):
-    count = len(length)
-    now, then = 0, 0
-    i = 0
-    begin = 0.0  # planned path at the start of move i
-    travelled = 0.0  # the same in space: a reorientation on the spot has none
-    saved = 0.0  # how much shorter the corners behind are than their lines
-    u, w = np.zeros(3), np.zeros(3)
-    first, second = np.zeros(3), np.zeros(3)
+@njit(cache=True, nogil=True)
+def _law(time, pieces, k, now, then, law):
+    """Write speed, acceleration, jerk, planned path; ``now`` and ``then`` are pieces not after the first."""
     for row in range(len(time)):
         now, s, v, a, area = _at(pieces, now, time[row])
         jerk = 0.0
@@ -96,35 +154,64 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             a = (v - v_old) / k
             v = (s - s_old) / k
             s = (area - area_old) / k
-        while i < count - 1 and s >= begin + length[i]:
-            travelled += math.sqrt(_product(start, end, i, i))
-            if blend[i] > 0.0:  # leaving the move behind leaves its corner's middle behind
-                saved += _saving(start, end, length, blend, i)
-            begin += length[i]
+        law[0][row], law[1][row], law[2][row], law[3][row] = v, a, jerk, s
+
+
+@njit(cache=True, nogil=True)
+def _moves(path, begins, move):
+    """Write the move each planned path lies in; it never goes back to an earlier one."""
+    i, last = 0, len(begins) - 2
+    for row in range(len(path)):
+        while i < last and path[row] >= begins[i + 1]:
             i += 1
-        inside = min(max(s - begin, 0.0), length[i])
+        move[row] = i
+
+
+@njit(cache=True, nogil=True)
+def _savings(moves, first, behind, size, saving):
+    """Write the length of moves in space (none for a turn on the spot) and what the corners behind save."""
+    start, end, length, blend = moves
+    for i in range(first, behind):
+        size[i] = math.sqrt(_product(start, end, i, i))
+        saving[i] = 0.0
+        if blend[i] > 0.0 and i + 1 < len(length):
+            join = blend[i] * math.sqrt(_product(start, end, i + 1, i + 1)) / length[i + 1]
+            saving[i] = join + _short_of_vertex(moves, i, 1.0)
+
+
+@njit(cache=True, nogil=True)
+def _place(move, moves, begins, way_to, saved_to, law, position, part, corner):
+    """Write position, part and corner, and over ``law`` the magnitudes in space and the arc length."""
+    start, end, length, blend = moves
+    speed, acceleration, jerk_of, path = law
+    u, w = np.zeros(3), np.zeros(3)
+    first, second = np.zeros(3), np.zeros(3)
+    for row in range(len(move)):
+        i = move[row]
+        v, a, jerk = speed[row], acceleration[row], jerk_of[row]
+        inside = min(max(path[row] - begins[i], 0.0), length[i])
         d_end = blend[i]
         d_start = blend[i - 1] if i > 0 else 0.0
         for c in range(3):
             u[c] = (end[i, c] - start[i, c]) / length[i] if length[i] > 0.0 else 0.0
             second[c] = 0.0
         share = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+        travelled, saved = way_to[i], saved_to[i]
         way = travelled + inside * share - saved
         if d_end > 0.0 and inside > length[i] - d_end:
             j, tau, d = i, (inside - length[i] + d_end) / (2.0 * d_end), d_end
-            way = travelled + length[i] * share - saved - _short_of_vertex(start, end, length, blend, j, tau)
+            way = travelled + length[i] * share - saved - _short_of_vertex(moves, j, tau)
         elif d_start > 0.0 and inside < d_start:
             j, tau, d = i - 1, (inside + d_start) / (2.0 * d_start), d_start
-            before = saved - _saving(start, end, length, blend, j)
-            way = travelled - before - _short_of_vertex(start, end, length, blend, j, tau)
+            way = travelled - saved_to[j] - _short_of_vertex(moves, j, tau)
         else:
             j, tau, d = -1, 0.0, 0.0
         if j < 0:
             for c in range(3):
                 position[row, c] = start[i, c] + u[c] * inside
                 first[c] = u[c]
-            if inside == length[i]:
-                position[row] = end[i]
+                if inside == length[i]:
+                    position[row, c] = end[i, c]
         else:
             for c in range(3):
                 u[c] = (end[j, c] - start[j, c]) / length[j]
@@ -137,13 +224,13 @@ def _sample(time, pieces, start, end, length, blend, k, position, figures, move,
             speed2 += (first[c] * v) ** 2
             acceleration2 += (first[c] * a + second[c] * v * v) ** 2
             jerk2 += (first[c] * jerk + 3.0 * second[c] * v * a) ** 2
-        figures[row, 0], figures[row, 1] = math.sqrt(speed2), math.sqrt(acceleration2)
-        figures[row, 2], figures[row, 3] = math.sqrt(jerk2), way
-        move[row] = i
+        speed[row], acceleration[row] = math.sqrt(speed2), math.sqrt(acceleration2)
+        jerk_of[row], path[row] = math.sqrt(jerk2), way
         part[row] = inside / length[i] if length[i] > 0.0 else 1.0
+        corner[row] = j >= 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _product(start, end, i, j):
     """Return the product of two moves as vectors."""
     dot = 0.0
@@ -152,17 +239,11 @@ def _product(start, end, i, j):
     return dot
 
 
-@njit(cache=True)
-def _short_of_vertex(start, end, length, blend, i, tau):
+@njit(cache=True, nogil=True)
+def _short_of_vertex(moves, i, tau):
     """Return how far the path at share tau of the corner behind move i is short of the corner's vertex."""
+    start, end, length, blend = moves
     uu = _product(start, end, i, i) / length[i] ** 2
     ww = _product(start, end, i + 1, i + 1) / length[i + 1] ** 2
     uw = _product(start, end, i, i + 1) / (length[i] * length[i + 1])
     return blend[i] * (math.sqrt(uu) - 2.0 * arc_length(tau, uu, uw, ww))
-
-
-@njit(cache=True)
-def _saving(start, end, length, blend, i):
-    """Return how much shorter the corner behind move i is than its two lines."""
-    join = blend[i] * math.sqrt(_product(start, end, i + 1, i + 1)) / length[i + 1]
-    return join + _short_of_vertex(start, end, length, blend, i, 1.0)

@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcode2krl.parts import edges, in_parts
+
 LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
 """The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
 
@@ -28,16 +30,24 @@ def corner_cdis(
     ``tolerance_mm`` (p,) is NaN where none is asked for: there ``cdis_mm`` holds. ``exact`` (p,) forces 0.
     A reversal (interior angle below 1°) is an exact stop.
     """
-    result = np.empty(len(position_mm))
-    _corner_cdis(position_mm, tolerance_mm, cdis_mm, exact, LEVELS_MM, result)
+    count = len(position_mm)
+    result = np.empty(count)
+    # with a tolerance a corner keeps the level of the one before, so they come one after the other
+    borders = edges(count) if np.isnan(tolerance_mm).all() else [0, count]
+    in_parts(
+        lambda start, end: _corner_cdis(
+            position_mm, tolerance_mm, cdis_mm, exact, LEVELS_MM, start, end, result
+        ),
+        borders,
+    )
     return result
 
 
-@njit(cache=True)
-def _corner_cdis(position, tolerance, cdis, exact, levels, result):
+@njit(cache=True, nogil=True)
+def _corner_cdis(position, tolerance, cdis, exact, levels, start, end, result):
     count = len(position)
     current = 0.0
-    for i in range(count):
+    for i in range(start, end):
         result[i] = 0.0
         if exact[i] or i == 0 or i == count - 1:
             continue
@@ -62,8 +72,9 @@ def _corner_cdis(position, tolerance, cdis, exact, levels, result):
         half_line = 0.5 * math.sqrt(min(before, after))
         level = 0.0
         for value in levels:  # the largest that is allowed, but none beyond what half the line can use
-            if value <= largest * (1.0 + 1e-12) and level < half_line:
-                level = value
+            if value > largest * (1.0 + 1e-12) or level >= half_line:
+                break
+            level = value
         keeps = current <= largest and current > 0.0 and current >= min(level, half_line)
         current = current if keeps else level
         result[i] = current

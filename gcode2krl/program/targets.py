@@ -4,10 +4,11 @@ The robot is either at HOME, standing above the work on the clearance plane, or 
 whose X, Y and Z have all been programmed are positions; machine moves become retracts.
 """
 
+import functools
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.parts import edges, in_parts
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import check_toolpath
 from gcode2krl.program.orientation import tool_rotation
@@ -204,42 +206,29 @@ class _Plan:
     def targets(self, spin_of: SpinOf, tolerance_mm: float | None) -> Targets:
         """Assemble the table from what was planned."""
         toolpath, columns = self.toolpath, self.columns
-        position = np.concatenate(columns.position)
-        move = np.concatenate(columns.move)
-        kind = np.concatenate(columns.kind)
+        position, move = np.concatenate(columns.position), np.concatenate(columns.move)
+        kind, tool = np.concatenate(columns.kind), np.concatenate(columns.tool)
         axis = self._axes()
-        tool = np.concatenate(columns.tool)
-        keep = _distinct(position, axis, kind, tool)
+        stand, keep = _StandingAt(move), _distinct(position, axis, kind, tool)
+        if not keep.all():
+            position, move, kind, tool = position[keep], move[keep], kind[keep], tool[keep]
+            axis = _rows(axis, keep)
         kept_index = np.cumsum(keep) - 1
-        position, axis, move, kind, tool = (
-            position[keep],
-            _rows(axis, keep),
-            move[keep],
-            kind[keep],
-            tool[keep],
-        )
         rotation = self._rotations(position, axis, tool, kind, spin_of)
         wait = np.zeros(len(position))
-        stand = _StandingAt(np.concatenate(columns.move), kept_index)
         events = self._place_events(stand, kept_index)
         for row in np.flatnonzero(toolpath.dwell_s > 0).tolist():
             for target, dwell_s in self._dwells(row, stand, kept_index):
                 wait[target] += dwell_s
-        rapid = np.where(move >= 0, toolpath.rapid[move] | toolpath.machine[move], True)
-        speed = np.where(
-            rapid, self.cell.controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[np.maximum(move, 0)]
-        )
-        speed[kind != _LIN] = np.nan
-        exact = self._exact_stops(move, kind, tool, rapid, wait, events)
+        said = self._said_by_moves(move, kind, tolerance_mm)
+        exact = self._exact_stops(said, kind, tool, wait, events)
         return Targets(
             position_mm=position,
             rotation=rotation,
             ptp=kind != _LIN,
             home=kind == _HOME,
-            speed_mm_s=speed,
-            cdis_mm=corner_cdis(
-                position, self._tolerances(move, tolerance_mm), self.cell.controller.cdis_mm, exact
-            ),
+            speed_mm_s=said.speed_mm_s,
+            cdis_mm=corner_cdis(position, said.tolerance_mm, self.cell.controller.cdis_mm, exact),
             wait_s=wait,
             move=move,
             source_line=self._source_lines(move, kind),
@@ -251,10 +240,38 @@ class _Plan:
 
     def _source_lines(self, move: NDArray[np.int32], kind: NDArray[np.int8]) -> NDArray[np.int32]:
         """Return the G-code line of each target; what is added has that of the move it leads to."""
-        own = np.flatnonzero(move >= 0)
-        after = own[np.minimum(np.searchsorted(own, np.arange(len(move))), len(own) - 1)]
-        line: NDArray[np.int32] = np.where(kind == _HOME, 0, self.toolpath.source_line[move[after]])
-        return np.where(move >= 0, self.toolpath.source_line[move], line)
+        line: NDArray[np.int32] = self.toolpath.source_line[np.maximum(move, 0)]
+        own, added = np.flatnonzero(move >= 0), np.flatnonzero(move < 0)
+        after = own[np.minimum(np.searchsorted(own, added), len(own) - 1)]
+        line[added] = np.where(kind[added] == _HOME, 0, self.toolpath.source_line[move[after]])
+        return line
+
+    def _said_by_moves(
+        self, move: NDArray[np.int32], kind: NDArray[np.int8], tolerance_mm: float | None
+    ) -> "_Said":
+        """Return what the G-code says of the targets; added ones are rapid, without a tolerance.
+
+        The tolerance's precedence: ``G64 P``, then the one asked for, then the cell's.
+        """
+        toolpath, controller = self.toolpath, self.cell.controller
+        own = controller.tolerance_mm
+        below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+        count = len(move)
+        said = _Said(np.empty(count, bool), np.empty(count), np.empty(count), np.empty(count, bool))
+
+        def part(start: int, end: int) -> None:
+            rows, row = slice(start, end), np.maximum(move[start:end], 0)
+            added = move[rows] < 0
+            rapid = added | toolpath.rapid[row] | toolpath.machine[row]
+            speed = np.where(rapid, controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[row])
+            programmed = np.where(added, np.nan, toolpath.tolerance_mm[row])
+            said.rapid[rows] = rapid
+            said.speed_mm_s[rows] = np.where(kind[rows] == _LIN, speed, np.nan)
+            said.tolerance_mm[rows] = np.where(np.isnan(programmed), below, programmed)
+            said.exact_stop[rows] = ~added & toolpath.exact_stop[row]
+
+        in_parts(part, edges(count))
+        return said
 
     def _axes(self) -> Floats:
         if self.toolpath.axis.strides[0] == 0:
@@ -264,11 +281,12 @@ class _Plan:
     def _rotations(
         self, position: Floats, axis: Floats, tool: NDArray[np.int32], kind: NDArray[np.int8], spin_of: SpinOf
     ) -> Floats:
-        planned = kind != _HOME
-        spin = spin_of(position[planned], _rows(axis, planned), tool[planned])
+        planned = _as_slice(kind != _HOME)
+        axis = _rows(axis, planned)
+        spin = spin_of(position[planned], axis, tool[planned])
         rotation = np.empty((len(position), 4))
-        rotation[planned] = tool_rotation(_rows(axis, planned), spin)
-        for row in np.flatnonzero(~planned):
+        rotation[planned] = tool_rotation(axis, spin)
+        for row in np.flatnonzero(kind == _HOME):
             position[row], rotation[row] = self.home_pose(int(tool[row]))
         return rotation
 
@@ -281,7 +299,7 @@ class _Plan:
             elif event.values.get("implied"):  # above the work, not while the mill is still in it
                 target = int(kept_index[self._next_tool_change(index)])
             else:
-                target = stand.at(event.row)
+                target = int(kept_index[stand.at(event.row)])
             earliest = max(earliest, target)
             dwell_s = event.values.get("dwell_s", 0.0) - self._dwell_before_change_s(event.row, index)
             values = {**event.values, "dwell_s": dwell_s} if dwell_s > 0 else _without_dwell(event.values)
@@ -301,7 +319,7 @@ class _Plan:
         self, row: int, stand: "_StandingAt", kept_index: NDArray[np.int64]
     ) -> list[tuple[int, float]]:
         """Return (target, seconds) of the dwell at a row: before and after tool changes there."""
-        marks = [(stand.at(row), 0.0)]
+        marks = [(int(kept_index[stand.at(row)]), 0.0)]
         for index in self._changes_at(row):
             before_s = float(self.toolpath.events[index].values.get("dwell_s", 0.0))
             marks.append((int(kept_index[self.tool_events[index]]), before_s))
@@ -314,28 +332,18 @@ class _Plan:
 
     def _exact_stops(
         self,
-        move: NDArray[np.int32],
+        said: "_Said",
         kind: NDArray[np.int8],
         tool: NDArray[np.int32],
-        rapid: NDArray[np.bool_],
         wait: Floats,
         events: tuple[Event, ...],
     ) -> NDArray[np.bool_]:
-        exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0)
-        exact |= (move >= 0) & self.toolpath.exact_stop[move]
-        exact[:-1] |= (rapid[:-1] != rapid[1:]) | (kind[1:] != _LIN)
+        exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0) | said.exact_stop
+        exact[:-1] |= (said.rapid[:-1] != said.rapid[1:]) | (kind[1:] != _LIN)
         exact[1:] |= tool[1:] != tool[:-1]  # the way there began with another tip
         exact[[event.row for event in events]] = True
         exact[-1] = True
         return exact
-
-    def _tolerances(self, move: NDArray[np.int32], tolerance_mm: float | None) -> Floats:
-        """Precedence: ``G64 P``, then the one asked for, then the cell's."""
-        own = self.cell.controller.tolerance_mm
-        below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
-        programmed = np.where(move >= 0, self.toolpath.tolerance_mm[move], np.nan)
-        result: Floats = np.where(np.isnan(programmed), below, programmed)
-        return result
 
     def _notes(self) -> list[Issue]:
         if self.cell.verified is not None:
@@ -351,41 +359,63 @@ class _Plan:
         ]
 
 
-class _StandingAt:
-    """Finds the target at which the tool stands after a row of the Toolpath."""
+class _Said(NamedTuple):
+    """What the G-code says of each target (p)."""
 
-    def __init__(self, move: NDArray[np.int32], kept_index: NDArray[np.int64]) -> None:
+    rapid: NDArray[np.bool_]
+    speed_mm_s: Floats
+    tolerance_mm: Floats
+    exact_stop: NDArray[np.bool_]
+
+
+class _StandingAt:
+    """Finds the planned motion at whose end the tool stands after a row of the Toolpath."""
+
+    def __init__(self, move: NDArray[np.int32]) -> None:
         self.moved = np.flatnonzero(move >= 0)
         self.rows = move[self.moved]
-        self.kept_index = kept_index
 
     def at(self, row: int) -> int:
         index = int(np.searchsorted(self.rows, row, side="right")) - 1
-        return int(self.kept_index[self.moved[index]]) if index >= 0 else 0
+        return int(self.moved[index]) if index >= 0 else 0
 
 
 def _distinct(
     position: Floats, axis: Floats, kind: NDArray[np.int8], tool: NDArray[np.int32]
 ) -> NDArray[np.bool_]:
     """Mark the rows that print as another point than the row before, are PTP or move another tool."""
-    grid = np.rint(position / GRID_MM)
-    different = np.ones(len(position), dtype=bool)
-    different[1:] = (grid[1:] != grid[:-1]).any(axis=1) | (tool[1:] != tool[:-1])
-    if axis.strides[0] != 0:
-        different[1:] |= (axis[1:] != axis[:-1]).any(axis=1)
-    result: NDArray[np.bool_] = different | (kind != _LIN)
-    return result
+    different: NDArray[np.bool_] = (kind != _LIN) | (np.arange(len(kind)) == 0)
+
+    def part(start: int, end: int) -> None:
+        rows, first = slice(start + 1, end + 1), slice(start, end)
+        grid = np.rint(position[start : end + 1] / GRID_MM)
+        moved = functools.reduce(np.logical_or, (grid[1:] != grid[:-1]).T)
+        different[rows] |= moved | (tool[rows] != tool[first])
+        if axis.strides[0] != 0:
+            different[rows] |= (axis[rows] != axis[first]).any(axis=1)
+
+    in_parts(part, edges(len(kind) - 1))
+    return different
+
+
+def _as_slice(chosen: NDArray[np.bool_]) -> slice | NDArray[np.int64]:
+    """Return the index of the chosen rows, a slice where they stand together, so that nothing is copied."""
+    rows = np.flatnonzero(chosen)
+    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
+    return slice(int(rows[0]), int(rows[-1]) + 1) if together else rows
 
 
 def _without_dwell(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key != "dwell_s"}
 
 
-def _rows(values: Floats, keep: NDArray[np.bool_]) -> Floats:
+def _rows(values: Floats, chosen: Any) -> Floats:
     """Select rows; a broadcast constant stays one."""
     if values.strides[0] == 0:
-        return np.broadcast_to(values[0], (int(np.count_nonzero(keep)), *values.shape[1:]))
-    return values[keep]
+        count = len(np.empty(len(values), dtype=np.bool_)[chosen])
+        return np.broadcast_to(values[0], (count, *values.shape[1:]))
+    result: Floats = values[chosen]
+    return result
 
 
 def _highest(toolpath: Toolpath) -> float:

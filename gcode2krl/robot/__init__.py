@@ -1,6 +1,15 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
-from gcode2krl.robot.joints import follow, follow_motion, joint_findings, motion_angles, ptp_joints
+from gcode2krl.robot.joints import (
+    follow,
+    follow_motion,
+    joints_at,
+    joints_from_angles,
+    motion_angles,
+    ptp_joints,
+    speed_share,
+    target_angles,
+)
 from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
 from gcode2krl.robot.quality import pose_quality
 
@@ -11,8 +20,11 @@ __all__ = [
     "forward",
     "inverse",
     "jacobian",
-    "joint_findings",
+    "joints_at",
+    "joints_from_angles",
     "motion_angles",
     "pose_quality",
     "ptp_joints",
+    "speed_share",
+    "target_angles",
 ]

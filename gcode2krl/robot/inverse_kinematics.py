@@ -2,8 +2,9 @@
 
 The index of a branch is KUKA's status S: bit 0 overhead, bit 1 elbow (A3 >= phi), bit 2 wrist (A5 < 0).
 The wrist centre splits the problem (Pieper 1968): A1 from the direction to it, A2 and A3 from a planar
-triangle by the law of cosines, A4 to A6 from the rotation that is left. All angles come from atan2, and A6
-from what A4 leaves over, so a pose next to a singularity is met as exactly as any other.
+triangle by the law of cosines, A4 to A6 from the rotation that is left. All angles come from atan2 of a
+direction (y, x), and A6 from what A4 leaves over, so a pose next to a singularity is met as exactly as any
+other.
 """
 
 import math
@@ -14,6 +15,8 @@ import numpy.typing as npt
 
 from gcode2krl.robot.kinematics import FloatArray, read_only
 
+Six = tuple[float, float, float, float, float, float]
+
 STRETCH_TOLERANCE = 1e-12
 """How far cos(A3 - phi) may exceed 1 by rounding; less than 1e-8 mm beyond the stretched arm."""
 
@@ -22,6 +25,9 @@ AXIS_1_TOLERANCE_MM = 1e-9
 
 WRIST_TOLERANCE = 1e-9
 """Below this |sin A5| axes 4 and 6 are one: A4 is free, A5 is exactly 0 or pi, A6 takes the rest."""
+
+_BLOCK = 4096
+"""Rows whose directions stay in the processor's cache."""
 
 
 def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: npt.ArrayLike) -> FloatArray:
@@ -100,21 +106,62 @@ def one_branch(
         raise ValueError("q_reference_rad is not finite")
     position = read_only("position_mm", position_mm, -1, 3)
     axes = read_only("rotation", rotation, 1 if np.shape(rotation)[0] == 1 else len(position), 3, 3)
+    shape = read_only("geometry", geometry, 6)
     q_rad = np.empty((len(position), 6))
-    _path_rows(position, axes, read_only("geometry", geometry, 6), int(branch), reference, q_rad)
+    room = np.empty((2, 6 * _BLOCK))
+    for first in range(0, len(position), _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        turned, found = axes[rows] if len(axes) > 1 else axes, q_rad[rows]
+        y, x = (column[: 6 * len(found)].reshape(6, len(found)) for column in room)
+        if _direction_rows(position[rows], turned, shape, int(branch), y, x):
+            _wind_rows(np.arctan2(y, x, out=y), reference, found)  # numpy's is the faster arc tangent
+        else:
+            _path_rows(position[rows], turned, shape, int(branch), reference, found)
+        reached = np.flatnonzero(found[:, 0] == found[:, 0])
+        if len(reached):
+            reference = read_only("q_reference_rad", found[reached[-1]], 6)
     return q_rad
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _all_rows(position_mm: FloatArray, rotation: FloatArray, geometry: FloatArray, q_rad: FloatArray) -> None:
     for i in range(position_mm.shape[0]):
-        for arm in range(4):
-            q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(position_mm[i], rotation, i, geometry, arm, 0.0)
-            for branch in (arm, arm + 4):
-                q4, q5, q6 = _wrist(rotation, i, cos_1, sin_1, cos_23, sin_23, branch, 0.0)
-                q = (q1, q2, q3, q4, q5, q6)
-                for j in range(6):
-                    q_rad[i, branch, j] = _main_value(q[j])
+        for branch in range(8):
+            y, x, _, _ = _directions(position_mm, i, rotation, i, geometry, branch, 1.0, 0.0, 1.0, 0.0)
+            for j in range(6):
+                q_rad[i, branch, j] = _main_value(math.atan2(y[j], x[j]))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _direction_rows(
+    position_mm: FloatArray,
+    rotation: FloatArray,
+    geometry: FloatArray,
+    branch: int,
+    y: FloatArray,
+    x: FloatArray,
+) -> bool:
+    """Write the angles (6, n) as directions y, x; False where one depends on the row before, or is none."""
+    regular = True
+    step = 1 if rotation.shape[0] > 1 else 0
+    for i in range(position_mm.shape[0]):
+        y_i, x_i, free_1, free_4 = _directions(
+            position_mm, i, rotation, i * step, geometry, branch, 1.0, 0.0, 1.0, 0.0
+        )
+        for j in range(6):
+            y[j, i], x[j, i] = y_i[j], x_i[j]
+        regular &= not (free_1 or free_4 or math.isnan(y_i[5]))
+    return regular
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _wind_rows(angle_rad: FloatArray, q_reference_rad: FloatArray, q_rad: FloatArray) -> None:
+    """Write the turns (n, 6) of angles (6, n) that are nearest to the row before."""
+    for j in range(6):
+        before = q_reference_rad[j]
+        for i in range(angle_rad.shape[1]):
+            before = _nearest_turn(angle_rad[j, i], before)
+            q_rad[i, j] = before
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -126,74 +173,80 @@ def _path_rows(
     q_reference_rad: FloatArray,
     q_rad: FloatArray,
 ) -> None:
+    """Write the angles row by row, each with what the one before leaves open."""
     before = np.empty(6)
     for j in range(6):
         before[j] = q_reference_rad[j]
-    last_rotation = rotation.shape[0] - 1
+    step = 1 if rotation.shape[0] > 1 else 0
     for i in range(position_mm.shape[0]):
-        turned = min(i, last_rotation)
-        q1, q2, q3, cos_1, sin_1, cos_23, sin_23 = _arm(
-            position_mm[i], rotation, turned, geometry, branch, before[0]
-        )
-        q4, q5, q6 = _wrist(rotation, turned, cos_1, sin_1, cos_23, sin_23, branch, before[3])
-        q = (q1, q2, q3, q4, q5, q6)
-        reached = not math.isnan(q6)  # NaN as soon as any part of the pose is
+        y, x, free_1, free_4 = _directions(
+            position_mm, i, rotation, i * step, geometry, branch,
+            math.cos(before[0]), math.sin(before[0]), math.cos(before[3]), math.sin(before[3]),
+        )  # fmt: skip
+        reached = not math.isnan(y[5])  # NaN as soon as any part of the pose is
         for j in range(6):
-            if reached:
-                before[j] = q[j] + 2.0 * math.pi * np.floor((before[j] - q[j]) / (2.0 * math.pi) + 0.5)
+            stays = (j == 0 and free_1) or (j == 3 and free_4)
+            if reached and not stays:
+                before[j] = _nearest_turn(math.atan2(y[j], x[j]), before[j])
             q_rad[i, j] = before[j] if reached else math.nan
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _arm(
-    position_mm: FloatArray, rotation: FloatArray, i: int, geometry: FloatArray, branch: int, q1_before: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """Return A1, A2, A3, cos A1, sin A1, cos(A2 + A3), sin(A2 + A3), all NaN where out of reach."""
+def _nearest_turn(angle_rad: float, before_rad: float) -> float:
+    """Return the angle with the whole turns that bring it nearest to another."""
+    way = before_rad - angle_rad
+    if -math.pi <= way < math.pi:
+        return angle_rad
+    return angle_rad + 2.0 * math.pi * np.floor(way / (2.0 * math.pi) + 0.5)  # type: ignore[no-any-return]
+
+
+@numba.njit(nogil=True, error_model="numpy", forceinline=True)
+def _directions(
+    position_mm: FloatArray,
+    k: int,
+    rotation: FloatArray,
+    i: int,
+    geometry: FloatArray,
+    branch: int,
+    cos_1: float,
+    sin_1: float,
+    cos_4: float,
+    sin_4: float,
+) -> tuple[Six, Six, bool, bool]:
+    """Return A1 to A6 of position k and rotation i as directions y, x, and whether A1 and A4 are free.
+
+    A free angle is the given one. Out of reach, all directions are NaN.
+    """
     a1, a2, c1, c2, c3, c4 = geometry
-    x = position_mm[0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
-    y = position_mm[1] - c4 * rotation[i, 1, 2]
-    radius = math.sqrt(x * x + y * y)
+    wrist_x = position_mm[k, 0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
+    wrist_y = position_mm[k, 1] - c4 * rotation[i, 1, 2]
+    radius = math.sqrt(wrist_x * wrist_x + wrist_y * wrist_y)
     if branch & 1:  # overhead: axis 1 turns its back on the wrist centre
-        x, y, radius = -x, -y, -radius
-    if abs(radius) > AXIS_1_TOLERANCE_MM:
-        q1, cos_1, sin_1 = -math.atan2(y, x), x / abs(radius), -y / abs(radius)
-    else:
-        q1, cos_1, sin_1 = q1_before, math.cos(q1_before), math.sin(q1_before)
+        wrist_x, wrist_y, radius = -wrist_x, -wrist_y, -radius
+    free_1 = not abs(radius) > AXIS_1_TOLERANCE_MM
+    cos_1 = cos_1 if free_1 else wrist_x / abs(radius)
+    sin_1 = sin_1 if free_1 else -wrist_y / abs(radius)
 
     # triangle of upper arm, forearm and the line from axis 2 to the wrist centre; angles count downwards
     along = radius - a1
-    down = c1 - (position_mm[2] - c4 * rotation[i, 2, 2])
+    down = c1 - (position_mm[k, 2] - c4 * rotation[i, 2, 2])
     forearm_2 = c3 * c3 + a2 * a2
     forearm = math.sqrt(forearm_2)
     distance_2 = along * along + down * down
     cos_elbow = (distance_2 - c2 * c2 - forearm_2) / (2.0 * c2 * forearm)
-    if not abs(cos_elbow) <= 1.0 + STRETCH_TOLERANCE:  # NaN input too
-        return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
-    sin_elbow = math.sqrt(max((1.0 - cos_elbow) * (1.0 + cos_elbow), 0.0))
-    if not branch & 2:
-        sin_elbow = -sin_elbow
-    q3 = math.atan2(sin_elbow, cos_elbow) - math.atan2(a2, c3)
+    reached = abs(cos_elbow) <= 1.0 + STRETCH_TOLERANCE  # NaN input is not
+    cos_1, cos_elbow = (cos_1, cos_elbow) if reached else (math.nan, math.nan)
+    square = (1.0 - cos_elbow) * (1.0 + cos_elbow)
+    sin_elbow = math.sqrt(0.0 if square < 0.0 else square)
+    sin_elbow = sin_elbow if branch & 2 else -sin_elbow
     reach_along, reach_down = c2 + forearm * cos_elbow, forearm * sin_elbow
     cos_2 = (along * reach_along + down * reach_down) / distance_2
     sin_2 = (down * reach_along - along * reach_down) / distance_2
     cos_3 = (cos_elbow * c3 + sin_elbow * a2) / forearm
     sin_3 = (sin_elbow * c3 - cos_elbow * a2) / forearm
     cos_23, sin_23 = cos_2 * cos_3 - sin_2 * sin_3, sin_2 * cos_3 + cos_2 * sin_3
-    return q1, math.atan2(sin_2, cos_2), q3, cos_1, sin_1, cos_23, sin_23
 
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _wrist(
-    rotation: FloatArray,
-    i: int,
-    cos_1: float,
-    sin_1: float,
-    cos_23: float,
-    sin_23: float,
-    branch: int,
-    q4_before: float,
-) -> tuple[float, float, float]:
-    """Return A4, A5, A6 from Rx(-A4) Ry(A5) Rx(-A6) = m, the flange's axes z, y, -x seen from the forearm."""
+    # Rx(-A4) Ry(A5) Rx(-A6) = m, the flange's axes z, y, -x seen from the forearm
     y_x, y_y = sin_1, cos_1  # the forearm's y; its z is (z_x, z_y, cos_23)
     z_x, z_y = cos_1 * sin_23, -sin_1 * sin_23
     m_00 = (cos_1 * rotation[i, 0, 2] - sin_1 * rotation[i, 1, 2]) * cos_23 - sin_23 * rotation[i, 2, 2]
@@ -204,16 +257,19 @@ def _wrist(
     m_12 = -y_x * rotation[i, 0, 0] - y_y * rotation[i, 1, 0]
     m_22 = -z_x * rotation[i, 0, 0] - z_y * rotation[i, 1, 0] - cos_23 * rotation[i, 2, 0]
     sin_5 = math.sqrt(m_10 * m_10 + m_20 * m_20)
-    if sin_5 < WRIST_TOLERANCE:
-        q4, q5 = q4_before, math.atan2(0.0, m_00)
-        cos_4, sin_4 = math.cos(q4_before), math.sin(q4_before)
-    else:
-        if branch & 4:
-            sin_5 = -sin_5
-        cos_4, sin_4 = -m_20 / sin_5, -m_10 / sin_5
-        q4, q5 = math.atan2(sin_4, cos_4), math.atan2(sin_5, m_00)
+    free_4 = sin_5 < WRIST_TOLERANCE
+    sin_5 = -sin_5 if branch & 4 else sin_5
+    cos_4 = cos_4 if free_4 else -m_20 / sin_5
+    sin_4 = sin_4 if free_4 else -m_10 / sin_5
+    sin_5 = 0.0 if free_4 else sin_5
     # rows 1 and 2 of Rx(A4) m = Ry(A5) Rx(-A6): exact for the A4 taken, at the singularity too
-    return q4, q5, math.atan2(cos_4 * m_12 - sin_4 * m_22, cos_4 * m_11 - sin_4 * m_21)
+    sin_6, cos_6 = cos_4 * m_12 - sin_4 * m_22, cos_4 * m_11 - sin_4 * m_21
+    return (
+        (sin_1, sin_2, sin_3, sin_4, sin_5, sin_6),
+        (cos_1, cos_2, cos_3, cos_4, m_00, cos_6),
+        free_1,
+        free_4,
+    )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -12,6 +12,9 @@ import numpy.typing as npt
 
 from gcode2krl.robot.kinematics import FloatArray, read_only
 
+_TOGETHER = 64
+"""Rows that are worked on side by side."""
+
 
 def jacobian(q_rad: npt.ArrayLike, geometry: npt.ArrayLike, tool_position_mm: npt.ArrayLike) -> FloatArray:
     """Return the Jacobian of the tool tip along the axes of the robot root.
@@ -90,18 +93,28 @@ def _jacobian_rows(
 def _sigma_rows(
     q: FloatArray, geometry: FloatArray, tool_position_mm: FloatArray, sigma_min: FloatArray
 ) -> None:
-    length_mm = geometry[3] + math.hypot(geometry[4], geometry[1])
-    columns, gram = np.empty((6, 6)), np.empty((6, 6))
-    for i in range(q.shape[0]):
-        _fill(q, i, geometry, tool_position_mm, 1.0 / length_mm, columns)
+    """Many rows go through each step together, side by side, so that the processor takes several at once."""
+    scale = 1.0 / (geometry[3] + math.hypot(geometry[4], geometry[1]))
+    count = q.shape[0]
+    one, columns, gram = np.empty((6, 6)), np.empty((6, 6, _TOGETHER)), np.empty((6, 6, _TOGETHER))
+    square, root = np.empty((6, _TOGETHER)), np.empty(_TOGETHER)
+    for first in range(0, count, _TOGETHER):
+        for m in range(_TOGETHER):
+            _fill(q, min(first + m, count - 1), geometry, tool_position_mm, scale, one)
+            for row in range(6):
+                for j in range(6):
+                    columns[row, j, m] = one[row, j]
         for row in range(6):
-            for column in range(row + 1):
-                total = 0.0
-                for k in range(6):
-                    total += columns[row, k] * columns[column, k]
-                gram[row, column] = total
-                gram[column, row] = total
-        sigma_min[i] = math.sqrt(_smallest_eigenvalue(gram))
+            for other in range(row + 1):
+                for m in range(_TOGETHER):
+                    total = 0.0
+                    for j in range(6):
+                        total += columns[row, j, m] * columns[other, j, m]
+                    gram[row, other, m] = total
+        _tridiagonal(gram, square)
+        _smallest_root(gram, square, root)
+        for m in range(min(_TOGETHER, count - first)):
+            sigma_min[first + m] = math.sqrt(root[m])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -159,51 +172,72 @@ def _fill(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _smallest_eigenvalue(a: FloatArray) -> float:
-    """Return that of a symmetric positive semi-definite (6, 6), which is overwritten.
+def _tridiagonal(a: FloatArray, square: FloatArray) -> None:
+    """Bring symmetric (6, 6, m), of which the lower half is looked at, to Householder's tridiagonal form.
 
-    Householder's tridiagonal form, then Newton's method on the characteristic polynomial from below: all
-    roots being real, it rises to the smallest one and never passes it (Golub and Van Loan, 8.3 and 8.4).
+    The diagonal is left in ``a``; ``square`` (6, m) gets the squares of the numbers beside it, from row 1 on
+    (Golub and Van Loan, 8.3).
     """
+    step, two_over = np.empty((6, _TOGETHER)), np.empty(_TOGETHER)
     for k in range(4):
-        norm_2 = 0.0
-        for i in range(k + 2, 6):
-            norm_2 += a[i, k] * a[i, k]
-        if norm_2 == 0.0:
-            continue
-        head = a[k + 1, k]
-        off_diagonal = -math.copysign(math.sqrt(head * head + norm_2), head)
-        a[k + 1, k] = head - off_diagonal  # the Householder vector stays in column k, below the diagonal
-        half = 0.5 * (a[k + 1, k] * a[k + 1, k] + norm_2)
-        product = 0.0
+        for m in range(_TOGETHER):
+            below = 0.0
+            for i in range(k + 2, 6):
+                below += a[i, k, m] * a[i, k, m]
+            head = a[k + 1, k, m]
+            beside = -math.copysign(math.sqrt(head * head + below), head)
+            square[k + 1, m] = beside * beside
+            head -= beside
+            a[k + 1, k, m] = head  # the Householder vector stays in column k, below the diagonal
+            size = head * head + below
+            two_over[m] = 2.0 / size if size > 1e-300 else 0.0
         for i in range(k + 1, 6):
-            total = 0.0
-            for j in range(k + 1, 6):
-                total += a[i, j] * a[j, k]
-            a[k, i] = total / half
-            product += a[k, i] * a[i, k]
+            for m in range(_TOGETHER):
+                total = 0.0
+                for j in range(k + 1, i + 1):
+                    total += a[i, j, m] * a[j, k, m]
+                for j in range(i + 1, 6):
+                    total += a[j, i, m] * a[j, k, m]
+                step[i, m] = total * two_over[m]
+        for m in range(_TOGETHER):
+            along = 0.0
+            for i in range(k + 1, 6):
+                along += step[i, m] * a[i, k, m]
+            along *= 0.5 * two_over[m]
+            for i in range(k + 1, 6):
+                step[i, m] -= along * a[i, k, m]
         for i in range(k + 1, 6):
-            a[k, i] -= 0.5 * product / half * a[i, k]
-        for i in range(k + 1, 6):
-            for j in range(k + 1, 6):
-                a[i, j] -= a[i, k] * a[k, j] + a[k, i] * a[j, k]
-        a[k + 1, k] = off_diagonal
+            for j in range(k + 1, i + 1):
+                for m in range(_TOGETHER):
+                    a[i, j, m] -= a[i, k, m] * step[j, m] + step[i, m] * a[j, k, m]
+    for m in range(_TOGETHER):
+        square[5, m] = a[5, 4, m] * a[5, 4, m]
 
-    root: float = 0.0
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _smallest_root(a: FloatArray, square: FloatArray, root: FloatArray) -> None:
+    """Write the smallest eigenvalues (m,) of positive semi-definite tridiagonal matrices, NaN where they are.
+
+    Newton's method on the characteristic polynomial from below: all roots being real, it rises to the
+    smallest one and never passes it (Golub and Van Loan, 8.4).
+    """
+    root[:] = 0.0
     for _ in range(60):
-        value, slope, value_before, slope_before = a[0, 0] - root, -1.0, 1.0, 0.0
-        for k in range(1, 6):
-            diagonal, square = a[k, k] - root, a[k, k - 1] * a[k, k - 1]
-            value, value_before, slope, slope_before = (
-                diagonal * value - square * value_before,
-                value,
-                diagonal * slope - value - square * slope_before,
-                slope,
-            )
-        step = -value / slope
-        if math.isnan(value):
-            return math.nan
-        if not step > 1e-15 * (1.0 + root):  # 0 / 0 at a double root too
-            return root
-        root += step
-    return root
+        rising = 0
+        for m in range(_TOGETHER):
+            at = root[m]
+            value, slope, value_before, slope_before = a[0, 0, m] - at, -1.0, 1.0, 0.0
+            for k in range(1, 6):
+                diagonal = a[k, k, m] - at
+                value, value_before, slope, slope_before = (
+                    diagonal * value - square[k, m] * value_before,
+                    value,
+                    diagonal * slope - value - square[k, m] * slope_before,
+                    slope,
+                )
+            step = -value / slope
+            rises = step > 1e-15 * (1.0 + at)  # 0 / 0 at a double root does not
+            root[m] = at + (step if rises else 0.0 * value)
+            rising += rises
+        if rising == 0:
+            return

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+IntArray = npt.NDArray[np.int32]
 
 
 def read_only(name: str, values: npt.ArrayLike, *shape: int) -> FloatArray:
@@ -76,7 +76,9 @@ def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[FloatArr
     return position_mm, rotation
 
 
-def status_turn(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[IntArray, IntArray]:
+def status_turn(
+    q_rad: npt.ArrayLike, geometry: npt.ArrayLike, grid_rad: float = 0.0
+) -> tuple[IntArray, IntArray]:
     """Return status S and turn T, the two integers with which KRL makes a pose name one set of angles.
 
     Status: bit 0, the wrist centre is behind axis 1 (overhead); bit 1, A3 >= phi, where phi = -atan2(a2, c3)
@@ -89,13 +91,16 @@ def status_turn(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[IntArray
         A1 to A6 with the controller's signs and zero.
     geometry : (6,)
         a1, a2, c1, c2, c3, c4 in mm.
+    grid_rad : float
+        The angles are rounded to its multiples first, so that a zero of the cell is one in spite of
+        rounding; 0 = not.
 
     Returns
     -------
     status : (n,)
-        0 to 7, the branch index of `all_branches`.
+        0 to 7, the branch index of `all_branches`; 0 where an angle is NaN.
     turn : (n,)
-        0 to 63.
+        0 to 63; 0 where the angles are NaN.
 
     Raises
     ------
@@ -103,23 +108,40 @@ def status_turn(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[IntArray
         If an array has the wrong shape.
     """
     q = read_only("q_rad", q_rad, -1, 6)
-    a1_mm, a2_mm, _, c2_mm, c3_mm, _ = read_only("geometry", geometry, 6)
-    elbow_rad = q[:, 2] + math.atan2(a2_mm, c3_mm)
-    forearm_mm = math.hypot(a2_mm, c3_mm)
-    radius_mm = a1_mm + c2_mm * np.cos(q[:, 1]) + forearm_mm * np.cos(q[:, 1] + elbow_rad)
-    overhead = radius_mm < 0.0
-    bent_down = _wrapped(elbow_rad) >= 0.0
-    flipped = _wrapped(q[:, 4]) < 0.0
-    status = overhead + 2 * bent_down + 4 * flipped
-    turn = (q < 0.0) @ (1 << np.arange(6))
-    return status.astype(np.int64), turn.astype(np.int64)
+    status, turn = np.empty(len(q), dtype=np.int32), np.empty(len(q), dtype=np.int32)
+    _status_rows(q, read_only("geometry", geometry, 6), grid_rad, status, turn)
+    return status, turn
 
 
-def _wrapped(angle_rad: FloatArray) -> FloatArray:
-    """Return the same directions in (-pi, pi]; what already lies there is not touched by rounding."""
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _status_rows(
+    q: FloatArray, geometry: FloatArray, grid_rad: float, status: IntArray, turn: IntArray
+) -> None:
+    a1, a2, _, c2, c3, _ = geometry
+    stretched, forearm = math.atan2(a2, c3), math.hypot(a2, c3)
+    angle = np.empty(6)
+    for i in range(q.shape[0]):
+        turns = 0
+        for j in range(6):
+            angle[j] = np.rint(q[i, j] / grid_rad) * grid_rad if grid_rad > 0.0 else q[i, j]
+            if angle[j] < 0.0:
+                turns |= 1 << j
+        elbow = angle[2] + stretched
+        bits = 0
+        if a1 + c2 * math.cos(angle[1]) + forearm * math.cos(angle[1] + elbow) < 0.0:
+            bits |= 1
+        if _wrapped(elbow) >= 0.0:
+            bits |= 2
+        if _wrapped(angle[4]) < 0.0:
+            bits |= 4
+        status[i], turn[i] = bits, turns
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _wrapped(angle_rad: float) -> float:
+    """Return the same direction in (-pi, pi]; what already lies there is not touched by rounding."""
     turns = np.ceil((angle_rad - math.pi) / (2.0 * math.pi))
-    wrapped: FloatArray = angle_rad - 2.0 * math.pi * turns
-    return wrapped
+    return angle_rad - 2.0 * math.pi * turns  # type: ignore[no-any-return]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.robot.inverse_kinematics import all_branches
-from gcode2krl.robot.joints import limits_rad
 from gcode2krl.robot.poses import flange_frames
+from gcode2krl.robot.standing import limits_rad
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 Floats = NDArray[np.float64]

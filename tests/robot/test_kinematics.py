@@ -335,7 +335,7 @@ class TestStatusTurn:
     def test_known_poses(self, q_deg: tuple[float, ...], status: int, turn_bits: int) -> None:
         found_status, found_turn = status_turn(np.radians([q_deg]), KR300)
         assert (found_status[0], found_turn[0]) == (status, turn_bits)
-        assert found_status.dtype == found_turn.dtype == np.int64
+        assert found_status.dtype == found_turn.dtype == np.int32
 
     def test_full_turns_change_the_turn_bits_only(self) -> None:
         q = random_angles(500, seed=5)

@@ -1,0 +1,113 @@
+"""How the arm stands, row by row: its distance to the limits, and what must not be."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+from gcode2krl.robot.kinematics import FloatArray, read_only
+from gcode2krl.units import RAD_PER_DEG
+
+Bits = NDArray[np.uint16]
+
+UNREACHED, FAST, WRIST = 64, 128, 256
+"""What is wrong with a row, as bits; bits 0 to 5: A1 to A6 beyond its limit."""
+ALL_BITS = tuple(1 << bit for bit in range(9))
+WRIST_ZONE_RAD = 5.0 * RAD_PER_DEG
+"""|A5| below which an excessive joint speed is called a wrist singularity."""
+_SPEED_ROOM = 1.0 + 1e-6
+
+
+def limits_rad(cell: Cell) -> FloatArray:
+    """Return the joint limits (6, 2); without known limits, infinite ones."""
+    pairs = cell.robot.limits.q_deg
+    if pairs is None:
+        return np.array([[-np.inf, np.inf]] * 6)
+    return np.array(pairs) * RAD_PER_DEG
+
+
+def limit_margin(q_rad: FloatArray, cell: Cell) -> FloatArray:
+    """Return the distance (n,) in rad to the nearest joint limit, negative beyond it; NaN where q is."""
+    margin, _ = _judged(q_rad, np.empty(0), cell)
+    return margin
+
+
+def what_is_wrong(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> Bits:
+    """Return the bits (n,) of what must not be: beyond a limit, out of reach, too fast.
+
+    ``duration_s`` (n,) is the time since the row before, NaN where there is none. A joint is too fast where
+    its mean speed since then is above its limit; of a robot whose speeds are not known, the rows within
+    `WRIST_ZONE_RAD` of the wrist singularity are marked instead.
+    """
+    _, wrong = _judged(q_rad, duration_s, cell)
+    return wrong
+
+
+def speed_share_of_rows(
+    qd_rad_s: FloatArray, row: NDArray[np.int32], count: int, cell: Cell
+) -> FloatArray | None:
+    """Return the largest share (count,) of its limit that a joint speed has in each row, 0 where none is.
+
+    ``row`` (m,) is the row that each of the speeds (m, 6) belongs to. None where the limits are not known.
+    """
+    speeds = cell.robot.speeds.qd_deg_s
+    if speeds is None:
+        return None
+    share = np.zeros(count)
+    most = read_only("most", np.array(speeds) * RAD_PER_DEG, 6)
+    _share_rows(read_only("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
+    return share
+
+
+def _judged(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> tuple[FloatArray, Bits]:
+    q = read_only("q_rad", q_rad, -1, 6)
+    speeds = cell.robot.speeds.qd_deg_s
+    most = np.empty(0) if speeds is None else np.array(speeds) * RAD_PER_DEG
+    margin, wrong = np.empty(len(q)), np.zeros(len(duration_s), dtype=np.uint16)
+    limits, most = read_only("limits", limits_rad(cell), 6, 2), read_only("most", most, -1)
+    _judge_rows(q, read_only("duration_s", duration_s, -1), limits, most, margin, wrong)
+    return margin, wrong
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _judge_rows(
+    q: FloatArray,
+    duration_s: FloatArray,
+    limits: FloatArray,
+    most_rad_s: FloatArray,
+    margin: FloatArray,
+    wrong: Bits,
+) -> None:
+    """Without durations only the margin is written; without ``most_rad_s`` the wrist is looked at."""
+    for i in range(q.shape[0]):
+        nearest, bits = math.inf, 0
+        if math.isnan(q[i, 0]):  # a pose out of reach has no angle at all
+            nearest, bits = math.nan, UNREACHED
+        else:
+            for j in range(6):
+                room = min(q[i, j] - limits[j, 0], limits[j, 1] - q[i, j])
+                nearest = min(nearest, room)
+                if room < 0.0:
+                    bits |= 1 << j
+        margin[i] = nearest
+        if i >= wrong.shape[0]:
+            continue
+        if most_rad_s.shape[0] == 0:
+            if abs(math.sin(q[i, 4])) < math.sin(WRIST_ZONE_RAD):
+                bits |= WRIST
+        elif i > 0:
+            for j in range(6):  # NaN, where there is no row before, is not too fast
+                if abs(q[i, j] - q[i - 1, j]) > most_rad_s[j] * duration_s[i] * _SPEED_ROOM:
+                    bits |= FAST
+        wrong[i] = bits
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _share_rows(qd: FloatArray, most_rad_s: FloatArray, row: NDArray[np.int32], share: FloatArray) -> None:
+    for i in range(qd.shape[0]):
+        for j in range(6):
+            found = abs(qd[i, j]) / most_rad_s[j]
+            if found > share[row[i]]:  # NaN is not
+                share[row[i]] = found
