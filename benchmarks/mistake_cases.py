@@ -424,7 +424,7 @@ MATERIAL_MISTAKES = (
         {**TOOL_9, 12: "@"}, STOCK + "[tool.9]\nlength_mm = 110.0\ncentre_cutting = false\n",
     ),
     Mistake("left-hand rotation", r"(?i)M4|wrong way", {7: "N40 S8000 M4", 12: "@", 13: "@"}, STOCK),
-    Mistake("stock mesh that is not there", r"raw\.stl", cell='[stock]\nmesh = "raw.stl"\n'),
+    Mistake("stock mesh that is not there", r"(?i)stock", cell='[stock]\nmesh = "raw.stl"\n'),
     Mistake("stock box the wrong way round", r"box_mm", cell=STOCK.replace("-20.0", "20.0")),
     Mistake("two force laws", r"linear_edge|kienzle", cell=(
         "[material]\nkienzle = { kc11 = 641.0, mc = 0.27 }\n"

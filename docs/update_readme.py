@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+STOCK = "[stock]\nbox_mm = [[0, -100, -30], [300, 100, 0]]\n"
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(
     r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```",
@@ -48,8 +49,9 @@ def draw_pictures() -> None:
     images = ROOT / "docs" / "images"
     images.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        output_of("gcode2krl predict examples/test_piece.nc -o {tmp}/p --plot", folder)
-        for name in ("path", "kinematics", "joints"):
+        (Path(folder) / "cell.toml").write_text(STOCK, encoding="utf-8")
+        output_of("gcode2krl predict examples/test_piece.nc --cell {tmp}/cell.toml -o {tmp}/p --plot", folder)
+        for name in ("path", "kinematics", "joints", "force", "deflection_path", "deflection_joints"):
             shutil.copy(Path(folder) / "p" / f"{name}.png", images / f"{name}.png")
 
 

@@ -22,6 +22,7 @@ _HOMES = {
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
     "cut": "gcode2krl.cutting",
+    "diagnose": "gcode2krl.gap",
     "deflect": "gcode2krl.compliance",
     "load_run": "gcode2krl.runs",
     "Run": "gcode2krl.runs",
@@ -37,6 +38,7 @@ __all__ = [
     "__version__",
     "cut",
     "deflect",
+    "diagnose",
     "load_cell",
     "load_run",
     "plan_motion",
@@ -50,9 +52,10 @@ __all__ = [
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell, load_cell
-    from gcode2krl.compliance import deflect
-    from gcode2krl.cutting import cut
+    from gcode2krl.compliance.deflect import deflect
+    from gcode2krl.cutting.cut import cut
     from gcode2krl.errors import Gcode2KrlError, Issue
+    from gcode2krl.gap.diagnose import diagnose
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
     from gcode2krl.predict import plan_motion, predict, set_targets, solve_joints

@@ -1,6 +1,5 @@
 """The pipeline, and whatever needs two stages: targets with their spin search, joints of targets."""
 
-import functools
 import hashlib
 import io
 from collections.abc import Callable, Sequence
@@ -28,6 +27,7 @@ Floats = NDArray[np.float64]
 _SLOWING_ROUNDS = 3
 _ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
+_ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
 
 
 def predict(
@@ -215,7 +215,10 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
         sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
-    return replace(motion, issues=tuple(issues))
+    planned = replace(motion, issues=tuple(issues))
+    if motion in _ANGLES_KNOWN:
+        _ANGLES_KNOWN[planned] = _ANGLES_KNOWN.pop(motion)
+    return planned
 
 
 def corner_errors(
@@ -268,7 +271,7 @@ def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
     For Targets ``qd_rad_s`` is NaN, and the findings on reach, limits and singularities are in ``issues``.
     """
     if isinstance(source, Motion):
-        return robot.follow_motion(source, cell)
+        return robot.joints_from_angles(source, *_motion_angles(source, cell), cell)
     joints, findings = robot.follow(source, cell)
     return replace(joints, issues=findings)
 
@@ -300,13 +303,19 @@ def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats 
     """Return the largest joint speed over its limit (n,) of each move of the chain; None without limits."""
     if cell.robot.speeds.qd_deg_s is None or len(chain.length_mm) == 0:
         return None
-    _, qd_rad_s = robot.motion_angles(motion, cell)
-    most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
-    load = functools.reduce(np.fmax, (np.abs(qd_rad_s) / most).T, np.zeros(len(motion)))
-    by_row = np.zeros(int(max(chain.move.max(), motion.move.max())) + 1)
-    np.maximum.at(by_row, motion.move, load)
-    share: Floats = by_row[chain.move]
-    return share
+    _, qd_rad_s = _motion_angles(motion, cell)
+    rows = int(max(chain.move.max(), motion.move.max())) + 1
+    by_row = robot.speed_share(motion, qd_rad_s, cell, rows)
+    return None if by_row is None else by_row[chain.move]
+
+
+def _motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
+    """Return angles and speeds (m, 6) of a Motion, remembered as long as it lives."""
+    known = _ANGLES_KNOWN.get(motion)
+    if known is None or known[0] is not cell:
+        known = (cell, *robot.motion_angles(motion, cell))
+        _ANGLES_KNOWN[motion] = known
+    return known[1], known[2]
 
 
 def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:

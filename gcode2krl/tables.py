@@ -106,7 +106,8 @@ class Toolpath(Table):
 
     def is_position(self) -> Bools:
         """Return (n,) True where X, Y and Z are all known: a point a robot may be sent to."""
-        result: Bools = np.logical_and.reduce(self.known, axis=1)
+        x, y, z = self.known.T
+        result: Bools = x & y & z
         return result
 
 

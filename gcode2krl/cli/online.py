@@ -202,10 +202,9 @@ def _draw(
     }
     run = runs["pilot"]
     device = run.device
-    needed = np.linalg.norm(run.error_mm - run.shift_mm, axis=1)
     signals = Signals(
         run.time_s, run.force_N, device.measured[:, :3], device.estimate_N, device.load[:, :3], device.weight,
-        needed, np.linalg.norm(run.shift_mm, axis=1), twin.settings.threshold_N,
+        run.needed_mm, np.linalg.norm(run.shift_mm, axis=1), twin.settings.threshold_N,
     )  # fmt: skip
     worst = np.where(judged.counts, runs["cartesian"].normal_mm, 0.0)
     around_s = float(run.time_s[int(np.argmax(worst))]) if len(worst) else 0.0
@@ -280,6 +279,8 @@ def serve_command(
     form = header.form if header is not None else "none"
     if files is not None:
         written = _controller_files(settings, form, name, Path(files))
+        if settings.link.address.startswith("127."):
+            console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
         if as_json:
             console.json({"files": [str(file) for file in written]})
         for file in written:

@@ -20,6 +20,7 @@ from gcode2krl.tables import Forces, Motion, Toolpath
 Floats = NDArray[np.float64]
 _SAME_AXIS = 1e-9
 _ARC_COLUMNS = 6
+_SHANK_MM = 1.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,10 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     field = height_field_of(toolpath, cell, to_field, tools)
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
-    engaged = engage(field, position, tool, wholly_rapid, f_z_mm, tools, law)
+    engaged = engage(field, position, tool, wholly_rapid, f_z_mm, [_with_shank(one) for one in tools], law)
+    overlap_mm = np.array(engaged.overlap_mm, dtype=np.float64)
+    flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
+    overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
     forces = Forces(
         force_base_N=engaged.force_N @ to_field,
         moment_base_Nmm=engaged.moment_Nmm @ to_field,
@@ -96,7 +100,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
         ramp_rad=engaged.ramp_rad,
         cycle_s=float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0,
         centre_mm=engaged.centre_mm,
-        overlap_mm=engaged.overlap_mm,
+        overlap_mm=overlap_mm,
     )
     return Removal(replace(forces, issues=findings_of(seen, forces, cell, field.guessed)), field)
 
@@ -109,6 +113,13 @@ def no_forces(motion: Motion) -> Forces:
         torque_Nmm=np.zeros(count), a_p_mm=np.zeros(count), a_e_mm=np.zeros(count),
         phi_rad=np.full((count, _ARC_COLUMNS), np.nan), tool=motion.tool,
     )  # fmt: skip
+
+
+def _with_shank(tool: Tool) -> Tool:
+    """Return a tool whose edges reach a little up a cylindrical shank, so that cuts deeper than they show."""
+    if tool.kind in ("tapered", "drill") or tool.flute_length_mm is None:
+        return tool
+    return tool.model_copy(update={"flute_length_mm": tool.flute_length_mm + _SHANK_MM})
 
 
 def _set_up(motion: Motion) -> Floats:

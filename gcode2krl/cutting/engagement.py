@@ -1,8 +1,8 @@
 """Engagement and mean force along a motion, by cutting it out of a height field.
 
-The field is divided into strips, one a thread. Each strip removes every sweep that comes near it, in the order of
-time, and reads the samples that stand in it; what a sample reads never depends on the division, so any number of
-threads gives the same result to the last bit.
+The field is divided into strips, one a thread. Each strip removes every sweep that comes near it, in the
+order of time, and reads the samples that stand in it; what a sample reads never depends on the division, so
+any number of threads gives the same result to the last bit.
 """
 
 import math
@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
+from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import ARCS, Cutters, Result, cut_strip
-from gcode2krl.cutting.removal import BALL, FLAT, OTHER, Grid, Path
+from gcode2krl.cutting.reading import Result, cut_strip
+from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path
 from gcode2krl.sections import Tool
 
 Floats = NDArray[np.float64]
@@ -34,14 +35,14 @@ _FEW_SAMPLES = 2000
 
 
 def engage(
-    field: HeightField, position_mm: Floats, tool: NDArray[np.int32], rapid: NDArray[np.bool_], f_z_mm: Floats,
-    tools: Sequence[Tool], law: Floats, threads: int | None = None,
+    field: HeightField, position_mm: Floats, tool: NDArray[np.int32], rapid: NDArray[np.bool_], f_z_mm:
+    Floats, tools: Sequence[Tool], law: Floats, threads: int | None = None,
 ) -> Result:  # fmt: skip
     """Cut a motion out of a field, which changes; return engagement and mean force of every sample.
 
-    Each sample is read at its own position, before the sweep that leads to it is removed. Forces are means over a
-    revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge; the moment is
-    that of heights above the tip times lateral forces, and the torque.
+    Each sample is read at its own position, before the sweep that leads to it is removed. Forces are means
+    over a revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge;
+    the moment is that of heights above the tip times lateral forces, and the torque.
 
     Parameters
     ----------
@@ -82,9 +83,24 @@ def engage(
         low, high = bounds[strip], bounds[strip + 1]
         begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
         own_begin, own_end = field.cells(axis, low, high)
-        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(count, np.float32)
+        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(count)
         reach_mm = halo_mm + float(path.outlines[:, 0].max())
-        cut_strip(grid, path, cutters, law, feed, way_mm, low, high, axis, reach_mm, index, rapid_mm, result)
+        cut_strip(
+            grid,
+            path,
+            cutters,
+            law,
+            feed,
+            way_mm,
+            low,
+            high,
+            axis,
+            reach_mm,
+            index,
+            new_work(),
+            rapid_mm,
+            result,
+        )
         return grid, own_begin, own_end, own_begin - begin, rapid_mm
 
     with ThreadPoolExecutor(len(bounds) - 1) as pool:
@@ -95,7 +111,7 @@ def engage(
     return result
 
 
-_Piece = tuple[Grid, int, int, int, NDArray[np.float32]]
+_Piece = tuple[Grid, int, int, int, Floats]
 
 
 def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:
@@ -126,14 +142,14 @@ def _outline(shape: Shape) -> tuple[float, ...]:
 def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
     """Return what the kernels need of tools on a field of a cell size."""
     listed = [_bands(tool, cell_mm) for tool in tools]
-    bands = np.zeros((len(tools), max(len(one) for one in listed), 7))
+    bands = np.zeros((len(tools), max(len(one) for one in listed), BAND_COLUMNS))
     for row, one in zip(bands, listed, strict=True):
         row[: len(one)] = one
     radius = outlines_of(tools)[:, 0]
     around = 2.0 * math.pi * radius / cell_mm
     return Cutters(
         bands=bands,
-        count=np.array([len(one) for one in listed], dtype=np.int32),
+        used=np.array([len(one) for one in listed], dtype=np.int64),
         wall_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_WALL_BINS)),
         ring_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_RING_BINS)),
         teeth=np.array([float(tool.teeth) for tool in tools]),
@@ -142,8 +158,8 @@ def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
     )
 
 
-def _round_up(bins: Floats) -> NDArray[np.int32]:
-    return (_BINS * np.ceil(bins / _BINS)).astype(np.int32)
+def _round_up(bins: Floats) -> NDArray[np.int64]:
+    return (_BINS * np.ceil(bins / _BINS)).astype(np.int64)
 
 
 def _bands(tool: Tool, cell_mm: float) -> Floats:
@@ -158,7 +174,9 @@ def _bands(tool: Tool, cell_mm: float) -> Floats:
         cos = np.where(np.abs(edge.cos_kappa) < 1e-9, 0.0, edge.cos_kappa)
         half = 0.5 * edge.db_mm * cos
         low, high = edge.radius_mm - half, edge.radius_mm + half
-        parts.append(np.stack([edge.z_low_mm, edge.z_high_mm, low, high, edge.sin_kappa, cos, edge.db_mm], axis=1))
+        parts.append(
+            np.stack([edge.z_low_mm, edge.z_high_mm, low, high, edge.sin_kappa, cos, edge.db_mm], axis=1)
+        )
     bands = np.concatenate(parts)
     bands[1:, 2] = bands[:-1, 3]  # a ring between two bands is read once
     return bands
@@ -182,6 +200,6 @@ def _air(count: int) -> Result:
         a_e_mm=np.zeros(count),
         phi_rad=np.full((count, 2 * ARCS), np.nan),
         ramp_rad=np.zeros(count),
-        centre_mm=np.zeros(count, np.float32),
-        overlap_mm=np.zeros((count, 3), np.float32),
+        centre_mm=np.zeros(count),
+        overlap_mm=np.zeros((count, 3)),
     )

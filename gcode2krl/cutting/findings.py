@@ -181,8 +181,8 @@ def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
                     what = "the spindle" if order % teeth else "tooth passing"
                     yield Issue(
                         "note", "near-mode", int(cut.source_line[row]),
-                        f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{int(number)} ({what}) is near the "
-                        f"mode at {mode:g} Hz; stability is not predicted",
+                        f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{int(number)} ({what}) is near "
+                        f"the mode at {mode:g} Hz; stability is not predicted",
                         "change the spindle speed",
                     )  # fmt: skip
                     break

@@ -4,16 +4,13 @@ A field belongs to one direction of the tool, its z; 3+2 machining has one field
 highest surface counts as solid down to one flat bottom, so undercuts are filled.
 """
 
-import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cutting.kernels import kernel
-from gcode2krl.cutting.removal import BLOCK, LANES, Grid, refresh
-from gcode2krl.errors import input_error
+from gcode2krl.cutting.sweep import BLOCK, LANES, Grid, refresh
 
 Floats = NDArray[np.float64]
 CELLS_PER_DIAMETER = 160.0
@@ -29,8 +26,9 @@ _EMPTY_MM = 1e-3
 class HeightField:
     """Material over a rectangle in the plane normal to the tool axis; row = y, column = x.
 
-    ``height_mm`` (ny, nx) float32, top of the material over the middle of each cell, -inf where there is none;
-    ``origin_mm`` (2,) the low corner; ``cell_mm`` (2,) size of a cell along x and y. It changes while it is cut.
+    ``height_mm`` (ny, nx) float32, top of the material over the middle of each cell, -inf where there is
+    none; ``origin_mm`` (2,) the low corner; ``cell_mm`` (2,) size of a cell along x and y. It changes while
+    it is cut.
     """
 
     height_mm: NDArray[np.float32]
@@ -50,7 +48,7 @@ class HeightField:
         return HeightField(self.height_mm.copy(), self.origin_mm, self.cell_mm, self.bottom_mm, self.guessed)
 
     def cells(self, axis: int, low_mm: float, high_mm: float) -> tuple[int, int]:
-        """Return the first column (axis 0) or row (axis 1) between two coordinates and the one behind the last."""
+        """Return the first column (axis 0) or row (axis 1) between coordinates and the one after the last."""
         count, origin, size = self.height_mm.shape[1 - axis], self.origin_mm[axis], self.cell_mm[axis]
         low, high = (np.clip((at - origin) / size, 0.0, float(count)) for at in (low_mm, high_mm))
         return int(low), int(high)
@@ -76,7 +74,7 @@ class HeightField:
         return grid
 
     def take_back(self, grid: Grid, axis: int, first: int, after: int, skip: int) -> None:
-        """Copy the heights of columns or rows back from a grid that begins ``skip`` cells before ``first``."""
+        """Copy columns or rows back from a grid that begins ``skip`` cells before ``first``."""
         own = slice(skip + 1, skip + 1 + after - first)
         if axis == 0:
             self.height_mm[:, first:after] = grid.height[1 : 1 + self.height_mm.shape[0], own]
@@ -84,7 +82,7 @@ class HeightField:
             self.height_mm[first:after] = grid.height[own, 1 : 1 + self.height_mm.shape[1]]
 
 
-@kernel  # type: ignore[untyped-decorator]
+@kernel
 def _bound(height: NDArray[np.float32], bound: NDArray[np.float32]) -> None:
     for i in range(bound.shape[0]):
         for j in range(bound.shape[1]):

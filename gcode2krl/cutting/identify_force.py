@@ -127,7 +127,8 @@ def _steady(basis_N: Floats) -> NDArray[np.bool_]:
     for shift in (-2, -1, 1, 2):
         other = np.roll(flat, shift, axis=0)
         change = np.maximum(change, np.abs(flat - other).max(axis=1))
-    return change <= _STEADY * np.maximum(np.abs(flat).max(axis=1), 1e-12)
+    steady: NDArray[np.bool_] = change <= _STEADY * np.maximum(np.abs(flat).max(axis=1), 1e-12)
+    return steady
 
 
 def _averaged(time_s: Floats, measured_s: Floats, measured_N: Floats) -> tuple[NDArray[np.int64], Floats]:

@@ -1,7 +1,14 @@
 """How the kernels of the material removal are compiled."""
 
+from typing import Any
+
 from numba import njit
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+
+kernel: Any = njit(**_OPTIONS)
 """For functions that only use arrays they are given: without numba's reference counts, which would cost more
 than these short functions do. They cannot make arrays."""
+
+inlined: Any = njit(**_OPTIONS, inline="always")
+"""The same for functions with one caller: compiled as a part of it, once."""

@@ -1,0 +1,153 @@
+"""What the four figures of `online simulate` depend on: one thing changed at a time, then filters and delays.
+
+The defaults are stated, plausible values; none was fitted to a figure. The last table runs over all plausible
+filters and delays together and prints the range beside the defaults' figures; `--plot FILE` draws the first.
+
+    python benchmarks/twin_sensitivity.py                 the test piece, about two minutes
+    python benchmarks/twin_sensitivity.py --small         fewer combinations
+"""
+
+import argparse
+import itertools
+from pathlib import Path
+
+from gcode2krl import load_cell
+from gcode2krl.online.judge import judged
+from gcode2krl.online.outcome import figures_of
+from gcode2krl.online.settings import Online
+from gcode2krl.online.twin import CASES, World, simulate, twin_of
+from gcode2krl.predict import predict
+from gcode2krl.sections import Stock
+
+PART = Path(__file__).resolve().parent.parent / "examples" / "test_piece.nc"
+STOCK = Stock(box_mm=((0.0, -100.0, -30.0), (300.0, 100.0, 0.0)))
+MS = 1e-3
+
+ONE_AT_A_TIME = (
+    ("low-pass (Hz)", "lowpass_hz", (2.0, 3.0, 4.0, 6.0, 8.0, 12.0), "settings"),
+    ("average (s)", "average_s", (0.0, 0.02, 0.04, 0.06, 0.08), "settings"),
+    ("lead (s)", "lead_s", (0.0, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08), "settings"),
+    ("blend (s)", "blend_s", (0.02, 0.04, 0.08, 0.12, 0.16), "settings"),
+    ("threshold (N)", "threshold_N", (50.0, 100.0, 150.0, 200.0, 300.0), "settings"),
+    ("robot dead time (s)", "dead_s", (0.004, 0.008, 0.012, 0.02, 0.03), "world"),
+    ("robot lag (s)", "lag_s", (0.004, 0.008, 0.012, 0.02, 0.03), "world"),
+    ("sensor delay (s)", "sensor_delay_s", (0.0, 0.004, 0.008, 0.012), "world"),
+    ("pilot force over true", "pilot_scale", (0.6, 0.7, 0.8, 0.9, 0.93, 1.0, 1.1, 1.2, 1.3, 1.5), "world"),
+    ("model stiffness over true", "stiffness_scale", (0.9, 1.0, 1.06, 1.12, 1.2), "world"),
+    ("sensor gain", "sensor_gain", (0.95, 0.98, 1.0, 1.02, 1.05), "world"),
+    ("sensor noise (N)", "noise_N", (0.0, 3.0, 10.0, 30.0), "world"),
+    ("cutter late (s)", "late_s", (-0.024, -0.012, 0.0, 0.012, 0.024), "world"),
+    ("speed over predicted", "feed_scale", (0.9, 0.97, 1.0, 1.03, 1.1), "world"),
+    ("backlash (deg)", "backlash_deg", (0.0, 0.0025, 0.005, 0.01, 0.017), "world"),
+)
+PLAUSIBLE = {
+    "lowpass_hz": (2.5, 4.0, 8.0),
+    "average_s": (0.02, 0.04, 0.06),
+    "sensor_delay_s": (0.004, 0.008),
+    "dead_s": (0.008, 0.012, 0.02),
+    "lag_s": (0.006, 0.012, 0.02),
+}
+"""Filters from the weakest that would quiet a sensor at a spindle on; delays of one to three cycles. Kept are
+those with a reaction of 100 to 150 ms, as the paper states."""
+REACTION_S = (0.100, 0.150)
+
+
+def figures(prediction, where, changed):
+    """Return the four figures with some settings changed; keys of the settings or of the world."""
+    own = {key: value for key, value in changed.items() if key in Online.model_fields}
+    world = {key: value for key, value in changed.items() if key not in Online.model_fields}
+    twin = twin_of(prediction, Online(**own), World(**world))
+    found = figures_of({case: simulate(twin, case) for case in CASES}, where)
+    return [found[f"{case}_mm"] for case in CASES]
+
+
+def reaction_s(changed):
+    """Return how long a force step takes to show to 90 % in the robot's movement."""
+    import numpy as np
+
+    from gcode2krl.online.filters import filter_start, filtered
+    from gcode2krl.online.plant import reaction
+
+    settings = Online(**{key: value for key, value in changed.items() if key in Online.model_fields})
+    load = np.zeros((300, 6))
+    load[50:, 0] = 1.0
+    _, out, _ = filtered(filter_start(settings), load, settings)
+    time_s = settings.cycle_s * np.arange(300)
+    moved = reaction(out[:, :1], time_s, changed["dead_s"], changed["lag_s"])[:, 0]
+    return float(time_s[np.argmax(moved >= 0.9)] - time_s[50] + changed["sensor_delay_s"])
+
+
+def row(label, values, mark=""):
+    print(f"  {label:<34}" + "".join(f"{value:>14.3f}" for value in values) + mark)
+
+
+def table(prediction, where):
+    """Print what each change costs; returns name -> (values, figures)."""
+    drawn = {}
+    for name, key, values, kind in ONE_AT_A_TIME:
+        print(name)
+        found = []
+        default = getattr(World() if kind == "world" else Online(), key)
+        default = Online().pilot_lead_s if default is None else default
+        for value in values:
+            found.append(figures(prediction, where, {key: value}))
+            row(f"{value:g}", found[-1], "   default" if value == default else "")
+        drawn[name] = (values, found)
+    return drawn
+
+
+def plausible_range(prediction, where, small):
+    """Print the range of the figures over all plausible filters and delays."""
+    names = list(PLAUSIBLE)
+    choices = [(values[0], values[-1]) if small else values for values in PLAUSIBLE.values()]
+    kept, low, high = 0, [9.0] * len(CASES), [0.0] * len(CASES)
+    for values in itertools.product(*choices):
+        changed = dict(zip(names, values, strict=True))
+        if not REACTION_S[0] <= reaction_s(changed) <= REACTION_S[1]:
+            continue
+        changed["robot_delay_s"] = changed["dead_s"] + changed["lag_s"]  # the lead follows the robot's delay
+        found = figures(prediction, where, changed)
+        kept += 1
+        low = [min(pair) for pair in zip(low, found, strict=True)]
+        high = [max(pair) for pair in zip(high, found, strict=True)]
+    print(f"all {kept} plausible filters and delays with a reaction of 100 to 150 ms")
+    row("least", low)
+    row("most", high)
+
+
+def draw(drawn, file):
+    """Draw the figures over each changed value."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13.0, 12.0), layout="constrained")
+    panels = figure.subplots(5, 3).ravel()
+    for axes, (name, (values, found)) in zip(panels, drawn.items(), strict=False):
+        for k, case in enumerate(CASES):
+            axes.plot(values, [one[k] for one in found], marker="o", ms=3, label=case)
+        axes.set_xlabel(name)
+        axes.set_ylim(bottom=0.0)
+    panels[0].legend(frameon=False, fontsize=8)
+    figure.supylabel("Largest deviation normal to the feed (mm)")
+    figure.savefig(file, dpi=120)
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--small", action="store_true")
+    parser.add_argument("--plot", type=Path)
+    options = parser.parse_args()
+    cell = load_cell().model_copy(update={"stock": STOCK})
+    prediction = predict(PART, cell, dt_s=Online().cycle_s)
+    where = judged(prediction, Online().memory_s)
+    print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
+    row("defaults", figures(prediction, where, {}))
+    drawn = table(prediction, where)
+    plausible_range(prediction, where, options.small)
+    if options.plot is not None:
+        draw(drawn, options.plot)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""Clocks within normal mismatch, run by run: stamps are moved so that what is left of them is linear.
+
+A clock that is 2 ms off leaves a·t²/2, some micrometres at every change of speed, beside its linear
+signature; over thousands of samples that is enough to look like something else.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.gap.bounds import sigma
+from gcode2krl.gap.examine import Question, columns_of, nuisance_for
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.signatures import Signatures
+
+Floats = NDArray[np.float64]
+LINKS = ("force", "mechanics")
+_ROUNDS = 2
+_MOST_S = 0.02
+_RIDGE = 1e-6
+
+
+def with_set_clocks(parts: Sequence[Part], question: Question, known: Signatures) -> list[Part]:
+    """Return the parts with each run's own clock error taken off its stamps; signatures stay as they are.
+
+    What all runs share is kept where it is more than mismatch: it is a cause to be found.
+    """
+    parts = list(parts)
+    if not parts or parts[0].link not in LINKS:
+        return parts
+    blocks = [block for block in question.blocks if block.effect.name != "clock"]
+    _, _, stacks = columns_of(blocks, parts, known)
+    nuisance = nuisance_for(parts, question, known)
+    total = np.zeros(len(parts))
+    current = parts
+    for _ in range(_ROUNDS):
+        for number, part in enumerate(current):
+            others = [each.columns for each in nuisance[number] if each.name != "clock"]
+            clock = [each.columns for each in nuisance[number] if each.name == "clock"]
+            if clock:
+                share = _coefficient(part, clock[0], np.concatenate([stacks[number], *others], axis=2))
+                total[number] += share * sigma(question.mismatch.clock_s) * question.clocks**0.5
+        total = np.clip(total, -_MOST_S, _MOST_S)
+        common = float(np.median(total))
+        limit = question.mismatch.clock_s * question.clocks
+        kept = common if abs(common) > limit else 0.0
+        current = [
+            replace(part, time_s=part.time_s - (offset - kept))
+            for part, offset in zip(parts, total.tolist(), strict=True)
+        ]
+        if kept:
+            break
+    for before, after in zip(parts, current, strict=True):
+        known.same(before, after)
+    return current
+
+
+def _coefficient(part: Part, clock: Floats, others: Floats) -> float:
+    """Return the coefficient of the clock's column beside all that any effect or mismatch could explain."""
+    k, n, _ = clock.shape
+    flat = np.concatenate([clock, others], axis=2).reshape(k * n, -1)
+    scale = np.sqrt(np.sum(flat**2, axis=0))
+    good = scale > 0.0
+    if not good[0]:
+        return 0.0
+    flat = flat[:, good] / scale[good]
+    gram = flat.T @ flat
+    gram[np.diag_indices_from(gram)] += _RIDGE
+    found = np.linalg.solve(gram, flat.T @ part.residual.T.reshape(k * n))
+    return float(found[0] / scale[0])

@@ -1,0 +1,202 @@
+"""The answer: judgements of the links, slips and clocks, put together."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gcode2krl.effects import Applied
+from gcode2krl.errors import Issue
+from gcode2krl.gap.judge import NAMED, Cause, Judgement
+from gcode2krl.gap.links import LINKS, SIGNAL, UNIT, needs
+from gcode2krl.gap.result import Gap
+from gcode2krl.gap.side import Side
+from gcode2krl.gap.slips import Slip
+from gcode2krl.gap.timing import timing_share, timing_sizes
+from gcode2krl.gap.where import place
+
+_ORDER = {"no_gap": 0, "explained": 1, "partly_explained": 2, "unexplained": 3}
+_MOST_ALIKE = 5
+_SURE = 0.95
+"""A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
+
+
+def answer(
+    sides: Sequence[Side], judgements: Sequence[Judgement], slips: Sequence[Slip], issues: Sequence[Issue],
+    examined: frozenset[str], notes: Sequence[str],
+) -> Gap:  # fmt: skip
+    """Return the diagnosis of all links together."""
+    main = max(judgements, key=_weight, default=None)
+    gapped = [each for each in judgements if each.verdict != "no_gap"]
+    causes = [_slip_cause(slip) for slip in slips]
+    causes += [_cause(cause, each) for each in gapped for cause in each.causes]
+    causes.sort(key=lambda cause: -cause["probability"])
+    verdict = _verdict(gapped, slips)
+    named = [slip.applied for slip in slips if not slip.final]
+    named += [one for each in gapped for one in each.applied]
+    every = [issue for side in sides for issue in side.run.issues]
+    return Gap(
+        verdict=verdict,
+        gap=_gap(main, slips),
+        links=_links(judgements, slips),
+        where=_where(main, judgements),
+        causes=causes,
+        unexplained=_rest(main),
+        not_examined=_not_examined(judgements, slips),
+        named=tuple(named),
+        issues=(*issues, *every),
+        runs=tuple(side.name for side in sides),
+        notes=tuple(notes),
+    )
+
+
+def _weight(judgement: Judgement) -> tuple[bool, float]:
+    """Order links by whether there is a gap, then by its power over the noise's."""
+    size = judgement.size
+    return judgement.verdict != "no_gap", size.excess_before / max(size.noise, 1e-30)
+
+
+def _verdict(gapped: Sequence[Judgement], slips: Sequence[Slip]) -> str:
+    if not gapped:
+        return "explained" if slips else "no_gap"
+    verdicts = {each.verdict for each in gapped}
+    if verdicts == {"explained"}:
+        return "explained"
+    if verdicts == {"unexplained"} and not slips:
+        return "unexplained"
+    return "partly_explained"
+
+
+def _gap(main: Judgement | None, slips: Sequence[Slip]) -> dict[str, Any]:
+    if main is None or (slips and main.verdict == "no_gap"):
+        slip = slips[0] if slips else None
+        link = slip.link if slip else "mechanics"
+        return {
+            "signal": SIGNAL[link], "unit": UNIT[link],
+            "rms_before": slip.rms_before if slip else None, "rms_after": slip.rms_after if slip else None,
+            "noise_floor": None, "max_before": None, "max_after": None, "shrink": None, "held_out": False,
+        }  # fmt: skip
+    size, factor = main.size, main.parts[0].factor
+    explained = bool(main.causes)
+    return {
+        "signal": "timing" if _is_timing(main) else main.parts[0].signal,
+        "unit": main.parts[0].unit,
+        "rms_before": factor * size.before**0.5,
+        "rms_after": factor * size.after**0.5,
+        "noise_floor": factor * size.floor**0.5,
+        "max_before": factor * size.largest_before,
+        "max_after": factor * size.largest_after,
+        "shrink": size.shrink if explained and main.held_out else None,
+        "held_out": main.held_out,
+    }
+
+
+def _is_timing(judgement: Judgement) -> bool:
+    return judgement.link == "path" and judgement.verdict != "no_gap" and timing_share(judgement.parts) > 0.5
+
+
+def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    by_link = {each.link: each for each in judgements}
+    slipped = {slip.link for slip in slips}
+    for link in LINKS:
+        if link == "timing" and "path" in by_link:
+            path = by_link["path"]
+            before, after = timing_sizes(path.parts, path.examination.applied)
+            verdict = path.verdict if _is_timing(path) else "no_gap"
+            entry = {"link": link, "rms_before": before, "rms_after": after, "noise": None, "unit": "s"}
+            found.append(entry | {"verdict": verdict})
+        if link in by_link:
+            each = by_link[link]
+            factor = each.parts[0].factor
+            verdict = "no_gap" if _is_timing(each) else each.verdict
+            found.append({
+                "link": link,
+                "rms_before": factor * each.size.before**0.5,
+                "rms_after": factor * each.size.after**0.5,
+                "noise": factor * each.size.floor**0.5,
+                "unit": each.parts[0].unit,
+                "verdict": "explained" if link in slipped and verdict == "no_gap" else verdict,
+            })  # fmt: skip
+    return found
+
+
+def _where(main: Judgement | None, judgements: Sequence[Judgement]) -> dict[str, Any]:
+    signals = [
+        {
+            "signal": each.parts[0].signal,
+            "rms": each.parts[0].factor * each.size.before**0.5,
+            "noise": each.parts[0].factor * each.size.floor**0.5,
+            "significant": each.verdict != "no_gap",
+        }
+        for each in judgements
+    ]
+    empty: dict[str, Any] = {
+        "intervals": [], "direction_base": None, "phases": [], "joints": [], "frequency_hz": None
+    }  # fmt: skip
+    if main is None or main.verdict == "no_gap":
+        return {"signals": signals, **empty}
+    named = list(main.applied)
+    return {"signals": signals, **place(main.parts, main.examination.noise, named)}
+
+
+def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
+    factor = judgement.parts[0].factor
+    link = "timing" if _is_timing(judgement) and "timing" in cause.applied.effect.links else judgement.link
+    return {
+        "effect": cause.applied.effect.name,
+        "target": cause.applied.target,
+        "link": link,
+        "probability": cause.probability,
+        "parameters": {name: each._asdict() for name, each in cause.parameters.items()},
+        "shrink": cause.shrink,
+        "rms_after": None if cause.rms_after is None else factor * cause.rms_after,
+        "indistinguishable_from": [
+            {"effect": rival.applied.effect.name, "target": rival.applied.target}
+            for rival, _ in cause.rivals
+            if rival.alike
+        ][:_MOST_ALIKE],
+        "rivals": [
+            {"effect": rival.applied.effect.name, "target": rival.applied.target, "probability": share}
+            for rival, share in cause.rivals
+            if not rival.alike
+        ],
+    }
+
+
+def _slip_cause(slip: Slip) -> dict[str, Any]:
+    values = {name: {"value": v, "low": v, "high": v} for name, v in slip.applied.values.items()}
+    shrink = None
+    if slip.rms_after is not None and slip.rms_before > 0.0:
+        shrink = float(np.clip(1.0 - slip.rms_after**2 / slip.rms_before**2, 0.0, 1.0))
+    return {
+        "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,
+        "probability": _SURE, "parameters": {} if slip.final else values, "shrink": shrink,
+        "rms_after": slip.rms_after, "indistinguishable_from": [], "words": slip.words,
+    }  # fmt: skip
+
+
+def _rest(main: Judgement | None) -> dict[str, Any]:
+    if main is None:
+        return {"rms": None, "significant": False, "structure": "unknown"}
+    size, factor = main.size, main.parts[0].factor
+    return {
+        "rms": factor * max(size.after, 0.0) ** 0.5,
+        "significant": bool(size.significant),
+        "structure": "structured" if size.significant else "white",
+    }
+
+
+def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
+    done = {each.link for each in judgements} | (
+        {"timing"} if any(e.link == "path" for e in judgements) else set()
+    )
+    final = any(slip.final for slip in slips)
+    return [
+        {"link": link, "needs": "a run that belongs to the prediction" if final else needs(link)}
+        for link in LINKS
+        if link not in done
+    ]
+
+
+__all__ = ["NAMED", "Applied", "answer"]

@@ -1,0 +1,288 @@
+"""The diagnosis: runs beside their predictions, link by link, to one answer."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.effects import Applied, Effect, inputs_of, library
+from gcode2krl.errors import input_error
+from gcode2krl.gap.answer import answer
+from gcode2krl.gap.bounds import Mismatch
+from gcode2krl.gap.clocks import coarse_offset, fitted_offset
+from gcode2krl.gap.examine import Question
+from gcode2krl.gap.fitted import with_fitted
+from gcode2krl.gap.from_log import log_sides
+from gcode2krl.gap.judge import Judgement, judge
+from gcode2krl.gap.links import EXAMINED, parts_of
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.replan import remembered_plan
+from gcode2krl.gap.result import Gap
+from gcode2krl.gap.retime import refined, retimed
+from gcode2krl.gap.side import Side
+from gcode2krl.gap.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
+from gcode2krl.gap.slips import Slip, clock_slips, slips_of
+from gcode2krl.prediction import Prediction
+from gcode2krl.runs import Run, check_program
+
+_S_PER_H = 3600.0
+_SLIPS_THAT_ARE_CAUSES = {"path": ("absolute_accuracy",), "servo": ("rsi_on",)}
+"""Slips that are searched for as every effect is; the others have tests of their own."""
+_SET = 0.1
+"""The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
+_PEAKS = 4
+_TIMING = ("velocity_rule", "corner", "advance_stop", "override")
+
+
+def diagnose(
+    prediction: Prediction,
+    runs: Sequence[Run],
+    holdout: Sequence[Run] = (),
+    *,
+    effects: Sequence[str | Path | Effect] = (),
+    mismatch: Mismatch | None = None,
+    seed: int = 0,
+) -> Gap:
+    """Return where runs differ from their prediction, why, and how much is gone with the causes in the model.
+
+    Parameters
+    ----------
+    runs : measured runs that explain; one whose ``run.toml`` names a prediction is compared with that one.
+    holdout : runs that only test; without any, whole runs by turns, of a single run stretches of the path.
+    effects : effects besides the library's, or folders of them.
+    mismatch : what is no gap; by default the bounds of `Mismatch`.
+
+    Raises
+    ------
+    NotUnderstoodError
+        No run, a run of another program than its prediction's, or a prediction without motion.
+    """
+    if not runs:
+        raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")
+    everything = [*runs, *holdout]
+    sides = list(_sides(prediction, everything))
+    known = known_effects(effects)
+    return _diagnosed(sides, len(runs), known, mismatch or Mismatch(), seed)
+
+
+def diagnose_log(
+    runs: Sequence[Run],
+    cell: Cell | None = None,
+    holdout: Sequence[Run] = (),
+    *,
+    effects: Sequence[str | Path | Effect] = (),
+    mismatch: Mismatch | None = None,
+    seed: int = 0,
+) -> Gap:
+    """Return what logs alone tell, without a prediction: servo, gear and, with a known robot, mechanics.
+
+    ``cell`` is the robot's; without one only joint signals are compared. Other parameters and errors as for
+    `diagnose`.
+    """
+    if not runs:
+        raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")
+    sides = log_sides([*runs, *holdout], cell)
+    return _diagnosed(
+        sides, len(runs), known_effects(effects), mismatch or Mismatch(), seed, cell is not None
+    )
+
+
+def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
+    """Return the library with effects of one's own."""
+    known = library([each for each in extra if not isinstance(each, Effect)])
+    return known | {each.name: each for each in extra if isinstance(each, Effect)}
+
+
+@dataclass
+class _State:
+    """What is known while the links are gone through."""
+
+    sides: list[Side]
+    explaining: int
+    known: Mapping[str, Effect]
+    mismatch: Mismatch
+    seed: int
+    kinematics: bool = True
+    examined: frozenset[str] = frozenset()
+    found: list[Applied] = field(default_factory=list)
+    """Causes that belong to the model of later links."""
+    slips: list[Applied] = field(default_factory=list)
+    judgements: list[Judgement] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    clock_s: dict[str, list[float]] = field(default_factory=dict)
+
+
+def _diagnosed(
+    sides: list[Side], explaining: int, known: Mapping[str, Effect], mismatch: Mismatch, seed: int,
+    kinematics: bool = True,
+) -> Gap:  # fmt: skip
+    sides = [_with_coarse_clocks(side) for side in sides]
+    slips, issues = slips_of(sides, known)
+    slips += clock_slips(sides, known)
+    state = _State(sides, explaining, known, mismatch, seed, kinematics)
+    if any(slip.final for slip in slips):
+        return answer(state.sides, [], slips, issues, state.examined, state.notes)
+    _apply_slips(state, slips)
+    _set_controller_clocks(state)
+    state.examined = frozenset(_examined(state))
+    for link in EXAMINED:
+        parts = _parts(state, link)
+        if parts:
+            held = [part for part in parts if part.side >= explaining]
+            mine = [part for part in parts if part.side < explaining]
+            judgement = judge(link, mine or held, held if mine else [], _question(state, link, parts))
+            state.judgements.append(judgement)
+            _learn(state, judgement)
+    return answer(state.sides, state.judgements, slips, issues, state.examined, state.notes)
+
+
+def _sides(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Side]:
+    started = [run.head.started for run in runs if run.head.started is not None]
+    first = min(started) if started else None
+    inputs = {}
+    for number, run in enumerate(runs):
+        own = run.path("prediction")
+        mine = Prediction.load(own) if own is not None and own.exists() else prediction
+        sha = mine.inputs.get("program_sha256")
+        wrong = check_program(run, sha) if isinstance(sha, str) else []
+        if wrong:
+            raise input_error(wrong[0].code, wrong[0].message, wrong[0].remedy, source=str(run.folder))
+        key = str(own) if mine is not prediction else ""
+        if key not in inputs:
+            inputs[key] = inputs_of(mine, plan=remembered_plan(mine))
+        hours = 0.0
+        if first is not None and run.head.started is not None:
+            hours = (run.head.started - first).total_seconds() / _S_PER_H
+        yield Side(run=run, number=number, inputs=replace(inputs[key], hours=hours))
+
+
+def _with_coarse_clocks(side: Side) -> Side:
+    tables = [table for table in (side.run.controller, side.run.tracker) if table is not None]
+    if side.from_log:
+        return side
+    offsets = {type(table).__name__.lower(): coarse_offset(side, table) for table in tables}
+    return replace(side, clock_s={name: offset for name, offset in offsets.items() if offset != 0.0})
+
+
+def _apply_slips(state: _State, slips: Sequence[Slip]) -> None:
+    """Let later links start from what a slip did to the motion."""
+    for slip in slips:
+        if slip.applied.effect.name == "override":
+            state.sides = [
+                replace(side, inputs=slip.applied.effect.replan(side.inputs, slip.applied))
+                for side in state.sides
+            ]
+        elif slip.applied.effect.name != "clock":
+            state.found.append(slip.applied)
+            state.slips.append(slip.applied)
+
+
+def _examined(state: _State) -> Iterator[str]:
+    for link in EXAMINED:
+        if _parts(state, link):
+            yield link
+            if link == "path":
+                yield "timing"
+
+
+def _parts(state: _State, link: str) -> list[Part]:
+    if link == "mechanics" and not state.kinematics:
+        return []
+    base = [one for one in state.found if _belongs(one, link) or one in state.slips]
+    return parts_of(link, state.sides, base)
+
+
+def _belongs(one: Applied, link: str) -> bool:
+    """Tell whether a cause found before is part of the model of a link."""
+    return link == "mechanics" and one.effect.family in ("force", "part")
+
+
+def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
+    cell = parts[0].inputs.cell
+    upstream = frozenset(each for each in EXAMINED if each not in state.examined)
+    blocks: list[Block] = []
+    for effect in state.known.values():
+        if effect.kind == "slip" and effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ()):
+            continue
+        for target in effect.targets(cell):
+            if link in effect.visible_links(state.examined, target) and _relevant(
+                effect, target, link, state
+            ):
+                if HZ in effect.names:
+                    p = effect.parameter(HZ)
+                    peaks = strongest_hz(
+                        [part.residual for part in parts], _step(parts), p.low, p.high, _PEAKS
+                    )
+                    blocks += blocks_at(effect, target, peaks)
+                else:
+                    blocks += blocks_of(effect, target)
+    clocks = 2 if link == "mechanics" and "path" not in state.examined and "servo" in state.examined else 1
+    share = _SET if link == "path" else 1.0
+    return Question(state.known, blocks, state.mismatch, upstream, clocks, share, state.seed)
+
+
+def _step(parts: Sequence[Part]) -> float:
+    return float(np.median(np.diff(parts[0].time_s)))
+
+
+def _relevant(effect: Effect, target: str | None, link: str, state: _State) -> bool:
+    """Leave out clocks that another link has already set right."""
+    if effect.name != "clock":
+        return True
+    if link == "path":
+        return target == "controller"
+    if link == "servo":
+        return target == "q_cmd"
+    return target != "controller" or "path" not in state.examined
+
+
+def _learn(state: _State, judgement: Judgement) -> None:
+    """Take what a link says into the model of the later ones."""
+    named = list(judgement.applied)
+    state.found += [one for one in named if one.effect.family in ("force", "part")]
+    if judgement.link in ("servo", "gear") and judgement.verdict in ("no_gap", "explained"):
+        state.sides = with_fitted(state.sides, judgement, _question_of(judgement))
+    if judgement.link != "path":
+        return
+    planned = [one for one in named if one.effect.name in _TIMING]
+    for one in planned:
+        state.sides = [replace(side, inputs=one.effect.replan(side.inputs, one)) for side in state.sides]
+    if judgement.verdict in ("unexplained", "partly_explained"):
+        state.sides = [retimed(side) for side in state.sides]
+    state.sides = [refined(_with_controller_clock(side)) for side in state.sides]
+
+
+def _question_of(judgement: Judgement) -> Question:
+    return judgement.examination.question
+
+
+def _set_controller_clocks(state: _State) -> None:
+    """Set the controllers' clocks run by run; what all of them are off by stays, where it is a finding."""
+    offsets = []
+    for side in state.sides:
+        parts = parts_of("path", [side])
+        offset, deviation = fitted_offset(parts[0]) if parts else (0.0, np.inf)
+        offsets.append(offset if np.isfinite(deviation) else 0.0)
+    common = float(np.median(offsets)) if offsets else 0.0
+    kept = common if abs(common) > state.mismatch.clock_s else 0.0
+    state.sides = [
+        replace(side, clock_s=_later(side, offset - kept))
+        for side, offset in zip(state.sides, offsets, strict=True)
+    ]
+
+
+def _later(side: Side, offset_s: float) -> dict[str, float]:
+    return {**side.clock_s, "controller": side.clock_s.get("controller", 0.0) + offset_s}
+
+
+def _with_controller_clock(side: Side) -> Side:
+    """Return the side with the controller's clock set by its commanded joints, run by run."""
+    parts = parts_of("path", [side])
+    if not parts:
+        return side
+    offset, deviation = fitted_offset(parts[0])
+    if not np.isfinite(deviation):
+        return side
+    return replace(side, clock_s=_later(side, offset))

@@ -1,0 +1,368 @@
+"""One link: noise, candidates, forward selection with refits, and what is left."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.effects import Applied, Effect
+from gcode2krl.gap.bounds import Mismatch
+from gcode2krl.gap.evidence import Ledger, rows_of
+from gcode2krl.gap.noise import Noise
+from gcode2krl.gap.noise_source import noise_of
+from gcode2krl.gap.nuisance import Nuisance, nuisance_of
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.refit import Fitted, Target, refit
+from gcode2krl.gap.select import (
+    Column,
+    Score,
+    left_out_gain,
+    scores,
+    surprise,
+    threshold,
+)  # fmt: skip
+from gcode2krl.gap.signatures import Block, Signatures
+
+Floats = NDArray[np.float64]
+MOST_EFFECTS = 4
+_SHORTLIST = 4
+_CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
+"""Rivals within this of the best linear gain are refitted too: signatures hold for small effects only."""
+PRUNE = 0.05
+_MARGIN = 2.0
+_STARTS = (1.0, -0.7, 3.0)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a link is examined for."""
+
+    library: Mapping[str, Effect]
+    blocks: Sequence[Block]
+    mismatch: Mismatch
+    upstream: frozenset[str]
+    clocks: int = 1
+    """How many clocks of their own the compared signals have."""
+    clock_share: float = 1.0
+    """Of the clocks' normal mismatch, what is left after they were set."""
+    seed: int = 0
+    starts: Mapping[tuple[str, str | None], Applied] = field(default_factory=dict)
+    """Where to begin the fit of effects that plan the motion anew."""
+
+
+@dataclass(eq=False)
+class Examination:
+    """What one link's data say."""
+
+    link: str
+    parts: list[Part]
+    noise: list[Noise]
+    nuisance: list[list[Nuisance]]
+    blocks: list[Block]
+    columns: list[Column]
+    signatures: Signatures
+    ledger: Ledger
+    target: Target
+    fitted: Fitted
+    level: float
+    chi2_before: float
+    question: Question
+    surprises: list[float] = field(default_factory=list)
+    usual: list[bool] = field(default_factory=list)
+    """Which of the fitted effects are within normal mismatch: in the model, but no finding."""
+
+    @property
+    def applied(self) -> tuple[Applied, ...]:
+        """Return the accepted effects, those within normal mismatch included."""
+        return self.fitted.applied
+
+    @property
+    def causes(self) -> tuple[Applied, ...]:
+        """Return the accepted effects that are more than normal mismatch."""
+        return tuple(a for a, usual in zip(self.fitted.applied, self.usual, strict=True) if not usual)
+
+    @property
+    def rows(self) -> int:
+        """Return the number of values."""
+        return sum(part.measured.size for part in self.parts)
+
+
+def examine(
+    link: str, parts: Sequence[Part], question: Question, signatures: Signatures | None = None,
+    noise: list[Noise] | None = None,
+) -> Examination:  # fmt: skip
+    """Choose and fit effects for a link, from these parts alone."""
+    parts = list(parts)
+    known = signatures or Signatures()
+    nuisance = nuisance_for(parts, question, known)
+    blocks, columns, stacked = columns_of(question.blocks, parts, known)
+    if noise is None:
+        noise = noise_of(parts, stacked, nuisance)
+    ledger = Ledger([
+        rows_of(part, s, own, noise) for part, s, own in zip(parts, stacked, nuisance, strict=True)
+    ])  # fmt: skip
+    target = Target(parts, nuisance, noise)
+    start = refit(target, ())
+    found = Examination(
+        link,
+        parts,
+        noise,
+        nuisance,
+        blocks,
+        columns,
+        known,
+        ledger,
+        target,
+        start,
+        0.0,
+        start.chi2,
+        question,
+    )
+    _select(found, np.random.default_rng(question.seed))
+    return found
+
+
+def nuisance_for(parts: Sequence[Part], question: Question, known: Signatures) -> list[list[Nuisance]]:
+    """Return the nuisance of each part, the shared ones of all parts in one order."""
+    return _aligned([
+        nuisance_of(
+            part, question.library, question.mismatch, known, question.upstream,
+            question.clocks**0.5 * question.clock_share,
+        )
+        for part in parts
+    ])  # fmt: skip
+
+
+def _select(found: Examination, generator: np.random.Generator) -> None:
+    rejected: set[tuple[str, str | None]] = set()
+    while len(found.causes) < MOST_EFFECTS and len(found.applied) < 2 * MOST_EFFECTS:
+        _update(found)
+        evidence = found.ledger.evidence()
+        given = range(found.ledger.given)
+        columns = [column.moved(found.ledger.given) for column in found.columns]
+        taken = {(each.effect.name, each.target) for each in found.applied} | rejected
+        allowed = [column for column in columns if found.blocks[column.block].key not in taken]
+        if not allowed:
+            break
+        found.level = threshold(evidence, allowed, generator, given)
+        spread = max(1.0, found.fitted.chi2 / max(evidence.rows, 1))
+        ranked = [
+            score
+            for score in scores(evidence, allowed, given, spread)
+            if (score.within or replans(found.blocks[score.column.block].effect))
+            and score.surprise > found.level
+        ]
+        ranked.sort(key=lambda score: -_worth(score, evidence.rows))
+        if not _accept(found, ranked, evidence.rows, spread, rejected):
+            break
+    _prune(found)
+
+
+def _accept(
+    found: Examination, ranked: list[Score], rows: int, spread: float, rejected: set[tuple[str, str | None]]
+) -> bool:
+    """Refit the best few and accept the one that explains most; False where none holds."""
+    while ranked:
+        short = _shortlist(found, ranked, rows)
+        tried: list[tuple[float, Score, Fitted]] = []
+        for score in short:
+            block = found.blocks[score.column.block]
+            start = block.applied(score.coefficients, found.parts[0])
+            if replans(block.effect):
+                fitted = _replanned(found, block, start)
+            else:
+                alone = len(start.effect.parameters) == 1
+                fitted = refit(found.target, (*found.applied, start), scan=alone)
+            penalty = _width(fitted) * np.log(rows)
+            tried.append((fitted.chi2 + penalty, score, fitted))
+        tried.sort(key=lambda each: each[0])
+        for _, score, fitted in tried:
+            gain = found.fitted.chi2 - fitted.chi2
+            certain = surprise(gain, score.column.width, spread)
+            if (
+                fitted.bound[-1]
+                or certain < found.level
+                or not (replans(score_effect(found, score)) or _holds(found, score))
+            ):
+                rejected.add(found.blocks[score.column.block].key)
+                continue
+            found.fitted = fitted
+            found.surprises.append(certain)
+            found.usual.append(False)
+            found.usual = [within_mismatch(found, number) for number in range(len(found.usual))]
+            return True
+        ranked = [score for score in ranked if found.blocks[score.column.block].key not in rejected]
+    return False
+
+
+def within_mismatch(found: Examination, number: int) -> bool:
+    """Tell whether every number of an accepted effect may be what normal mismatch allows, to 2 sigma."""
+    applied, question = found.fitted.applied[number], found.question
+    part = found.parts[0]
+    duration = float(part.time_s[-1] - part.time_s[0])
+    limits = question.mismatch.limits(applied, duration, question.clocks)
+    if not limits:
+        return False
+    nominal = applied.effect.nominal(part.inputs, applied.target)
+    deviation = found.fitted.deviations(number)
+    return all(
+        abs(applied.values[name] - nominal[name])
+        <= limits.get(name, 0.0) + _MARGIN * deviation.get(name, 0.0)
+        for name in applied.effect.names
+        if not applied.effect.parameter(name).is_shape
+    )
+
+
+def score_effect(found: Examination, score: Score) -> Effect:
+    """Return the effect of a score."""
+    return found.blocks[score.column.block].effect
+
+
+def _holds(found: Examination, score: Score) -> bool:
+    """Tell whether the effect also helps on runs (or stretches) that it was not fitted to."""
+    everything = found.ledger.stretches()
+    numbers = sorted({number for number, _ in everything})
+    if len(numbers) > 1:
+        folds = [[each for each in everything if each[0] == number] for number in numbers]
+    else:
+        quarters = np.array_split(np.arange(len(everything)), 4)
+        folds = [[everything[i] for i in quarter] for quarter in quarters]
+    return left_out_gain(found.ledger, folds, score.column, range(found.ledger.given)) > 0.0
+
+
+def _shortlist(found: Examination, ranked: list[Score], rows: int) -> list[Score]:
+    """Return the best block of each of the best few effects that come close to the best one."""
+    best = _worth(ranked[0], rows)
+    least = best - max(_CLOSE_SHARE * abs(best), _CLOSE_GAIN)
+    short: dict[tuple[str, str | None], Score] = {}
+    for score in ranked:
+        block = found.blocks[score.column.block]
+        key = block.key
+        if replans(block.effect) and key not in short:
+            short[key] = score
+        if _worth(score, rows) >= least and key not in short:
+            short[key] = score
+    near = [score for score in short.values() if not replans(found.blocks[score.column.block].effect)]
+    return [*near[:_SHORTLIST], *(score for score in short.values() if score not in near)]
+
+
+def replans(effect: Effect) -> bool:
+    """Tell whether an effect plans the motion anew: its linear signature then tells little of its size."""
+    return type(effect).replan is not Effect.replan
+
+
+def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
+    """Return the best refit from several starts."""
+    nominal = block.effect.nominal(found.parts[0].inputs, block.target)
+    typical = block.effect.start(found.parts[0].inputs, block.target)
+    known = found.question.starts.get(block.key)
+    if known is not None:
+        return refit(found.target, (*found.applied, known))
+    starts = [linear]
+    for factor in () if found.question.starts else _STARTS:
+        values = dict(linear.values) | {
+            p.name: float(
+                np.clip(nominal[p.name] + factor * (typical[p.name] - nominal[p.name]), p.low, p.high)
+            )
+            for p in block.effect.parameters
+            if not p.is_shape and np.isfinite(nominal[p.name])
+        }
+        starts.append(Applied(block.effect, block.target, values | dict(block.shape)))
+    rough = [refit(found.target, (*found.applied, start), steps=3) for start in starts]
+    best = min(rough, key=lambda each: each.chi2)
+    return refit(found.target, best.applied)
+
+
+def _worth(score: Score, rows: int) -> float:
+    """Return the gain less what so many numbers gain by themselves (Schwarz 1978)."""
+    return score.gain - score.column.width * float(np.log(rows))
+
+
+def _width(fitted: Fitted) -> int:
+    return len(fitted.free[-1].names) if fitted.free else 0
+
+
+def _update(found: Examination) -> None:
+    """Set the ledger's data to what the accepted effects leave, with their tangents as given."""
+    residuals = [part.measured - part.sample(found.applied) for part in found.parts]
+    tangents = [tangents_of(part, found.fitted) for part in found.parts]
+    found.ledger.set_data(residuals, tangents)
+
+
+def tangents_of(part: Part, fitted: Fitted, without: int = -1) -> Floats:
+    """Return (k, n, t) how the model changes with each number of the accepted effects, but one of them."""
+    n, k = part.shape
+    base = part.sample(fitted.applied)
+    columns = []
+    edges = np.cumsum([0, *(len(free.names) for free in fitted.free)])
+    for number, free in enumerate(fitted.free):
+        if number == without:
+            continue
+        x = fitted.x[edges[number] : edges[number + 1]]
+        for i in range(len(x)):
+            step = 0.02 * free.scale[i]
+            step = -step if x[i] + step > free.high[i] else step
+            moved = x.copy()
+            moved[i] += step
+            effects = list(fitted.applied)
+            effects[number] = free.applied(moved)
+            columns.append((part.sample(effects) - base).T / step * free.scale[i])
+    return np.stack(columns, axis=2) if columns else np.zeros((k, n, 0))
+
+
+def _prune(found: Examination) -> None:
+    """Drop what brings less than 5 % of the whole gain."""
+    while len(found.applied) > 1:
+        whole = found.chi2_before - found.fitted.chi2
+        costs = []
+        for number in range(len(found.applied)):
+            rest = tuple(each for i, each in enumerate(found.applied) if i != number)
+            without = refit(found.target, rest, steps=4)
+            costs.append((without.chi2 - found.fitted.chi2, number, without))
+        cost, number, without = min(costs, key=lambda each: each[0])
+        if cost >= PRUNE * whole:
+            return
+        found.fitted = without
+        del found.surprises[number], found.usual[number]
+
+
+def columns_of(
+    blocks: Sequence[Block], parts: Sequence[Part], known: Signatures
+) -> tuple[list[Block], list[Column], list[Floats]]:
+    """Return the blocks that are possible, where their columns stand, and the columns of each part."""
+    kept: list[Block] = []
+    columns: list[Column] = []
+    at = 0
+    stacks: list[list[Floats]] = [[] for _ in parts]
+    for block in blocks:
+        found = [known.columns(block, part) for part in parts]
+        width = found[0].shape[2]
+        if width == 0 or any(each.shape[2] != width for each in found):
+            continue
+        if not any(np.any(each) for each in found):
+            continue
+        low, high = block.bounds(parts[0])
+        columns.append(Column(len(kept), at, width, low, high))
+        kept.append(block)
+        at += width
+        for stack, each in zip(stacks, found, strict=True):
+            stack.append(each)
+    stacked = [
+        np.concatenate(stack, axis=2) if stack else np.zeros((*part.shape[::-1], 0))
+        for stack, part in zip(stacks, parts, strict=True)
+    ]
+    return kept, columns, stacked
+
+
+def _aligned(nuisance: list[list[Nuisance]]) -> list[list[Nuisance]]:
+    """Return the nuisance of all parts with the shared ones in one order, zero where a part has none."""
+    names = dict.fromkeys(each.name for own in nuisance for each in own if each.shared)
+    widths = {each.name: each.columns.shape[2] for own in nuisance for each in own if each.shared}
+    found = []
+    for own in nuisance:
+        mine = {each.name: each for each in own if each.shared}
+        k, n = own[0].columns.shape[:2] if own else (0, 0)
+        shared = [mine.get(name) or Nuisance(name, True, np.zeros((k, n, widths[name]))) for name in names]
+        found.append([*shared, *(each for each in own if not each.shared)])
+    return found

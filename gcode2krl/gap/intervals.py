@@ -1,0 +1,71 @@
+"""Intervals of parameters: curvature of chi2, with a sandwich over stretches of time for coloured rests."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.gap.evidence import stretches_of
+from gcode2krl.gap.examine import Examination
+from gcode2krl.gap.refit import residual_jacobian
+
+Floats = NDArray[np.float64]
+_DRAWS = 400
+_LEAST_STRETCHES = 8
+
+
+class Interval(NamedTuple):
+    """A value and its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def intervals_of(found: Examination) -> list[dict[str, Interval]]:
+    """Return the interval of every parameter of every accepted effect.
+
+    The covariance of the fit's numbers is H⁻¹·B·H⁻¹ with H the curvature and B the sum over stretches of time
+    of the outer products of their scores (White 1980, by clusters); never less than H⁻¹ alone.
+    """
+    if not found.applied:
+        return []
+    covariance = _covariance(found)
+    generator = np.random.default_rng(0)
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = found.fitted.x + generator.standard_normal((_DRAWS, len(found.fitted.x))) @ root.T
+    result, at = [], 0
+    for number, free in enumerate(found.fitted.free):
+        width = len(free.names)
+        mine = np.clip(draws[:, at : at + width], free.low, free.high)
+        at += width
+        drawn = [free.applied(x).values for x in mine]
+        own = found.applied[number].values
+        result.append({
+            name: Interval(own[name], *np.quantile([d[name] for d in drawn], [0.05, 0.95]).tolist())
+            for name in own
+        })  # fmt: skip
+    return result
+
+
+def _covariance(found: Examination) -> Floats:
+    residual, jacobian = residual_jacobian(found.target, found.fitted)
+    scale = np.concatenate([free.scale for free in found.fitted.free])
+    scaled = jacobian * scale
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True)
+    clusters = np.concatenate([
+        np.tile(1000 * number + stretches_of(part), part.shape[1]) for number, part in enumerate(found.parts)
+    ])  # fmt: skip
+    rows = len(clusters)
+    scores = scaled[:rows] * residual[:rows, None]
+    names = np.unique(clusters)
+    sums = np.stack([scores[clusters == name].sum(axis=0) for name in names])
+    plain: Floats = inverse * np.outer(scale, scale)
+    if len(names) < _LEAST_STRETCHES:
+        return plain
+    meat = sums.T @ sums * len(names) / (len(names) - 1.0)
+    robust: Floats = inverse @ meat @ inverse * np.outer(scale, scale)
+    grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(plain), 1e-300), 1.0))
+    widened: Floats = plain * np.outer(grown, grown)
+    return widened

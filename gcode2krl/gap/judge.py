@@ -1,0 +1,164 @@
+"""One link, from its parts to a judgement: causes, their probability, and what held-out data say of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from gcode2krl.effects import Applied
+from gcode2krl.gap.align import with_set_clocks
+from gcode2krl.gap.attribute import Rival, probabilities, rivals_of, unknown_probability
+from gcode2krl.gap.examine import Examination, Question, examine, nuisance_for
+from gcode2krl.gap.fold import folds_of
+from gcode2krl.gap.intervals import Interval, intervals_of
+from gcode2krl.gap.measure import Size, size_of_gap
+from gcode2krl.gap.noise import Noise
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.signatures import Signatures
+
+NAMED = 0.5
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect at one target."""
+
+    applied: Applied
+    link: str
+    probability: float
+    parameters: dict[str, Interval]
+    shrink: float | None
+    """Share of the explainable gap that it takes on held-out data, on top of those above it."""
+    rms_after: float | None
+    rivals: tuple[tuple[Rival, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is known of one link."""
+
+    link: str
+    parts: tuple[Part, ...]
+    verdict: str
+    causes: tuple[Cause, ...]
+    size: Size
+    held_out: bool
+    examination: Examination
+    usual: tuple[Applied, ...] = field(default=())
+
+    @property
+    def applied(self) -> tuple[Applied, ...]:
+        """Return the named causes."""
+        return tuple(cause.applied for cause in self.causes if cause.probability >= NAMED)
+
+
+def judge(link: str, parts: Sequence[Part], held: Sequence[Part], question: Question) -> Judgement:
+    """Examine a link on some parts and report on the held-out ones; without any, each part by turns."""
+    known = Signatures()
+    moved = with_set_clocks([*parts, *held], question, known)
+    parts, held = moved[: len(parts)], moved[len(parts) :]
+    found = examine(link, parts, question, known)
+    usual = tuple(each for each in found.applied if each not in found.causes)
+    if not found.causes:
+        everything = [*parts, *held]
+        size = _size(everything, found, question, known, (), usual)
+        verdict = "unexplained" if size.significant else "no_gap"
+        return Judgement(link, tuple(parts), verdict, (), size, True, found, usual)
+    trials = _trials(link, parts, held, question, known, found)
+    sizes = [_pooled([trial(count) for trial in trials]) for count in range(len(found.causes) + 1)]
+    return _judgement(link, parts, found, usual, sizes, bool(trials))
+
+
+def _trials(
+    link: str, parts: Sequence[Part], held: Sequence[Part], question: Question, known: Signatures,
+    found: Examination,
+) -> list["_Trial"]:  # fmt: skip
+    """Return one trial a split: what was chosen without the held-out data, and these."""
+    if held:
+        return [_Trial(found, list(held), question, known, found)]
+    question = replace(question, starts={(each.effect.name, each.target): each for each in found.applied})
+    return [
+        _Trial(examine(link, train, question, known, found.noise), test, question, known, found)
+        for train, test in folds_of(parts)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Held-out parts and what the other parts say is at work."""
+
+    chosen: Examination
+    held: list[Part]
+    question: Question
+    known: Signatures
+    main: Examination
+
+    def __call__(self, count: int) -> Size:
+        """Return the size of the held-out gap with those of its effects that are among the first causes."""
+        names = [(each.effect.name, each.target) for each in self.main.causes[:count]]
+        mine = [each for each in self.chosen.causes if (each.effect.name, each.target) in names]
+        if count == len(self.main.causes):
+            mine = list(self.chosen.causes)
+        usual = [each for each in self.chosen.applied if each not in self.chosen.causes]
+        return _size(self.held, self.chosen, self.question, self.known, mine, usual)
+
+
+def _size(
+    parts: Sequence[Part], found: Examination, question: Question, known: Signatures,
+    applied: Sequence[Applied], usual: Sequence[Applied],
+) -> Size:  # fmt: skip
+    noise: list[Noise] = found.noise
+    return size_of_gap(parts, nuisance_for(parts, question, known), noise, applied, usual)
+
+
+def _pooled(sizes: Sequence[Size]) -> Size:
+    """Return the mean over splits, each by its rows."""
+    rows = sum(size.rows for size in sizes)
+
+    def mean(name: str) -> float:
+        return sum(float(getattr(size, name)) * size.rows for size in sizes) / rows
+
+    return Size(
+        rows=rows,
+        before=mean("before"),
+        after=mean("after"),
+        floor=mean("floor"),
+        noise=mean("noise"),
+        excess=mean("excess"),
+        excess_before=mean("excess_before"),
+        deviation=mean("deviation") / len(sizes) ** 0.5,
+        largest_before=max(size.largest_before for size in sizes),
+        largest_after=max(size.largest_after for size in sizes),
+    )
+
+
+def _judgement(
+    link: str, parts: Sequence[Part], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
+    held_out: bool,
+) -> Judgement:  # fmt: skip
+    last = sizes[-1]
+    unknown = unknown_probability(last.share_left, last.significant)
+    causes = []
+    positions = [i for i, flag in enumerate(found.usual) if not flag]
+    intervals = intervals_of(found)
+    for order, number in enumerate(positions):
+        rivals = rivals_of(found, number)
+        own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
+        causes.append(
+            Cause(
+                applied=found.applied[number],
+                link=link,
+                probability=own,
+                parameters=intervals[number],
+                shrink=max(0.0, sizes[order + 1].shrink - sizes[order].shrink),
+                rms_after=sizes[order + 1].after ** 0.5,
+                rivals=tuple(zip(rivals, others, strict=True)),
+            )
+        )
+    causes.sort(key=lambda cause: -cause.probability)
+    named = [cause for cause in causes if cause.probability >= NAMED]
+    if named and not (last.significant and last.share_left > 0.15):
+        verdict = "explained"
+    elif named:
+        verdict = "partly_explained"
+    else:
+        verdict = "unexplained"
+    return Judgement(link, tuple(parts), verdict, tuple(causes), last, held_out, found, usual)

@@ -1,0 +1,181 @@
+"""The links of the measuring chain: what is measured against what, run by run.
+
+timing and path: q_cmd of the log against the predicted one · servo: q_act - q_cmd · gear: q_load - q_act ·
+force: measured against predicted · mechanics: tip against FK(joints) + C(q)·F. The measured signal before a
+link is the input of its model, so that an error upstream is not blamed twice.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.effects import Applied
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.side import Side, usable_rows
+from gcode2krl.runs import Controller, Measured
+from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
+
+Floats = NDArray[np.float64]
+JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
+LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
+EXAMINED = ("path", "servo", "gear", "force", "mechanics")
+"""Links with a model of their own; timing is the tangential part of path."""
+_MODEL_RAD = 4e-4 * RAD_PER_DEG
+"""The predicted path is right to 0.01 mm (design/gap.md), 4e-4 degrees at an arm's length."""
+_MOVES_RAD = 1e-4 * RAD_PER_DEG
+SIGNAL = {
+    "timing": "timing", "path": "joint_commanded", "servo": "joint_actual", "gear": "joint_load",
+    "force": "force", "mechanics": "tcp", "part": "scan",
+}  # fmt: skip
+UNIT = {
+    "timing": "s",
+    "path": "deg",
+    "servo": "deg",
+    "gear": "deg",
+    "force": "N",
+    "mechanics": "mm",
+    "part": "mm",
+}
+_NEEDS = {
+    "timing": "controller.csv with q1_cmd_deg …, and a prediction",
+    "path": "controller.csv with q1_cmd_deg …, and a prediction",
+    "servo": "controller.csv with q1_cmd_deg … and q1_act_deg …",
+    "gear": "controller.csv with q1_load_deg … (encoders behind the gear)",
+    "force": "force.csv, and a prediction with forces",
+    "mechanics": "tracker.csv, absolute angles and a known robot",
+    "part": "scan.csv of the finished part",
+}
+
+
+def needs(link: str) -> str:
+    """Return what a run must hold for a link to be examined."""
+    return _NEEDS[link]
+
+
+def parts_of(link: str, sides: Sequence[Side], found: Sequence[Applied] = ()) -> list[Part]:
+    """Return the measured signals of a link, one a run that has it; ``found`` belongs to the model."""
+    build = {"path": _path, "servo": _servo, "gear": _gear, "force": _force, "mechanics": _mechanics}[link]
+    parts = [build(side, tuple(found)) for side in sides]
+    return [part for part in parts if part is not None and len(part.time_s) >= 10]
+
+
+def _path(side: Side, found: tuple[Applied, ...]) -> Part | None:
+    table = side.run.controller
+    if table is None or table.q_cmd_rad is None or side.from_log or side.run.head.angles == "relative":
+        return None
+    # joints alone: what plans anew need not remove the material again
+    side = replace(side, inputs=replace(side.inputs, cut=None, forces=None))
+    return _joint_part(side, table, "path", table.q_cmd_rad, "q_cmd_rad", None, found)
+
+
+def _servo(side: Side, found: tuple[Applied, ...]) -> Part | None:
+    table = side.run.controller
+    if table is None or table.q_act_rad is None or table.q_cmd_rad is None:
+        return None
+    side = side.with_measured_joints("q_cmd")
+    return _joint_part(
+        side, table, "servo", table.q_act_rad - table.q_cmd_rad, "q_act_rad", "q_cmd_rad", found
+    )
+
+
+def _gear(side: Side, found: tuple[Applied, ...]) -> Part | None:
+    table = side.run.controller
+    if table is None or table.q_load_rad is None or table.q_act_rad is None:
+        return None
+    side = side.with_measured_joints("q_act")
+    apart = table.q_load_rad - table.q_act_rad
+    return _joint_part(side, table, "gear", apart, "q_load_rad", "q_act_rad", found)
+
+
+def _joint_part(
+    side: Side, table: Controller, link: str, values: Floats, plus: str, minus: str | None,
+    found: tuple[Applied, ...],
+) -> Part | None:  # fmt: skip
+    there = np.isfinite(values).all(axis=0) & _moves(table)
+    stamps = side.stamps(table)
+    rows, segments = usable_rows(table, stamps, side.inputs)
+    if not there.any() or len(rows) == 0:
+        return None
+    noise = side.run.head.noise
+    stated = {"gear": noise.q_load_deg, "servo": noise.q_act_deg}.get(link)
+    sigma = _MODEL_RAD if link == "path" else None if stated is None else stated * RAD_PER_DEG
+    columns = tuple(np.flatnonzero(there).tolist())
+    return Part(
+        link=link,
+        run=side.name,
+        side=side.number,
+        signal=SIGNAL[link],
+        unit="deg",
+        factor=DEG_PER_RAD,
+        components=tuple(JOINTS[column] for column in columns),
+        columns=columns,
+        plus=plus,
+        minus=minus,
+        inputs=side.inputs,
+        base=found,
+        time_s=stamps[rows],
+        measured=values[np.ix_(rows, np.array(columns))],
+        segments=segments,
+        declared_sigma=sigma,
+    )
+
+
+def _moves(table: Controller) -> NDArray[np.bool_]:
+    """Return which joints (6,) ever move, by whatever of them is recorded; a joint at rest tells nothing."""
+    moving = np.zeros(6, dtype=np.bool_)
+    for values in (table.q_cmd_rad, table.q_act_rad):
+        if values is not None:
+            moving |= np.nan_to_num(np.ptp(values, axis=0)) > _MOVES_RAD
+    return moving
+
+
+def _force(side: Side, found: tuple[Applied, ...]) -> Part | None:
+    table = side.run.force
+    if table is None or side.from_log:
+        return None
+    part = _vector_part(side, table, "force", table.force_N, "force_meas_base_N", found)
+    frame = side.run.head.frames.force
+    noise = side.run.head.noise.force_N
+    return replace(
+        part, in_sensor_frame=frame == "sensor", in_tool_frame=frame == "tcp", declared_sigma=noise
+    )
+
+
+def _mechanics(side: Side, found: tuple[Applied, ...]) -> Part | None:
+    table = side.run.tracker
+    if table is None or (side.from_log and side.run.head.angles == "relative"):
+        return None
+    side = side.with_measured_joints("q_load")
+    part = _vector_part(side, table, "mechanics", table.position_mm, "tcp_base_mm", found)
+    frame = side.run.head.frames.tracker
+    return replace(
+        part,
+        in_sensor_frame=frame == "sensor",
+        in_tool_frame=frame == "tcp",
+        declared_sigma=side.run.head.noise.tcp_mm,
+    )
+
+
+def _vector_part(
+    side: Side, table: Measured, link: str, values: Floats, plus: str, found: tuple[Applied, ...]
+) -> Part:
+    stamps = side.stamps(table)
+    rows, segments = usable_rows(table, stamps, side.inputs)
+    return Part(
+        link=link,
+        run=side.name,
+        side=side.number,
+        signal=SIGNAL[link],
+        unit=UNIT[link],
+        factor=1.0,
+        components=("x", "y", "z"),
+        columns=(0, 1, 2),
+        plus=plus,
+        inputs=side.inputs,
+        base=found,
+        time_s=stamps[rows],
+        measured=values[rows],
+        segments=segments,
+    )

@@ -1,0 +1,146 @@
+"""Nuisance: what normal mismatch does to a signal, as columns with the standard deviation of each."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.effects import Effect
+from gcode2krl.gap.bounds import Mismatch, sigma
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.signatures import Block, Signatures
+from gcode2krl.units import DEG_PER_RAD
+
+Floats = NDArray[np.float64]
+_JITTER_KNOTS_S = 1.0
+_ROUGH = 1e3
+"""Standard deviation of what is no finding whatever its size, in units of its bound."""
+
+
+class Nuisance(NamedTuple):
+    """Columns (k, n, c), already times their standard deviation."""
+
+    name: str
+    shared: bool
+    """One value for all runs, or one for each."""
+    columns: Floats
+
+
+def nuisance_of(
+    part: Part, library: Mapping[str, Effect], mismatch: Mismatch, known: Signatures,
+    upstream: frozenset[str], clock: float = 1.0,
+) -> list[Nuisance]:  # fmt: skip
+    """Return what normal mismatch may do to a part.
+
+    ``upstream``: links that are not measured before it; ``clock``: mismatch of its clock over that of one.
+    """
+    found = _all(part, library, mismatch, known, upstream, clock)
+    return [each for each in found if np.any(each.columns)]
+
+
+def _all(
+    part: Part, library: Mapping[str, Effect], m: Mismatch, known: Signatures, upstream: frozenset[str],
+    clock: float,
+) -> Iterator[Nuisance]:  # fmt: skip
+    def effect(
+        name: str, target: str | None, parameter: str, bound: float, **shape: float
+    ) -> Nuisance | None:
+        if name not in library or target not in library[name].targets(part.inputs.cell):
+            return None
+        one = library[name]
+        apart = one.start(part.inputs, target)[parameter] - one.nominal(part.inputs, target)[parameter]
+        # at the size that it may have: a lag of 15 ms has another shape than one of half a millisecond
+        size = abs(bound / apart)
+        columns = known.columns(Block(one, target, shape), part, size)
+        if columns.shape[2] == 0:
+            return None
+        return Nuisance(f"{name} {target or ''}".strip(), True, columns * (sigma(bound) / (size * apart)))
+
+    def present(items: Sequence[Nuisance | None]) -> Iterator[Nuisance]:
+        return (each for each in items if each is not None)
+
+    joints = [f"A{number}" for number in range(1, 7)]
+    behind_gear = part.link == "gear" or (part.link == "mechanics" and "gear" in upstream)
+    if part.link == "servo" or (part.link == "mechanics" and "servo" in upstream):
+        yield from present([effect("servo_lag", a, "tau_s", m.lag_s) for a in joints])
+    if behind_gear:
+        play_deg = m.play_rad * DEG_PER_RAD
+        yield from present([effect("backlash", a, "gap_deg", play_deg) for a in joints])
+        yield from present([
+            effect("transmission", a, "amplitude_deg", play_deg, harmonic=h)
+            for a in joints
+            for h in (1.0, 2.0)
+        ])  # fmt: skip
+    if part.link == "gear":
+        yield Nuisance("encoder zero", False, _constants(part) * m.joint_zero_rad * _ROUGH)
+    if part.link in ("force", "mechanics"):
+        yield from present([
+            effect("force_scale", way, "scale", m.coefficients) for way in ("tangential", "radial", "axial")
+        ])  # fmt: skip
+    if part.link == "force":
+        yield Nuisance("force zero", False, _force_zero(part) * sigma(m.force_zero_N))
+        yield Nuisance("sensor gain", False, _diagonal(part.nominal) * sigma(m.sensor_gain))
+    if part.link == "mechanics":
+        yield from present([
+            effect("stiffness", str(name), "scale", m.stiffness)
+            for name in part.inputs.cell.compliance.virtual_joints
+        ])  # fmt: skip
+        yield Nuisance("frame", False, _frame(part, m))
+    yield Nuisance("clock", False, -_stacked(part.rate)[:, :, None] * sigma(m.clock_s) * clock)
+    if part.link == "path" or (part.link == "mechanics" and "path" in upstream):
+        yield Nuisance("time law", False, _jitter(part) * sigma(m.clock_s))
+
+
+def _stacked(values: Floats) -> Floats:
+    return np.ascontiguousarray(values.T)
+
+
+def _constants(part: Part) -> Floats:
+    n, k = part.shape
+    return np.repeat(np.eye(k)[:, None, :], n, axis=1)
+
+
+def _diagonal(values: Floats) -> Floats:
+    """Return (k, n, k): column j is component j alone."""
+    n, k = values.shape
+    columns = np.zeros((k, n, k))
+    for j in range(k):
+        columns[j, :, j] = values[:, j]
+    return columns
+
+
+def _force_zero(part: Part) -> Floats:
+    """Return a unit force along each axis of the sensor, in the frame of the measured values."""
+    if part.in_sensor_frame or part.in_tool_frame:
+        return _constants(part)
+    turned = _rows(part, part.inputs.sensor_rotation)
+    return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
+
+
+def _frame(part: Part, m: Mismatch) -> Floats:
+    """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
+    position = part.nominal
+    turned = np.zeros((3, len(position), 6))
+    for axis in range(3):
+        turned[axis, :, axis] = sigma(m.frame_mm)
+    arm = position - position.mean(axis=0)
+    for axis in range(3):
+        turn = np.cross(np.eye(3)[axis], arm)
+        turned[:, :, 3 + axis] = turn.T * sigma(m.frame_rad)
+    return turned
+
+
+def _jitter(part: Part) -> Floats:
+    """Return the signal's rate times hats over time: a time law that is off by a little, here and there."""
+    start, end = part.time_s[0], part.time_s[-1]
+    knots = np.linspace(start, end, max(2, round((end - start) / _JITTER_KNOTS_S) + 1))
+    hats = np.maximum(0.0, 1.0 - np.abs(part.time_s[:, None] - knots) / (knots[1] - knots[0]))
+    columns: Floats = -_stacked(part.rate)[:, :, None] * hats[None]
+    return columns
+
+
+def _rows(part: Part, rotations: Floats) -> Floats:
+    from gcode2krl.gap.part import nearest_rows
+
+    return rotations[nearest_rows(part.inputs.time_s, part.time_s)]

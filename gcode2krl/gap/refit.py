@@ -1,0 +1,341 @@
+"""Non-linear refit: the real effects, re-simulated, against the whitened data, nuisance fitted along."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.effects import Applied, Effect
+from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.noise import Noise
+from gcode2krl.gap.nuisance import Nuisance
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.signatures import PHASE
+
+Floats = NDArray[np.float64]
+_FIXED = ("harmonic",)
+"""Shapes that are counts: a fit keeps the value of the grid."""
+_MOST_STEPS = 12
+_AT_BOUND = 1e-3
+_MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Free:
+    """The numbers of one effect that a fit moves: sizes and shapes as they are, a vector as size·direction,
+    a sine as its two amplitudes."""
+
+    effect: Effect
+    target: str | None
+    fixed: Mapping[str, float]
+    names: tuple[str, ...]
+    low: Floats
+    high: Floats
+    scale: Floats
+
+    def applied(self, x: Floats) -> Applied:
+        """Return the effect at the numbers (p,)."""
+        values = dict(self.fixed)
+        direction = self.effect.direction
+        for name, number in zip(self.names, x.tolist(), strict=True):
+            values[name] = number
+        if direction is not None:
+            size = self._size()
+            vector = np.array([values[name] for name in direction])
+            length = float(np.linalg.norm(vector))
+            values[size] = length
+            if length > 0.0:
+                values |= dict(zip(direction, (vector / length).tolist(), strict=True))
+        if PHASE in self.names:
+            size = self._size()
+            a, b = values[size], values[PHASE]
+            values[size], values[PHASE] = math.hypot(a, b), math.atan2(b, a)
+        return Applied(self.effect, self.target, values)
+
+    def _size(self) -> str:
+        return size_of(self.effect)
+
+    def start(self, applied: Applied) -> Floats:
+        """Return the numbers of an effect."""
+        values = dict(applied.values)
+        if self.effect.direction is not None:
+            size = values[self._size()]
+            values |= {name: size * values[name] for name in self.effect.direction}
+        if PHASE in self.names:
+            size = values[self._size()]
+            values |= {
+                self._size(): size * math.cos(values[PHASE]), PHASE: size * math.sin(values[PHASE])
+            }  # fmt: skip
+        numbers = np.array([values[name] for name in self.names], dtype=np.float64)
+        clipped: Floats = np.clip(numbers, self.low, self.high)
+        return clipped
+
+    def at_bound(self, x: Floats) -> bool:
+        """Tell whether a number stands at an end of its plausible range that is not a mere shape's."""
+        span = self.high - self.low
+        sizes = np.array([not self.effect.parameter(name).is_shape for name in self.names])
+        near = (x - self.low < _AT_BOUND * span) | (self.high - x < _AT_BOUND * span)
+        return bool(np.any(near & sizes & np.isfinite(span)))
+
+
+def size_of(effect: Effect) -> str:
+    """Return the parameter that gives the size of an effect with a direction or a phase."""
+    directions = effect.direction or ()
+    return next(p.name for p in effect.parameters if not p.is_shape and p.name not in directions)
+
+
+def free_of(applied: Applied, part: Part) -> Free:
+    """Return what of an effect a fit moves, from where it stands."""
+    effect = applied.effect
+    direction = effect.direction or ()
+    names, low, high, scale = [], [], [], []
+    nominal, start = (f(part.inputs, applied.target) for f in (effect.nominal, effect.start))
+    most = None
+    if direction or PHASE in effect.names:
+        most = effect.parameter(size_of(effect)).high
+    for p in effect.parameters:
+        if p.name in _FIXED or (direction and p.name == size_of(effect)):
+            continue
+        vector = p.name in direction or (PHASE in effect.names and (p.name == PHASE or not p.is_shape))
+        names.append(p.name)
+        bound = most if vector and most is not None else None
+        low.append(p.low if bound is None else -bound)
+        high.append(p.high if bound is None else bound)
+        step = abs(start[p.name] - nominal[p.name])
+        if vector and most is not None:
+            step = abs(start[size_of(effect)] - nominal[size_of(effect)])
+        scale.append(step or 0.1 * (p.high - p.low) or 1.0)
+    return Free(
+        effect, applied.target, dict(applied.values), tuple(names), np.array(low), np.array(high),
+        np.array(scale),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Effects as refitted, chi2 with them, and how sure their numbers are."""
+
+    applied: tuple[Applied, ...]
+    chi2: float
+    x: Floats
+    covariance: Floats
+    free: tuple[Free, ...]
+    bound: tuple[bool, ...]
+
+    def deviations(self, number: int) -> dict[str, float]:
+        """Return the standard deviation of each number of an effect, by the curvature of chi2."""
+        first = sum(len(free.names) for free in self.free[:number])
+        names = self.free[number].names
+        variance = np.diag(self.covariance)[first : first + len(names)]
+        return dict(zip(names, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+
+
+class Target:
+    """Whitened data of all parts with their nuisance, to be compared with simulations."""
+
+    def __init__(
+        self, parts: Sequence[Part], nuisance: Sequence[Sequence[Nuisance]], noise: Sequence[Noise]
+    ) -> None:
+        self.parts, self.noise = list(parts), list(noise)
+        self.shared_width = sum(
+            {each.name: each.columns.shape[2] for own in nuisance for each in own if each.shared}.values()
+        )
+        self.columns = self._wide(nuisance, whitened=True)
+        self._decompose()
+
+    def raw(self, nuisance: Sequence[Sequence[Nuisance]]) -> list[Floats]:
+        """Return the nuisance columns (k·n, w) of each part as they are, not whitened."""
+        return self._wide(nuisance, whitened=False)
+
+    def _wide(self, nuisance: Sequence[Sequence[Nuisance]], whitened: bool) -> list[Floats]:
+        """Return the columns (k·n, w) of each part: shared ones in common places, own ones side by side."""
+        widths = {each.name: each.columns.shape[2] for own in nuisance for each in own if each.shared}
+        starts = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
+        at = sum(widths.values())
+        width = at + sum(each.columns.shape[2] for own in nuisance for each in own if not each.shared)
+        found: list[Floats] = []
+        for part, own in zip(self.parts, nuisance, strict=True):
+            n, k = part.shape
+            wide = np.zeros((k * n, width))
+            for each in own:
+                flat = self._white(part, each.columns) if whitened else each.columns.reshape(k * n, -1)
+                place = starts[each.name] if each.shared else at
+                wide[:, place : place + flat.shape[1]] = flat
+                at += 0 if each.shared else flat.shape[1]
+            found.append(wide)
+        return found
+
+    def _decompose(self) -> None:
+        """Prepare y -> y - N·(NᵀN + I)⁻¹·Nᵀy, whose squared length with that of b is the marginal chi2."""
+        width = self.columns[0].shape[1] if self.columns else 0
+        gram = sum((c.T @ c for c in self.columns), np.zeros((width, width))) + np.eye(width)
+        self.factor = np.linalg.cholesky(gram)
+
+    def _white(self, part: Part, columns: Floats) -> Floats:
+        return np.concatenate([
+            self.noise[j].whiten(columns[j], part.segments) for j in range(columns.shape[0])
+        ])  # fmt: skip
+
+    def whiten(self, values: Sequence[Floats]) -> Floats:
+        """Return residuals (n, k) of all parts as one whitened vector."""
+        return np.concatenate([
+            self._white(part, value.T[:, :, None])[:, 0]
+            for part, value in zip(self.parts, values, strict=True)
+        ])  # fmt: skip
+
+    def without_nuisance(self, y: Floats) -> Floats:
+        """Return the vector whose squared length is chi2 after nuisance; also for a matrix of vectors."""
+        at, sums = 0, np.zeros((len(self.factor), *y.shape[1:]))
+        for columns in self.columns:
+            sums += columns.T @ y[at : at + len(columns)]
+            at += len(columns)
+        from scipy.linalg import cho_solve
+
+        b = cho_solve((self.factor, True), sums)
+        fitted = np.concatenate([columns @ b for columns in self.columns]) if self.columns else 0.0 * y
+        return np.concatenate([y - fitted, b])
+
+    def nuisance_of(self, y: Floats) -> Floats:
+        """Return the nuisance coefficients that fit a whitened vector best."""
+        at, sums = 0, np.zeros(len(self.factor))
+        for columns in self.columns:
+            sums += columns.T @ y[at : at + len(columns)]
+            at += len(columns)
+        from scipy.linalg import cho_solve
+
+        b: Floats = cho_solve((self.factor, True), sums)
+        return b
+
+    def residual(self, applied: Sequence[Applied]) -> Floats:
+        """Return the marginal residual vector with some effects."""
+        return self.without_nuisance(
+            self.whiten([part.measured - part.sample(applied) for part in self.parts])
+        )
+
+
+def refit(target: Target, start: Sequence[Applied], steps: int = _MOST_STEPS, scan: bool = False) -> Fitted:
+    """Return the effects with the numbers that fit best within their plausible ranges (Gauss-Newton with
+    damping and bounds); with ``scan`` the last effect begins at the best of some multiples of its size."""
+    frees = tuple(free_of(each, target.parts[0]) for each in start)
+    sizes = [len(each.names) for each in frees]
+    edges = np.cumsum([0, *sizes])
+    low, high, scale = (
+        np.concatenate([getattr(each, name) for each in frees]) if frees else np.zeros(0)
+        for name in ("low", "high", "scale")
+    )
+
+    def effects(x: Floats) -> tuple[Applied, ...]:
+        return tuple(free.applied(x[a:b]) for free, a, b in zip(frees, edges[:-1], edges[1:], strict=True))
+
+    x = np.concatenate([free.start(each) for free, each in zip(frees, start, strict=True)]) if frees else low
+    if scan and frees:
+        x = _scanned(target, effects, x, int(edges[-2]), low, high)
+    r = target.residual(effects(x))
+    best = float(r @ r)
+    jacobian = np.zeros((len(r), len(x)))
+    damping = 1e-3
+    for _ in range(steps):
+        jacobian = _jacobian(target, effects, x, r, low, high, scale)
+        improved = False
+        for _ in range(4):
+            step = _bounded_step(jacobian, r, x, low, high, scale, damping)
+            trial = np.clip(x + step, low, high)
+            try:
+                r_new = target.residual(effects(trial))
+            except Gcode2KrlError:
+                damping *= 10.0
+                continue
+            chi2 = float(r_new @ r_new)
+            if chi2 < best:
+                improved = True
+                damping = max(damping / 10.0, 1e-6)
+                break
+            damping *= 10.0
+        if not improved:
+            break
+        gain, x, r, best = best - chi2, trial, r_new, chi2
+        if gain < 0.02 + 1e-5 * best:
+            break
+    normal = jacobian.T @ jacobian / np.outer(1.0 / scale, 1.0 / scale) if len(x) else np.zeros((0, 0))
+    inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-10, hermitian=True), dtype=np.float64)
+    covariance: Floats = inverse * np.outer(scale, scale)
+    bound = tuple(free.at_bound(x[a:b]) for free, a, b in zip(frees, edges[:-1], edges[1:], strict=True))
+    return Fitted(effects(x), best, x, covariance, frees, bound)
+
+
+def _scanned(
+    target: Target, effects: Callable[[Floats], tuple[Applied, ...]], x: Floats, first: int, low: Floats,
+    high: Floats,
+) -> Floats:  # fmt: skip
+    """Return the numbers with those from ``first`` on at the best multiple; a signal may not be linear."""
+    best, found = np.inf, x
+    for factor in _MULTIPLES:
+        trial = x.copy()
+        trial[first:] = x[first:] * factor
+        trial = np.clip(trial, low, high)
+        try:
+            r = target.residual(effects(trial))
+        except Gcode2KrlError:
+            continue
+        chi2 = float(r @ r)
+        if chi2 < best:
+            best, found = chi2, trial
+    return found
+
+
+def residual_jacobian(target: Target, fitted: Fitted) -> tuple[Floats, Floats]:
+    """Return the marginal residual (r,) and its derivative (r, p) by each number of the fit."""
+    edges = np.cumsum([0, *(len(free.names) for free in fitted.free)])
+
+    def effects(x: Floats) -> tuple[Applied, ...]:
+        return tuple(
+            free.applied(x[a:b]) for free, a, b in zip(fitted.free, edges[:-1], edges[1:], strict=True)
+        )
+
+    low, high, scale = (
+        np.concatenate([getattr(free, name) for free in fitted.free]) for name in ("low", "high", "scale")
+    )
+    residual = target.residual(fitted.applied)
+    return residual, _jacobian(target, effects, fitted.x, residual, low, high, scale)
+
+
+def _jacobian(
+    target: Target,
+    effects: Callable[[Floats], tuple[Applied, ...]],
+    x: Floats,
+    r: Floats,
+    low: Floats,
+    high: Floats,
+    scale: Floats,
+) -> Floats:
+    columns = []
+    for i in range(len(x)):
+        step = 0.02 * scale[i]
+        if x[i] + step > high[i]:
+            step = -step
+        moved = x.copy()
+        moved[i] += step
+        columns.append((target.residual(effects(moved)) - r) / step)
+    return np.stack(columns, axis=1) if columns else np.zeros((len(r), 0))
+
+
+def _bounded_step(
+    jacobian: Floats, r: Floats, x: Floats, low: Floats, high: Floats, scale: Floats, damping: float
+) -> Floats:
+    """Return a damped step that leaves numbers at their bounds alone where they would go beyond."""
+    scaled = jacobian * scale
+    free = np.ones(len(x), dtype=bool)
+    step = np.zeros(len(x))
+    for _ in range(3):
+        a = scaled[:, free]
+        normal = a.T @ a
+        normal += damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal))
+        step[:] = 0.0
+        step[free] = -np.linalg.solve(normal, a.T @ r) * scale[free]
+        beyond = free & (((x <= low) & (step < 0.0)) | ((x >= high) & (step > 0.0)))
+        if not beyond.any():
+            break
+        free &= ~beyond
+    return step

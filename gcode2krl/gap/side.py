@@ -1,0 +1,94 @@
+"""One run beside its prediction: which signals there are, on which clock, and what the model is given."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.effects import Inputs
+from gcode2krl.gap.part import cubic, linear
+from gcode2krl.runs import Controller, Measured, Run
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+SAME_PATH_RAD = 2e-5
+"""A log this close to the prediction, 0.03 mm at an arm's length, is that path and its last decimal."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Side:
+    """A run and the nominal inputs of its chain."""
+
+    run: Run
+    number: int
+    inputs: Inputs
+    from_log: bool = False
+    """There is no prediction: the inputs' commanded joints are those of the log."""
+    clock_s: Mapping[str, float] = field(default_factory=dict)
+    """Offset of each table that is taken off its stamps."""
+    fitted: Mapping[str, Floats] = field(default_factory=dict)
+    """Link (servo, gear) -> what its model says of the difference (n, 6), without the encoders' noise."""
+
+    @property
+    def name(self) -> str:
+        """Return the run's name."""
+        return self.run.name
+
+    def stamps(self, table: Measured) -> Floats:
+        """Return the time stamps of a table less its coarse clock error."""
+        stamps: Floats = table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)
+        return stamps
+
+    def with_measured_joints(self, upto: str) -> "Side":
+        """Return the side with what the controller measured in place of the model: q_cmd, q_act or q_load.
+
+        Only the differences between neighbouring signals are interpolated, which are small and smooth.
+        """
+        table = self.run.controller
+        if table is None:
+            return self
+        own_s, inputs = self.stamps(table), self.inputs
+        q_cmd, q_act, q_load = table.q_cmd_rad, table.q_act_rad, table.q_load_rad
+        here = inputs.time_s
+        commanded = inputs.q_cmd_rad
+        if q_cmd is not None and not self.from_log:
+            apart = np.nan_to_num(q_cmd - cubic(own_s, here, inputs.q_cmd_rad))
+            if float(np.sqrt(np.mean(apart**2))) > SAME_PATH_RAD:
+                commanded = commanded + linear(here, own_s, apart)
+        if upto == "q_cmd":
+            return replace(self, inputs=replace(inputs, q_cmd_rad=commanded))
+        actual = None
+        if q_act is not None:
+            reference = q_cmd if q_cmd is not None else cubic(own_s, here, inputs.q_cmd_rad)
+            apart = self.fitted.get("servo", q_act - reference)
+            actual = commanded + linear(here, own_s, np.nan_to_num(apart))
+        if upto == "q_act" or q_load is None:
+            return replace(self, inputs=replace(inputs, q_act_rad=actual))
+        reference = q_act if q_act is not None else cubic(own_s, here, inputs.q_cmd_rad)
+        before = actual if actual is not None else commanded
+        apart = self.fitted.get("gear", q_load - reference)
+        load = before + linear(here, own_s, np.nan_to_num(apart))
+        return replace(self, inputs=replace(inputs, q_act_rad=actual, q_load_rad=load))
+
+
+def usable_rows(table: Measured, stamps: Floats, inputs: Inputs) -> tuple[Ints, Ints]:
+    """Return the rows (n,) of a table within the prediction's time, and their segments (s, 2)."""
+    first, last = inputs.time_s[0], inputs.time_s[-1]
+    inside = (stamps >= first) & (stamps <= last)
+    rows = np.flatnonzero(inside)
+    edges = []
+    for start, end in table.segments:
+        within = np.searchsorted(rows, [start, end])
+        if within[1] > within[0]:
+            edges.append(within)
+    segments = np.array(edges, dtype=np.int64).reshape(-1, 2)
+    return rows, segments
+
+
+def encoder_zeros(table: Controller) -> Floats:
+    """Return the mean (6,) in rad by which each load encoder differs from the motor side; NaN without one."""
+    if table.q_load_rad is None or table.q_act_rad is None:
+        return np.full(6, np.nan)
+    zeros: Floats = np.mean(table.q_load_rad - table.q_act_rad, axis=0)
+    return zeros

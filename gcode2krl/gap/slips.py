@@ -1,0 +1,246 @@
+"""Set-up slips, tested before everything else: most real gaps are one of them.
+
+A slip is named where the run's own checks name it, or where the effect of the slip, re-simulated, takes nine
+tenths of a gap that is far beyond what machines do by themselves.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.effects import Applied, Effect
+from gcode2krl.errors import Gcode2KrlError, Issue
+from gcode2krl.gap.links import parts_of
+from gcode2krl.gap.part import Part
+from gcode2krl.gap.side import Side
+from gcode2krl.runs import check_against
+from gcode2krl.runs.matching import rotation_between
+from gcode2krl.units import DEG_PER_RAD
+
+Floats = NDArray[np.float64]
+_LARGE_RAD = 3e-3
+"""A commanded path further off than this, 5 mm at an arm's length, is no matter of a servo or a gear."""
+_LARGE_MM = 20.0
+_EXPLAINS = 0.9
+_SPEED = 5.0
+"""Per cent by which the override must differ."""
+_FATAL = ("run-unit", "run-axes", "run-program")
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A slip, where it showed, and whether anything can be said beyond it."""
+
+    applied: Applied
+    link: str
+    rms_before: float
+    rms_after: float | None
+    unit: str
+    words: str
+    final: bool
+    """The run cannot be compared further."""
+
+
+def slips_of(sides: Sequence[Side], library: Mapping[str, Effect]) -> tuple[list[Slip], list[Issue]]:
+    """Return the slips that all runs share, and what the checks of the runs say besides."""
+    issues = [issue for side in sides for issue in _checked(side)]
+    codes = {issue.code for issue in issues if issue.severity == "error"}
+    found = [*_override(sides, library), *_other_frame(sides, library)]
+    if found:
+        return found[:1], issues
+    found = _tracker_frame(sides, library)
+    if found:
+        return found, issues
+    for issue in issues:
+        if issue.severity == "error" and issue.code in _FATAL and len(codes) > 0:
+            name = {"run-unit": "unit", "run-axes": "unit", "run-program": "other_program"}[issue.code]
+            return [_fatal(library, name, issue, sides)], issues
+    return [], issues
+
+
+def clock_slips(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the tables whose clock is so far off that it was taken off their stamps."""
+    found = []
+    if "clock" not in library:
+        return []
+    for name, link in (("controller", "path"), ("tracker", "mechanics")):
+        offsets = [side.clock_s.get(name, 0.0) for side in sides]
+        if not any(offsets):
+            continue
+        plain = [replace(side, clock_s={**side.clock_s, name: 0.0}) for side in sides]
+        after, before = parts_of(link, sides), parts_of(link, plain)
+        if not after or not before:
+            continue
+        offset = float(np.median(offsets))
+        one = Applied(library["clock"], name, {"offset_s": offset, "skew": 0.0})
+        words = f"the clock of {name} is {offset:+.3f} s off the prediction's"
+        rms = [_rms([part.residual for part in parts]) * after[0].factor for parts in (before, after)]
+        found.append(Slip(one, link, rms[0], rms[1], after[0].unit, words, False))
+    return found
+
+
+def _checked(side: Side) -> list[Issue]:
+    if side.from_log:
+        return []
+    return check_against(side.run, side.inputs.time_s, side.inputs.position_mm, side.inputs.q_cmd_rad)
+
+
+def _fatal(library: Mapping[str, Effect], name: str, issue: Issue, sides: Sequence[Side]) -> Slip:
+    effect = library[name]
+    file = issue.message.split(".")[0].split(":")[0]
+    target = file if file in effect.targets(sides[0].inputs.cell) else None
+    parts = parts_of("path", sides) or parts_of("mechanics", sides)
+    rms = _rms([part.residual for part in parts]) if parts else 0.0
+    factor, unit = (parts[0].factor, parts[0].unit) if parts else (1.0, "mm")
+    values = {p.name: p.start if p.nominal is None else p.nominal for p in effect.parameters}
+    return Slip(Applied(effect, target, values), "path", rms * factor, None, unit, issue.message, True)
+
+
+def _override(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the override at which the program ran, by the time that the same path took."""
+    if "override" not in library or any(side.from_log for side in sides):
+        return []
+    percents = [_percent(side) for side in sides]
+    known = [each for each in percents if each is not None]
+    if not known or abs(float(np.median(known)) - 100.0) < _SPEED:
+        return []
+    parts = parts_of("path", sides) or parts_of("mechanics", sides)
+    if not parts:
+        return []
+    guess = float(np.median(known))
+    tried = [
+        Applied(library["override"], None, {"percent": percent})
+        for percent in guess * np.array([0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1])
+    ]
+    best, rms = _best(parts, tried)
+    for width in (0.02, 0.008, 0.003, 0.001, 4e-4, 1.5e-4):
+        around = best.values["percent"] * (1.0 + width * np.array([-0.5, 0.0, 0.5, -1.0, 1.0]))
+        best, rms = _best(parts, [replace(best, values={"percent": float(p)}) for p in around])
+    return _slip_if_explained(parts, best, rms, f"the run was at {best.values['percent']:.1f} % override")
+
+
+def _percent(side: Side) -> float | None:
+    """Return 100 times predicted over measured time in motion; None where paths differ in length."""
+    table = side.run.controller
+    if table is not None and table.q_cmd_rad is not None and np.isfinite(table.q_cmd_rad).all():
+        own_s, own, wanted, still = table.time_s, table.q_cmd_rad, side.inputs.q_cmd_rad, 1e-3
+    elif side.run.tracker is not None:
+        own_s, own, wanted, still = (
+            side.run.tracker.time_s,
+            side.run.tracker.position_mm,
+            side.inputs.position_mm,
+            1.0,
+        )
+    else:
+        return None
+    measured, length = _moving(own_s, own, still)
+    predicted, expected = _moving(side.inputs.time_s, wanted, still)
+    if measured <= 0.0 or expected <= 0.0 or abs(length / expected - 1.0) > 0.1:
+        return None
+    return 100.0 * predicted / measured
+
+
+def _moving(time_s: Floats, values: Floats, still: float) -> tuple[float, float]:
+    """Return for how long a signal moves faster than ``still`` a second, and how far."""
+    step = max(1, round(0.1 / float(np.median(np.diff(time_s)))))
+    t, v = time_s[::step], values[::step]
+    way = np.linalg.norm(np.diff(v, axis=0), axis=1)
+    dt = np.diff(t)
+    moves = way > still * dt
+    return float(dt[moves].sum()), float(way[moves].sum())
+
+
+def _other_frame(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return another tool or base, if the commanded joints show one."""
+    parts = parts_of("path", sides)
+    if not parts or _rms([part.residual for part in parts]) < _LARGE_RAD:
+        return []
+    cell, used = sides[0].inputs.cell, set(np.unique(sides[0].inputs.tool).tolist())
+    tried = []
+    if "tool_number" in library:
+        effect = library["tool_number"]
+        tried += [Applied(effect, str(n), {}) for n in sorted(cell.tool) if n not in used]
+    if "base_number" in library:
+        tried.append(_base_number(sides[0], library["base_number"]))
+    if not tried:
+        return []
+    best, rms = _best(parts, tried)
+    name = best.target if best.effect.name == "tool_number" else "another one"
+    what = "tool" if best.effect.name == "tool_number" else "base"
+    return _slip_if_explained(parts, best, rms, f"the commanded joints are those of {what} {name}")
+
+
+def _base_number(side: Side, effect: Effect) -> Applied:
+    """Return the base that the logged joints belong to (Kabsch 1976 on their tips)."""
+    from gcode2krl import robot
+    from gcode2krl.gap.part import cubic
+
+    table = side.run.controller
+    values = dict.fromkeys(effect.names, 0.0)
+    if table is None or table.q_cmd_rad is None or not np.isfinite(table.q_cmd_rad).all():
+        return Applied(effect, None, values)
+    tool = int(np.bincount(np.maximum(side.inputs.tool, 0)).argmax())
+    tips, turned = robot.forward(table.q_cmd_rad, side.inputs.cell, tool)
+    stamps = side.stamps(table)
+    wanted = cubic(stamps, side.inputs.time_s, side.inputs.position_mm)
+    row = len(tips) // 2
+    near = int(np.argmin(np.abs(side.inputs.time_s - stamps[row])))
+    rotation = fr.rotation_from_quaternion(turned[row : row + 1])[0] @ side.inputs.tool_rotation[near].T
+    by_path, _ = rotation_between(wanted, tips)
+    if np.abs(by_path - rotation).max() < 1e-3:
+        rotation = by_path
+    shift = (tips - wanted @ rotation.T).mean(axis=0)
+    abc = fr.abc_from_rotation(rotation) * DEG_PER_RAD
+    names = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+    return Applied(effect, None, dict(zip(names, [*shift.tolist(), *abc.tolist()], strict=True)))
+
+
+def _tracker_frame(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the frame in which the tracker states the tip, if it is far from ``$BASE`` (Kabsch 1976)."""
+    parts = [
+        part for part in parts_of("mechanics", sides) if not (part.in_sensor_frame or part.in_tool_frame)
+    ]
+    if "base_frame" not in library or not parts or _rms([part.residual for part in parts]) < _LARGE_MM:
+        return []
+    wanted, found = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("nominal", "measured")
+    )
+    rotation, shift = rotation_between(wanted, found)
+    abc = fr.abc_from_rotation(rotation) * DEG_PER_RAD
+    effect = library["base_frame"]
+    numbers = [*shift.tolist(), *abc.tolist()]
+    names = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+    one = Applied(effect, None, dict(zip(names, numbers, strict=True)))
+    rms = _rms([part.measured - part.sample([one]) for part in parts])
+    words = f"the tracker is in another frame: $BASE shifted by {np.linalg.norm(shift):.0f} mm and turned"
+    return _slip_if_explained(parts, one, rms, words)
+
+
+def _best(parts: Sequence[Part], tried: Sequence[Applied]) -> tuple[Applied, float]:
+    """Return the effect that leaves least, and its rms; what cannot be simulated is left out."""
+    found = []
+    for one in tried:
+        try:
+            found.append((_rms([part.measured - part.sample([one]) for part in parts]), one))
+        except Gcode2KrlError:
+            continue
+    if not found:
+        return tried[0], float("inf")
+    rms, best = min(found, key=lambda each: each[0])
+    return best, rms
+
+
+def _slip_if_explained(parts: Sequence[Part], best: Applied, rms: float, words: str) -> list[Slip]:
+    before = _rms([part.residual for part in parts])
+    if rms**2 > (1.0 - _EXPLAINS) * before**2:
+        return []
+    part = parts[0]
+    return [Slip(best, part.link, before * part.factor, rms * part.factor, part.unit, words, False)]
+
+
+def _rms(values: Sequence[Floats]) -> float:
+    """Return the rms of vectors, a constant clock error of a run left in."""
+    return float(np.sqrt(np.mean(np.concatenate([np.sum(v**2, axis=1) for v in values]))))

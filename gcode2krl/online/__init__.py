@@ -1,0 +1,1 @@
+"""The online side: compensator, pilot, RSI link and the twin that closes the loop on predicted forces."""

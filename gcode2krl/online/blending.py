@@ -1,0 +1,101 @@
+"""Which force to trust: the measured one, or the pilot's estimate (Haehn & Weigold 2020, section 2.3).
+
+While both differ by less than a threshold the measurement counts: it knows wear and the real material.
+Beyond, a change of direction or the cutter's exit is assumed, which the filtered measurement shows too late,
+and the signal goes over to the estimate linearly within the blend time, and back the same way.
+
+What the paper leaves open: the difference is the length of the vector; the way back takes the same time; and
+an estimate that stays beyond the threshold while it does not change is a wrong estimate, not an event. It is
+then not trusted until both agree again.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from gcode2krl.online.rows import Bools, Floats, frozen
+from gcode2krl.online.settings import Online
+
+STEADY_SHARE = 0.2
+"""An estimate is steady while it changes by less than this share of the threshold; our choice."""
+WEIGHT, BEYOND_S, DISTRUSTED = 0, 1, 2
+ANCHOR, LAST = 3, 6
+
+
+class BlendState(NamedTuple):
+    """What the blend remembers."""
+
+    values: Floats
+    """(9,) weight of the estimate, time beyond the threshold in a steady cut, distrust; the estimate when
+    that began (3), and the last one there was (3)."""
+
+
+class Blend(NamedTuple):
+    """The load to compensate, and how it came about."""
+
+    load: Floats
+    """(n, 6)"""
+    weight: Floats
+    """(n,) share of the estimate, 0 to 1."""
+    distrusted: Bools
+    """(n,) True while an estimate is not trusted."""
+
+
+def blend_start() -> BlendState:
+    """Return the state before the first sample: the measurement counts."""
+    return BlendState(np.zeros(9))
+
+
+def blended(
+    state: BlendState, measured: Floats, estimate_N: Floats, known: Bools, settings: Online
+) -> tuple[BlendState, Blend]:
+    """Return the superposition of measured loads (n, 6) and estimated forces (n, 3).
+
+    ``known`` (n,) is False where there is no estimate; the weight of the last one then goes back, as above.
+    The estimate has no moment: what it counts for has none.
+    """
+    values = frozen(measured, -1, 6)
+    after = BlendState(state.values.copy())
+    blend = Blend(np.empty(values.shape), np.empty(len(values)), np.zeros(len(values), dtype=np.bool_))
+    patience_s = settings.pilot_lead_s + settings.blend_s + 2.0 * settings.filter_s
+    _blend(
+        values, frozen(estimate_N, len(values), 3), np.ascontiguousarray(known), after.values,
+        settings.cycle_s, settings.threshold_N, settings.blend_s, patience_s, blend.load, blend.weight,
+        blend.distrusted,
+    )  # fmt: skip
+    return after, blend
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _blend(
+    measured: Floats, estimate: Floats, known: Bools, state: Floats, cycle: float, threshold: float,
+    blend_s: float, patience: float, load: Floats, weight: Floats, distrusted: Bools,
+) -> None:  # fmt: skip
+    for i in range(len(measured)):
+        apart, moved = 0.0, 0.0
+        for c in range(3):
+            apart += (estimate[i, c] - measured[i, c]) ** 2
+            moved += (estimate[i, c] - state[ANCHOR + c]) ** 2
+        beyond = known[i] and apart >= threshold * threshold
+        if not beyond or moved > (STEADY_SHARE * threshold) ** 2:
+            state[BEYOND_S] = 0.0
+            for c in range(3):
+                state[ANCHOR + c] = estimate[i, c]
+        else:
+            state[BEYOND_S] += cycle
+        if not beyond:
+            state[DISTRUSTED] = 0.0
+        elif state[BEYOND_S] > patience:
+            state[DISTRUSTED] = 1.0
+        step = cycle / blend_s
+        towards = beyond and state[DISTRUSTED] == 0.0
+        state[WEIGHT] = min(state[WEIGHT] + step, 1.0) if towards else max(state[WEIGHT] - step, 0.0)
+        w = state[WEIGHT]
+        for c in range(3):
+            if known[i]:
+                state[LAST + c] = estimate[i, c]
+            load[i, c] = (1.0 - w) * measured[i, c] + w * state[LAST + c]
+            load[i, c + 3] = (1.0 - w) * measured[i, c + 3]
+        weight[i] = w
+        distrusted[i] = state[DISTRUSTED] > 0.0

@@ -1,0 +1,82 @@
+"""The quasi-static part of a sensor's signal: low-pass, moving average (Haehn & Weigold 2020, section 2.2).
+
+A filter is one compiled loop over rows that carries its memory from call to call, so a stream in one call and
+the same stream sample by sample give the same bits.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from gcode2krl.online.rows import Bools, Floats, Ints, frozen
+from gcode2krl.online.settings import Online
+
+WIDTH = 6
+"""Force x, y, z in N and moment x, y, z in N·mm."""
+
+
+class FilterState(NamedTuple):
+    """What the filter remembers."""
+
+    low: Floats
+    """(6,) output of the low-pass."""
+    window: Floats
+    """(k, 6) the last k outputs of the low-pass."""
+    counts: Ints
+    """(2,) samples so far; samples in a row that were not numbers."""
+
+
+def filter_start(settings: Online) -> FilterState:
+    """Return the memory before the first sample, which then fills it: no transient at the start."""
+    length = max(1, round(settings.average_s / settings.cycle_s))
+    return FilterState(np.zeros(WIDTH), np.zeros((length, WIDTH)), np.zeros(2, dtype=np.int64))
+
+
+def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[FilterState, Floats, Bools]:
+    """Return the filtered loads (n, 6), and (n,) True where the sensor is lost.
+
+    First-order low-pass, exact for an input that is held over a cycle, then the mean of the last
+    ``average_s``. A sample that is not a number, or above ``most_force_N``, leaves the output as it was; more
+    of them in a row than ``sensor_hold_s`` is a lost sensor, and so is at once a force that is no cut.
+    """
+    values = frozen(load, -1, WIDTH)
+    after = FilterState(state.low.copy(), state.window.copy(), state.counts.copy())
+    out, lost = np.empty(values.shape), np.zeros(len(values), dtype=np.bool_)
+    share = -math.expm1(-2.0 * math.pi * settings.lowpass_hz * settings.cycle_s)
+    allowed = round(settings.sensor_hold_s / settings.cycle_s)
+    _filter(values, after.low, after.window, after.counts, share, allowed, settings.most_force_N, out, lost)
+    return after, out, lost
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _filter(
+    values: Floats, low: Floats, window: Floats, count: Ints, share: float, allowed: int, most: float,
+    out: Floats, lost: Bools,
+) -> None:  # fmt: skip
+    length = window.shape[0]
+    for i in range(len(values)):
+        finite, size = True, 0.0
+        for c in range(6):
+            finite = finite and np.isfinite(values[i, c])
+        for c in range(3):
+            size += values[i, c] * values[i, c]
+        if finite and size <= most * most:
+            first = count[0] == 0
+            at = count[0] % length
+            for c in range(6):
+                low[c] = values[i, c] if first else low[c] + share * (values[i, c] - low[c])
+                if first:
+                    window[:, c] = low[c]
+                window[at, c] = low[c]
+            count[0] += 1
+            count[1] = 0
+        else:
+            count[1] += 1
+            lost[i] = count[1] > allowed or finite
+        for c in range(6):
+            total = 0.0
+            for k in range(length):
+                total += window[k, c]
+            out[i, c] = total / length

@@ -1,0 +1,106 @@
+"""Where an error of the tip counts: on what stays on the part, and where the forces are to be believed."""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from gcode2krl.cutting.law import feed_per_tooth
+from gcode2krl.frames import Floats
+from gcode2krl.online.rows import Bools, frozen
+from gcode2krl.prediction import Prediction
+
+SIDE_RAD = 0.05
+"""An engagement arc that begins or ends so near to the feed's normal leaves a wall."""
+CELL_MM = 0.5
+DEEPER_MM = 0.05
+"""What another pass cuts deeper by more than this does not stay."""
+LEAST_CHIP_MM = 0.005
+"""Below this the bottom edges plough; the force law does not hold there (docs/cutting.md)."""
+_SINKS = 1e-3
+
+
+class Judged(NamedTuple):
+    """Samples (n,) on which errors are judged, and those that are left out although they stay."""
+
+    counts: Bools
+    ploughs: Bools
+    """The tool sinks so slowly, or did just before, that the predicted force is that of ploughing edges."""
+
+
+def judged(prediction: Prediction, memory_s: float) -> Judged:
+    """Return where an error of the tip stays on the part.
+
+    It does where an edge passes the side of the cut: there the wall is made, which at entry and exit of a
+    slot is where the tool's centre is over the part. And it does where no other pass goes deeper. What the
+    edges' ploughing does is kept apart, and so is all that a compensator with a memory of ``memory_s`` makes
+    of it.
+    """
+    motion, forces, cell = prediction.motion, prediction.forces, prediction.cell
+    if motion is None or forces is None:
+        raise ValueError("a prediction without forces")
+    start, end = forces.phi_rad[:, 0::2], forces.phi_rad[:, 1::2]
+    with np.errstate(invalid="ignore"):
+        side = ((start <= SIDE_RAD) | (end >= np.pi - SIDE_RAD)).any(axis=1)
+    cuts = (forces.force_base_N != 0.0).any(axis=1) & side
+    radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
+    stays = cuts & _stays(motion.position_mm, radius, cuts)
+    velocity = np.gradient(motion.position_mm, motion.time_s, axis=0)
+    speed = np.linalg.norm(velocity, axis=1)
+    sink = -velocity[:, 2] / np.maximum(speed, 1e-9)
+    row = np.clip(motion.move, 0, len(prediction.toolpath) - 1)
+    teeth = np.array([cell.tool[int(number)].teeth for number in motion.tool])
+    chip = sink * feed_per_tooth(speed, prediction.toolpath.spindle_rad_s[row], 1) / teeth
+    ploughing = (forces.force_base_N != 0.0).any(axis=1) & (sink > _SINKS) & (chip < LEAST_CHIP_MM)
+    ploughs = stays & _lasting(ploughing, motion.time_s, memory_s)
+    return Judged(stays & ~ploughs, ploughs)
+
+
+def grid_of(position_mm: Floats, radius_mm: Floats) -> tuple[Floats, tuple[int, int]]:
+    """Return the centre of the first cell (2,) and the shape (ny, nx) of a grid below all positions."""
+    most = float(radius_mm.max(initial=0.0)) + CELL_MM
+    low = position_mm[:, :2].min(axis=0, initial=np.inf) - most
+    if not np.isfinite(low).all():
+        return np.zeros(2), (1, 1)
+    size = np.ceil((position_mm[:, :2].max(axis=0) + most - low) / CELL_MM).astype(int) + 1
+    return low, (int(size[1]), int(size[0]))
+
+
+def floor_over(position_mm: Floats, radius_mm: Floats, low_mm: Floats, shape: tuple[int, int]) -> Floats:
+    """Return the lowest tip over each cell (ny, nx) in mm; inf where nothing cuts."""
+    floor = np.full(shape, np.inf)
+    _lower(frozen(position_mm, -1, 3), frozen(radius_mm, -1), frozen(low_mm, 2), CELL_MM, floor)
+    return floor
+
+
+def _lasting(happens: Bools, time_s: Floats, memory_s: float) -> Bools:
+    """Return (n,) True where something happens, and for so long after it."""
+    last_s = np.maximum.accumulate(np.where(happens, time_s, -np.inf))
+    lasting: Bools = time_s - last_s <= memory_s
+    return lasting
+
+
+def _stays(position_mm: Floats, radius_mm: Floats, cuts: Bools) -> Bools:
+    """Return (n,) True where no pass is deeper below the tool's centre."""
+    low, shape = grid_of(position_mm[cuts], radius_mm[cuts])
+    floor = floor_over(position_mm[cuts], radius_mm[cuts], low, shape)
+    cell = np.rint((position_mm[:, :2] - low) / CELL_MM).astype(int)
+    column, row = np.clip(cell[:, 0], 0, floor.shape[1] - 1), np.clip(cell[:, 1], 0, floor.shape[0] - 1)
+    stays: Bools = position_mm[:, 2] <= floor[row, column] + DEEPER_MM
+    return stays
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _lower(position: Floats, radius: Floats, low: Floats, cell: float, floor: Floats) -> None:
+    """Lower the floor below a flat bottom at each position; a row of cells at a time."""
+    for k in range(len(position)):
+        x, y, r = position[k, 0] - low[0], position[k, 1] - low[1], radius[k]
+        first, last = max(int(np.ceil((y - r) / cell)), 0), min(int((y + r) / cell), floor.shape[0] - 1)
+        for i in range(first, last + 1):
+            half = np.sqrt(max(r * r - (i * cell - y) ** 2, 0.0))
+            left, right = (
+                max(int(np.ceil((x - half) / cell)), 0),
+                min(int((x + half) / cell), floor.shape[1] - 1),
+            )
+            for j in range(left, right + 1):
+                floor[i, j] = min(floor[i, j], position[k, 2])

@@ -1,0 +1,124 @@
+"""The last word on every correction: its sum, its rate, its step; and the controller in front of it."""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from gcode2krl.online.rows import Bools, Floats, frozen
+from gcode2krl.online.settings import Gains, Online
+from gcode2krl.units import RAD_PER_DEG
+
+NO_CORRECTION = 1e6
+"""mm or rad: from here on a wanted value is no number to reckon with."""
+
+
+class Bounds(NamedTuple):
+    """What a correction is held in."""
+
+    most: Floats
+    """(w,) largest value of each component; of a vector its length."""
+    step: Floats
+    """(w,) largest change from one cycle to the next; of a vector its length."""
+    is_vector: bool
+    """True: the length of the vector counts, and its direction is kept."""
+    gains: Floats
+    """(w, 3) P, I in 1/s, D in s."""
+    cycle_s: float
+
+
+class LimitState(NamedTuple):
+    """What the controller remembers."""
+
+    sent: Floats
+    """(w,) the last correction."""
+    integral: Floats
+    wanted: Floats
+    """(w,) the last set value; NaN before the first."""
+
+
+def cartesian_bounds(settings: Online) -> Bounds:
+    """Return the bounds of a correction x, y, z in mm."""
+    step_mm = min(settings.step_mm, settings.rate_mm_s * settings.cycle_s)
+    three = np.ones(3)
+    return Bounds(
+        settings.most_mm * three, step_mm * three, True, _gains((settings.gains,) * 3), settings.cycle_s
+    )
+
+
+def axis_bounds(settings: Online) -> Bounds:
+    """Return the bounds of a correction of A1 to A6 in rad."""
+    most = np.array(settings.axis_most_deg) * RAD_PER_DEG
+    step = np.array(settings.axis_rate_deg_s) * RAD_PER_DEG * settings.cycle_s
+    return Bounds(most, step, False, _gains(settings.axis_gains), settings.cycle_s)
+
+
+def _gains(gains: tuple[Gains, ...]) -> Floats:
+    return np.array([(g.p, g.i_1_s, g.d_s) for g in gains])
+
+
+def limit_start(width: int) -> LimitState:
+    """Return the state before the first sample: no correction."""
+    return LimitState(np.zeros(width), np.zeros(width), np.full(width, np.nan))
+
+
+def limited(state: LimitState, wanted: Floats, held: Bools, bounds: Bounds) -> tuple[LimitState, Floats]:
+    """Return the corrections (n, w) that are sent for those that are wanted, (n, w).
+
+    u = P·r + I·∫(r - u)dt + D·dr/dt with r scaled into the sum; then u is, into sum and step. The integral
+    takes what was really sent, so it neither winds up nor changes a correction that is reached. Where
+    ``held`` (n,), or where r is not a number or beyond `NO_CORRECTION`, the correction stays as it is.
+    """
+    width = len(bounds.most)
+    values = frozen(wanted, -1, width)
+    after = LimitState(*(part.copy() for part in state))
+    out = np.empty(values.shape)
+    _limit(
+        values, np.ascontiguousarray(held), *after, bounds.most, bounds.step, bounds.is_vector, bounds.gains,
+        bounds.cycle_s, out,
+    )  # fmt: skip
+    return after, out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _limit(
+    wanted: Floats, held: Bools, sent: Floats, integral: Floats, before: Floats, most: Floats, step: Floats,
+    is_vector: bool, gains: Floats, cycle: float, out: Floats,
+) -> None:  # fmt: skip
+    width = len(most)
+    r, u = np.empty(width), np.empty(width)
+    for i in range(len(wanted)):
+        finite = True
+        for c in range(width):
+            finite = finite and abs(wanted[i, c]) < NO_CORRECTION  # False for NaN
+        if held[i] or not finite:
+            out[i] = sent
+            before[:] = np.nan  # no derivative over the gap
+            continue
+        r[:] = wanted[i]
+        _shrink(r, most, is_vector)
+        for c in range(width):
+            slope = (r[c] - before[c]) / cycle if before[c] == before[c] else 0.0
+            u[c] = gains[c, 0] * r[c] + gains[c, 1] * integral[c] + gains[c, 2] * slope
+            before[c] = r[c]
+        _shrink(u, most, is_vector)
+        for c in range(width):
+            u[c] -= sent[c]
+        _shrink(u, step, is_vector)
+        for c in range(width):
+            sent[c] += u[c]
+            integral[c] += (r[c] - sent[c]) * cycle
+        out[i] = sent
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _shrink(u: Floats, most: Floats, is_vector: bool) -> None:
+    """Scale a vector into its bounds; its direction stays."""
+    share = 0.0
+    for c in range(len(u)):
+        share = share + (u[c] / most[c]) ** 2 if is_vector else max(share, abs(u[c]) / most[c])
+    share = math.sqrt(share) if is_vector else share
+    if share > 1.0:
+        for c in range(len(u)):
+            u[c] /= share

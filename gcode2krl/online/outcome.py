@@ -1,0 +1,101 @@
+"""What the twin found: the four figures of the paper, and what stands behind them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gcode2krl.errors import Issue
+from gcode2krl.online.judge import Judged
+from gcode2krl.online.pilot_gate import Gate
+from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
+from gcode2krl.tables import Ints
+
+Runs = Mapping[Case, Run]
+
+
+def simulate_all(twin: Twin) -> dict[Case, Run]:
+    """Return the four cases."""
+    return {case: simulate(twin, case) for case in CASES}
+
+
+def figures_of(runs: Runs, judged: Judged) -> dict[str, float | None]:
+    """Return the largest deviation normal to the feed of each case in mm; None where nothing is judged."""
+    return {f"{case}_mm": _worst(run, judged.counts) for case, run in runs.items()}
+
+
+def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints) -> dict[str, Any]:
+    """Return the object of ``online simulate --json``; ``source_line`` (n,) is the line of each sample."""
+    figures = figures_of(runs, judged)
+    before, after = figures["uncompensated_mm"], figures["pilot_mm"]
+    reduction = 100.0 * (1.0 - after / before) if before and after is not None else None
+    return {
+        **figures,
+        "reduction_percent": reduction,
+        "depth_mm": {case: _depth(twin, run, judged) for case, run in runs.items()},
+        "descents_mm": {case: _worst(run, judged.ploughs) for case, run in runs.items()},
+        "lines": [_of_line(int(n), runs, judged, source_line) for n in np.unique(source_line[judged.counts])],
+        "pilot": pilot_of(twin, runs),
+        "max_force_N": float(np.linalg.norm(runs["uncompensated"].force_N, axis=1).max(initial=0.0)),
+        "settings": as_settings(twin),
+    }
+
+
+def pilot_of(twin: Twin, runs: Runs) -> dict[str, Any]:
+    """Return whether the pilot was used, and why not."""
+    device = runs["pilot"].device
+    if device is None:
+        raise ValueError("the case with pilot has no compensator")
+    cycles = np.bincount(device.gate, minlength=len(Gate))
+    return {
+        "knots": len(twin.knots),
+        "used_share": float((device.weight > 0.0).mean()) if len(device.weight) else 0.0,
+        "distrusted_cycles": int(device.distrusted.sum()),
+        "gate_cycles": {gate.name.lower(): int(cycles[gate]) for gate in Gate if cycles[gate]},
+    }
+
+
+def findings(twin: Twin, runs: Runs, judged: Judged) -> list[Issue]:
+    """Return what a person should know of the figures."""
+    found = []
+    pilot = pilot_of(twin, runs)
+    closed = [
+        name for name in ("checksum", "override", "mode", "order", "speed") if name in pilot["gate_cycles"]
+    ]
+    if closed:
+        sentence = f"the pilot was refused ({', '.join(closed)}): the measured force alone is compensated"
+        found.append(Issue("warning", "pilot-refused", 0, sentence, "it holds at 100 % override only"))
+    if pilot["distrusted_cycles"]:
+        sentence = (
+            f"the pilot was wrong by more than {twin.settings.threshold_N:g} N in steady cuts "
+            f"({pilot['distrusted_cycles']} cycles): not trusted there"
+        )
+        found.append(Issue("warning", "pilot-wrong", 0, sentence, "measure the force coefficients"))
+    if judged.ploughs.any():
+        worst = max(_worst(run, judged.ploughs) or 0.0 for run in runs.values())
+        sentence = (
+            f"descents with ploughing edges are judged apart (up to {worst:.2f} mm): their force is a guess"
+        )
+        found.append(Issue("note", "descent", 0, sentence, ""))
+    if not judged.counts.any():
+        remedy = "state [stock]: a guessed one may leave nothing to cut"
+        found.append(Issue("warning", "nothing-judged", 0, "no cut leaves a wall on the part", remedy))
+    return found
+
+
+def _worst(run: Run, where: Any) -> float | None:
+    return float(run.normal_mm[where].max()) if where.any() else None
+
+
+def _depth(twin: Twin, run: Run, judged: Judged) -> float | None:
+    """Return the largest deviation along the tool axis in mm."""
+    if not judged.counts.any():
+        return None
+    x, y, z, w = twin.motion.rotation[judged.counts].T
+    axis = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
+    return float(np.abs(np.einsum("ij,ij->i", run.error_mm[judged.counts], axis)).max())
+
+
+def _of_line(number: int, runs: Runs, judged: Judged, source_line: Ints) -> dict[str, float | int | None]:
+    here = judged.counts & (source_line == number)
+    return {"line": number, **{f"{case}_mm": _worst(run, here) for case, run in runs.items()}}

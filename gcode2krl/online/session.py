@@ -1,0 +1,281 @@
+"""One RSI session as a pure step: a telegram comes in, an answer goes out, and a phase says what may happen.
+
+    waiting -> resting -> probing -> settling -> running -> held | zero | closed
+
+The correction is zero until the robot has shown, standing in air, that it takes corrections as absolute: a
+small correction along the tool axis moves it by as much and no more, and without it the robot goes back.
+Whatever goes wrong afterwards ends in one of three states that are never left: ``held`` sends the last
+correction unchanged (a correction is never taken back in material), ``zero`` sends none (a robot that adds
+corrections up), ``closed`` does not answer, and the controller's own time-out stops the robot.
+"""
+
+import enum
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gcode2krl.frames import Floats, rotation_from_quaternion
+from gcode2krl.online.compensator import Compensator, Samples, State, joints_at, start, step
+from gcode2krl.online.pilot_gate import NO_KNOT_YET, Announced, Gate
+from gcode2krl.online.settings import Online
+from gcode2krl.online.telegram import Answer, Telegram
+from gcode2krl.robot import forward
+
+_S_PER_MS = 1e-3
+RESTART_MS = 1000
+"""An IPOC that falls by more is a controller that was started anew; by less, a datagram that came late."""
+JUMP_MS = 60_000
+SEEN_SHARE, BACK_SHARE, ADDS_UP_SHARE = 0.4, 0.3, 1.6
+"""Of the probe: seen; back; more than was asked for."""
+SEEN_CYCLES = 2
+RUNAWAY_CYCLES = 3
+RUNAWAY_MM = 0.5
+"""How far beyond the largest correction the robot may be from the program, normal to it."""
+
+
+class Phase(enum.Enum):
+    """What a session is doing."""
+
+    WAITING = "waiting"
+    RESTING = "resting"
+    PROBING = "probing"
+    SETTLING = "settling"
+    RUNNING = "running"
+    HELD = "held"
+    ZERO = "zero"
+    CLOSED = "closed"
+
+
+UNKNOWN_KNOT = -2
+SAME_VALUE = 0.02
+"""N and s: forces are written with two decimals and pass through the controller's 4-byte REAL."""
+ENDED = (Phase.HELD, Phase.ZERO, Phase.CLOSED)
+
+
+@dataclass(frozen=True)
+class Session:
+    """The state of a session; `begin` makes the first."""
+
+    phase: Phase
+    device: State
+    sent: Floats
+    """The last correction."""
+    reason: str = ""
+    """Why the phase is what it is."""
+    ipoc: int = -1
+    cycles: int = 0
+    """Telegrams in this phase."""
+    rest_mm: Floats = field(default_factory=lambda: np.full(3, np.nan))
+    """(3,) where the robot rests."""
+    probe: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,) direction of the probe."""
+    seen: int = 0
+    """Telegrams in a row in which the probe was seen."""
+    away: int = 0
+    """Telegrams in a row in which the robot was too far from the program."""
+    gate: int = Gate.NOT_STARTED
+    knot: int = UNKNOWN_KNOT
+    """The knot that the values of the form ``values`` mean."""
+    lost: int = 0
+    """Telegrams that never came."""
+    ignored: int = 0
+    """Telegrams that came twice or too late."""
+
+    @property
+    def ready(self) -> bool:
+        """True while corrections are made."""
+        return self.phase is Phase.RUNNING
+
+
+def begin(device: Compensator) -> Session:
+    """Return the state before the first telegram."""
+    return Session(Phase.WAITING, start(device), np.zeros(len(device.bounds.most)))
+
+
+def exchange(
+    session: Session, telegram: Telegram, load: Floats, device: Compensator
+) -> tuple[Session, Answer | None]:
+    """Return the state after a telegram and its answer, None where it must not be answered.
+
+    ``load`` (6,) is what the force sensor says now, NaN where it says nothing.
+    """
+    session, is_new = _counted(session, telegram.ipoc, device.settings)
+    if session.phase is Phase.CLOSED or not is_new:
+        return session, None
+    if session.phase is Phase.WAITING:
+        session = _enter(session, Phase.RESTING, "", rest_mm=telegram.position_mm)
+    session = _STEPS[session.phase](session, telegram, load, device)
+    session = replace(session, cycles=session.cycles + 1)
+    return session, Answer(telegram.ipoc, session.sent, session.ready)
+
+
+def silent(session: Session, silence_s: float, settings: Online) -> Session:
+    """Return the state after so long without a telegram: closed where that is too long."""
+    if session.phase in (Phase.WAITING, Phase.CLOSED) or silence_s < settings.link.silence_s:
+        return session
+    return _enter(session, Phase.CLOSED, "silence")
+
+
+def _enter(session: Session, phase: Phase, reason: str, **more: object) -> Session:
+    return replace(session, phase=phase, reason=reason, cycles=0, **more)  # type: ignore[arg-type]
+
+
+def _counted(session: Session, ipoc: int, settings: Online) -> tuple[Session, bool]:
+    """Take over the IPOC, and tell whether it is a new one; where it does not follow, say what that means."""
+    if session.ipoc < 0:
+        return replace(session, ipoc=ipoc), True
+    step_ms = round(settings.cycle_s / _S_PER_MS)
+    ahead = ipoc - session.ipoc
+    if ahead < -RESTART_MS:
+        return _enter(session, Phase.CLOSED, "ipoc-restart"), False
+    if ahead <= 0:
+        return replace(session, ignored=session.ignored + 1), False
+    missing = max(ahead // step_ms - 1, 0)
+    following = replace(session, ipoc=ipoc, lost=session.lost + min(missing, JUMP_MS))
+    if session.phase in ENDED:
+        return following, True
+    is_running = session.phase is Phase.RUNNING
+    reason = ""
+    if ahead % step_ms:
+        reason = "ipoc-cycle"
+    elif missing > (settings.link.lost_cycles if is_running else 0):  # the proof needs every telegram
+        reason = "ipoc-jump" if ahead > JUMP_MS else "telegrams-lost"
+    if not reason:
+        return following, True
+    return _enter(following, Phase.HELD if is_running else Phase.RESTING, reason), True
+
+
+def _rest(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Zero, until the robot has stood for some time."""
+    probe = device.settings.probe
+    session = replace(session, sent=np.zeros_like(session.sent))
+    if np.abs(telegram.position_mm - session.rest_mm).max() > probe.rest_mm:
+        return replace(session, rest_mm=telegram.position_mm, cycles=0)
+    if session.cycles < probe.rest_cycles:
+        return session
+    _, rotation = forward(telegram.q_rad[None], device.cell, device.tool)
+    away = rotation_from_quaternion(rotation)[0, :, 2]
+    return _probe(_enter(session, Phase.PROBING, "", probe=away, seen=0), telegram, load, device)
+
+
+def _probe(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """A small correction, until the robot is seen to have moved by it, twice: one that adds up moves on."""
+    probe = device.settings.probe
+    moved = _moved(session, telegram)
+    if moved > ADDS_UP_SHARE * probe.amplitude_mm:
+        return _adds_up(session)
+    seen = session.seen + 1 if moved >= SEEN_SHARE * probe.amplitude_mm else 0
+    if seen >= SEEN_CYCLES or session.cycles >= probe.most_cycles:
+        return _enter(session, Phase.SETTLING, "", seen=seen, sent=np.zeros_like(session.sent))
+    shift = probe.amplitude_mm * session.probe
+    if len(session.sent) == 6:
+        joints = joints_at(telegram.q_command_rad[None], shift[None], device.cell)[0]
+        shift = joints - telegram.q_command_rad
+    if not np.isfinite(shift).all():
+        return _enter(session, Phase.ZERO, "reach", sent=np.zeros_like(session.sent))
+    return replace(session, sent=shift, seen=seen)
+
+
+def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Zero again: the robot must come back."""
+    probe = device.settings.probe
+    moved = _moved(session, telegram)
+    if moved > ADDS_UP_SHARE * probe.amplitude_mm:
+        return _adds_up(session)
+    if session.cycles < probe.settle_cycles:
+        return session
+    beside = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
+    if beside > probe.rest_mm:
+        return _enter(session, Phase.RESTING, "moved", rest_mm=telegram.position_mm)
+    if not session.seen:
+        return _enter(session, Phase.RESTING, "probe-not-seen", rest_mm=telegram.position_mm)
+    if moved > BACK_SHARE * probe.amplitude_mm:
+        return _adds_up(session)
+    return _enter(session, Phase.RUNNING, "", device=start(device), away=0)
+
+
+def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Compensate, as long as the robot is where it should be and the sensor is there."""
+    away = session.away + 1 if _too_far(session, telegram, device.settings) else 0
+    if away >= RUNAWAY_CYCLES:
+        return _adds_up(session)
+    knot = knot_of(telegram.values, session.knot, device)
+    told = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
+    state, out = step(device, session.device, sample_of(told, load))
+    after = replace(
+        session, device=state, sent=out.correction[0], away=away, gate=int(out.gate[0]), knot=knot
+    )
+    return _enter(after, Phase.HELD, "sensor") if out.sensor_lost[0] else after
+
+
+def _stay(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Send what was sent."""
+    return session
+
+
+_STEPS = {
+    Phase.RESTING: _rest,
+    Phase.PROBING: _probe,
+    Phase.SETTLING: _settle,
+    Phase.RUNNING: _run,
+    Phase.HELD: _stay,
+    Phase.ZERO: _stay,
+}
+
+
+def _adds_up(session: Session) -> Session:
+    """The robot adds corrections up: for such a robot zero is to stand still, at once."""
+    return _enter(session, Phase.ZERO, "adds-up", sent=np.zeros_like(session.sent))
+
+
+def _moved(session: Session, telegram: Telegram) -> float:
+    """Return how far the robot is from its rest along the probe, in mm."""
+    return float((telegram.position_mm - session.rest_mm) @ session.probe)
+
+
+def _too_far(session: Session, telegram: Telegram, settings: Online) -> bool:
+    """Tell whether the robot is farther from the program than any correction of ours can have moved it.
+
+    By the applied correction where the controller reports it, else by RIst less RSol, of which only what is
+    normal to the movement counts: along it the robot is behind its program.
+    """
+    most = settings.most_mm + RUNAWAY_MM
+    if np.isfinite(telegram.monitor_mm).all():
+        return float(np.linalg.norm(telegram.monitor_mm)) > most
+    apart = telegram.position_mm - telegram.command_mm
+    along = session.device.feed.direction
+    length = float(along @ along)
+    if length > 0.0:
+        apart = apart - (apart @ along) / length * along
+    return float(np.linalg.norm(apart)) > most
+
+
+def knot_of(values: Floats, last: int, device: Compensator) -> int:
+    """Return which knot of the sidecar announced values (4,) are: the last one, the next, or none of them.
+
+    Before the first all are zero. Values are compared to the decimals in which they are written.
+    """
+    table = device.table
+    if not np.isfinite(values).all():
+        return UNKNOWN_KNOT
+    if not values.any():
+        return NO_KNOT_YET
+    for knot in (last, last + 1):
+        if 0 <= knot < len(table.time_s):
+            row = np.append(table.force_N[knot], table.lead_s[knot])
+            if np.abs(values - row).max() <= SAME_VALUE:
+                return knot
+    return UNKNOWN_KNOT
+
+
+def sample_of(telegram: Telegram, load: Floats) -> Samples:
+    """Return a telegram and the sensor's load (6,) as one row for the compensator."""
+    told = (telegram.knot, telegram.checksum, telegram.override_percent, telegram.t1)
+    return Samples(
+        time_s=np.array([_S_PER_MS * telegram.ipoc]),
+        load=load[None],
+        q_rad=telegram.q_rad[None],
+        q_command_rad=telegram.q_command_rad[None],
+        position_mm=telegram.command_mm[None],
+        told=Announced(*(np.array([value]) for value in told)),
+    )

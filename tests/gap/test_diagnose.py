@@ -1,0 +1,136 @@
+"""The whole diagnosis on runs made with the library's effects, noise and normal mismatch."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gcode2krl.gap import Gap, diagnose, text_report
+from gcode2krl.gap.result import SCHEMA
+from tests.gap.synthetic import LIBRARY, applied, prediction, runs
+
+SERVO = {"tracker": False, "force": False}
+GEAR = {**SERVO, "load_encoders": True}
+FORCE = {"tracker": False, "controller": False}
+TIP = {"force": False}
+
+
+def _gap(*texts: str, seed: int = 5, count: int = 2, **signals: bool) -> Gap:
+    return diagnose(prediction(), runs(applied(*texts), count, seed, **signals))
+
+
+@pytest.mark.parametrize(
+    ("text", "signals", "parameter", "tolerance"),
+    [
+        ("friction:target=A2,spike_deg=0.006,decay_s=0.15", SERVO, "spike_deg", 0.1),
+        ("servo_lag:target=A3,tau_s=0.012", SERVO, "tau_s", 0.06),
+        ("backlash:target=A1,gap_deg=0.008", GEAR, "gap_deg", 0.1),
+        ("transmission:target=A2,amplitude_deg=0.004,harmonic=2,phase=1", GEAR, "amplitude_deg", 0.1),
+        ("clock:target=q_load,offset_s=0.01", GEAR, "offset_s", 0.2),
+        ("tool_wear:growth_per_m=0.5", FORCE, "growth_per_m", 0.15),
+        ("force_scale:target=radial,scale=1.5", FORCE, "scale", 0.06),
+        ("runout:runout_mm=0.02", FORCE, "runout_mm", 0.1),
+        ("force_offset:fx_N=20,fy_N=-10,fz_N=5", FORCE, "fx_N", 0.2),
+        ("stiffness:target=A2,scale=0.6", TIP, "scale", 0.12),
+        ("mastering:target=A2,offset_deg=0.01", TIP, "offset_deg", 0.2),
+        ("vibration:hz=12,participation=0.5,direction=1/0/0", TIP, "hz", 0.01),
+        ("base_frame:x_mm=0.5,y_mm=-0.3,c_deg=0.02", TIP, "x_mm", 0.1),
+    ],
+)
+def test_an_effect_is_named_with_its_target_and_size(text, signals, parameter, tolerance):
+    truth = applied(text)[0]
+    gap = _gap(text, **signals)
+    first = gap.causes[0]
+    alike = [(each["effect"], each["target"]) for each in first["indistinguishable_from"]]
+    assert (truth.effect.name, truth.target) in [(first["effect"], first["target"]), *alike]
+    assert len(gap.named_causes) == 1
+    assert first["probability"] > 0.5
+    assert gap.verdict == "explained"
+    assert gap.gap["held_out"]
+    assert gap.gap["shrink"] > 0.9
+    if first["effect"] == truth.effect.name:
+        value = first["parameters"][parameter]
+        assert value["value"] == pytest.approx(truth.values[parameter], rel=tolerance)
+        assert value["low"] <= value["value"] <= value["high"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_normal_mismatch_is_no_gap(seed):
+    signals = [SERVO, GEAR, FORCE, {}][seed]
+    gap = _gap(seed=200 + seed, **signals)
+    assert gap.verdict == "no_gap"
+    assert gap.causes == []
+
+
+def test_an_effect_that_the_library_lacks_is_not_blamed_on_another():
+    def bump(name, values, stamps, signals, number):
+        if name != "q_act_rad":
+            return values
+        shape = np.zeros_like(values)
+        shape[:, 3] = 2e-4 * np.sin(2.0 * np.pi * 0.7 * stamps) ** 5  # nothing that servos do
+        return values + shape
+
+    gap = diagnose(prediction(), runs([], 2, 3, extra=bump, **SERVO))
+    assert gap.verdict == "unexplained"
+    assert not gap.named_causes
+    assert gap.where["joints"][0]["joint"] == "A4"
+    assert gap.unexplained["significant"]
+
+
+def test_two_effects_are_both_named():
+    gap = _gap("friction:target=A1,spike_deg=0.008,decay_s=0.15", "servo_lag:target=A4,tau_s=0.01", **SERVO)
+    found = {(each["effect"], each["target"]) for each in gap.named_causes}
+    assert found == {("friction", "A1"), ("servo_lag", "A4")}
+
+
+def test_the_place_of_a_spike_is_after_the_reversals_of_its_joint():
+    gap = _gap("friction:target=A2,spike_deg=0.01,decay_s=0.15", **SERVO)
+    assert gap.where["phases"][0]["phase"] in ("reversal", "corner")
+    assert gap.where["joints"][0]["joint"] == "A2"
+    assert {each["what"] for each in gap.where["intervals"]} & {"reversal of A2"}
+    for each in gap.where["intervals"]:
+        assert each["t_end_s"] - each["t_start_s"] < 1.0
+
+
+def test_a_held_out_run_is_reported_on_and_not_used():
+    some = runs(applied("servo_lag:target=A3,tau_s=0.012"), 3, 6, **SERVO)
+    gap = diagnose(prediction(), some[:2], some[2:])
+    assert gap.gap["held_out"]
+    assert gap.gap["shrink"] > 0.95
+    other = runs([], 1, 7, **SERVO)  # held out and without the effect: it must not shrink there
+    assert diagnose(prediction(), some[:2], other).gap["shrink"] == 0.0
+
+
+def test_a_single_run_is_split_with_guard_gaps():
+    gap = _gap("servo_lag:target=A3,tau_s=0.012", count=1, **SERVO)
+    assert [(each["effect"], each["target"]) for each in gap.named_causes] == [("servo_lag", "A3")]
+    assert gap.gap["held_out"]
+
+
+def test_the_json_has_every_key_and_plain_values():
+    found = json.loads(
+        json.dumps(_gap("servo_lag:target=A3,tau_s=0.012", **SERVO).as_dict(), allow_nan=False)
+    )
+    assert found["schema"] == SCHEMA
+    assert set(found) >= {
+        "verdict", "gap", "links", "where", "causes", "unexplained", "not_examined", "next_run",
+    }  # fmt: skip
+    assert set(found["gap"]) == {
+        "signal", "unit", "rms_before", "rms_after", "noise_floor", "max_before", "max_after", "shrink",
+        "held_out",
+    }  # fmt: skip
+    assert set(found["where"]) == {
+        "signals", "intervals", "direction_base", "phases", "joints", "frequency_hz",
+    }  # fmt: skip
+    assert {each["link"] for each in found["not_examined"]} == {"gear", "force", "mechanics", "part"}
+
+
+def test_the_report_begins_with_a_sentence():
+    text = text_report(_gap("backlash:target=A2,gap_deg=0.01", **GEAR))
+    assert text.splitlines()[0].endswith(".")
+    assert "backlash of A2" in text.splitlines()[0]
+    assert "not examined" in text
+
+
+def test_every_cause_of_the_library_has_a_link():
+    assert all(effect.links for effect in LIBRARY.values() if effect.kind == "cause")
