@@ -15,16 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cutting.kernels import kernel
-from gcode2krl.cutting.rings import (
-    LOWER,
-    SHARE,
-    TOP,
-    UPPER,
-    correct_at_walls,
-    stand_above_cutter,
-    take_off_recent,
-    tops_on_ring,
-)
+from gcode2krl.cutting.rings import correct_at_walls, stand_above_cutter, take_off_recent, tops_on_ring
 from gcode2krl.cutting.slices import LINEAR_EDGE, arc_force
 from gcode2krl.cutting.sweep import FEEL_MM, outline_height, sweep_height
 from gcode2krl.cutting.walls import height_at
@@ -43,7 +34,7 @@ _COARSE_JUMP = 0.25  # the same for one of many bands, absolute share
 _TURN = 2.0 * math.pi
 _WALL_TURN, _RING_TURN = np.int64(0), np.int64(2)  # rows of `Work.turn`
 _NONE = np.int64(0)
-_LANES = np.uintp(8)
+_LOWER, _LOWER_TOP, _UPPER, _UPPER_TOP, _SHARE = range(5)  # rows of `Work.rows`
 
 
 class Cutters(NamedTuple):
@@ -83,8 +74,6 @@ class Work(NamedTuple):
     arc: NDArray[np.float64]
     part: NDArray[np.float64]
     total: NDArray[np.float64]
-    lanes: NDArray[np.float64]
-    """(5, _LANES) partial sums."""
 
 
 def new_work() -> Work:
@@ -92,8 +81,8 @@ def new_work() -> Work:
     bins = _MOST_BINS
     rows, reach = np.zeros((5, bins)), np.zeros((2, bins))
     recent, arcs = np.zeros((MOST_RECENT, 2), np.int64), np.zeros((_MOST_ARCS, 2))
-    turn, heading, lanes = np.zeros((8, bins)), np.zeros((2, bins)), np.zeros((5, int(_LANES)))
-    return Work(turn, heading, rows, reach, recent, arcs, np.zeros(4), np.zeros(4), np.zeros(10), lanes)
+    turn, heading = np.zeros((8, bins)), np.zeros((2, bins))
+    return Work(turn, heading, rows, reach, recent, arcs, np.zeros(4), np.zeros(4), np.zeros(10))
 
 
 @kernel
@@ -119,17 +108,14 @@ def add_bands(grid, path, cutters, law, i, outline, heading, chip, top, recent, 
     No material stands more than ``top`` above the tip.
     """
     tool, bands, position, part, total = path.tool[i], cutters.bands, path.position_mm, work.part, work.total
-    rows, reach, directions = work.rows, work.reach, work.heading
-    bins, arcs, known, turned, widest = (
-        cutters.ring_bins[tool],
-        _NONE,
-        -1.0,
-        -_RING_TURN,
-        cutters.ring_bins[tool],
-    )
+    lower, lower_top, upper, upper_top, share = _rows(work.rows)
+    east, north, depth, reach = work.heading[0], work.heading[1], work.reach[1], work.reach[0]
+    bins, arcs, known, turned = cutters.ring_bins[tool], _NONE, -1.0, -_RING_TURN
+    widest = bins
     x, y, z = position[i, 0], position[i, 1], position[i, 2]
     last, bottom = cutters.used[tool] - 1, grid.bottom_mm - z
-    reach[:, :bins] = 0.0
+    for j in range(np.uintp(bins)):
+        reach[j], depth[j] = 0.0, 0.0
     for b in range(last + 1):
         band = _band_of(bands, tool, b)
         if band[_LOW] >= top:
@@ -138,39 +124,47 @@ def add_bands(grid, path, cutters, law, i, outline, heading, chip, top, recent, 
         if start >= 0.25 * _TURN:
             continue
         if band[_COS] == 0.0:
-            turned = _turn(work.turn, directions, _WALL_TURN, cutters.wall_bins[tool], heading, turned)
+            turned = _turn(work.turn, east, north, _WALL_TURN, cutters.wall_bins[tool], heading, turned)
             arcs = _wall(grid, path, law, i, outline, band, chip, recent, work, cutters.wall_bins[tool], arcs)
             continue
-        turned = _turn(work.turn, directions, _RING_TURN, bins, heading, turned)
+        turned = _turn(work.turn, east, north, _RING_TURN, bins, heading, turned)
         first = _first_bin(min(start, _first_angle(_band_of(bands, tool, min(b + 1, last)), chip)), bins)
         for ring in range(1 if known == band[_R_LOW] else 0, 2):
             for j in range(np.uintp(first), np.uintp(bins - first)):
-                rows[LOWER, j], rows[LOWER + TOP, j] = rows[UPPER, j], rows[UPPER + TOP, j]
+                lower[j], lower_top[j] = upper[j], upper_top[j]
             r = band[_R_LOW + ring]
             level = z + outline_height(r, outline)
-            after, to = bins - first, UPPER + TOP
+            after = bins - first
             walls = tops_on_ring(
-                grid.place, grid.shift, grid.height, grid.wall, x, y, r, first, after, directions, rows, to
+                grid.place, grid.shift, grid.height, grid.wall, x, y, r, first, after, east, north, upper_top
             )
-            stand_above_cutter(grid.place, outline, x, y, z, r, level, first, after, directions, rows)
+            stand_above_cutter(
+                grid.place, outline, x, y, z, r, level, first, after, east, north, upper_top, upper
+            )
             if walls:
-                correct_at_walls(grid, path, x, y, r, level, first, after, directions, rows, UPPER, to)
+                correct_at_walls(grid, path, x, y, r, level, first, after, east, north, upper_top, upper)
             if recent:
                 past = (recent, work.recent)
                 take_off_recent(
-                    position, outline, x, y, r, level, first, after, past, directions, rows, UPPER, to
+                    position, outline, x, y, r, level, first, after, past, east, north, upper_top, upper
                 )
         known, widest = band[_R_HIGH], min(widest, first)
         first = _first_bin(start, bins)
-        _share(bottom, z, band, first, bins, rows, reach)
+        _share(bottom, band, first, bins, lower, upper, share)
+        _extend(z, band[_R_HIGH], first, bins, share, lower_top, upper, upper_top, reach, depth)
         part[:] = 0.0
         if law[0] == LINEAR_EDGE:
-            _integrate(law, band, chip, first, bins, rows, work.turn, work.lanes, part)
+            _integrate(law, band, chip, first, bins, share, work.turn, part)
         else:
-            _by_arcs(law, band, chip, first, bins, rows, work.arc, part)
+            _by_arcs(law, band, chip, first, bins, share, work.arc, part)
         lever = 0.5 * (band[_LOW] + max(bottom - band[_LOW], 0.0) + band[_HIGH])
         _sum(band[_WIDTH], 0.5 * (band[_R_LOW] + band[_R_HIGH]), lever, part, total)
-    return _list_arcs(work.turn, reach, widest, bins, max(bottom, 0.0), total, work.arcs, arcs)
+    return _list_arcs(work.turn, reach, depth, widest, bins, max(bottom, 0.0), total, work.arcs, arcs)
+
+
+@kernel
+def _rows(rows):
+    return rows[_LOWER], rows[_LOWER_TOP], rows[_UPPER], rows[_UPPER_TOP], rows[_SHARE]
 
 
 @kernel
@@ -199,74 +193,56 @@ def _first_bin(start, bins):
 
 
 @kernel
-def _turn(turn, directions, which, bins, heading, turned):
+def _turn(turn, east, north, which, bins, heading, turned):
     """Turn the table of directions into the heading of the sample."""
     if turned == which:
         return turned
     fx, fy = heading
     for j in range(np.uintp(bins)):
-        directions[0, j] = turn[which, j] * fx - turn[which + 1, j] * fy
-        directions[1, j] = turn[which, j] * fy + turn[which + 1, j] * fx
+        east[j] = turn[which, j] * fx - turn[which + 1, j] * fy
+        north[j] = turn[which, j] * fy + turn[which + 1, j] * fx
     return which
 
 
 @kernel
-def _blocks(first, bins):
-    """Return the bins that contain all of a band in whole blocks of _LANES."""
-    return np.uintp(first) // _LANES * _LANES, (
-        np.uintp(bins - first) + _LANES - np.uintp(1)
-    ) // _LANES * _LANES
-
-
-@kernel
-def _share(bottom, z, band, first, bins, rows, reach):
+def _share(bottom, band, first, bins, lower, upper, share):
     """Write the share of a band that is engaged: between its rings the thickness changes evenly.
 
     ``bottom`` is the height of the material's bottom above the tip.
     """
-    height, missing, radius = band[_HIGH] - band[_LOW], max(bottom - band[_LOW], 0.0), band[_R_HIGH]
+    height, missing = band[_HIGH] - band[_LOW], max(bottom - band[_LOW], 0.0)
     sound = 1.0 if missing == 0.0 else max(1.0 - missing / height, 0.0) if height > 0.0 else 0.0
-    low_end, high_end = _blocks(first, bins)
-    for j in range(low_end, high_end):
-        rows[SHARE, j] = 0.0
     for j in range(np.uintp(first), np.uintp(bins - first)):
-        low, high = rows[LOWER, j], rows[UPPER, j]
+        low, high = lower[j], upper[j]
         low_in, high_in = low > FEEL_MM, high > FEEL_MM
         most, gap = (low if low > high else high), abs(low - high)
         part = most / (gap if gap > most else most)
         part = part if low_in | high_in else 0.0
-        part = sound * (1.0 if low_in & high_in else part)
-        rows[SHARE, j] = part
-        here = radius if part > 0.0 else 0.0
-        reach[0, j] = reach[0, j] if reach[0, j] > here else here
-        top = (rows[UPPER + TOP, j] if high_in else rows[LOWER + TOP, j]) - z
-        top = top if part > 0.0 else 0.0
-        reach[1, j] = reach[1, j] if reach[1, j] > top else top
+        share[j] = sound * (1.0 if low_in & high_in else part)
 
 
 @kernel
-def _integrate(law, band, chip, first, bins, rows, turn, lanes, part):
-    """Add the force of a band from the integrals over its bins: linear edge forces.
+def _extend(z, radius, first, bins, share, lower_top, upper, upper_top, reach, depth):
+    """Note the radius of a band, and the height of the material above the tip, where the band is engaged."""
+    for j in range(np.uintp(first), np.uintp(bins - first)):
+        here = radius if share[j] > 0.0 else 0.0
+        reach[j] = reach[j] if reach[j] > here else here
+    for j in range(np.uintp(first), np.uintp(bins - first)):
+        top = (upper_top[j] if upper[j] > FEEL_MM else lower_top[j]) - z
+        top = top if share[j] > 0.0 else 0.0
+        depth[j] = depth[j] if depth[j] > top else top
 
-    Summed in _LANES places, so that the compiler adds eight bins at once.
-    """
-    lanes[:] = 0.0
-    low_end, high_end = _blocks(first, bins)
-    for block in range(low_end, high_end, _LANES):
-        for lane in range(_LANES):
-            share = rows[SHARE, block + lane]
-            lanes[0, lane] += share
-            lanes[1, lane] += share * turn[4, block + lane]
-            lanes[2, lane] += share * turn[5, block + lane]
-            lanes[3, lane] += share * turn[6, block + lane]
-            lanes[4, lane] += share * turn[7, block + lane]
+
+@kernel
+def _integrate(law, band, chip, first, bins, share, turn, part):
+    """Add the force of a band from the integrals over its bins: linear edge forces."""
     one, sin, cos, sin_sin, sin_cos = 0.0, 0.0, 0.0, 0.0, 0.0
-    for lane in range(_LANES):
-        one += lanes[0, lane]
-        sin += lanes[1, lane]
-        cos += lanes[2, lane]
-        sin_sin += lanes[3, lane]
-        sin_cos += lanes[4, lane]
+    for j in range(np.uintp(first), np.uintp(bins - first)):
+        one += share[j]
+        sin += share[j] * turn[4, j]
+        cos += share[j] * turn[5, j]
+        sin_sin += share[j] * turn[6, j]
+        sin_cos += share[j] * turn[7, j]
     if one > 0.0 and chip[0] > 0.0:
         _edge_force((one * _TURN / bins, sin, cos, sin_sin, sin_cos), band, chip, law, part)
 
@@ -290,17 +266,13 @@ def _edge_force(integrals, band, chip, law, out):
 
 
 @kernel
-def _by_arcs(law, band, chip, first, bins, rows, one, part):
+def _by_arcs(law, band, chip, first, bins, share, one, part):
     """Add the force of a band arc by arc: any law."""
     at = first
     while at < bins - first:
         end, added = at, 0.0
-        while (
-            end < bins - first
-            and rows[SHARE, end] > 0.0
-            and abs(rows[SHARE, end] - rows[SHARE, at]) < _COARSE_JUMP
-        ):
-            added += rows[SHARE, end]
+        while end < bins - first and share[end] > 0.0 and abs(share[end] - share[at]) < _COARSE_JUMP:
+            added += share[end]
             end += 1
         if end > at:
             a, b = -0.25 * _TURN + at * _TURN / bins, -0.25 * _TURN + end * _TURN / bins
@@ -324,35 +296,36 @@ def _sum(width, radius, z, part, total):
 @kernel
 def _wall(grid, path, law, i, outline, band, chip, recent, work, bins, arcs):
     """Add a cylindrical band: its depth may change along the rim, by steps whose places are looked for."""
-    position, directions, rows, total, part = path.position_mm, work.heading, work.rows, work.total, work.part
+    position, total, part, depths = path.position_mm, work.total, work.part, work.rows[_SHARE]
+    east, north = work.heading[0], work.heading[1]
     x, y, z = position[i, 0], position[i, 1], position[i, 2]
     r, below, high = band[_R_HIGH], max(grid.bottom_mm - z, 0.0), band[_HIGH]
     foot, first, after = max(band[_LOW], below), bins // 4, bins - bins // 4
     if tops_on_ring(
-        grid.place, grid.shift, grid.height, grid.wall, x, y, r, first, after, directions, rows, SHARE
+        grid.place, grid.shift, grid.height, grid.wall, x, y, r, first, after, east, north, depths
     ):
-        correct_at_walls(grid, path, x, y, r, 0.0, first, after, directions, rows, SHARE, SHARE)
+        correct_at_walls(grid, path, x, y, r, 0.0, first, after, east, north, depths, depths)
     if recent:
         past = (recent, work.recent)
-        take_off_recent(position, outline, x, y, r, 0.0, first, after, past, directions, rows, SHARE, SHARE)
+        take_off_recent(position, outline, x, y, r, 0.0, first, after, past, east, north, depths, depths)
     engaged = 0
     for j in range(np.uintp(first), np.uintp(after)):
-        depth = rows[SHARE, j] - (z + foot)
+        depth = depths[j] - (z + foot)
         depth = depth if depth > FEEL_MM else 0.0
         engaged |= depth > 0.0
-        rows[SHARE, j] = depth
+        depths[j] = depth
     if not engaged:
         return arcs
     at, a = first, 0.0
     while at < after:
         end, added = at, 0.0
-        while end < after and not _jumps(rows[SHARE, at], rows[SHARE, end]):
-            added += rows[SHARE, end]
+        while end < after and not _jumps(depths[at], depths[end]):
+            added += depths[end]
             end += 1
         b = 0.5 * _TURN
         if end < after:
             b = _edge(grid, path, outline, (x, y, r, z + foot), end, bins, recent, work)
-        if rows[SHARE, at] > 0.0 and b > a:
+        if depths[at] > 0.0 and b > a:
             deep = added / (end - at)
             width = min(deep, high - foot)
             part[:] = 0.0
@@ -375,12 +348,13 @@ def _jumps(a, b):
 def _edge(grid, path, outline, place, j, bins, recent, work):
     """Return the angle between bins j - 1 and j at which the depth jumps."""
     x, y, r, foot = place
-    position, outlines, tools, directions = path.position_mm, path.outlines, path.tool, work.heading
-    low, high, before, behind = 0.0, 1.0, work.rows[SHARE, j - 1], work.rows[SHARE, j]
+    position, outlines, tools = path.position_mm, path.outlines, path.tool
+    east, north, depths = work.heading[0], work.heading[1], work.rows[_SHARE]
+    low, high, before, behind = 0.0, 1.0, depths[j - 1], depths[j]
     for _ in range(4):
         middle = 0.5 * (low + high)
-        qx = x + r * (directions[0, j - 1] + middle * (directions[0, j] - directions[0, j - 1]))
-        qy = y + r * (directions[1, j - 1] + middle * (directions[1, j] - directions[1, j - 1]))
+        qx = x + r * (east[j - 1] + middle * (east[j] - east[j - 1]))
+        qy = y + r * (north[j - 1] + middle * (north[j] - north[j - 1]))
         height = height_at(grid.place, grid.shift, grid.height, grid.wall, position, outlines, tools, qx, qy)
         for sweep in range(recent):
             start, end = work.recent[sweep, 0], work.recent[sweep, 1]
@@ -394,15 +368,15 @@ def _edge(grid, path, outline, place, j, bins, recent, work):
 
 
 @kernel
-def _list_arcs(turn, reach, first, bins, below, total, listed, arcs):
+def _list_arcs(turn, reach, depth, first, bins, below, total, listed, arcs):
     """List the arcs over which any band between rings is engaged, and their extent normal to the feed."""
     open_at, most, least, top = -1, total[MOST], total[LEAST], total[A_P] + below
     for j in range(first, bins - first + 1):
-        engaged = j < bins - first and reach[0, j] > 0.0
+        engaged = j < bins - first and reach[j] > 0.0
         if engaged:
-            side = reach[0, j] * turn[3, j]
+            side = reach[j] * turn[3, j]
             most, least = (side if side > most else most), (side if side < least else least)
-            top = reach[1, j] if reach[1, j] > top else top
+            top = depth[j] if depth[j] > top else top
             open_at = j if open_at < 0 else open_at
         elif open_at >= 0:
             a, b = -0.25 * _TURN + open_at * _TURN / bins, -0.25 * _TURN + j * _TURN / bins

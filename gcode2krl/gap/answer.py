@@ -1,21 +1,19 @@
 """The answer: judgements of the links, slips and clocks, put together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from gcode2krl.effects import Applied
 from gcode2krl.errors import Issue
-from gcode2krl.gap.judge import NAMED, Cause, Judgement
-from gcode2krl.gap.links import LINKS, SIGNAL, UNIT, needs
+from gcode2krl.gap.judge import Cause, Judgement
+from gcode2krl.gap.links import JOINTS, LINKS, SIGNAL, UNIT, needs
 from gcode2krl.gap.result import Gap
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.slips import Slip
 from gcode2krl.gap.timing import timing_share, timing_sizes
 from gcode2krl.gap.where import place
 
-_ORDER = {"no_gap": 0, "explained": 1, "partly_explained": 2, "unexplained": 3}
 _MOST_ALIKE = 5
 _SURE = 0.95
 """A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
@@ -46,8 +44,22 @@ def answer(
         named=tuple(named),
         issues=(*issues, *every),
         runs=tuple(side.name for side in sides),
-        notes=tuple(notes),
+        notes=(*notes, *_notes(sides, judgements)),
     )
+
+
+def _notes(sides: Sequence[Side], judgements: Sequence[Judgement]) -> Iterator[str]:
+    """Yield what a reader should know of what was left out."""
+    if any(side.run.head.angles == "relative" for side in sides):
+        yield "angles are relative: no kinematics, no limits, no gravity"
+    for each in judgements:
+        left = [joint for joint in JOINTS if joint not in each.parts[0].components]
+        if each.link in ("path", "servo", "gear") and left:
+            yield f"{each.link}: {', '.join(left)} left out: not recorded, or never moving"
+    for each in judgements:
+        if each.usual:
+            names = ", ".join(one.label for one in each.usual)
+            yield f"{each.link}: {names} within normal mismatch"
 
 
 def _weight(judgement: Judgement) -> tuple[bool, float]:
@@ -118,7 +130,18 @@ def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[
                 "unit": each.parts[0].unit,
                 "verdict": "explained" if link in slipped and verdict == "no_gap" else verdict,
             })  # fmt: skip
+        if link == "gear" and link in by_link:
+            found[-1]["offset_deg"] = _zeros(by_link[link])
     return found
+
+
+def _zeros(judgement: Judgement) -> dict[str, float]:
+    """Return the constant difference of the encoders of each joint, which is a zero and no finding."""
+    values = np.mean([part.measured.mean(axis=0) for part in judgement.parts], axis=0)
+    factor = judgement.parts[0].factor
+    return {
+        name: factor * float(value) for name, value in zip(judgement.parts[0].components, values, strict=True)
+    }
 
 
 def _where(main: Judgement | None, judgements: Sequence[Judgement]) -> dict[str, Any]:
@@ -197,6 +220,3 @@ def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> lis
         for link in LINKS
         if link not in done
     ]
-
-
-__all__ = ["NAMED", "Applied", "answer"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from gcode2krl.effects import Applied
 from gcode2krl.gap.align import with_set_clocks
 from gcode2krl.gap.attribute import Rival, probabilities, rivals_of, unknown_probability
-from gcode2krl.gap.examine import Examination, Question, examine, nuisance_for
+from gcode2krl.gap.examine import PRUNE, Examination, Question, examine, nuisance_for
 from gcode2krl.gap.fold import folds_of
 from gcode2krl.gap.intervals import Interval, intervals_of
 from gcode2krl.gap.measure import Size, size_of_gap
@@ -15,6 +15,10 @@ from gcode2krl.gap.part import Part
 from gcode2krl.gap.signatures import Signatures
 
 NAMED = 0.5
+MOST_TOGETHER = 2
+"""More effects in one link than this at once imitate something that the library does not have."""
+CROWDED = 0.4
+"""Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
 
 
 @dataclass(frozen=True)
@@ -136,19 +140,24 @@ def _judgement(
 ) -> Judgement:  # fmt: skip
     last = sizes[-1]
     unknown = unknown_probability(last.share_left, last.significant)
+    if len(found.causes) > MOST_TOGETHER:
+        unknown = max(unknown, 1.0 - CROWDED)
     causes = []
     positions = [i for i, flag in enumerate(found.usual) if not flag]
     intervals = intervals_of(found)
     for order, number in enumerate(positions):
         rivals = rivals_of(found, number)
         own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
+        brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
+        if brings < PRUNE:
+            own *= CROWDED
         causes.append(
             Cause(
                 applied=found.applied[number],
                 link=link,
                 probability=own,
                 parameters=intervals[number],
-                shrink=max(0.0, sizes[order + 1].shrink - sizes[order].shrink),
+                shrink=brings,
                 rms_after=sizes[order + 1].after ** 0.5,
                 rivals=tuple(zip(rivals, others, strict=True)),
             )

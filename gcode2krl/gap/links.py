@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied
-from gcode2krl.gap.part import Part
+from gcode2krl.gap.part import Part, nearest_rows
 from gcode2krl.gap.side import Side, usable_rows
 from gcode2krl.runs import Controller, Measured
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
@@ -75,9 +75,34 @@ def _servo(side: Side, found: tuple[Applied, ...]) -> Part | None:
     if table is None or table.q_act_rad is None or table.q_cmd_rad is None:
         return None
     side = side.with_measured_joints("q_cmd")
-    return _joint_part(
-        side, table, "servo", table.q_act_rad - table.q_cmd_rad, "q_act_rad", "q_cmd_rad", found
-    )
+    apart = table.q_act_rad - table.q_cmd_rad - logged_correction(side, table)
+    return _joint_part(side, table, "servo", apart, "q_act_rad", "q_cmd_rad", found)
+
+
+def logged_correction(side: Side, table: Controller) -> Floats:
+    """Return what a logged RSI correction moves the joints by (n, 6); rows without an answer hold the last.
+
+    Under a correction the commanded columns stay those of the program and the actual ones move.
+    """
+    joints = np.zeros((len(table), 6))
+    if table.q_correction_rad is not None:
+        joints += _held(table.q_correction_rad)
+    if table.correction_mm is not None:
+        twist = np.zeros((len(table), 6))
+        twist[:, :3] = _held(table.correction_mm)
+        if table.correction_rad is not None:  # A, B, C turn about z, y, x
+            twist[:, 3:] = _held(table.correction_rad)[:, ::-1]
+        jacobian = side.inputs.jacobian[nearest_rows(side.inputs.time_s, side.stamps(table))]
+        joints += np.linalg.solve(jacobian, twist[:, :, None])[:, :, 0]
+    return np.cumsum(joints, axis=0) if side.run.head.channels.correction == "relative" else joints
+
+
+def _held(values: Floats) -> Floats:
+    """Return the values with the last one before each that is missing; 0 before the first."""
+    known = np.isfinite(values)
+    row = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], -1), axis=0)
+    held: Floats = np.take_along_axis(np.nan_to_num(values), np.maximum(row, 0), axis=0)
+    return np.where(row >= 0, held, 0.0)
 
 
 def _gear(side: Side, found: tuple[Applied, ...]) -> Part | None:

@@ -196,6 +196,7 @@ def test_the_lasso_finds_two_of_many():
     assert baselines._lasso(np.zeros(400), wide, np.arange(30), groups) == []
 
 
+@pytest.mark.slow
 def test_three_cases_go_through_and_resume(tmp_path, capsys):
     options = ["--small", "--seed", "7", "--jobs", "1", "--effects", "backlash", "--no-baselines"]
     options += ["--resume", str(tmp_path)]

@@ -9,6 +9,8 @@ from gcode2krl.gap import Gap, diagnose, text_report
 from gcode2krl.gap.result import SCHEMA
 from tests.gap.synthetic import LIBRARY, applied, prediction, runs
 
+pytestmark = pytest.mark.slow
+
 SERVO = {"tracker": False, "force": False}
 GEAR = {**SERVO, "load_encoders": True}
 FORCE = {"tracker": False, "controller": False}

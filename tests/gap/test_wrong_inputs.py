@@ -10,6 +10,8 @@ from gcode2krl.gap import diagnose
 from gcode2krl.runs import load_run
 from tests.gap.synthetic import PROGRAM, applied, prediction, runs, write
 
+pytestmark = pytest.mark.slow
+
 SERVO = {"tracker": False, "force": False}
 
 
