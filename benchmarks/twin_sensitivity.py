@@ -52,11 +52,12 @@ those with a reaction of 100 to 150 ms, as the paper states."""
 REACTION_S = (0.100, 0.150)
 
 
-def figures(prediction, where, changed):
+def figures(prediction, changed):
     """Return the four figures with some settings changed; keys of the settings or of the world."""
     own = {key: value for key, value in changed.items() if key in Online.model_fields}
     world = {key: value for key, value in changed.items() if key not in Online.model_fields}
     twin = twin_of(prediction, Online(**own), World(**world))
+    where = judged(prediction, Online().memory_s, twin.world.late_s)
     found = figures_of({case: simulate(twin, case) for case in CASES}, where)
     return [found[f"{case}_mm"] for case in CASES]
 
@@ -81,7 +82,7 @@ def row(label, values, mark=""):
     print(f"  {label:<34}" + "".join(f"{value:>14.3f}" for value in values) + mark)
 
 
-def table(prediction, where):
+def table(prediction):
     """Print what each change costs; returns name -> (values, figures)."""
     drawn = {}
     for name, key, values, kind in ONE_AT_A_TIME:
@@ -90,13 +91,13 @@ def table(prediction, where):
         default = getattr(World() if kind == "world" else Online(), key)
         default = Online().pilot_lead_s if default is None else default
         for value in values:
-            found.append(figures(prediction, where, {key: value}))
+            found.append(figures(prediction, {key: value}))
             row(f"{value:g}", found[-1], "   default" if value == default else "")
         drawn[name] = (values, found)
     return drawn
 
 
-def plausible_range(prediction, where, small):
+def plausible_range(prediction, small):
     """Print the range of the figures over all plausible filters and delays."""
     names = list(PLAUSIBLE)
     choices = [(values[0], values[-1]) if small else values for values in PLAUSIBLE.values()]
@@ -106,7 +107,7 @@ def plausible_range(prediction, where, small):
         if not REACTION_S[0] <= reaction_s(changed) <= REACTION_S[1]:
             continue
         changed["robot_delay_s"] = changed["dead_s"] + changed["lag_s"]  # the lead follows the robot's delay
-        found = figures(prediction, where, changed)
+        found = figures(prediction, changed)
         kept += 1
         low = [min(pair) for pair in zip(low, found, strict=True)]
         high = [max(pair) for pair in zip(high, found, strict=True)]
@@ -140,11 +141,10 @@ def main():
     options = parser.parse_args()
     cell = load_cell().model_copy(update={"stock": STOCK})
     prediction = predict(PART, cell, dt_s=Online().cycle_s)
-    where = judged(prediction, Online().memory_s)
     print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
-    row("defaults", figures(prediction, where, {}))
-    drawn = table(prediction, where)
-    plausible_range(prediction, where, options.small)
+    row("defaults", figures(prediction, {}))
+    drawn = table(prediction)
+    plausible_range(prediction, options.small)
     if options.plot is not None:
         draw(drawn, options.plot)
 

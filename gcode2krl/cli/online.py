@@ -61,8 +61,9 @@ def simulate_command(
     from gcode2krl.online.outcome import findings, simulate_all
     from gcode2krl.online.twin import World, twin_of
 
-    twin = twin_of(prediction, settings, World(**world_values))
-    judged = judge(prediction, settings.memory_s)
+    world = World(**world_values)
+    twin = twin_of(prediction, settings, world)
+    judged = judge(prediction, settings.memory_s, world.late_s)
     with console.progress("simulating", None):
         runs = simulate_all(twin)
     motion = prediction.motion

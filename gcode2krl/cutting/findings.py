@@ -12,13 +12,15 @@ from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spi
 from gcode2krl.errors import Issue
 from gcode2krl.sections import Tool
 from gcode2krl.tables import Forces
-from gcode2krl.units import MM_PER_M, RAD_PER_REV, S_PER_MIN
+from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 MOST_PER_KIND = 20
 _CONTACT_MM = 0.01
 """Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
+_PLUNGE_RAD = 20.0 * RAD_PER_DEG
+"""Descent above which a mill that does not cut at its centre cannot follow: assumed, ramps are flatter."""
 _NEAR_MODE = 0.15
 """Share of a mode's frequency within which a spindle or tooth harmonic is noted."""
 _HARMONICS = 3
@@ -97,7 +99,7 @@ def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) ->
 def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]) -> Iterator[Issue]:
     unable = np.array([not cell.tool[int(number)].centre_cutting for number in _tools(forces)])
     number = np.searchsorted(_tools(forces), forces.tool)
-    into = (cut.centre_mm > _CONTACT_MM) & unable[number]
+    into = (cut.centre_mm > _CONTACT_MM) & unable[number] & (cut.ramp_rad > _PLUNGE_RAD)
     for row in _starts(into):
         sentence = f"T{forces.tool[row]} plunges into material and does not cut at its centre"
         remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"

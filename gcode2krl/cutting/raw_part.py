@@ -1,7 +1,8 @@
 """The raw part as a height field: a block by numbers, a mesh, or a guess from the program.
 
 A guess is the box of the feed moves in the plane, widened by the tool's radius; its bottom is the lowest feed
-point, its top the lower of the lowest rapid that stays at its height and the highest end of a feed move.
+point, its top the lower of the lowest rapid that stays at its height and the highest end of a feed move; a
+program of one depth, which would have no thickness, begins where its first feed move does.
 """
 
 import math
@@ -80,6 +81,8 @@ def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float) -> Float
     lowest_rapid = position[level & moved, 2].min(initial=np.inf)
     bottom = float(ends[:, 2].min())
     top = max(min(float(lowest_rapid), float(ends[:, 2].max())), bottom)
+    if top - bottom < _FLAT_MM and len(starts):  # one depth: from where the first feed move came
+        top = max(min(float(lowest_rapid), float(starts[:, 2].max())), bottom)
     return np.array([[*(low - radius_mm), bottom], [*(high + radius_mm), top]])
 
 

@@ -45,7 +45,7 @@ _NEEDS = {
     "gear": "controller.csv with q1_load_deg … (encoders behind the gear)",
     "force": "force.csv, and a prediction with forces",
     "mechanics": "tracker.csv, absolute angles and a known robot",
-    "part": "scan.csv of the finished part",
+    "part": "scan.csv; it is read, but not compared with the predicted part",
 }
 
 

@@ -28,13 +28,13 @@ class Judged(NamedTuple):
     """The tool sinks so slowly, or did just before, that the predicted force is that of ploughing edges."""
 
 
-def judged(prediction: Prediction, memory_s: float) -> Judged:
+def judged(prediction: Prediction, memory_s: float, late_s: float = 0.0) -> Judged:
     """Return where an error of the tip stays on the part.
 
     It does where an edge passes the side of the cut: there the wall is made, which at entry and exit of a
     slot is where the tool's centre is over the part. And it does where no other pass goes deeper. What the
     edges' ploughing does is kept apart, and so is all that a compensator with a memory of ``memory_s`` makes
-    of it.
+    of it. Where the cutter really enters and leaves ``late_s`` later than predicted, so is what counts.
     """
     motion, forces, cell = prediction.motion, prediction.forces, prediction.cell
     if motion is None or forces is None:
@@ -53,7 +53,18 @@ def judged(prediction: Prediction, memory_s: float) -> Judged:
     chip = sink * feed_per_tooth(speed, prediction.toolpath.spindle_rad_s[row], 1) / teeth
     ploughing = (forces.force_base_N != 0.0).any(axis=1) & (sink > _SINKS) & (chip < LEAST_CHIP_MM)
     ploughs = stays & _lasting(ploughing, motion.time_s, memory_s)
-    return Judged(stays & ~ploughs, ploughs)
+    step_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 1.0
+    later = round(late_s / step_s)
+    return Judged(_later(stays & ~ploughs, later), _later(ploughs, later))
+
+
+def _later(where: Bools, samples: int) -> Bools:
+    """Return (n,) the same so many samples later, before 0 earlier."""
+    moved = np.zeros_like(where)
+    kept = len(where) - abs(samples)
+    if kept > 0:
+        moved[max(samples, 0) :][:kept] = where[max(-samples, 0) :][:kept]
+    return moved
 
 
 def grid_of(position_mm: Floats, radius_mm: Floats) -> tuple[Floats, tuple[int, int]]:

@@ -43,9 +43,9 @@ def test_json_has_every_key_of_the_contract(run, part):
     assert result["moves"] == 5
     assert result["path_mm"] == pytest.approx(52 + 50 + 52, abs=0.1)  # corners cut a little of it
     assert 52 / 10 + 50 / 25 + 52 / 200 < result["time_s"] < 9
-    assert result["max_force_N"] == 0  # it only scratches the stock that is guessed
-    assert result["max_deflection_mm"] == 0
-    assert result["pilot"]["max_error_N"] == 0
+    assert result["max_force_N"] > 100
+    assert result["max_deflection_mm"] > 0.1
+    assert result["pilot"]["knots"] > 2
 
 
 def test_the_output_lies_beside_the_input_by_default(run, part, tmp_path):

@@ -31,7 +31,7 @@ def test_a_block_is_filled_without_rest():
 
 def test_the_guess_follows_the_feed_moves(toolpath):
     box = guessed_box(toolpath, np.eye(3), 8.0)
-    np.testing.assert_allclose(box, [[10 - 8, 20 - 8, -3], [60 + 8, 50 + 8, -3]])
+    np.testing.assert_allclose(box, [[10 - 8, 20 - 8, -3], [60 + 8, 50 + 8, 5]])
 
 
 def test_the_guess_ends_at_the_lowest_level_rapid():

@@ -2,7 +2,6 @@
 
 import json
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -109,12 +108,14 @@ def test_serve_answers_until_the_peer_is_silent_and_records_a_run(online, tmp_pa
     port = free_port()
     krc = Krc(cell, stands_s=0.4)
     krc.load = np.zeros(6)
-    sent = []
 
     def controller():
-        time.sleep(1.5)
-        wire = Wire(port)
-        exchange(wire, krc, 150, sent)
+        wire = Wire(port, 1.0)
+        while (first := wire.ask(krc.telegram())) is None:  # not listening yet
+            krc.take(None)
+        krc.take(first)
+        wire.socket.settimeout(5.0)
+        exchange(wire, krc, 149)
 
     thread = threading.Thread(target=controller)
     thread.start()

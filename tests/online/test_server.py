@@ -36,7 +36,7 @@ def free_port():
 @contextmanager
 def running(cell, *, folder=None, force=None, **link):
     """Run a server in a thread; yields its port and what it ends with."""
-    link = {"port": free_port(), "silence_s": 0.4, **link}
+    link = {"port": free_port(), "silence_s": 1.5, **link}
     settings = Online(link=RobotLink(**link))
     device = compensator(cell, settings, load_frame="base")
     stop, outcome = threading.Event(), {}
@@ -59,7 +59,7 @@ def running(cell, *, folder=None, force=None, **link):
 class Wire:
     """The controller's socket."""
 
-    def __init__(self, port, wait_s=0.25):
+    def __init__(self, port, wait_s=5.0):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(wait_s)
@@ -92,7 +92,7 @@ def test_a_session_over_udp_compensates_and_ends_when_the_peer_is_silent(cell, t
         wire, krc = Wire(port), Krc(cell)
         exchange(wire, krc, 300)
         assert krc.ready
-        wire.socket.settimeout(1.0)
+        wire.socket.settimeout(2.5)
         with pytest.raises(TimeoutError):
             wire.socket.recv(10)
     session, statistics = outcome["end"]

@@ -191,6 +191,13 @@ def test_entry_and_exit_count_while_the_centre_is_over_the_part(slot, judgement)
     assert not judgement.ploughs.any()
 
 
+def test_what_counts_comes_as_late_as_the_cutter(slot, judgement):
+    for samples in (3, -3):
+        moved = judged(slot, Online().memory_s, 0.004 * samples).counts
+        assert moved.sum() == judgement.counts.sum()
+        assert np.flatnonzero(moved)[0] == np.flatnonzero(judgement.counts)[0] + samples
+
+
 def test_the_floor_is_the_lowest_pass(cell):
     position = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, -1.0], [20.0, 0.0, -0.5]])
     radius = np.full(3, 8.0)
