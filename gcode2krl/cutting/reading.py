@@ -23,6 +23,8 @@ from gcode2krl.cutting.walls import draw_walls, height_at
 _STRAIGHT = 0.03  # sine of the angle in plan below which a way counts as straight
 _LEVEL = 0.15  # the same up or down, where it only moves the angle at which the chip begins
 _TURN = 2.0 * math.pi
+STRAIGHT_ON = 0.985
+"""Cosine of the turn at a sample, 10 degrees, above which its direction is the mean of before and after."""
 
 
 class Result(NamedTuple):
@@ -158,7 +160,7 @@ def _heading(position, first, i):
     ax, ay, az, after = _step(position, first, i + 1)
     if before < 1e-9:
         bx, by, bz, before = ax, ay, az, after
-    elif after > 1e-9 and ax * bx + ay * by + az * bz > 0.5 * before * after:
+    elif after > 1e-9 and ax * bx + ay * by + az * bz > STRAIGHT_ON * before * after:
         bx, by, bz = bx + ax, by + ay, bz + az
         before = math.sqrt(bx * bx + by * by + bz * bz)
     if before < 1e-9:
@@ -171,16 +173,19 @@ def _heading(position, first, i):
 
 @kernel
 def _recent(position, i, lag, dx, dy, dz, recent):
-    """List the sweeps that the field does not show yet and that were not on a straight way to sample i."""
+    """List the sweeps that the field does not show yet and that were not on a straight way to sample i.
+
+    The sweep that ends at the sample itself is not one of them: its engagement comes before its removal.
+    """
     stride = max((i - lag + MOST_RECENT - 1) // MOST_RECENT, 1)
     count = 0
-    for start in range(lag, i, stride):
+    for start in range(lag, i - 1, stride):
         ax, ay = position[i, 0] - position[start, 0], position[i, 1] - position[start, 1]
         az = position[i, 2] - position[start, 2]
         back, aside = ax * dx + ay * dy + az * dz, ax * dy - ay * dx
         off = ax * ax + ay * ay + az * az - back * back
         if back < 0.0 or off > (_LEVEL * back) ** 2 + 1e-12 or abs(aside) > _STRAIGHT * back:
-            recent[count, 0], recent[count, 1] = start, min(start + stride, i)
+            recent[count, 0], recent[count, 1] = start, min(start + stride, i - 1)
             count += 1
     return count
 

@@ -13,6 +13,7 @@ from gcode2krl.gap.answer import answer
 from gcode2krl.gap.bounds import Mismatch
 from gcode2krl.gap.clocks import coarse_offset, fitted_offset
 from gcode2krl.gap.examine import Question
+from gcode2krl.gap.fine import refined_prediction
 from gcode2krl.gap.fitted import with_fitted
 from gcode2krl.gap.from_log import log_sides
 from gcode2krl.gap.judge import Judgement, judge
@@ -151,7 +152,8 @@ def _sides(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Side]:
             raise input_error(wrong[0].code, wrong[0].message, wrong[0].remedy, source=str(run.folder))
         key = str(own) if mine is not prediction else ""
         if key not in inputs:
-            inputs[key] = inputs_of(mine, plan=remembered_plan(mine))
+            fine = refined_prediction(mine)
+            inputs[key] = inputs_of(fine, plan=remembered_plan(fine))
         hours = 0.0
         if first is not None and run.head.started is not None:
             hours = (run.head.started - first).total_seconds() / _S_PER_H

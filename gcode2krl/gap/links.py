@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.effects import Applied
+from gcode2krl.effects import Applied, Inputs
+from gcode2krl.gap.fold import with_rows
 from gcode2krl.gap.part import Part, nearest_rows
 from gcode2krl.gap.side import Side, usable_rows
 from gcode2krl.runs import Controller, Measured
@@ -24,6 +25,8 @@ EXAMINED = ("path", "servo", "gear", "force", "mechanics")
 """Links with a model of their own; timing is the tangential part of path."""
 _MODEL_RAD = 4e-4 * RAD_PER_DEG
 """The predicted path is right to 0.01 mm (design/gap.md), 4e-4 degrees at an arm's length."""
+_JUMP_S, _JUMP, _AROUND_S = 0.012, 0.1, 0.02
+"""A change by a tenth of the largest force within 12 ms is a jump; a cutter enters in tenths of a second."""
 _MOVES_RAD = 1e-4 * RAD_PER_DEG
 SIGNAL = {
     "timing": "timing", "path": "joint_commanded", "servo": "joint_actual", "gear": "joint_load",
@@ -188,7 +191,7 @@ def _vector_part(
 ) -> Part:
     stamps = side.stamps(table)
     rows, segments = usable_rows(table, stamps, side.inputs)
-    return Part(
+    part = Part(
         link=link,
         run=side.name,
         side=side.number,
@@ -204,3 +207,25 @@ def _vector_part(
         measured=values[rows],
         segments=segments,
     )
+    return with_rows(part, ~at_edges(side.inputs, part.time_s))
+
+
+def at_edges(inputs: Inputs, time_s: Floats) -> NDArray[np.bool_]:
+    """Return where (n,) the predicted force jumps, some hundredths of a second around it.
+
+    Removal finds an edge of the cut to a sample; within it the force is right or wrong by all of itself.
+    """
+    force = inputs.force_base_N
+    largest = float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    if largest == 0.0:
+        return np.zeros(len(time_s), dtype=np.bool_)
+    own_s = inputs.time_s
+    later = np.stack([np.interp(own_s + _JUMP_S, own_s, column) for column in force.T], axis=1)
+    jumps = own_s[np.linalg.norm(later - force, axis=1) > _JUMP * largest] + _JUMP_S / 2.0
+    if len(jumps) == 0:
+        return np.zeros(len(time_s), dtype=np.bool_)
+    after = np.clip(np.searchsorted(jumps, time_s), 1, len(jumps) - 1) if len(jumps) > 1 else 0
+    before = np.maximum(after - 1, 0)
+    nearest = np.minimum(np.abs(time_s - jumps[after]), np.abs(time_s - jumps[before]))
+    near: NDArray[np.bool_] = nearest < _AROUND_S
+    return near

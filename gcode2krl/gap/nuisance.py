@@ -89,7 +89,7 @@ def _all(
         yield Nuisance("frame", False, _frame(part, m))
     yield Nuisance("clock", False, -_stacked(part.rate)[:, :, None] * sigma(m.clock_s) * clock)
     if part.link == "path" or (part.link == "mechanics" and "path" in upstream):
-        yield Nuisance("time law", False, _jitter(part) * sigma(m.clock_s))
+        yield Nuisance("time law", False, _jitter(part, _JITTER_KNOTS_S) * sigma(m.clock_s))
 
 
 def _stacked(values: Floats) -> Floats:
@@ -131,10 +131,10 @@ def _frame(part: Part, m: Mismatch) -> Floats:
     return turned
 
 
-def _jitter(part: Part) -> Floats:
+def _jitter(part: Part, knots_s: float) -> Floats:
     """Return the signal's rate times hats over time: a time law that is off by a little, here and there."""
     start, end = part.time_s[0], part.time_s[-1]
-    knots = np.linspace(start, end, max(2, round((end - start) / _JITTER_KNOTS_S) + 1))
+    knots = np.linspace(start, end, max(2, round((end - start) / knots_s) + 1))
     hats = np.maximum(0.0, 1.0 - np.abs(part.time_s[:, None] - knots) / (knots[1] - knots[0]))
     columns: Floats = -_stacked(part.rate)[:, :, None] * hats[None]
     return columns

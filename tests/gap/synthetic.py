@@ -39,6 +39,7 @@ G1 X-20 Y60 Z10 F6000
 M30
 """
 LIBRARY = library()
+TRUE_STEP_S = 0.003
 
 
 @functools.cache
@@ -101,7 +102,7 @@ def runs(
 ) -> list[Run]:  # fmt: skip
     """Return runs of one program with some effects at work."""
     generator = np.random.default_rng(seed)
-    nominal = base or prediction()
+    nominal = base or prediction(dt_s=TRUE_STEP_S)  # a robot is finer than any prediction of it
     usual = mismatch(generator, nominal.cell) if normal else []
     return [
         _run(number, inputs_of(nominal, hours=0.5 * number), [*effects, *usual], generator, sigma_mm, sigma_N,

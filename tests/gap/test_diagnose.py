@@ -1,13 +1,15 @@
 """The whole diagnosis on runs made with the library's effects, noise and normal mismatch."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gcode2krl.gap import Gap, diagnose, text_report
 from gcode2krl.gap.result import SCHEMA
-from tests.gap.synthetic import LIBRARY, applied, prediction, runs
+from gcode2krl.runs import RunHead
+from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
 pytestmark = pytest.mark.slow
 
@@ -62,6 +64,15 @@ def test_normal_mismatch_is_no_gap(seed):
     gap = _gap(seed=200 + seed, **signals)
     assert gap.verdict == "no_gap"
     assert gap.causes == []
+
+
+def test_runs_of_different_programs_are_compared_with_their_own_predictions(tmp_path):
+    other = PROGRAM.replace("X140 Y40", "X100 Y30").replace("G1 X60 Y60", "G1 X50 Y50")
+    prediction(other).save(tmp_path / "other")
+    one = runs([], 1, 1)[0]
+    two = runs([], 1, 1, base=prediction(other, TRUE_STEP_S))[0]
+    two = replace(two, name="run-2", folder=tmp_path, head=RunHead(prediction="other"))
+    assert diagnose(prediction(), [one, two]).verdict == "no_gap"
 
 
 def test_an_effect_that_the_library_lacks_is_not_blamed_on_another():

@@ -40,7 +40,7 @@ def test_swapped_columns_are_named(tmp_path):
 
 def test_another_program_is_named():
     other = PROGRAM.replace("X120", "X40").replace("Y-20", "Y30").replace("X140 Y40", "X-60 Y-40")
-    gap = diagnose(prediction(), runs([], 1, 1, base=prediction(other), normal=False, **SERVO))
+    gap = diagnose(prediction(), runs([], 1, 1, base=prediction(other, 0.003), normal=False, **SERVO))
     assert _named(gap) == [("other_program", None)]
 
 
