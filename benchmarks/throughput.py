@@ -49,6 +49,28 @@ motion = plan_motion(targets, cell, dt_s={cycle})
 joints = solve_joints(motion, cell)
 write_krl(targets, {out!r}, cell)
 """
+COMPLIANCE = CHAIN.replace(
+    "write_krl(targets",
+    """import numpy as np
+from gcode2krl.compliance import deflection_of, feed_direction
+feed = feed_direction(joints.q_rad, joints.qd_rad_s, cell, motion.tool)
+load_N = np.array([100.0, 200.0, -50.0])
+deflection_of(joints.q_rad, load_N, np.zeros(3), feed, cell, motion.tool)
+write_krl(targets""",
+)
+WHOLE = """
+from gcode2krl import cut, deflect, load_cell, plan_motion, read_gcode, set_targets, solve_joints, write_krl
+from gcode2krl.prediction import Prediction
+cell = load_cell({cell!r})
+toolpath = read_gcode({part!r}, cell)
+targets = set_targets(toolpath, cell)
+motion = plan_motion(targets, cell, dt_s={cycle})
+joints = solve_joints(motion, cell)
+forces = cut(toolpath, motion, cell)
+deflection = deflect(joints, forces, cell)
+prediction = Prediction(toolpath, targets, cell, motion, joints, {{}}, forces, deflection)
+write_krl(prediction, {out!r}, pilot="none")
+"""
 # --- one process, measured -------------------------------------------------------------------------
 
 
@@ -131,6 +153,8 @@ def write_inputs(folder: Path) -> None:
     (folder / "tool.tbl").write_text("T13 P13 Z0 D8\n", encoding="ascii")
     (folder / "vars.var").write_text("", encoding="ascii")
     (folder / "unlimited.toml").write_text('[controller]\nadvance = "unlimited"\n', encoding="ascii")
+    material = '[controller]\nadvance = "unlimited"\n[stock]\nresolution_mm = 0.25\n'
+    (folder / "material.toml").write_text(material, encoding="ascii")
     (folder / "look_ahead.toml").write_text("", encoding="ascii")
 
 
@@ -207,8 +231,8 @@ def toppra_line(part: Path, folder: Path) -> str:
 # --- the work: ours --------------------------------------------------------------------------------
 
 
-def chain_work(name: str, part: Path, cell: str, to_reach: float | None = None) -> Work:
-    code = CHAIN.format(cell=cell, part=str(part), cycle=CYCLE_S, out=str(part.with_name("chain.src")))
+def chain_work(name: str, part: Path, cell: str, to_reach: float | None = None, chain: str = CHAIN) -> Work:
+    code = chain.format(cell=cell, part=str(part), cycle=CYCLE_S, out=str(part.with_name("chain.src")))
     return Work(name, [sys.executable, "-c", code], to_reach)
 
 
@@ -220,7 +244,9 @@ def our_work(part: Path) -> list[Work]:
     work = [Work("read into a Toolpath", read, 0.25), Work("translate: KRL written and verified", translate)]
     if HAS_MOTION:
         work.append(chain_work("the same, 12 ms plan, joints", part, "unlimited.toml", 0.6))
-        work.append(chain_work("the same with look-ahead on", part, "look_ahead.toml"))
+        work.append(chain_work("the same with compliance", part, "unlimited.toml", 0.6, COMPLIANCE))
+        work.append(chain_work("whole chain, material at 0.25 mm cells", part, "material.toml", 1.8, WHOLE))
+        work.append(chain_work("12 ms plan, joints, with look-ahead on", part, "look_ahead.toml"))
     return work
 
 

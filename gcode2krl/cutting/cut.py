@@ -73,7 +73,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     teeth = np.array([one.teeth for one in tools])[tool]
     f_z_mm = feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth
     position = np.ascontiguousarray(motion.position_mm @ to_field.T)
-    field = height_field_of(toolpath, cell, to_field, tools)
+    field = height_field_of(toolpath, cell, to_field, tools, len(motion))
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
     engaged = engage(field, position, tool, wholly_rapid, f_z_mm, [_with_shank(one) for one in tools], law)
