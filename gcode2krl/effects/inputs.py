@@ -161,7 +161,7 @@ class Inputs:
             path_mm=motion.path_mm,
             tool=motion.tool,
             spindle_rad_s=self.toolpath.spindle_rad_s[motion.move],
-            q_cmd_rad=robot.follow_motion(motion, self.cell).q_rad,
+            q_cmd_rad=robot.angles_near(motion, self.q_cmd_rad[0], self.cell),
             position_mm=motion.position_mm,
             rotation=motion.rotation,
             force_base_N=nothing if forces is None else forces.force_base_N,

@@ -16,7 +16,7 @@ from gcode2krl.gap.part import Part
 from gcode2krl.gap.signatures import Signatures
 
 Floats = NDArray[np.float64]
-LINKS = ("force", "mechanics")
+LINKS = ("gear", "force", "mechanics")
 _ROUNDS = 2
 _MOST_S = 0.02
 _RIDGE = 1e-6
@@ -46,15 +46,19 @@ def with_set_clocks(parts: Sequence[Part], question: Question, known: Signatures
         common = float(np.median(total))
         limit = question.mismatch.clock_s * question.clocks
         kept = common if abs(common) > limit else 0.0
-        current = [
-            replace(part, time_s=part.time_s - (offset - kept))
-            for part, offset in zip(parts, total.tolist(), strict=True)
-        ]
+        current = [_later(part, offset - kept) for part, offset in zip(parts, total.tolist(), strict=True)]
         if kept:
             break
     for before, after in zip(parts, current, strict=True):
         known.same(before, after)
     return current
+
+
+def _later(part: Part, offset_s: float) -> Part:
+    """Return the part with a clock error taken off: of the load encoders alone, or of the whole table."""
+    if part.link == "gear":
+        return replace(part, plus_late_s=offset_s)
+    return replace(part, time_s=part.time_s - offset_s)
 
 
 def _coefficient(part: Part, clock: Floats, others: Floats) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.gap.box import MOST, boxed
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
@@ -110,6 +111,19 @@ def marginal(gram: Floats, keep: int) -> Floats:
     return result
 
 
+def _less(total: Floats, held: Floats) -> Floats:
+    """Return the Gram matrix with held columns, at their values, taken off the data and out of the rest."""
+    found = total.copy()
+    at = np.flatnonzero(held)
+    if len(at):
+        off = total[:, at] @ held[at]
+        found[0] -= off
+        found[:, 0] -= off
+        found[0, 0] += held[at] @ total[np.ix_(at, at)] @ held[at]
+        found[at], found[:, at] = 0.0, 0.0
+    return found
+
+
 class Ledger:
     """Gram matrices by run and stretch of time; any choice of them is evidence."""
 
@@ -124,6 +138,7 @@ class Ledger:
             for each, members in zip(self.rows, self._members, strict=True)
         ]
         self._grams: list[dict[int, tuple[Floats, int]]] = []
+        self._held = np.zeros(0)
         self.given = 0
 
     def set_data(self, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> None:
@@ -142,19 +157,98 @@ class Ledger:
             self._grams.append(found)
 
     def evidence(self, chosen: Sequence[tuple[int, int]] | None = None) -> Evidence:
-        """Return the evidence of some (part, stretch) pairs, None = all; tangents come first."""
+        """Return the evidence of some (part, stretch) pairs, None = all; tangents come first.
+
+        Nuisance that the data drive to its bounds, with the tangents alone, is held there and taken off.
+        """
         wanted = None if chosen is None else set(chosen)
-        total: Floats | None = None
-        count, kept = 0, 1 + self.given + self.rows[0].signatures
-        for number, grams in enumerate(self._grams):
+        kept = 1 + self.given + self.rows[0].signatures
+        places = self._places(np.arange(kept))
+        size = 1 + max(int(into.max(initial=-1)) for _, into in places)
+        total, count = np.zeros((size, size)), 0
+        for number, (grams, (at, into)) in enumerate(zip(self._grams, places, strict=True)):
             mine = [value for key, value in grams.items() if wanted is None or (number, key) in wanted]
             if mine:
-                gram = marginal(np.sum([gram for gram, _ in mine], axis=0), kept + self.rows[number].shared)
-                total = gram if total is None else total + gram
+                total[np.ix_(into, into)] += np.sum([gram for gram, _ in mine], axis=0)[np.ix_(at, at)]
                 count += sum(rows for _, rows in mine)
-        if total is None:
-            return Evidence(np.zeros((kept, kept)), 0)
+        self._held = self._at_bounds(total, kept)
+        total = _less(total, self._held)
         return Evidence(marginal(total, kept), count)
+
+    def _at_bounds(self, total: Floats, kept: int) -> Floats:
+        """Return what is held of each column: -bound or bound of nuisance at its bounds, else 0."""
+        here = np.r_[0, np.arange(kept, len(total))]
+        gram = total[np.ix_(here, here)]
+        if self.given:
+            tangents = np.arange(1, 1 + self.given)
+            cross = total[np.ix_(tangents, here)]
+            gram = gram - cross.T @ solve(total[np.ix_(tangents, tangents)], cross)
+        b = boxed(gram[1:, 1:] + np.eye(len(here) - 1), gram[1:, 0])
+        held = np.zeros(len(total))
+        held[kept:] = np.where(np.abs(b) >= MOST, b, 0.0)
+        return held
+
+    def inflation(self, columns: Ints) -> float:
+        """Return by how much the gain of signatures varies more than white noise lets it, at least 1.
+
+        From the scores of each stretch of time beside the best fit of these signatures, the given ones and
+        nuisance (White 1980, by clusters): what a model is off by here and there, of either sign, makes the
+        noise of a gain larger than the noise of a sample says.
+        """
+        chosen = np.r_[0, np.asarray(columns, dtype=int) + 1]
+        given = np.arange(1, 1 + self.given)
+        places = self._places(given)
+        held = self._held[1 + self.given + self.rows[0].signatures :]
+        size = 1 + max(int(into.max(initial=-1)) for _, into in places)
+        normal, right = np.zeros((size, size)), np.zeros((size, len(chosen)))
+        total = np.zeros((len(chosen), len(chosen)))
+        for grams, (at, into) in zip(self._grams, places, strict=True):
+            whole = np.sum([gram for gram, _ in grams.values()], axis=0)
+            normal[np.ix_(into, into)] += whole[np.ix_(at, at)]
+            right[into] += whole[np.ix_(at, chosen)]
+            total += whole[np.ix_(chosen, chosen)]
+        normal[range(len(given), size), range(len(given), size)] += 1.0
+        at_bound = np.r_[np.zeros(len(given)), held]
+        free = at_bound == 0.0
+        score = total[1:, 0] - right[:, 1:].T @ at_bound
+        right[:, 0] -= normal @ at_bound
+        taken = np.zeros_like(right)
+        taken[free] = solve(normal[np.ix_(free, free)], right[free])
+        info = total[1:, 1:] - right[:, 1:].T @ taken[:, 1:]
+        fitted = solve(info, (score - right[free, 1:].T @ taken[free, 0])[:, None])[:, 0]
+        taken[:, 0] += at_bound
+        rest = np.r_[1.0, -fitted]
+        scores = []
+        for grams, (at, into) in zip(self._grams, places, strict=True):
+            rows = np.r_[chosen, at]
+            basis = np.vstack([np.eye(len(chosen)), -taken[into]])
+            for gram, _ in grams.values():
+                scores.append(basis[:, 1:].T @ gram[np.ix_(rows, rows)] @ (basis @ rest))
+        u = np.array(scores)
+        grown = np.trace(solve(info, u.T @ u)) / (len(chosen) - 1)
+        return float(max(1.0, grown * len(u) / max(len(u) - len(chosen), 1)))
+
+    def _places(self, given: Ints) -> list[tuple[Ints, Ints]]:
+        """Return for each part where given signatures and nuisance stand in its Gram, and in that of all."""
+        found, own = [], 0
+        first = 1 + self.given + self.rows[0].signatures
+        for rows in self.rows:
+            width = rows.whitened.shape[1] - rows.signatures
+            common = len(given) + rows.shared
+            start = common + own
+            into = np.r_[np.arange(common), np.arange(start, start + width - rows.shared)]
+            found.append((np.r_[given, np.arange(first, first + width)], into))
+            own += width - rows.shared
+        return found
+
+    def power(self, stretch: tuple[int, int], columns: Ints) -> float:
+        """Return the summed squares of some whitened signatures in a (part, stretch) pair."""
+        gram, _ = self._grams[stretch[0]][stretch[1]]
+        at = np.asarray(columns, dtype=int) + 1
+        scale = sum(
+            np.diag(value)[at] for grams in self._grams for value, _ in grams.values()
+        )  # fmt: skip
+        return float(np.sum(np.diag(gram)[at] / np.maximum(scale, 1e-300)))
 
     def stretches(self) -> list[tuple[int, int]]:
         """Return all (part, stretch) pairs."""

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.gap.bounds import Mismatch
-from gcode2krl.gap.evidence import Ledger, rows_of
+from gcode2krl.gap.evidence import Evidence, Ledger, rows_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.noise_source import noise_of
 from gcode2krl.gap.nuisance import Nuisance, nuisance_of
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Fitted, Target, refit
+from gcode2krl.gap.refit import Fitted, Target, inflation_of, refit
 from gcode2krl.gap.select import (
+    LEAST_RATIO,
     Column,
     Score,
     left_out_gain,
@@ -27,6 +28,8 @@ from gcode2krl.gap.signatures import Block, Signatures
 Floats = NDArray[np.float64]
 MOST_EFFECTS = 4
 _SHORTLIST = 4
+_MOST_TRIED = 12
+_GROUPS = 4
 _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
 """Rivals within this of the best linear gain are refitted too: signatures hold for small effects only."""
 PRUNE = 0.05
@@ -83,9 +86,14 @@ class Examination:
         return tuple(a for a, usual in zip(self.fitted.applied, self.usual, strict=True) if not usual)
 
     @property
-    def rows(self) -> int:
+    def values(self) -> int:
         """Return the number of values."""
         return sum(part.measured.size for part in self.parts)
+
+    @property
+    def times(self) -> int:
+        """Return the number of times at which there are values."""
+        return sum(len(part.time_s) for part in self.parts)
 
 
 def examine(
@@ -119,7 +127,7 @@ def examine(
         start.chi2,
         question,
     )
-    _select(found, np.random.default_rng(question.seed))
+    _select(found)
     return found
 
 
@@ -134,33 +142,50 @@ def nuisance_for(parts: Sequence[Part], question: Question, known: Signatures) -
     ])  # fmt: skip
 
 
-def _select(found: Examination, generator: np.random.Generator) -> None:
+def _select(found: Examination) -> None:
     rejected: set[tuple[str, str | None]] = set()
     while len(found.causes) < MOST_EFFECTS and len(found.applied) < 2 * MOST_EFFECTS:
+        if _is_sound(found):
+            break
         _update(found)
         evidence = found.ledger.evidence()
-        given = range(found.ledger.given)
         columns = [column.moved(found.ledger.given) for column in found.columns]
         taken = {(each.effect.name, each.target) for each in found.applied} | rejected
         allowed = [column for column in columns if found.blocks[column.block].key not in taken]
-        if not allowed:
-            break
-        found.level = threshold(evidence, allowed, generator, given)
-        spread = max(1.0, found.fitted.chi2 / max(evidence.rows, 1))
-        ranked = [
-            score
-            for score in scores(evidence, allowed, given, spread)
-            if (score.within or replans(found.blocks[score.column.block].effect))
-            and score.surprise > found.level
-        ]
-        ranked.sort(key=lambda score: -_worth(score, evidence.rows))
-        if not _accept(found, ranked, evidence.rows, spread, rejected):
+        found.level = threshold(len(allowed))
+        ranked = _candidates(found, evidence, allowed)
+        if not _accept(found, ranked, evidence.rows, rejected):
             break
     _prune(found)
 
 
+def _is_sound(found: Examination) -> bool:
+    """Tell whether the path is met to the accuracy of the model, which is no noise that averages out."""
+    return found.link == "path" and found.fitted.chi2 < found.values
+
+
+def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column]) -> list[Score]:
+    """Return the plausible and surprising scores, the best first."""
+    plain = [
+        score
+        for score in scores(evidence, allowed, range(found.ledger.given))
+        if (score.within or replans(found.blocks[score.column.block].effect))
+        and score.surprise > found.level
+        and score.gain > LEAST_RATIO**2 * found.times
+    ]
+    plain.sort(key=lambda score: -_worth(score, evidence.rows))
+    sure = []
+    for score in plain[:_MOST_TRIED]:
+        # a signature holds for small effects only: that of a large one is judged after its refit
+        small = score.gain < found.times and not replans(found.blocks[score.column.block].effect)
+        inflation = found.ledger.inflation(score.column.index) if small else 1.0
+        if surprise(score.gain / inflation, score.column.width) > found.level:
+            sure.append(score)
+    return sure
+
+
 def _accept(
-    found: Examination, ranked: list[Score], rows: int, spread: float, rejected: set[tuple[str, str | None]]
+    found: Examination, ranked: list[Score], rows: int, rejected: set[tuple[str, str | None]]
 ) -> bool:
     """Refit the best few and accept the one that explains most; False where none holds."""
     while ranked:
@@ -179,10 +204,12 @@ def _accept(
         tried.sort(key=lambda each: each[0])
         for _, score, fitted in tried:
             gain = found.fitted.chi2 - fitted.chi2
-            certain = surprise(gain, score.column.width, spread)
+            number = len(fitted.applied) - 1
+            certain = surprise(gain / inflation_of(found.target, fitted, number), score.column.width)
             if (
                 fitted.bound[-1]
                 or certain < found.level
+                or gain < LEAST_RATIO**2 * found.times
                 or not (replans(score_effect(found, score)) or _holds(found, score))
             ):
                 rejected.add(found.blocks[score.column.block].key)
@@ -220,14 +247,18 @@ def score_effect(found: Examination, score: Score) -> Effect:
 
 
 def _holds(found: Examination, score: Score) -> bool:
-    """Tell whether the effect also helps on runs (or stretches) that it was not fitted to."""
-    everything = found.ledger.stretches()
-    numbers = sorted({number for number, _ in everything})
-    if len(numbers) > 1:
-        folds = [[each for each in everything if each[0] == number] for number in numbers]
-    else:
-        quarters = np.array_split(np.arange(len(everything)), 4)
-        folds = [[everything[i] for i in quarter] for quarter in quarters]
+    """Tell whether the effect also helps on stretches that it was not fitted to.
+
+    Stretches in their order make four groups in which the block has the same power: a run in air tells
+    nothing of a force.
+    """
+    index = score.column.index
+    stretches = found.ledger.stretches()
+    power = np.cumsum([found.ledger.power(each, index) for each in stretches])
+    if len(stretches) < _GROUPS or power[-1] <= 0.0:
+        return True
+    group = np.minimum((_GROUPS * (power - power[0] / 2.0) / power[-1]).astype(int), _GROUPS - 1)
+    folds = [[each for each, own in zip(stretches, group, strict=True) if own == g] for g in range(_GROUPS)]
     return left_out_gain(found.ledger, folds, score.column, range(found.ledger.given)) > 0.0
 
 

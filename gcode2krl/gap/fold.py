@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +12,33 @@ from gcode2krl.gap.part import Part
 Bools = NDArray[np.bool_]
 _GUARD_S = STRETCH_S
 _QUARTERS = 4
+_NEARLY_ALL = 0.75
+_LEAST_KEPT, _LEAST_HELD = 30, 10
 
 
-def folds_of(parts: Sequence[Part]) -> list[tuple[list[Part], list[Part]]]:
-    """Return (to explain, held out) pairs: whole runs by turns; of a single run quarters with guard gaps."""
-    if len(parts) > 1:
+def folds_of(parts: Sequence[Part], power: Sequence[float] = ()) -> list[tuple[list[Part], list[Part]]]:
+    """Return (to explain, held out) pairs: whole runs by turns; of a single run quarters with guard gaps.
+
+    ``power``: what a gap has in each part. Where one run has nearly all of it the others cannot tell of it,
+    and quarters of all runs are held out by turns.
+    """
+    alone = len(parts) == 1 or (len(power) > 0 and max(power) > _NEARLY_ALL * sum(power))
+    if not alone:
         return [([part for part in parts if part is not held], [held]) for held in parts]
-    part = parts[0]
-    edges = np.linspace(part.time_s[0], part.time_s[-1] + 1e-9, _QUARTERS + 1)
     found = []
-    for first, last in pairwise(edges):
-        held = (part.time_s >= first) & (part.time_s < last)
-        near = (part.time_s >= first - _GUARD_S) & (part.time_s < last + _GUARD_S)
-        found.append(([with_rows(part, ~near)], [with_rows(part, held)]))
-    return [(a, b) for a, b in found if len(a[0].time_s) >= 30 and len(b[0].time_s) >= 10]
+    for quarter in range(_QUARTERS):
+        kept, held = [], []
+        for part in parts:
+            edges = np.linspace(part.time_s[0], part.time_s[-1] + 1e-9, _QUARTERS + 1)
+            first, last = edges[quarter], edges[quarter + 1]
+            near = (part.time_s >= first - _GUARD_S) & (part.time_s < last + _GUARD_S)
+            kept.append(with_rows(part, ~near))
+            held.append(with_rows(part, (part.time_s >= first) & (part.time_s < last)))
+        kept = [part for part in kept if len(part.time_s) >= _LEAST_KEPT]
+        held = [part for part in held if len(part.time_s) >= _LEAST_HELD]
+        if kept and held:
+            found.append((kept, held))
+    return found
 
 
 def with_rows(part: Part, chosen: Bools) -> Part:

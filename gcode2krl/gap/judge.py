@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from gcode2krl.effects import Applied
 from gcode2krl.gap.align import with_set_clocks
 from gcode2krl.gap.attribute import Rival, probabilities, rivals_of, unknown_probability
@@ -47,6 +49,8 @@ class Judgement:
     held_out: bool
     examination: Examination
     usual: tuple[Applied, ...] = field(default=())
+    every: tuple[Part, ...] = field(default=())
+    """The parts with the held-out ones."""
 
     @property
     def applied(self) -> tuple[Applied, ...]:
@@ -65,10 +69,11 @@ def judge(link: str, parts: Sequence[Part], held: Sequence[Part], question: Ques
         everything = [*parts, *held]
         size = _size(everything, found, question, known, (), usual)
         verdict = "unexplained" if size.significant else "no_gap"
-        return Judgement(link, tuple(parts), verdict, (), size, True, found, usual)
+        return Judgement(link, tuple(parts), verdict, (), size, True, found, usual, tuple(everything))
     trials = _trials(link, parts, held, question, known, found)
     sizes = [_pooled([trial(count) for trial in trials]) for count in range(len(found.causes) + 1)]
-    return _judgement(link, parts, found, usual, sizes, bool(trials))
+    judged = _judgement(link, parts, found, usual, sizes, bool(trials))
+    return replace(judged, every=(*parts, *held))
 
 
 def _trials(
@@ -81,8 +86,13 @@ def _trials(
     question = replace(question, starts={(each.effect.name, each.target): each for each in found.applied})
     return [
         _Trial(examine(link, train, question, known, found.noise), test, question, known, found)
-        for train, test in folds_of(parts)
+        for train, test in folds_of(parts, _power(parts, found))
     ]
+
+
+def _power(parts: Sequence[Part], found: Examination) -> list[float]:
+    """Return the power of what the causes do in each part."""
+    return [float(np.sum((part.sample(found.causes) - part.nominal) ** 2)) for part in parts]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,6 @@ from gcode2krl.gap.refit import Target
 Floats = NDArray[np.float64]
 SIGNIFICANT_SIGMA = 4.0
 """Excess power over its own standard deviation (by stretches of time): one in 30,000 by chance."""
-_MOST_SIGMA = 2.0
-"""A uniform draw within bounds stays within sqrt(3) of its standard deviation; some room for the rest."""
 LEAST_SHARE = 0.1
 """Excess power below this share of the noise's is within what the noise model is sure of."""
 
@@ -109,7 +107,7 @@ def _nuisance(
     No coefficient leaves its bounds: what is beyond them is a gap.
     """
     target = Target(parts, nuisance, noise)
-    b = np.clip(target.nuisance_of(target.whiten(residuals)), -_MOST_SIGMA, _MOST_SIGMA)
+    b = target.nuisance_of(target.whiten(residuals))
     width = target.shared_width
     own, shared = [], []
     for part, wide in zip(parts, target.raw(nuisance), strict=True):

@@ -55,7 +55,8 @@ def _all(
         columns = known.columns(Block(one, target, shape), part, size)
         if columns.shape[2] == 0:
             return None
-        return Nuisance(f"{name} {target or ''}".strip(), True, columns * (sigma(bound) / (size * apart)))
+        words = " ".join([name, target or "", *(f"{value:g}" for value in shape.values())])
+        return Nuisance(words, True, columns * (sigma(bound) / (size * apart)))
 
     def present(items: Sequence[Nuisance | None]) -> Iterator[Nuisance]:
         return (each for each in items if each is not None)
@@ -87,7 +88,7 @@ def _all(
             for name in part.inputs.cell.compliance.virtual_joints
         ])  # fmt: skip
         yield Nuisance("frame", False, _frame(part, m))
-    yield Nuisance("clock", False, -_stacked(part.rate)[:, :, None] * sigma(m.clock_s) * clock)
+    yield Nuisance("clock", False, -_stacked(part.clock_rate)[:, :, None] * sigma(m.clock_s) * clock)
     if part.link == "path" or (part.link == "mechanics" and "path" in upstream):
         yield Nuisance("time law", False, _jitter(part, _JITTER_KNOTS_S) * sigma(m.clock_s))
 

@@ -18,6 +18,7 @@ _PATHS = {"tcp_base_mm": "position_mm", "q_cmd_rad": "q_cmd_rad", "q_act_rad": "
 """Signals that follow the commanded path closely: the path is interpolated by cubics, the rest by lines."""
 
 
+_CLOCK_STEP_S = 0.004
 _MOST_KNOWN = 64
 _PATHS_KNOWN: OrderedDict[Any, tuple[Inputs, Signals]] = OrderedDict()
 """Commanded paths by what they were planned with; the inputs are kept, so that their id stays their own."""
@@ -50,6 +51,8 @@ class Part:
     measured: Floats
     segments: Ints
     """(s, 2) stretches without a gap."""
+    plus_late_s: float = 0.0
+    """By how much the samples of ``plus`` are older than their stamps, beyond the table's clock."""
     declared_sigma: float | None = None
     in_sensor_frame: bool = False
     """The values are along the sensor's axes, which are those of the flange."""
@@ -80,6 +83,17 @@ class Part:
         )
 
     @cached_property
+    def clock_rate(self) -> Floats:
+        """(n, k) how fast the signal changes with its own clock: that of ``plus`` where both have one."""
+        if self.minus is None or self.link != "gear":
+            return self.rate
+        step, signals = _CLOCK_STEP_S, self._plain
+        times = self.time_s - self.plus_late_s
+        apart = [interpolate(signals, self.plus, times + s) for s in (step, -step)]
+        found: Floats = (apart[0] - apart[1])[:, list(self.columns)] / (2.0 * step)
+        return found
+
+    @cached_property
     def _plain(self) -> Signals:
         return simulate(self.inputs, self.base)
 
@@ -102,7 +116,7 @@ class Part:
         return _PATHS_KNOWN[key][1]
 
     def _at(self, signals: Signals, stamps: Floats) -> Floats:
-        times = signals.true_time(self.plus, stamps)
+        times = signals.true_time(self.plus, stamps - self.plus_late_s)
         if self.minus is None:
             values = interpolate(signals, self.plus, times)
         else:

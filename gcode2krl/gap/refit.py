@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.box import boxed
+from gcode2krl.gap.evidence import stretches_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
@@ -19,6 +21,7 @@ _FIXED = ("harmonic",)
 """Shapes that are counts: a fit keeps the value of the grid."""
 _MOST_STEPS = 12
 _AT_BOUND = 1e-3
+_MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
 
 
@@ -168,10 +171,9 @@ class Target:
         return found
 
     def _decompose(self) -> None:
-        """Prepare y -> y - N·(NᵀN + I)⁻¹·Nᵀy, whose squared length with that of b is the marginal chi2."""
+        """Prepare y -> y - N·b, whose squared length with that of b is chi2 after nuisance."""
         width = self.columns[0].shape[1] if self.columns else 0
-        gram = sum((c.T @ c for c in self.columns), np.zeros((width, width))) + np.eye(width)
-        self.factor = np.linalg.cholesky(gram)
+        self.gram = sum((c.T @ c for c in self.columns), np.zeros((width, width))) + np.eye(width)
 
     def _white(self, part: Part, columns: Floats) -> Floats:
         return np.concatenate([
@@ -186,27 +188,18 @@ class Target:
         ])  # fmt: skip
 
     def without_nuisance(self, y: Floats) -> Floats:
-        """Return the vector whose squared length is chi2 after nuisance; also for a matrix of vectors."""
-        at, sums = 0, np.zeros((len(self.factor), *y.shape[1:]))
-        for columns in self.columns:
-            sums += columns.T @ y[at : at + len(columns)]
-            at += len(columns)
-        from scipy.linalg import cho_solve
-
-        b = cho_solve((self.factor, True), sums)
+        """Return the vector whose squared length is chi2 after nuisance within its bounds."""
+        b = self.nuisance_of(y)
         fitted = np.concatenate([columns @ b for columns in self.columns]) if self.columns else 0.0 * y
         return np.concatenate([y - fitted, b])
 
     def nuisance_of(self, y: Floats) -> Floats:
-        """Return the nuisance coefficients that fit a whitened vector best."""
-        at, sums = 0, np.zeros(len(self.factor))
+        """Return the nuisance coefficients, within their bounds, that fit a whitened vector best."""
+        at, sums = 0, np.zeros(len(self.gram))
         for columns in self.columns:
             sums += columns.T @ y[at : at + len(columns)]
             at += len(columns)
-        from scipy.linalg import cho_solve
-
-        b: Floats = cho_solve((self.factor, True), sums)
-        return b
+        return boxed(self.gram, sums)
 
     def residual(self, applied: Sequence[Applied]) -> Floats:
         """Return the marginal residual vector with some effects."""
@@ -283,6 +276,36 @@ def _scanned(
         if chi2 < best:
             best, found = chi2, trial
     return found
+
+
+def inflation_of(target: Target, fitted: Fitted, number: int) -> float:
+    """Return by how much the gain of an effect varies more than white noise lets it, at least 1.
+
+    From the scores of each stretch of time at the best fit (White 1980, by clusters): what a model is off by
+    here and there, of either sign, makes the noise of a gain larger than the noise of a sample says.
+    """
+    residual, jacobian = residual_jacobian(target, fitted)
+    first = sum(len(free.names) for free in fitted.free[:number])
+    wide = jacobian * np.concatenate([free.scale for free in fitted.free])
+    mine = wide[:, first : first + len(fitted.free[number].names)]
+    others = np.delete(wide, np.s_[first : first + mine.shape[1]], axis=1)
+    if others.shape[1]:
+        mine = mine - others @ np.linalg.lstsq(others, mine, rcond=1e-9)[0]
+    clusters = stretches_of_all(target.parts)
+    names, at = np.unique(clusters, return_inverse=True)
+    sums = np.zeros((len(names), mine.shape[1]))
+    np.add.at(sums, at, mine[: len(clusters)] * residual[: len(clusters), None])
+    info = np.linalg.pinv(mine.T @ mine, rcond=1e-9, hermitian=True)
+    grown = float(np.trace(info @ (sums.T @ sums))) / mine.shape[1]
+    return max(1.0, grown * len(names) / max(len(names) - mine.shape[1], 1))
+
+
+def stretches_of_all(parts: Sequence[Part]) -> NDArray[np.int64]:
+    """Return the number of the stretch of time of each value of all parts, as `Target.whiten` orders them."""
+    return np.concatenate([
+        _MOST_STRETCHES * number + np.tile(stretches_of(part), part.shape[1])
+        for number, part in enumerate(parts)
+    ])  # fmt: skip
 
 
 def residual_jacobian(target: Target, fitted: Fitted) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
 from gcode2krl.robot.joints import (
+    angles_near,
     follow,
     follow_motion,
     joints_at,
@@ -14,6 +15,7 @@ from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
 from gcode2krl.robot.quality import pose_quality
 
 __all__ = [
+    "angles_near",
     "flange_frames",
     "follow",
     "follow_motion",

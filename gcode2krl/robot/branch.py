@@ -62,6 +62,18 @@ class Branch(NamedTuple):
         return self.q_rad[at] if known else None
 
 
+def same_branch(path: Path, q_rad: Floats, cell: Cell) -> Floats:
+    """Return the joints (n, 6) along a path in the branch and turns of the joints (6,) near its first row."""
+    position, rotation = flange_frames(path.position_mm, path.rotation, path.tool, cell)
+    geometry = cell.robot.geometry.array()
+    apart = [
+        np.abs(one_branch(position[:1], rotation[:1], geometry, number, q_rad)[0] - q_rad).sum()
+        for number in range(8)
+    ]
+    number = int(np.argmin(np.nan_to_num(apart, nan=np.inf)))
+    return one_branch(position, rotation, geometry, number, q_rad)
+
+
 def thinned(starts: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Return the samples of the trial: some 2000, with the first of each chain and the last of all."""
     evenly = np.arange(0, count, max(1, count // _TRIAL_SAMPLES))

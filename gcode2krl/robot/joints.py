@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.parts import ROWS, edges, in_parts
-from gcode2krl.robot.branch import Branch, Path, best_branch, thinned
+from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
 from gcode2krl.robot.jacobian import smallest_singular_value
 from gcode2krl.robot.kinematics import status_turn
@@ -64,6 +64,16 @@ def ptp_joints(targets: Targets, cell: Cell) -> Joints:
 def follow_motion(motion: Motion, cell: Cell) -> Joints:
     """Return joints at each sample (m) of a Motion, one branch for all."""
     return joints_from_angles(motion, *motion_angles(motion, cell), cell)
+
+
+def angles_near(motion: Motion, q_rad: Floats, cell: Cell) -> Floats:
+    """Return the angles (m, 6) in rad along a Motion whose first row is near the joints (6,).
+
+    Branch and turns are those of these joints; nothing is said of limits.
+    """
+    starts = np.zeros(len(motion), dtype=np.bool_)
+    path = Path(motion.position_mm, motion.rotation, motion.tool, starts)
+    return same_branch(path, q_rad, cell)
 
 
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:

@@ -112,7 +112,8 @@ def test_wrist_coupling(swinging, known):
     q[:, 4] += 0.002 * q4
     q[:, 5] += 0.002 * (q4 + q5)
     np.testing.assert_allclose(signals.q_true_rad, q, atol=1e-15)
-    np.testing.assert_array_equal(signals.q_load_rad, swinging.q_cmd_rad)
+    np.testing.assert_allclose(signals.q_load_rad, q, atol=1e-15)
+    np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
 
 
 def test_link_length(swinging, known):

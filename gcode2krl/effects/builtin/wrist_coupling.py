@@ -9,12 +9,13 @@ from gcode2krl.effects.inputs import Inputs
 class WristCoupling(Effect):
     """The controller's decoupling of the wrist is off: q5 += ratio·q4, q6 += ratio·(q4 + q5).
 
-    q4 and q5 on the right are the indicated ones; the wrist's encoders do not see it.
+    q4 and q5 on the right are the indicated ones. The motors' encoders do not see it; encoders behind the gears
+    do.
     """
 
     name = "wrist_coupling"
     family = "joint"
-    links = frozenset({"mechanics"})
+    links = frozenset({"gear"})
     parameters = (
         Parameter(
             "ratio", "", -0.05, 0.05, nominal=0.0, start=0.001, linear=True,
@@ -22,13 +23,13 @@ class WristCoupling(Effect):
         ),
     )  # fmt: skip
 
-    def joints(self, q_true_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
-        """Return the true joints."""
+    def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return what is behind the gears of the wrist."""
         if applied["ratio"] == 0.0:
-            return q_true_rad
-        q = np.array(q_true_rad)
-        q[:, 4] += applied["ratio"] * q_true_rad[:, 3]
-        q[:, 5] += applied["ratio"] * (q_true_rad[:, 3] + q_true_rad[:, 4])
+            return q_load_rad
+        q = np.array(q_load_rad)
+        q[:, 4] += applied["ratio"] * q_load_rad[:, 3]
+        q[:, 5] += applied["ratio"] * (q_load_rad[:, 3] + q_load_rad[:, 4])
         return q
 
 
