@@ -109,7 +109,7 @@ def measure(options):
     from gcode2krl.online.compensator import compensator
     from gcode2krl.online.recorder import Recorder
     from gcode2krl.online.server import open_socket, serve
-    from gcode2krl.online.settings import Online, RobotLink
+    from gcode2krl.online_section import Online, RobotLink
 
     settings = Online(cycle_s=options.cycle_ms / 1000.0, mode=options.mode, link=RobotLink(lost_cycles=100))
     settings = settings.model_copy(update={"link": settings.link.model_copy(update={"port": 0})})

@@ -4,7 +4,7 @@ The defaults are stated, plausible values; none was fitted to a figure. The last
 filters and delays together and prints the range beside the defaults' figures; `--plot FILE` draws the first.
 
     python benchmarks/twin_sensitivity.py                 the test piece, about two minutes
-    python benchmarks/twin_sensitivity.py --small         fewer combinations
+    python benchmarks/twin_sensitivity.py --small         ends and defaults only, fewer combinations
 """
 
 import argparse
@@ -14,8 +14,8 @@ from pathlib import Path
 from gcode2krl import load_cell
 from gcode2krl.online.judge import judged
 from gcode2krl.online.outcome import figures_of
-from gcode2krl.online.settings import Online
 from gcode2krl.online.twin import CASES, World, simulate, twin_of
+from gcode2krl.online_section import Online
 from gcode2krl.predict import predict
 from gcode2krl.sections import Stock
 
@@ -82,7 +82,7 @@ def row(label, values, mark=""):
     print(f"  {label:<34}" + "".join(f"{value:>14.3f}" for value in values) + mark)
 
 
-def table(prediction):
+def table(prediction, defaults, small):
     """Print what each change costs; returns name -> (values, figures)."""
     drawn = {}
     for name, key, values, kind in ONE_AT_A_TIME:
@@ -90,10 +90,11 @@ def table(prediction):
         found = []
         default = getattr(World() if kind == "world" else Online(), key)
         default = Online().pilot_lead_s if default is None else default
-        for value in values:
-            found.append(figures(prediction, {key: value}))
+        chosen = sorted({values[0], default, values[-1]}) if small else values
+        for value in chosen:
+            found.append(defaults if value == default else figures(prediction, {key: value}))
             row(f"{value:g}", found[-1], "   default" if value == default else "")
-        drawn[name] = (values, found)
+        drawn[name] = (chosen, found)
     return drawn
 
 
@@ -142,8 +143,9 @@ def main():
     cell = load_cell().model_copy(update={"stock": STOCK})
     prediction = predict(PART, cell, dt_s=Online().cycle_s)
     print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
-    row("defaults", figures(prediction, {}))
-    drawn = table(prediction)
+    defaults = figures(prediction, {})
+    row("defaults", defaults)
+    drawn = table(prediction, defaults, options.small)
     plausible_range(prediction, options.small)
     if options.plot is not None:
         draw(drawn, options.plot)

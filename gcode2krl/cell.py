@@ -16,6 +16,7 @@ from pydantic import Field, ValidationError
 from gcode2krl import frames as fr
 from gcode2krl import library
 from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.online_section import Online
 from gcode2krl.sections import (
     Axis,
     Clearance,
@@ -63,6 +64,7 @@ class Cell(Section):
     load: Load
     compliance: Compliance = Compliance()
     pilot: Pilot = Pilot()
+    online: Online = Online()
     spindle: Spindle
     effects: tuple[EffectEntry, ...] = ()
     guard_inputs: tuple[GuardInput, ...] = ()
@@ -139,7 +141,8 @@ def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str =
         for section, kind in (("robot", "robots"), ("controller", "controllers"), ("material", "materials")):
             merged[section] = _fill_in(merged.get(section), kind, beside)
         _take_compliance_of_robot(merged)
-        _find_mesh(merged.get("stock"), beside)
+        _find_file(merged.get("stock"), "mesh", beside)
+        _find_file(merged.get("online"), "calibration", beside)
         tools = merged["tool"]
         merged["tool"] = {number: _fill_in(tool, "tools", beside) for number, tool in tools.items()}
         cell = Cell.model_validate(merged)
@@ -197,10 +200,10 @@ def _take_compliance_of_robot(merged: dict[str, Any]) -> None:
     merged["compliance"] = library.merge(below, merged.get("compliance", {}))
 
 
-def _find_mesh(stock: Any, beside: Path | None) -> None:
-    """Make the path of a stock's mesh one that holds wherever the command runs."""
-    if isinstance(stock, dict) and isinstance(stock.get("mesh"), str) and beside is not None:
-        stock["mesh"] = str((beside / stock["mesh"]).resolve())
+def _find_file(section: Any, key: str, beside: Path | None) -> None:
+    """Make the path of a file that a section names one that holds wherever the command runs."""
+    if isinstance(section, dict) and isinstance(section.get(key), str) and beside is not None:
+        section[key] = str((beside / section[key]).resolve())
 
 
 def _validation_issues(error: ValidationError) -> Iterator[Issue]:

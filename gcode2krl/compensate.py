@@ -145,7 +145,7 @@ def refuse_twice(online: bool, both: bool) -> None:
     """Raise `RefusedError` where the online compensation would correct again what the targets correct."""
     if online and not both:
         sentence = "offline and online compensation together correct the same deflection twice"
-        remedy = "choose one, or state that the online side knows of the offset"
+        remedy = "choose one; --both where the server knows of the offset, which `online serve` does not"
         raise RefusedError(Issue("error", "compensation-twice", 0, sentence, remedy))
 
 

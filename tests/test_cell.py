@@ -1,12 +1,14 @@
 """The cell file: partial files, errors that name the key, tool frames, the library."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
+import tomli_w
 
 from gcode2krl import Gcode2KrlError, frames, library, load_cell
-from gcode2krl.cell import Cell, cell_schema, controller_axes
+from gcode2krl.cell import Cell, as_toml, cell_from_resolved, cell_schema, controller_axes
 
 
 def _write(tmp_path, text):
@@ -127,3 +129,47 @@ def test_the_schema_knows_every_key_and_requires_none():
     schema = cell_schema()
     assert set(schema["properties"]) == set(Cell.model_fields)
     assert '"required"' not in json.dumps(schema)
+
+
+def test_the_online_section_has_defaults_and_takes_values(tmp_path, cell):
+    assert cell.online.cycle_s == 0.004
+    assert cell.online.link.address == "127.0.0.1"
+    text = '[online]\nmost_mm = 1.5\ncalibration = "sensor.toml"\n[online.link]\nport = 50000\n'
+    own = load_cell(_write(tmp_path, text))
+    assert own.online.most_mm == 1.5
+    assert own.online.link.port == 50000
+    assert own.online.rate_mm_s == cell.online.rate_mm_s
+    assert own.online.calibration == str((tmp_path / "sensor.toml").resolve())
+    again = cell_from_resolved(tomllib.loads(tomli_w.dumps(as_toml(own))), "cell")
+    assert again.online == own.online
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("cycle_s = 0.005", ("online.cycle_s", "0.005", "0.004 or 0.012")),
+        ("mode = 'polar'", ("online.mode", "polar", "cartesian")),
+        ("most_mm = 11", ("online.most_mm", "11", "10")),
+        ("step_mm = -1", ("online.step_mm", "-1", "greater than 0")),
+        ("lead_s = nan", ("online.lead_s", "nan", "finite")),
+        ("axis_rate_deg_s = [0, 1, 1, 1, 1, 1]", ("online.axis_rate_deg_s", "0", "above 0")),
+        ("axis_most_deg = [1, 1]", ("online.axis_most_deg", "6 items")),
+        ("gain = 1", ("online.gain", "no such key")),
+        ("gains = { p = 'much' }", ("online.gains.p", "much")),
+        ("probe = { amplitude_mm = 0.5 }", ("online.probe.amplitude_mm", "0.5", "0.2")),
+        ("link = { address = 'robot' }", ("online.link.address", "robot", "IPv4")),
+        ("link = { address = '1.2.3.4</IP_NUMBER>' }", ("online.link.address", "IPv4")),
+        ("link = { port = 70000 }", ("online.link.port", "70000", "65535")),
+        ("link = { timeout_cycles = 6 }", ("online.link.timeout_cycles", "6", "5")),
+        ("link = { sensor_type = 'a b' }", ("online.link.sensor_type", "a b")),
+        ("link = { t1_output = 9, ready_output = 9 }", ("online.link", "t1_output", "ready_output")),
+    ],
+)
+def test_a_wrong_online_value_names_its_key_in_one_line(tmp_path, text, words):
+    path = _write(tmp_path, f"[online]\n{text}\n")
+    with pytest.raises(Gcode2KrlError) as caught:
+        load_cell(path)
+    assert caught.value.exit_code == 2
+    assert len(caught.value.issues) == 1
+    for word in (str(path), *words):
+        assert word in str(caught.value)

@@ -135,6 +135,12 @@ def _to_confirm(cell: Cell) -> Iterator[tuple[str, str, str]]:
     yield "coolant", f"$OUT[{spindle.flood_output}] flood, $OUT[{spindle.mist_output}] mist", spindle.sure
     for item in cell.guard_inputs:
         yield f"$IN[{item.number}]", f"{item.meaning} = {item.value}", "assumption"
+    link = cell.online.link
+    yield (
+        "RSI",
+        f"$OUT[{link.t1_output}] on in T1, $OUT[{link.ready_output}] free, PC {link.address}:{link.port}",
+        "memory",
+    )
     yield "M-codes", ", ".join(cell.m_code), "assumption"
 
 

@@ -10,7 +10,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 from gcode2krl.prediction import Prediction
 
 TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
@@ -53,7 +53,7 @@ def simulate_command(
     """
     console = Console(quiet, as_json)
     cell = read_cell(cell_path)
-    settings = _changed(_settings(cell), options)
+    settings = _changed(cell.online, options)
     world_values = _world_values(options)
     prediction = _predicted(part, cell, settings, console, tolerance, chord_tolerance, block_delete)
     from gcode2krl.online.judge import judged as judge
@@ -94,11 +94,6 @@ _WORDS = {
 }
 
 
-def _settings(cell: Cell) -> Online:
-    """Return the ``[online]`` section."""
-    return Online()
-
-
 def _changed(settings: Online, options: dict[str, Any]) -> Online:
     """Return the settings with the options of the command line laid over them."""
     changes: dict[str, Any] = {}
@@ -125,8 +120,10 @@ def _valid(settings: Online, changes: dict[str, Any]) -> Online:
     except ValidationError as error:
         detail = error.errors(include_url=False)[0]
         key = ".".join(str(step) for step in detail["loc"])
-        found, allowed = detail["input"], detail["msg"].removeprefix("Input should be ")
-        raise input_error("option-value", f"{key}: found {found}, allowed: {allowed}") from None
+        words = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        said = detail["type"] == "value_error"
+        text = words if said else f"found {detail['input']}, allowed: {words}"
+        raise input_error("option-value", f"{key}: {text}") from None
 
 
 def _world_values(options: dict[str, Any]) -> dict[str, Any]:
@@ -231,7 +228,10 @@ def replay_command(
     from gcode2krl.runs import load_run
 
     knots, header = _pilot(sidecar)
-    result = replay(load_run(run), cell, _settings(cell), tool=tool, knots=knots, header=header)
+    result = replay(
+        load_run(run), cell, cell.online, tool=tool, calibration=_calibration(cell.online), knots=knots,
+        header=header,
+    )  # fmt: skip
     found = replay_json(result)
     if output is not None:
         import polars as pl
@@ -256,11 +256,13 @@ def replay_command(
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that will run.")
 @click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")
-@click.option("--mode", type=click.Choice(["cartesian", "axis"]), help="What is corrected.")
-@click.option("--address", metavar="IP", help="Where to listen; default: loopback.")
-@click.option("--port", type=int, metavar="N", help="UDP port; default: 49152.")
-@click.option("--cycle-ms", type=click.Choice(["4", "12"]), help="#IPO_FAST or #IPO.")
-@click.option("--most-mm", type=float, metavar="MM", help="Largest correction; 0.001 = none to speak of.")
+@click.option(
+    "--mode", type=click.Choice(["cartesian", "axis"]), help="What is corrected; default: the cell's."
+)
+@click.option("--address", metavar="IP", help="Where to listen; default: the cell's, loopback.")
+@click.option("--port", type=int, metavar="N", help="UDP port; default: the cell's, 49152.")
+@click.option("--cycle-ms", type=click.Choice(["4", "12"]), help="#IPO_FAST or #IPO; default: the cell's.")
+@click.option("--most-mm", type=float, metavar="MM", help="Largest correction; default: the cell's.")
 @click.option("-o", "--output", type=click.Path(), metavar="FOLDER", help="Record the run there.")
 @click.option("--files", type=click.Path(), metavar="FOLDER", help="Write the controller's files, and end.")
 @click.option("--name", default="GK_RSI", show_default=True, help="Name of the controller's files.")
@@ -270,16 +272,17 @@ def serve_command(
 ) -> int:  # fmt: skip
     """Answer a controller's RSI telegrams with corrections. Not a safety function, not hard real time.
 
-    Listens on loopback unless --address is given, talks to one controller, and stays at zero until the robot
-    has shown in air that it takes corrections as absolute. The force comes in the telegram (element Force).
+    Listens on loopback unless [online.link] or --address says otherwise, talks to one controller, and stays
+    at zero until the robot has shown in air that it takes corrections as absolute. The force comes in the
+    telegram (element Force).
     """
     console = Console(quiet, as_json)
     cell = read_cell(cell_path)
-    settings = _link_changed(_settings(cell), options)
+    settings = _link_changed(cell.online, options)
     knots, header = _pilot(sidecar)
     form = header.form if header is not None else "none"
     if files is not None:
-        written = _controller_files(settings, form, name, Path(files))
+        written = _controller_files(cell.model_copy(update={"online": settings}), form, name, Path(files))
         if settings.link.address.startswith("127."):
             console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
         if as_json:
@@ -292,14 +295,10 @@ def serve_command(
     from gcode2krl.online.server import open_socket, serve
     from gcode2krl.online.session import Phase
 
-    calibration = None
-    if settings.calibration is not None:
-        from gcode2krl.compliance.sensor import read_calibration
-
-        calibration = read_calibration(settings.calibration)
     device = compensator(
-        cell, settings, tool=tool, load_frame="sensor", calibration=calibration, knots=knots, header=header
-    )
+        cell, settings, tool=tool, load_frame="sensor", calibration=_calibration(settings), knots=knots,
+        header=header,
+    )  # fmt: skip
     with open_socket(device) as socket, Recorder(Path(output) if output else None, _RUN_HEAD) as recorder:
         address, port = socket.getsockname()
         console.hint(f"listening on {address}:{port}; Ctrl-C ends it. This is not a safety function.")
@@ -347,6 +346,15 @@ def _pilot(sidecar: str | None) -> Any:
     return read_pilot(sidecar)
 
 
+def _calibration(settings: Online) -> Any:
+    """Return weight and offset of the sensor, None where the section names no file."""
+    if settings.calibration is None:
+        return None
+    from gcode2krl.compliance.sensor import read_calibration
+
+    return read_calibration(settings.calibration)
+
+
 def _gates(cycles: dict[str, int]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in cycles.items())
 
@@ -364,22 +372,17 @@ def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
     return _valid(settings, changes)
 
 
-def _controller_files(settings: Online, form: Any, name: str, folder: Path) -> list[Path]:
+def _controller_files(cell: Cell, form: Any, name: str, folder: Path) -> list[Path]:
     """Write what belongs into the controller's folder ``SensorInterface``."""
-    from gcode2krl.online.krl_files import ethernet_xml, file_names, signal_flow_xml
+    from gcode2krl.krl.files import write_together
+    from gcode2krl.krl.rsi_files import rsi_files
 
-    ethernet, flow = file_names(name)
-    texts = {
-        ethernet: ethernet_xml(settings, form),
-        flow: signal_flow_xml(settings, form, ethernet),
-    }
-    written = []
+    texts = rsi_files(name, cell.online, cell.pilot, form)
     try:
         folder.mkdir(exist_ok=True)
-        for file_name, text in texts.items():
-            (folder / file_name).write_text(text, encoding="ascii", newline="\r\n")
-            written.append(folder / file_name)
     except OSError as error:
         why = error.strerror or str(error)
         raise input_error("output-unwritable", f"cannot write: {why}", source=str(folder)) from None
-    return written
+    files = {folder / key: text.replace("\n", "\r\n").encode("ascii") for key, text in texts.items()}
+    write_together(files)
+    return list(files)

@@ -60,10 +60,12 @@ def _duration(seconds: float) -> str:
 
 
 def _files(written: WrittenProgram) -> str:
-    names = [str(file) for file in written.files]
-    if len(names) <= 3:
-        return ", ".join(names)
-    return f"{names[0]}, {len(names) - 2} parts {names[1]} ... {names[-2]}, {names[-1]}"
+    first, *rest = [str(file) for file in written.files]
+    parts = [name for name in rest if name.endswith(".src")]
+    others = [name for name in rest if not name.endswith(".src")]
+    if len(parts) > 2:
+        parts = [f"{len(parts)} parts {parts[0]} ... {parts[-1]}"]
+    return ", ".join([first, *parts, *others])
 
 
 def _span(values: "np.ndarray[tuple[int], np.dtype[np.float64 | np.int32]]", decimals: int) -> str:

@@ -1,9 +1,10 @@
 """``gcode2krl translate part.nc -o part.src``, the default command."""
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 import numpy as np
@@ -16,6 +17,9 @@ from gcode2krl.cli.loads import largest
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
+
+if TYPE_CHECKING:
+    from gcode2krl.krl import WrittenProgram
 
 Floats = NDArray[np.float64]
 
@@ -51,6 +55,14 @@ Floats = NDArray[np.float64]
     type=click.Choice(["index", "values", "none"]),
     help="How the program carries the pilot force; default: the cell's, none on standard output.",
 )
+@click.option(
+    "--online",
+    metavar="NAME",
+    help="Correct online by RSI: switch it in the program, write NAME.rsi.xml and NAME_ETH.xml beside it.",
+)
+@click.option(
+    "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
+)
 @click.option("--comment-every", type=click.IntRange(0), help="A G-code line number every so many motions.")
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
@@ -58,7 +70,8 @@ def command(
     name: str | None, allow: tuple[str, ...], strict: bool, no_guard: bool,
     split: Literal["defs", "files"], max_lines: int | None, no_forces: bool,
     compensate: Literal["offline"] | None, compensate_plot: str | None,
-    pilot: Literal["index", "values", "none"] | None, comment_every: int | None,
+    pilot: Literal["index", "values", "none"] | None, online: str | None, both: bool,
+    comment_every: int | None,
 ) -> int:  # fmt: skip
     """Translate G-code into a KRL program, verify it, and say what it is.
 
@@ -69,6 +82,7 @@ def command(
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
         file = _output_file(part, output, cell_path)
+        _refuse_online(online, both, compensate, file)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.krl import suggested_name, write_krl
@@ -79,6 +93,9 @@ def command(
             chord_tolerance=chord_tolerance,
             block_delete=block_delete,
             spin=cell.frames.spin,
+            compensate=compensate,
+            online=online,
+            both=both,
         )
         if file is None and name is None and part != STANDARD:
             name = suggested_name(Path(part).stem)
@@ -86,7 +103,7 @@ def command(
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
             targets = replace(targets, issues=(*targets.issues, *corner_issues))
-            _refuse_early(targets, allow)
+            _refuse_early(targets, cell, allow, online)
             prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
@@ -104,6 +121,7 @@ def command(
                 options=options,
                 strict=strict,
                 pilot=pilot,
+                online=online,
             )
     except Gcode2KrlError as error:
         if not as_json:
@@ -125,7 +143,38 @@ def command(
 
     for line in summary_lines(part, prediction, joints, corner_mm, written):
         console.say(line)
+    if online is not None:
+        for line in _online_lines(written):
+            console.say(line)
     return 0
+
+
+def _refuse_online(online: str | None, both: bool, compensate: str | None, file: Path | None) -> None:
+    """Raise where ``--online`` cannot be, or must not be together with another option."""
+    if both and (online is None or compensate is None):
+        sentence = "--both: there are no two compensations"
+        raise input_error("option-value", sentence, "give --online NAME and --compensate offline too")
+    if online is None:
+        return
+    from gcode2krl.krl.rsi_files import file_names
+
+    file_names(online)
+    if file is None:
+        sentence = "--online writes RSI files, which standard output cannot carry"
+        raise input_error("option-value", sentence, "give -o part.src")
+    if compensate == "offline":
+        from gcode2krl.compensate import refuse_twice
+
+        refuse_twice(online=True, both=both)
+
+
+def _online_lines(written: "WrittenProgram") -> Iterator[str]:
+    """Yield what to do with the RSI files."""
+    files = " and ".join(file.name for file in written.files if file.suffix == ".xml")
+    yield f"  online     {files} belong into SensorInterface; docs/online.md lists what to confirm there"
+    pilot = "".join(f" --pilot {file}" for file in written.files if file.suffix == ".csv")
+    tool = int(written.targets.tool[~written.targets.home][-1])
+    yield f"  server     gcode2krl online serve --tool {tool}{pilot} must listen before RSI_ON"
 
 
 def _from_part(error: Gcode2KrlError, part: str) -> Gcode2KrlError:
@@ -165,12 +214,14 @@ def _words(**options: Any) -> str:
     )
 
 
-def _refuse_early(targets: Targets, allow: tuple[str, ...]) -> None:
-    """Refuse what cannot move at all before its motion is planned."""
+def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: str | None) -> None:
+    """Refuse what cannot move at all, or not be corrected online, before its motion is planned."""
     from gcode2krl.krl.release import released
+    from gcode2krl.krl.rsi_refusals import online_issues
 
-    if any(issue.severity == "error" for issue in targets.issues):
-        released(targets.issues, allow)
+    issues = [*targets.issues, *(online_issues(targets, cell) if online is not None else ())]
+    if any(issue.severity == "error" for issue in issues):
+        released(issues, allow)
 
 
 def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:

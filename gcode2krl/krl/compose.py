@@ -13,6 +13,8 @@ from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
 from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
+from gcode2krl.krl.rsi_text import RsiText, rsi_rows
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
@@ -48,6 +50,8 @@ class Layout:
     allowed: tuple[str, ...] = ()
     forces: bool = False
     """True where material removal and cutting forces have been predicted."""
+    online: str = ""
+    """Name of the RSI files of a program that is corrected online."""
 
 
 def compose(
@@ -60,7 +64,8 @@ def compose(
 ) -> dict[str, bytes]:
     """Return file name → bytes of the program ``name``.
 
-    ``.src``, ``.dat``, split ``name_001.src`` …, and ``.pilot.csv`` where there is a pilot force.
+    ``.src``, ``.dat``, split ``name_001.src`` …, ``.pilot.csv`` where there is a pilot force, and the RSI
+    files where the program is corrected online.
     """
     writer = _Composer(targets, joints, cell, name, layout, pilot)
     return writer.files()
@@ -91,6 +96,12 @@ class _Composer:
         if pilot is not None:
             self.triggers, self.trigger_start = pilot.before(len(targets))
             self.checksum = self._checksum(pilot)
+        self.rsi = self._rsi(layout.online) if layout.online else None
+
+    def _rsi(self, name: str) -> RsiText:
+        on, off = rsi_rows(self.targets)
+        form = self.pilot.header.form if self.pilot is not None else "none"
+        return RsiText(name, self.cell, form, on, off, int(self.targets.tool[off]))
 
     def files(self) -> dict[str, bytes]:
         """Compose the main program and its subprograms."""
@@ -113,15 +124,21 @@ class _Composer:
         return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
 
     def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
-        """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program."""
+        """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program.
+
+        So does the motion at whose end RSI is switched off: its variables are those of the main program.
+        """
         chunks: list[tuple[int, int, bool]] = []
         start, count = 0, len(self.targets)
+        apart = self.targets.ptp.copy()
+        if self.rsi is not None:
+            apart[self.rsi.off] = True
         while start < count:
-            if self.targets.ptp[start]:
+            if apart[start]:
                 chunks.append((start, start + 1, False))
                 start += 1
                 continue
-            following = np.flatnonzero(self.targets.ptp[start:])
+            following = np.flatnonzero(apart[start:])
             end = start + int(following[0]) if len(following) else count
             if end - start > most:
                 end = start + most
@@ -137,7 +154,8 @@ class _Composer:
         ptp, wait = self.targets.ptp, self.targets.wait_s
         special = np.zeros(end - start, dtype=bool)
         special |= ptp[start:end] | (wait[start:end] > 0)
-        special[[row - start for row in self.events if start <= row < end]] = True
+        rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
+        special[[row - start for row in rows if start <= row < end]] = True
         pieces: list[bytes] = []
         at = start
         for row in [*(np.flatnonzero(special) + start), end]:
@@ -177,7 +195,7 @@ class _Composer:
         )  # fmt: skip
 
     def _around(self, row: int) -> bytes:
-        """What stands at a special row: its PTP, then dwell and events."""
+        """What stands at a special row: its PTP, then dwell and events; RSI is on or off without them."""
         lines: list[str] = []
         targets = self.targets
         if targets.ptp[row]:
@@ -186,12 +204,16 @@ class _Composer:
                 self.guarded_pose = True
                 q_deg = self.joints.q_rad[row] * DEG_PER_RAD
                 lines.append(st.environment().get_template("pose_guard.j2").render(q_deg=q_deg))
+        if self.rsi is not None and row == self.rsi.off:
+            lines.append(self.rsi.end)
         waited_s = 0.0
         for dwell_s, text in self.events.get(row, []):
             lines += _dwell(dwell_s - waited_s)
             waited_s = max(waited_s, dwell_s)
             lines.append(text)
         lines += _dwell(targets.wait_s[row] - waited_s)
+        if self.rsi is not None and row == self.rsi.on:
+            lines.append(self.rsi.start)
         return _text("\n".join(lines))
 
     def _ptp(self, row: int) -> str:
@@ -211,6 +233,8 @@ class _Composer:
         declarations.append(DECLARATIONS)
         if checks:
             declarations.append(FRAME_DECLARATIONS)
+        if self.rsi is not None:
+            declarations.append(RSI_DECLARATIONS)
         template = st.environment().get_template("head.src.j2")
         text = template.render(
             source=self.source,
@@ -223,6 +247,7 @@ class _Composer:
             guard=self.layout.guard,
             forces=self.layout.forces,
             pilot=self.pilot,
+            rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
             frame_checks=checks,
             declarations="\n".join(declarations),
@@ -248,12 +273,15 @@ class _Composer:
                 parts[f"{name}.src"] = b"".join([head, *text, *own])
             else:
                 main += [NEWLINE, *text]
-        files = {f"{self.name}.src": b"".join([*main, *called]), **parts}
+        lost = [NEWLINE, _text(self.rsi.lost)] if self.rsi is not None else []
+        files = {f"{self.name}.src": b"".join([*main, *called, *lost]), **parts}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
             files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
         if self.pilot is not None and self.pilot.sidecar:
             files[f"{self.name}{SIDECAR}"] = self.pilot.file(self.checksum)
+        if self.rsi is not None:
+            files |= {name: _text(text) for name, text in self.rsi.files.items()}
         return files
 
 

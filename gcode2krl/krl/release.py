@@ -16,6 +16,9 @@ NEVER_RELEASED = frozenset(
         "no-clearance",
         "no-feed",
         "template",
+        "online-nothing",
+        "online-tool",
+        "online-home",
     }
 )
 """Without these a program would have no meaning."""

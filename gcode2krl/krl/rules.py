@@ -8,6 +8,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram
+from gcode2krl.krl.rsi_rules import rsi_issues
 from gcode2krl.units import MM_PER_M
 
 _MOST_PER_CHECK = 20
@@ -81,6 +82,7 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
             )
         )
     issues += _statement_rules(program, cell)
+    issues += rsi_issues(program, cell)
     return [*issues, *_blend_issues(program)]
 
 

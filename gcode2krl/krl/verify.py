@@ -18,6 +18,7 @@ from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, chec
 from gcode2krl.krl.pilot_plan import pilot_forces
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
+from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
 from gcode2krl.pilot import knot_rows, read_pilot
 from gcode2krl.predict import plan_motion, set_targets, solve_joints
@@ -85,8 +86,8 @@ def verify_krl(
     ``tolerance_mm`` must be the one the program was made with. A pilot force is compared with the sidecar
     beside the program and carried out along the Motion of ``prediction``, or along one planned here; with
     ``prediction`` its targets (which may be compensated) are what is intended, and the knots are compared
-    with its forces. Raises `NotUnderstoodError` where a file cannot
-    be read or the G-code has no motion.
+    with its forces. The RSI files beside a program that is corrected online must be as the cell asks for.
+    Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
     """
     program = read_krl(path)
     targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)
@@ -106,7 +107,11 @@ def verify_krl(
         targets, joints, _ = split(targets, joints, pieces, cell)
     elif len(program.triggers.motion):
         issues.append(_no_sidecar(program, Path(path)))
-    expected = compose(targets, joints, cell, program.name, Layout(guard=program.guard), pilot)
+    online = rsi_name(program, Path(path).parent)
+    layout = Layout(guard=program.guard, online=online)
+    expected = compose(targets, joints, cell, program.name, layout, pilot)
+    if online:
+        issues += rsi_file_issues(Path(path), online, expected)
     intended = read_texts(expected, f"{program.name}.src")
     return compare(program, targets, joints, cell, intended, issues, case)
 

@@ -16,6 +16,8 @@ from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.pilot_plan import PilotPlan, plan_pilot
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import released
+from gcode2krl.krl.rsi_files import file_names
+from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.verify import VerifyReport, compare
 from gcode2krl.predict import solve_ptp_joints
 from gcode2krl.prediction import Prediction
@@ -57,8 +59,9 @@ def write_krl(
     options: str = "",
     strict: bool = False,
     pilot: PilotForm | None = None,
+    online: str | None = None,
 ) -> WrittenProgram:
-    """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``), all together or not at all.
+    """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
     Parameters
     ----------
@@ -74,6 +77,8 @@ def write_krl(
     strict : warnings refuse the program too.
     pilot : how the program carries the pilot force, by default as the cell says where the prediction has
         forces, and not without a path; ``index`` needs the sidecar beside the program.
+    online : name of the RSI files of a program that is corrected online by the cell's ``[online]``; they
+        are written beside it. RSI is on from above the first cut to above the last.
 
     Raises
     ------
@@ -87,6 +92,9 @@ def write_krl(
         raise input_error("option-value", "write_krl needs a cell with Targets")
     file = Path(path) if path is not None else None
     program_name, issues = _program_name(file, name)
+    if online is not None:
+        _refuse_name(online, file)
+        issues += online_issues(targets, cell)
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
     plan = _pilot_plan(source, pilot, joints, file is not None)
@@ -95,7 +103,15 @@ def write_krl(
         issues += released(plan.issues, (), strict)
         targets, joints, text, case = plan.targets, plan.joints, plan.text, plan.case
     known = isinstance(source, Prediction) and source.forces is not None
-    layout = Layout(guard, split if file is not None else "defs", file is None, options, tuple(allow), known)
+    layout = Layout(
+        guard,
+        split if file is not None else "defs",
+        single_file=file is None,
+        options=options,
+        allowed=tuple(allow),
+        forces=known,
+        online=online or "",
+    )
     texts = compose(targets, joints, cell, program_name, layout, text)
     issues += released(_size_issues(texts, targets, cell), (), strict)
     report = compare(read_texts(texts, f"{program_name}.src"), targets, joints, cell, pilot=case)
@@ -125,6 +141,14 @@ def _pilot_plan(
         sentence = "--pilot index needs the sidecar .pilot.csv, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src, or --pilot values")
     return plan_pilot(source, joints, form, sidecar)
+
+
+def _refuse_name(online: str, file: Path | None) -> None:
+    """Raise where RSI files of that name cannot be written."""
+    file_names(online)
+    if file is None:
+        sentence = "--online needs the RSI files, which standard output cannot carry"
+        raise input_error("option-value", sentence, "give -o part.src")
 
 
 def _place(file: Path, part: str, program_name: str) -> Path:
@@ -164,7 +188,8 @@ def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]
 
 
 def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
-    size_mb = sum(len(text) for name, text in texts.items() if not name.endswith(SIDECAR)) / BYTES_PER_MB
+    program = (text for name, text in texts.items() if not name.endswith((SIDECAR, ".xml")))
+    size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from gcode2krl.online.rows import Bools, Floats, frozen
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 STEADY_SHARE = 0.2
 """An estimate is steady while it changes by less than this share of the threshold; our choice."""

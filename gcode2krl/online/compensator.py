@@ -16,7 +16,7 @@ from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compliance import deflection_of, missing_stiffness
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
-from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.frames import Floats
 from gcode2krl.online.blending import BlendState, blend_start, blended
 from gcode2krl.online.feed import FeedState, feed_of, feed_start
@@ -24,7 +24,7 @@ from gcode2krl.online.filters import FilterState, filter_start, filtered
 from gcode2krl.online.limits import Bounds, LimitState, axis_bounds, cartesian_bounds, limit_start, limited
 from gcode2krl.online.pilot_gate import Announced, GateState, PilotTable, estimate, gate_start, pilot_table
 from gcode2krl.online.rows import Bools, Ints
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.robot.inverse_kinematics import all_branches
 from gcode2krl.robot.kinematics import flange_pose, status_turn
@@ -137,6 +137,9 @@ def compensator(
     missing = missing_stiffness(cell)
     if missing is not None:
         raise NotUnderstoodError(missing, cell.name)
+    if tool not in cell.tool:
+        known = ", ".join(str(number) for number in sorted(cell.tool))
+        raise input_error("tool-unknown", f"tool {tool} is not in the cell", f"known are {known}")
     bounds = cartesian_bounds(settings) if settings.mode == "cartesian" else axis_bounds(settings)
     table = pilot_table(knots, header)
     frame, form = (header.frame, header.form) if header is not None else ("base", "index")

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from gcode2krl.online.rows import Floats, Ints, frozen
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 WINDOW_S = 0.020
 """Positions come with few decimals: over this time the direction is right to 1° at 25 mm/s and 0.01 mm."""

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from gcode2krl.online.rows import Bools, Floats, Ints, frozen
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 WIDTH = 6
 """Force x, y, z in N and moment x, y, z in N·mm."""

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 
 from gcode2krl.online.rows import Bools, Floats, frozen
-from gcode2krl.online.settings import Gains, Online
+from gcode2krl.online_section import Gains, Online
 from gcode2krl.units import RAD_PER_DEG
 
 NO_CORRECTION = 1e6

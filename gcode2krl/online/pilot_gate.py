@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from gcode2krl.online.rows import Bools, Floats, Ints, frozen
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 
 NO_KNOT_YET = -1

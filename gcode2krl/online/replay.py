@@ -10,13 +10,14 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.compliance import project_normal, tip_position
+from gcode2krl.compliance.sensor import Calibration
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.frames import Floats, invert
 from gcode2krl.online.compensator import Corrections, Samples, compensator, start, stream
 from gcode2krl.online.pilot_gate import Announced, Gate
 from gcode2krl.online.plant import reaction, tip_shift_mm
-from gcode2krl.online.settings import Online
 from gcode2krl.online.twin import World
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.runs import Run
 from gcode2krl.runs.measured import Measured
@@ -46,6 +47,7 @@ def replay(
     settings: Online,
     *,
     tool: int = 1,
+    calibration: Calibration | None = None,
     knots: Knots | None = None,
     header: PilotHeader | None = None,
     world: World | None = None,
@@ -53,7 +55,8 @@ def replay(
     """Return what the compensator would have done in a run.
 
     Knots are taken as announced ``lead_s`` ahead of their predicted time, on the clock on which ``run.toml``
-    puts its tables. ``world`` says how late the robot reacts. An error is the tip against its command.
+    puts its tables. ``calibration`` is that of forces recorded in the sensor's axes. ``world`` says how late
+    the robot reacts. An error is the tip against its command.
 
     Raises `NotUnderstoodError` where the run has no forces, no joints, or ends at once.
     """
@@ -81,8 +84,9 @@ def replay(
         told=_announced(run, time_s, knots, header),
     )
     device = compensator(
-        cell, settings, tool=tool, load_frame=run.head.frames.force, knots=knots, header=header
-    )
+        cell, settings, tool=tool, load_frame=run.head.frames.force, calibration=calibration, knots=knots,
+        header=header,
+    )  # fmt: skip
     _, corrections = stream(device, start(device), samples)
     world = world or World()
     moved = reaction(corrections.correction, time_s, world.dead_s, world.lag_s)

@@ -27,7 +27,7 @@ from gcode2krl.online.compensator import (
 )
 from gcode2krl.online.pilot_gate import Announced
 from gcode2krl.online.plant import reaction, tip_shift_mm, with_backlash
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
 from gcode2krl.prediction import Prediction
 from gcode2krl.sections import VirtualJoint

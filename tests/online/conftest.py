@@ -7,8 +7,8 @@ import pytest
 
 from gcode2krl.online.compensator import compensator
 from gcode2krl.online.session import begin, exchange
-from gcode2krl.online.settings import Online
 from gcode2krl.online.telegram import answer_text, parse
+from gcode2krl.online_section import Online
 
 
 @dataclass

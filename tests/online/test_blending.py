@@ -3,7 +3,7 @@
 import numpy as np
 
 from gcode2krl.online.blending import blend_start, blended
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 

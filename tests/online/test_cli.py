@@ -67,6 +67,8 @@ def test_simulate_says_it_to_a_person_and_draws(online, tmp_path):
         ("simulate", "slot.nc", "--plot", "a/b/c"), ("replay", "nothing"), ("serve", "--port", "0"),
         ("serve", "--address", "203.0.113.1"), ("serve", "--pilot", "nothing.csv"),
         ("serve", "--files", "a", "--name", "much too long a name"),
+        ("serve", "--address", "the robot"), ("serve", "--tool", "99"),
+        ("serve", "--files", "a/b/c"), ("serve", "--most-mm", "99"),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_line_and_exit_code_2(online, arguments):
@@ -102,6 +104,31 @@ def test_serve_writes_the_controllers_files(online, tmp_path):
     assert outcome.code == 0, outcome.err
     assert len(json.loads(outcome.out)["files"]) == 2
     assert {file.name for file in (tmp_path / "sensor").iterdir()} == {"PART_1_ETH.xml", "PART_1.rsi.xml"}
+
+
+def test_every_command_reads_the_section_of_the_cell(online, tmp_path):
+    section = (
+        '[online]\nlead_s = 0.055\nmost_mm = 1.5\n[online.link]\nport = 50123\naddress = "192.168.7.3"\n'
+    )
+    (tmp_path / "cell.toml").write_text(STOCK + section)
+    assert simulate(online)["settings"]["lead_ms"] == pytest.approx(55.0)
+    outcome = online("serve", "--cell", "cell.toml", "--files", "sensor", "--name", "A")
+    assert outcome.code == 0, outcome.err
+    config = (tmp_path / "sensor" / "A_ETH.xml").read_text()
+    assert "<PORT>50123</PORT>" in config
+    assert "<IP_NUMBER>192.168.7.3</IP_NUMBER>" in config
+    assert 'Name="UpperLimX" ParamID="4" ParamValue="1.5"' in (tmp_path / "sensor" / "A.rsi.xml").read_text()
+    outcome = online("serve", "--cell", "cell.toml", "--files", "sensor", "--name", "B", "--port", "50200")
+    assert outcome.code == 0
+    assert "<PORT>50200</PORT>" in (tmp_path / "sensor" / "B_ETH.xml").read_text()
+
+
+def test_the_sensors_calibration_is_that_of_the_cell(online, tmp_path):
+    """The file is named in the section, and found beside the cell file."""
+    (tmp_path / "cell.toml").write_text(STOCK + '[online]\ncalibration = "sensor.toml"\n')
+    outcome = online("serve", "--cell", "cell.toml", "--port", free_port())
+    assert outcome.code == 2
+    assert str(tmp_path / "sensor.toml") in outcome.err
 
 
 def test_serve_answers_until_the_peer_is_silent_and_records_a_run(online, tmp_path, cell):

@@ -21,7 +21,7 @@ from gcode2krl.online.compensator import (
     stream,
 )
 from gcode2krl.online.pilot_gate import Announced
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.units import RAD_PER_DEG
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gcode2krl.online.feed import feed_of, feed_start
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 

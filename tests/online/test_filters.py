@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from gcode2krl.online.filters import filter_start, filtered
-from gcode2krl.online.settings import Online
+from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.krl.rsi_files import ethernet_xml
 from gcode2krl.online.compensator import compensator
-from gcode2krl.online.krl_files import ethernet_xml
 from gcode2krl.online.recorder import Recorder
 from gcode2krl.online.server import open_socket, serve
 from gcode2krl.online.session import Phase
-from gcode2krl.online.settings import Online, RobotLink
+from gcode2krl.online_section import Online, RobotLink
 from tests.online.krc import Krc
 from tests.online.relay import GARBAGE, Relay
 

@@ -8,8 +8,8 @@ import pytest
 from gcode2krl.online.compensator import compensator
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.session import Phase, begin, exchange, silent
-from gcode2krl.online.settings import Online
 from gcode2krl.online.telegram import parse
+from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from tests.online.conftest import Log, talk
 from tests.online.krc import Krc

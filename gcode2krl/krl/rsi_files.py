@@ -1,21 +1,24 @@
-"""What the controller needs for RSI: the Ethernet file, the signal flow, and the lines of KRL around the cut.
+"""What the controller needs for RSI beside the program: the Ethernet file and the signal flow.
 
 Written after KUKA's examples for KSS 8.3 and RSI 3, object numbers and all; nobody has loaded these files
-into a controller yet. Both files of one program belong together: the numbers of the channels are those of
-both.
+into a controller yet. Both belong together: the numbers of the channels are those of both. The tags are
+those that the online side parses.
 """
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
-from gcode2krl.cell import Cell
-from gcode2krl.errors import input_error
-from gcode2krl.online.settings import Online
+from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.online_section import Online
+from gcode2krl.sections import Pilot
 
 Form = Literal["index", "values", "none"]
 LONGEST_NAME = 16
-INTERRUPT = 21
-READY_SUBPROGRAM = "GK_RSI_LOST"
+RESERVED = frozenset(
+    ["CON", "PRN", "AUX", "NUL", *(f"{word}{k}" for word in ("COM", "LPT") for k in range(1, 10))]
+)
+"""Names that Windows, on which a KRC4 runs, keeps for devices."""
 MOST_TURN_DEG = 0.1
 """We correct positions, no orientations: a turn beyond is none of ours."""
 MONITOR_SHARE = 1.2
@@ -24,6 +27,8 @@ _XYZABC = ("X", "Y", "Z", "A", "B", "C")
 _AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _IN_BASE = 1
 """``RefCorrSys``: the corrections are along ``$BASE``."""
+_INTEGER, _REAL = r"\$SEN_PINT\[(\d{1,2})\]", r"\$SEN_PREA"
+"""What the objects SEN_PINT and SEN_PREA of a signal flow can read."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +55,28 @@ class _Channel:
     output: int = 1
 
 
+def is_file_name(name: str) -> bool:
+    """Tell whether files of that name can be named on a controller."""
+    return re.fullmatch(rf"[A-Za-z0-9_]{{1,{LONGEST_NAME}}}", name) is not None and (
+        name.upper() not in RESERVED
+    )
+
+
 def file_names(name: str) -> tuple[str, str]:
     """Return the names of the Ethernet file and the signal flow; raises where the name is none for KUKA."""
-    if not (name.isascii() and name.replace("_", "a").isalnum() and 0 < len(name) <= LONGEST_NAME):
-        allowed = f"1 to {LONGEST_NAME} letters, digits and _"
-        raise input_error("option-value", f"--online: found {name!r}, allowed: {allowed}")
+    if not is_file_name(name):
+        allowed = f"1 to {LONGEST_NAME} letters, digits and _, and no name of a device"
+        raise input_error("option-value", f"name of the RSI files: found {name!r}, allowed: {allowed}")
     return f"{name}_ETH.xml", f"{name}.rsi.xml"
+
+
+def rsi_files(name: str, settings: Online, pilot: Pilot, form: Form) -> dict[str, str]:
+    """Return file name → text of both files of ``name``."""
+    ethernet, flow = file_names(name)
+    return {
+        ethernet: ethernet_xml(settings, form),
+        flow: signal_flow_xml(settings, pilot, form, ethernet),
+    }
 
 
 def ethernet_xml(settings: Online, form: Form) -> str:
@@ -89,9 +110,16 @@ def ethernet_xml(settings: Online, form: Form) -> str:
     return "\n".join(lines) + "\n"
 
 
-def signal_flow_xml(settings: Online, form: Form, ethernet_file: str) -> str:
-    """Return the signal flow (``.rsi.xml``) with the limits of the settings on the controller's side."""
-    objects = [*_sources(settings, form), *_corrections(settings), _ethernet(settings, form, ethernet_file)]
+def signal_flow_xml(settings: Online, pilot: Pilot, form: Form, ethernet_file: str) -> str:
+    """Return the signal flow (``.rsi.xml``) with the limits of the settings on the controller's side.
+
+    Raises `RefusedError` where RSI cannot read the variables of the pilot force.
+    """
+    objects = [
+        *_sources(settings, pilot, form),
+        *_corrections(settings),
+        _ethernet(settings, form, ethernet_file),
+    ]
     schema = "/Roboter/Config/System/Common/Schemes/RSIContext.xsd"
     lines = [
         '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>',
@@ -107,81 +135,6 @@ def signal_flow_xml(settings: Online, form: Form, ethernet_file: str) -> str:
             lines += ["<Parameters>", *(_parameter(*each) for each in one.parameters), "</Parameters>"]
         lines.append("</RSIObject>")
     return "\n".join([*lines, "</RSIObjects>"]) + "\n"
-
-
-DECLARATIONS = "DECL INT GK_RSI_RET,GK_RSI_ID"
-
-
-def start_statements(name: str, settings: Online) -> str:
-    """Return the KRL that switches RSI on: on the clearance plane, behind the exact stop above the first cut.
-
-    The program waits until the server has proven the absolute mode; the robot must not move meanwhile.
-    """
-    cycle = "#IPO_FAST" if settings.cycle_s < 0.012 else "#IPO"
-    ready = f"$OUT[{settings.link.ready_output}]"
-    return "\n".join(
-        [
-            "; corrections by RSI: gcode2krl online serve must listen before the next line",
-            f'GK_RSI_RET=RSI_CREATE("{name}.rsi",GK_RSI_ID,TRUE)',
-            *_unless_ok("RSI_CREATE failed"),
-            f"GK_RSI_RET=RSI_ON(#ABSOLUTE,{cycle})",
-            *_unless_ok("RSI_ON failed"),
-            f"WAIT FOR {ready} ; the absolute mode is proven",
-            f"INTERRUPT DECL {INTERRUPT} WHEN {ready}==FALSE DO {READY_SUBPROGRAM}( )",
-            f"INTERRUPT ON {INTERRUPT}",
-        ]
-    )
-
-
-def end_statements() -> str:
-    """Return the KRL that switches RSI off: on the clearance plane, behind the last retract."""
-    return "\n".join(
-        [
-            f"INTERRUPT OFF {INTERRUPT}",
-            "GK_RSI_RET=RSI_OFF()",
-            *_unless_ok("RSI_OFF failed"),
-            "GK_RSI_RET=RSI_DELETE(GK_RSI_ID)",
-        ]
-    )
-
-
-def lost_subprogram(settings: Online, cell: Cell, tool: int) -> str:
-    """Return the subprogram of the interrupt: stop on the path, out along the tool axis, halt.
-
-    RSI holds the correction (``HOLDON``): it is never taken back in material.
-    """
-    axis = cell.tool[tool].axis or "+z"
-    away = settings.link.retract_mm if axis[0] == "+" else -settings.link.retract_mm
-    return "\n".join(
-        [
-            f"DEF {READY_SUBPROGRAM}( )",
-            f"INTERRUPT OFF {INTERRUPT}",
-            "BRAKE",
-            f"LIN_REL {{{axis[1].upper()} {away:.3f}}} #TOOL",
-            f"WHILE NOT $OUT[{settings.link.ready_output}]",
-            "HALT ; the link is lost: switch the spindle off, cancel the program",
-            "ENDWHILE",
-            "HALT ; the link was lost: the cut has a mark; cancel, or go on above it",
-            "END",
-        ]
-    )
-
-
-def used_variables(settings: Online, cell: Cell, form: Form) -> str:
-    """Return the note which variables and signals of the controller the files use."""
-    pilot = {
-        "index": f"{cell.pilot.index_variable} number of the knot, {cell.pilot.hash_variable} checksum",
-        "values": f"{cell.pilot.value_variable}[1..4] next knot, {cell.pilot.hash_variable} checksum",
-        "none": "none for the pilot",
-    }[form]
-    return (
-        f"RSI reads {pilot}, $OV_PRO, $OUT[{settings.link.t1_output}] (T1); "
-        f"it writes $OUT[{settings.link.ready_output}] (corrections are made)"
-    )
-
-
-def _unless_ok(message: str) -> tuple[str, ...]:
-    return ("IF GK_RSI_RET<>RSIOK THEN", f"HALT ; {message}", "ENDIF")
 
 
 def _correction_tags(settings: Online) -> list[str]:
@@ -206,19 +159,31 @@ def _channels(settings: Online, form: Form) -> list[_Channel]:
     return channels
 
 
-def _sources(settings: Online, form: Form) -> list[_Object]:
-    def numbered(kind: str, number: int, index: int) -> _Object:
-        return _Object(kind, number, f"{kind}{index}", parameters=(("Index", 1, index, True),))
+def _sources(settings: Online, pilot: Pilot, form: Form) -> list[_Object]:
+    """Return the objects that feed the channels; their names are those of the channels, not of the index."""
+
+    def numbered(kind: str, number: int, name: int, index: int) -> _Object:
+        return _Object(kind, number, f"{kind}{name}", parameters=(("Index", 1, index, True),))
 
     bit = (("Index", 1, settings.link.t1_output, True), ("DataSize", 2, 0, True))
     found = [_Object("OV_PRO", 63, "OV_PRO1"), _Object("DIGOUT", 43, "DIGOUT1", parameters=bit)]
     if form == "index":
-        found.append(numbered("SEN_PINT", 57, 1))
+        found.append(numbered("SEN_PINT", 57, 1, _index(pilot.index_variable, _INTEGER)))
     if form == "values":
-        found += [numbered("SEN_PREA", 58, k) for k in (1, 2, 3, 4)]
+        _index(pilot.value_variable, _REAL)
+        found += [numbered("SEN_PREA", 58, k, k) for k in (1, 2, 3, 4)]
     if form != "none":
-        found.append(numbered("SEN_PINT", 57, 2))
+        found.append(numbered("SEN_PINT", 57, 2, _index(pilot.hash_variable, _INTEGER)))
     return found
+
+
+def _index(variable: str, pattern: str) -> int:
+    """Return the index of a variable that RSI can read, 0 of one without."""
+    found = re.fullmatch(pattern, variable, re.IGNORECASE)
+    if found is None:
+        sentence = f"RSI cannot read {variable} of [pilot], only $SEN_PINT[n] and $SEN_PREA"
+        raise RefusedError(Issue("error", "online-pilot", 0, sentence, "correct [pilot], or --pilot none"))
+    return int(found[1]) if found.groups() else 0
 
 
 def _corrections(settings: Online) -> list[_Object]:

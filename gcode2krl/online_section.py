@@ -1,14 +1,13 @@
 """The ``[online]`` section of a cell: how the compensator, its limits and the link to the robot are set."""
 
 import math
+from ipaddress import AddressValueError, IPv4Address
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from gcode2krl.sections import Finite, NotNegative, Positive, Section, SignalNumber
+from gcode2krl.sections import Finite, NotNegative, Positive, Section, SignalNumber, SixFloats
 
-Three = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
-Six = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
 PortNumber = Annotated[int, Field(ge=1, le=65535)]
 CYCLES_S = (0.004, 0.012)
 LEAD_SHARE_OF_BLEND = 0.2
@@ -27,7 +26,7 @@ class RobotLink(Section):
     """Where the telegrams go, and what ends a session."""
 
     address: str = "127.0.0.1"
-    """Where the server listens; loopback unless stated."""
+    """Where the server listens, and where the controller looks for it; loopback unless stated."""
     port: PortNumber = 49152
     sensor_type: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,32}$")] = "ImFree"
     """``SENTYPE`` of the controller's file, sent in every answer."""
@@ -48,6 +47,20 @@ class RobotLink(Section):
     the program waits for it and stops without it. Our choice: it must be free."""
     retract_mm: Positive = 50.0
     """Along the tool axis, out of the part, where the link is lost in a cut."""
+
+    @field_validator("address")
+    @classmethod
+    def _is_an_address(cls, text: str) -> str:
+        try:
+            return str(IPv4Address(text))
+        except AddressValueError:
+            raise ValueError(f"found {text!r}, allowed: an IPv4 address such as 192.168.1.10") from None
+
+    @model_validator(mode="after")
+    def _own_outputs(self) -> Self:
+        if self.t1_output == self.ready_output:
+            raise ValueError(f"t1_output and ready_output are both {self.ready_output}")
+        return self
 
 
 class Probe(Section):
@@ -91,8 +104,8 @@ class Online(Section):
     """Largest change in a second; 1.4 mm behind the low-pass of 4 Hz begin to fall with 35 mm/s."""
     step_mm: Positive = 0.25
     """Largest change from one telegram to the next."""
-    axis_most_deg: Six = (0.3, 0.3, 0.3, 2.0, 2.0, 2.0)
-    axis_rate_deg_s: Six = (6.0, 6.0, 6.0, 40.0, 40.0, 40.0)
+    axis_most_deg: SixFloats = (0.3, 0.3, 0.3, 2.0, 2.0, 2.0)
+    axis_rate_deg_s: SixFloats = (6.0, 6.0, 6.0, 40.0, 40.0, 40.0)
     limit_margin_deg: NotNegative = 1.0
     """No correction may bring a joint nearer to its limit than this."""
     most_force_N: Positive = 2000.0
@@ -100,21 +113,23 @@ class Online(Section):
     sensor_hold_s: NotNegative = 0.020
     """A sensor may be silent, or not a number, for so long before the correction is held."""
     calibration: str | None = None
-    """File of `identify sensor`; None: the sensor's values are those of the process."""
+    """File of `identify sensor`, relative to the cell file; None: the sensor's values are the process's."""
     probe: Probe = Probe()
     link: RobotLink = RobotLink()
 
-    @model_validator(mode="after")
-    def _allowed(self) -> Self:
-        if self.cycle_s not in CYCLES_S:
-            raise ValueError(f"cycle_s: found {self.cycle_s:g}, allowed: 0.004 or 0.012")
-        for name, values in (
-            ("axis_most_deg", self.axis_most_deg),
-            ("axis_rate_deg_s", self.axis_rate_deg_s),
-        ):
-            if min(values) <= 0.0:
-                raise ValueError(f"{name}: found {min(values):g}, allowed: above 0")
-        return self
+    @field_validator("cycle_s")
+    @classmethod
+    def _is_a_cycle_of_rsi(cls, seconds: float) -> float:
+        if seconds not in CYCLES_S:
+            raise ValueError(f"found {seconds:g}, allowed: 0.004 or 0.012")
+        return seconds
+
+    @field_validator("axis_most_deg", "axis_rate_deg_s")
+    @classmethod
+    def _is_above_zero(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if min(values) <= 0.0:
+            raise ValueError(f"found {min(values):g}, allowed: above 0")
+        return values
 
     @property
     def pilot_lead_s(self) -> float:

@@ -1,28 +1,21 @@
-"""The controller's files: limits on its side, channels that fit each other, and the lines of KRL."""
+"""The controller's files: limits on its side, and channels that fit each other, the cell and the server."""
 
-import re
 import xml.etree.ElementTree as ET
 
 import pytest
 
-from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.online.krl_files import (
-    end_statements,
-    ethernet_xml,
-    file_names,
-    lost_subprogram,
-    signal_flow_xml,
-    start_statements,
-    used_variables,
-)
-from gcode2krl.online.settings import Online, RobotLink
+from gcode2krl.cell import resolve_cell
+from gcode2krl.errors import NotUnderstoodError, RefusedError
+from gcode2krl.krl.rsi_files import ethernet_xml, file_names, rsi_files, signal_flow_xml
+from gcode2krl.online_section import Online
+from gcode2krl.sections import Pilot
 
 FORMS = ["index", "values", "none"]
 MODES = ["cartesian", "axis"]
 
 
-def objects(own, form):
-    root = ET.fromstring(signal_flow_xml(own, form, "X_ETH.xml").encode())
+def objects(own, form, pilot=None):
+    root = ET.fromstring(signal_flow_xml(own, pilot or Pilot(), form, "X_ETH.xml").encode())
     return {one.get("ObjID"): one for one in root}
 
 
@@ -80,55 +73,56 @@ def test_limits_stand_in_the_controllers_files_too():
         assert most < float(parameters(flow["AXISCORRMON1"])[f"MaxA{k}"]) <= 1.25 * most
 
 
-def test_more_than_five_cycles_of_silence_cannot_be_asked_for():
-    with pytest.raises(ValueError, match="timeout_cycles"):
-        RobotLink(timeout_cycles=6)
+def test_both_files_say_what_the_cell_says():
+    own = resolve_cell({
+        "online": {
+            "most_mm": 1.25,
+            "link": {
+                "address": "192.168.7.3", "port": 50123, "sensor_type": "Mine", "timeout_cycles": 3,
+                "decimals": 6, "t1_output": 41, "ready_output": 42,
+            },
+        },
+        "pilot": {"index_variable": "$SEN_PINT[7]", "hash_variable": "$SEN_PINT[9]"},
+    })  # fmt: skip
+    texts = rsi_files("RSI_7", own.online, own.pilot, "index")
+    assert list(texts) == ["RSI_7_ETH.xml", "RSI_7.rsi.xml"]
+    config = ET.fromstring(texts["RSI_7_ETH.xml"]).find("CONFIG")
+    assert {e.tag: e.text for e in config} == {
+        "IP_NUMBER": "192.168.7.3", "PORT": "50123", "SENTYPE": "Mine", "ONLYSEND": "FALSE",
+    }  # fmt: skip
+    flow = {one.get("ObjID"): parameters(one) for one in ET.fromstring(texts["RSI_7.rsi.xml"].encode())}
+    assert flow["ETHERNET1"] == {"ConfigFile": "RSI_7_ETH.xml", "Timeout": "3", "Precision": "6"}
+    assert flow["DIGOUT1"]["Index"] == "41"
+    assert flow["MAP2DIGOUT1"]["Index"] == "42"
+    assert (flow["SEN_PINT1"]["Index"], flow["SEN_PINT2"]["Index"]) == ("7", "9")
+    assert flow["POSCORR1"]["UpperLimX"] == "1.25"
 
 
-def test_absolute_mode_only():
-    for own, cycle in ((Online(), "#IPO_FAST"), (Online(cycle_s=0.012), "#IPO")):
-        text = start_statements("GK_RSI", own)
-        assert f"RSI_ON(#ABSOLUTE,{cycle})" in text
-        assert "RELATIVE" not in text
-        lines = text.splitlines()
-        on = next(k for k, line in enumerate(lines) if "RSI_ON" in line)
-        assert any("RSI_CREATE" in line for line in lines[:on])
-        assert any(line.startswith("WAIT FOR $OUT[1020]") for line in lines[on:])
+@pytest.mark.parametrize(
+    ("pilot", "form"),
+    [
+        ({"index_variable": "KNOT"}, "index"),
+        ({"hash_variable": "$SEN_PREA[2]"}, "index"),
+        ({"hash_variable": "SUM"}, "values"),
+        ({"value_variable": "FORCE"}, "values"),
+    ],
+)
+def test_a_variable_that_rsi_cannot_read_is_refused(pilot, form):
+    with pytest.raises(RefusedError, match="online-pilot"):
+        rsi_files("A", Online(), Pilot(**pilot), form)
+    assert rsi_files("A", Online(), Pilot(**pilot), "none")
 
 
-def test_every_call_of_rsi_is_checked():
-    text = "\n".join((start_statements("A", Online()), end_statements()))
-    calls = re.findall(r"GK_RSI_RET=RSI_(?:CREATE|ON|OFF)", text)
-    assert len(calls) == 3
-    assert text.count("IF GK_RSI_RET<>RSIOK THEN") == 3
+@pytest.mark.parametrize("form", FORMS)
+def test_texts_are_ascii(form):
+    assert all(text.isascii() for text in rsi_files("A", Online(), Pilot(), form).values())
 
 
-def test_the_interrupt_stops_on_the_path_and_retracts_along_the_tool(cell):
-    text = lost_subprogram(Online(), cell, 1).splitlines()
-    assert text[0] == "DEF GK_RSI_LOST( )"
-    assert text.index("BRAKE") < next(k for k, line in enumerate(text) if line.startswith("LIN_REL"))
-    assert "LIN_REL {Z 50.000} #TOOL" in text
-    tool = cell.tool[1].model_copy(update={"axis": "-x"})
-    other = cell.model_copy(update={"tool": {1: tool}})
-    assert "LIN_REL {X -50.000} #TOOL" in lost_subprogram(Online(), other, 1)
-
-
-def test_texts_are_ascii_and_short(cell):
-    for form in FORMS:
-        for text in (
-            ethernet_xml(Online(), form),
-            signal_flow_xml(Online(), form, "A"),
-            used_variables(Online(), cell, form),
-        ):
-            assert text.isascii()
-    for text in (start_statements("A" * 16, Online()), end_statements(), lost_subprogram(Online(), cell, 1)):
-        assert text.isascii()
-        assert max(len(line) for line in text.splitlines()) < 100
-
-
-@pytest.mark.parametrize("name", ["", "a b", "ä", "x" * 17, "a.b", "../a"])
+@pytest.mark.parametrize(
+    "name", ["", "a b", "ä", "x" * 17, "a.b", "../a", "a\n", "CON", "lpt1", 'a"b', "a/b", "A²"]
+)
 def test_names_that_are_none_for_a_controller_are_refused(name):
-    with pytest.raises(NotUnderstoodError, match="--online"):
+    with pytest.raises(NotUnderstoodError, match="name of the RSI files"):
         file_names(name)
 
 
@@ -136,8 +130,8 @@ def test_rsipi_reads_the_files_as_we_mean_them(tmp_path):
     """An independent reader of both files, where it is installed."""
     parser = pytest.importorskip("RSIPI.config_parser")
     limits = pytest.importorskip("RSIPI.rsi_limit_parser")
-    (tmp_path / "e.xml").write_text(ethernet_xml(Online(), "index"))
-    (tmp_path / "f.rsi.xml").write_text(signal_flow_xml(Online(), "index", "e.xml"))
-    config = parser.ConfigParser(str(tmp_path / "e.xml"))
+    for file_name, text in rsi_files("E", Online(), Pilot(), "index").items():
+        (tmp_path / file_name).write_text(text)
+    config = parser.ConfigParser(str(tmp_path / "E_ETH.xml"))
     assert set(config.receive_variables["RKorr"]) == set("XYZABC")
-    assert limits.parse_ethernet_timeout(str(tmp_path / "f.rsi.xml")) == 5
+    assert limits.parse_ethernet_timeout(str(tmp_path / "E.rsi.xml")) == 5

@@ -1,0 +1,135 @@
+"""Rules of a program that is corrected online, as it was read: what switches RSI, once, and where."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue
+from gcode2krl.krl.read import KrlProgram, Statement
+from gcode2krl.krl.rsi_files import file_names, is_file_name
+from gcode2krl.krl.rsi_text import INTERRUPT, LOST_SUBPROGRAM
+
+_OURS = "GK_RSI_"
+_CALL = re.compile(r"\bRSI_(\w+)\(")
+_NAME = re.compile(r'RSI_CREATE\(\s*"(\w+)\.rsi"', re.IGNORECASE)
+_ORDER = ["CREATE", "ON", "OFF", "DELETE"]
+_SAME_HEIGHT_MM = 0.002
+_REMEDY = "translate again"
+
+
+def rsi_name(program: KrlProgram, folder: Path) -> str:
+    """Return the name of the RSI files that a program uses, empty where it uses none of ours.
+
+    Spelled as beside the program, as a controller does not tell letters by their case.
+    """
+    found = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
+    name = next((match[1] for match in found if match and is_file_name(match[1])), "")
+    spelled = _beside(folder).get(f"{name}.rsi.xml".casefold())
+    return spelled.name[: len(name)] if spelled is not None else name
+
+
+def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
+    """Yield what is wrong with RSI in a program that uses it as ours do; others are the integrator's."""
+    if not any(_is_ours(statement.text) for statement in (*program.statements, *program.declarations)):
+        return
+    calls = [
+        (name, statement, _normal(statement.text))
+        for statement in program.statements
+        for name in _CALL.findall(_normal(statement.text))
+    ]
+    if [name for name, _, _ in calls] != _ORDER:
+        line = calls[0][1].line if calls else program.def_line
+        found = ", ".join(name for name, _, _ in calls) or "none"
+        yield _issue("rsi-order", line, f"RSI calls are {found}; allowed: {', '.join(_ORDER)}, once each")
+        return
+    create, on, off = (statement for _, statement, _ in calls[:3])
+    cycle = "#IPO_FAST" if cell.online.cycle_s < 0.012 else "#IPO"
+    if calls[1][2] != f"GK_RSI_RET=RSI_ON(#ABSOLUTE,{cycle})":
+        yield _issue("rsi-mode", on.line, f"{on.text!r}; allowed: RSI_ON(#ABSOLUTE,{cycle}) only")
+    yield from _place_issues(program, cell, create, on, off)
+    yield from _ready_issues(program, cell, create, on, off)
+
+
+def rsi_file_issues(path: Path, name: str, expected: dict[str, bytes]) -> Iterator[Issue]:
+    """Yield where the RSI files beside a program are not those that program and cell ask for."""
+    beside = _beside(path.parent)
+    for file_name in file_names(name):
+        file = beside.get(file_name.casefold())
+        if file is None:
+            yield _issue("rsi-file", 0, f"{file_name} is missing beside the program")
+        elif file.read_bytes().split() != expected[file_name].split():
+            yield _issue("rsi-file", 0, f"{file.name} is not as the cell asks for")
+
+
+def _place_issues(
+    program: KrlProgram, cell: Cell, create: Statement, on: Statement, off: Statement
+) -> Iterator[Issue]:
+    """On and off, the robot stands on the clearance plane; every LIN lies between, and no PTP."""
+    ptp = program.ptp
+    joints = np.isfinite(program.q_deg[:, 0])
+    for statement in (create, on, off):
+        row = statement.motion - 1
+        stands = row >= 0 and not joints[row] and program.cdis_mm[row] == 0.0
+        if not (stands and _is_clear(float(program.position_mm[row, 2]), cell)):
+            text = f"{statement.text!r} where the robot does not stand on the clearance plane"
+            yield _issue("rsi-place", statement.line, text)
+    outside = np.concatenate([ptp[: create.motion], ptp[off.motion :]])
+    if create.motion != on.motion or not outside.all() or ptp[on.motion : off.motion].any():
+        text = "RSI must be on for every LIN, from the first to the last, and for no PTP"
+        yield _issue("rsi-place", on.line, text)
+    if off.motion >= len(ptp) or not joints[off.motion]:
+        yield _issue("rsi-place", off.line, "RSI must be off before HOME")
+
+
+def _ready_issues(
+    program: KrlProgram, cell: Cell, create: Statement, on: Statement, off: Statement
+) -> Iterator[Issue]:
+    """The program waits, standing, for readiness, is stopped without it, and nothing else sets it."""
+    ready = f"$OUT[{cell.online.link.ready_output}]"
+    switched = (f"INTERRUPTON{INTERRUPT}", f"INTERRUPTOFF{INTERRUPT}")
+    normal = ((_normal(s.text), s) for s in program.statements)
+    touching = [(text, s) for text, s in normal if ready in text or text.startswith(switched)]
+    wanted = [
+        f"{ready}=FALSE",
+        f"WAITFOR{ready}",
+        f"INTERRUPTDECL{INTERRUPT}WHEN{ready}==FALSEDO{LOST_SUBPROGRAM}()",
+        switched[0],
+        f"WAITFOR{ready}",
+        switched[1],
+        f"{ready}=FALSE",
+    ]
+    motions = [on.motion] * 5 + [off.motion] * 2
+    line = [s.line for _, s in touching]
+    if [text for text, _ in touching] != wanted or [s.motion for _, s in touching] != motions:
+        text = f"{ready} must be put out, waited for, watched by interrupt {INTERRUPT}, and nothing else"
+        yield _issue("rsi-ready", on.line, text)
+    elif not (line[0] < create.line < on.line < line[1] and line[5] < off.line < line[6]):
+        text = f"{ready} must be out before RSI_CREATE and after RSI_OFF, and waited for after RSI_ON"
+        yield _issue("rsi-ready", on.line, text)
+    lost = program.uncalled.get(f"{program.file[0]}/{LOST_SUBPROGRAM}", ())
+    elsewhere = (text for texts in program.uncalled.values() for text in texts)
+    if "BRAKE" not in lost or any(_CALL.search(text) for text in elsewhere):
+        yield _issue("rsi-ready", on.line, f"{LOST_SUBPROGRAM} must stop the robot and leave RSI alone")
+
+
+def _beside(folder: Path) -> dict[str, Path]:
+    return {file.name.casefold(): file for file in folder.iterdir() if file.is_file()}
+
+
+def _is_clear(z_mm: float, cell: Cell) -> bool:
+    return cell.clearance_z_mm is not None and z_mm >= cell.clearance_z_mm - _SAME_HEIGHT_MM
+
+
+def _is_ours(text: str) -> bool:
+    return _OURS in text.upper()
+
+
+def _normal(text: str) -> str:
+    return re.sub(r"\s+", "", text).upper()
+
+
+def _issue(code: str, line: int, text: str) -> Issue:
+    return Issue("error", code, line, text, _REMEDY)

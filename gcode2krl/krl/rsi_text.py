@@ -1,0 +1,149 @@
+"""What stands in a program that is corrected online: RSI on above the first cut, off above the last.
+
+Corrections are absolute only. The program waits, standing, until the server has proven that the robot takes
+them so, and an interrupt stops it where the server is not there any more. Signatures of RSI_CREATE, RSI_ON,
+RSI_OFF and RSI_DELETE as remembered of RSI 3; no controller has run them yet.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.krl.rsi_files import Form, file_names, rsi_files
+from gcode2krl.online_section import Online
+from gcode2krl.tables import Targets
+
+INTERRUPT = 21
+LOST_SUBPROGRAM = "GK_RSI_LOST"
+DECLARATIONS = "DECL INT GK_RSI_RET,GK_RSI_ID"
+
+
+@dataclass(frozen=True)
+class RsiText:
+    """RSI of one program: the rows at whose end it is switched, and the text."""
+
+    name: str
+    """Of the files, see `file_names`."""
+    cell: Cell
+    form: Form
+    """How the program carries the pilot force."""
+    on: int
+    """Row of Targets: the PTP to the clearance plane above the first position."""
+    off: int
+    """Row of Targets: the last before HOME, on the clearance plane."""
+    tool: int
+
+    @property
+    def start(self) -> str:
+        """The statements at the end of row `on`."""
+        return start_statements(self.name, self.cell.online)
+
+    @property
+    def end(self) -> str:
+        """The statements at the end of row `off`."""
+        return end_statements(self.cell.online)
+
+    @property
+    def lost(self) -> str:
+        """The subprogram of the interrupt."""
+        return lost_subprogram(self.cell.online, self.cell, self.tool)
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines of the header."""
+        files = " and ".join(file_names(self.name))
+        return [f"corrected online by RSI: {files}", *used_variables(self.cell, self.form)]
+
+    @property
+    def files(self) -> dict[str, str]:
+        """File name → text of what belongs beside the program."""
+        return rsi_files(self.name, self.cell.online, self.cell.pilot, self.form)
+
+
+def rsi_rows(targets: Targets) -> tuple[int, int]:
+    """Return the rows (on, off): the first PTP that is not HOME, and the last row that is not HOME."""
+    away = np.flatnonzero(~targets.home)
+    return int(away[0]), int(away[-1])
+
+
+def start_statements(name: str, settings: Online) -> str:
+    """Return the KRL that switches RSI on, where the robot stands in air.
+
+    The output that shows readiness keeps its value when RSI ends, so it is put out first. An interrupt sees
+    it fall, not that it is out already, so the program looks again once the interrupt is on.
+    """
+    cycle = "#IPO_FAST" if settings.cycle_s < 0.012 else "#IPO"
+    ready = f"$OUT[{settings.link.ready_output}]"
+    return "\n".join(
+        [
+            ";FOLD RSI on: gcode2krl online serve must listen before",
+            "WAIT SEC 0.0",
+            f"{ready}=FALSE",
+            f'GK_RSI_RET=RSI_CREATE("{name}.rsi",GK_RSI_ID,TRUE)',
+            *_until_ok("RSI_CREATE failed"),
+            f"GK_RSI_RET=RSI_ON(#ABSOLUTE,{cycle})",
+            *_until_ok("RSI_ON failed"),
+            f"WAIT FOR {ready} ; the absolute mode is proven",
+            f"INTERRUPT DECL {INTERRUPT} WHEN {ready}==FALSE DO {LOST_SUBPROGRAM}( )",
+            f"INTERRUPT ON {INTERRUPT}",
+            f"WAIT FOR {ready}",
+            ";ENDFOLD (RSI on)",
+        ]
+    )
+
+
+def end_statements(settings: Online) -> str:
+    """Return the KRL that switches RSI off: on the clearance plane, behind the last retract."""
+    return "\n".join(
+        [
+            ";FOLD RSI off",
+            "WAIT SEC 0.0",
+            f"INTERRUPT OFF {INTERRUPT}",
+            "GK_RSI_RET=RSI_OFF()",
+            *_until_ok("RSI_OFF failed"),
+            "GK_RSI_RET=RSI_DELETE(GK_RSI_ID)",
+            f"$OUT[{settings.link.ready_output}]=FALSE",
+            ";ENDFOLD (RSI off)",
+        ]
+    )
+
+
+def lost_subprogram(settings: Online, cell: Cell, tool: int) -> str:
+    """Return the subprogram of the interrupt: stop on the path, out along the tool axis, and no further.
+
+    RSI holds the correction (``HOLDON``): it is never taken back in material. The program does not go on,
+    as the way back into the cut would be straight from where it was left.
+    """
+    axis = cell.tool[tool].axis or "+z"
+    away = settings.link.retract_mm if axis[0] == "+" else -settings.link.retract_mm
+    return "\n".join(
+        [
+            f"DEF {LOST_SUBPROGRAM}( )",
+            f"INTERRUPT OFF {INTERRUPT}",
+            "BRAKE",
+            f"LIN_REL {{{axis[1].upper()} {away:.3f}}} #TOOL",
+            "LOOP",
+            "HALT ; the RSI link is lost: switch the spindle off, cancel the program",
+            "ENDLOOP",
+            "END",
+        ]
+    )
+
+
+def used_variables(cell: Cell, form: Form) -> list[str]:
+    """Return notes on the variables and signals of the controller that the files use."""
+    own, link = cell.pilot, cell.online.link
+    pilot = {
+        "index": f"{own.index_variable} number of the knot, {own.hash_variable} checksum, ",
+        "values": f"{own.value_variable}[1..4] next knot, {own.hash_variable} checksum, ",
+        "none": "",
+    }[form]
+    return [
+        f"RSI reads {pilot}$OV_PRO, $OUT[{link.t1_output}] (on in T1)",
+        f"RSI writes $OUT[{link.ready_output}] (on while corrections are made)",
+    ]
+
+
+def _until_ok(message: str) -> tuple[str, ...]:
+    return ("WHILE GK_RSI_RET<>RSIOK", f"HALT ; {message}: cancel the program", "ENDWHILE")
