@@ -4,6 +4,13 @@ There is no grid. The stock is a box; what earlier motion has removed is a union
 straight pieces. A point of the rim is cut from the top of what is left there down to the tip. The height left
 at a plan point is the box's top or the lowest tip of any piece while it covered the point (a quadratic
 equation).
+
+A tooth meets what the tooth before it left, so what counts as removed ends one tooth passing back: the rim of
+the present place is compared with the motion up to the place where the cutter was then. Feed direction and
+advance are the way between these two places. That holds in rounded corners as on straight moves: on the inner
+side of a turn the earlier motion has taken a part of the rim's front already, everywhere else the chip is
+that of the advance. Corners are chords, inside the curve by less than a hundredth of the usual advance,
+and swept volumes are thinner by as much, so that no chord takes what a tooth is about to cut.
 """
 
 from dataclasses import dataclass
@@ -15,7 +22,8 @@ from tests.plant.path import Chain, at_distance
 from tests.plant.scene import Cutter, World
 
 CELLS = 90  # of the front half turn, 2° each
-SKIN_mm = 1e-6  # a swept volume is this much thinner, so that a rim point in front of it is uncut
+SKIN_mm = 5e-4  # chords lie this much inside a corner's curve, and swept volumes are this much thinner
+STILL_mm = 1e-9  # advance of a tooth that cuts nothing
 
 
 @dataclass(frozen=True)
@@ -30,15 +38,10 @@ class Pieces:
 
 
 def pieces(links: list[Chain], world: World) -> Pieces:
-    """The commanded path as straight pieces; a wide corner becomes chords."""
+    """The commanded path as straight pieces; a rounded corner becomes chords."""
     start, end, owner, begin, finish = [], [], [], [], []
     for number, chain in enumerate(links):
-        knots = chain.knots_mm
-        marks = [knots]
-        for i in range(1, len(knots) - 1):
-            d = chain.reach_mm[i]
-            if d > 0.2:
-                marks.append(knots[i] + d * np.array([-1.0, -0.5, 0.5, 1.0]))
+        marks = [chain.knots_mm[[0, -1]], *(_marks(chain, i) for i in range(1, len(chain.knots_mm) - 1))]
         s = np.unique(np.concatenate(marks))
         s = s[np.append(True, np.diff(s) > 1e-9)]
         place = at_distance(chain, s, world)
@@ -51,56 +54,68 @@ def pieces(links: list[Chain], world: World) -> Pieces:
     return Pieces(join(start), join(end), join(owner), join(begin), join(finish))
 
 
-@njit(cache=True, nogil=True)
-def _lowest(x, y, a, b, share, radius):
-    """Lowest tip of a piece, driven up to `share`, while it covers the plan point; inf if never."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    px, py = x - a[0], y - a[1]
+def _marks(chain: Chain, corner: int) -> np.ndarray:
+    """Ends of a corner's chords, no further than the skin from its curve: sagitta = bend·length²/8."""
+    at, d = chain.knots_mm[corner], chain.reach_mm[corner]
+    before, after = np.diff(chain.points_mm[corner - 1 : corner + 2], axis=0)
+    turn = np.linalg.norm(after / np.linalg.norm(after) - before / np.linalg.norm(before))
+    bend = 1.5 * turn / (2.0 * d) if d > 0.0 else 0.0  # of the soft corner in its middle; the parabola's is 1
+    count = max(1, int(np.ceil(2.0 * d * np.sqrt(bend / (8.0 * SKIN_mm)))))
+    return at + np.linspace(-d, d, count + 1)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _lowest(x, y, swept, k, radius):
+    """Lowest tip of piece k (its start and its way) while it covers the plan point; inf if never."""
+    px, py, az = x - swept[k, 0], y - swept[k, 1], swept[k, 2]
+    dx, dy, dz = swept[k, 3], swept[k, 4], swept[k, 5]
     square = dx * dx + dy * dy
     if square < 1e-18:
         if px * px + py * py > radius * radius:
             return np.inf
-        return min(a[2], a[2] + share * (b[2] - a[2]))
+        return min(az, az + dz)
     half = px * dx + py * dy
     disc = half * half - square * (px * px + py * py - radius * radius)
     if disc <= 0.0:
         return np.inf
     root = np.sqrt(disc)
-    low, high = max((half - root) / square, 0.0), min((half + root) / square, share)
+    low, high = max((half - root) / square, 0.0), min((half + root) / square, 1.0)
     if low > high:
         return np.inf
-    return min(a[2] + low * (b[2] - a[2]), a[2] + high * (b[2] - a[2]))
+    return min(az + low * dz, az + high * dz)
 
 
-@njit(cache=True, nogil=True)
-def _left(x, y, box, cos_turn, sin_turn, start, end, shares, chosen, count, radius):
-    """Height of the material left at a plan point; -inf outside the block."""
+@njit(cache=True, nogil=True, inline="always")
+def _left(x, y, floor, box, turn, swept, count, radius):
+    """Height of the material left at a plan point, or any below `floor`; -inf outside the block."""
     cx, cy = 0.5 * (box[0, 0] + box[1, 0]), 0.5 * (box[0, 1] + box[1, 1])
     u, v = x - cx, y - cy
-    px, py = cx + cos_turn * u + sin_turn * v, cy - sin_turn * u + cos_turn * v
+    px, py = cx + turn[0] * u + turn[1] * v, cy - turn[1] * u + turn[0] * v
     if px < box[0, 0] or px > box[1, 0] or py < box[0, 1] or py > box[1, 1]:
         return -np.inf
     top = box[1, 2]
     for k in range(count):
-        j = chosen[k]
-        top = min(top, _lowest(x, y, start[j], end[j], shares[k], radius))
+        top = min(top, _lowest(x, y, swept, k, radius))
+        if top <= floor:
+            break
     return top
 
 
 @njit(cache=True, nogil=True)
-def _near(p, last, share, start, end, box, radius, chosen, shares):
-    """Pieces that can have touched the material around this place; the last one is driven to `share`."""
+def _near(p, fx, fy, last, share, swept, top, radius, near):
+    """Copy the pieces that can have touched the rim's front, the last driven to `share`, latest first."""
     count = 0
-    reach = 2.0 * radius
-    for j in range(last + 1):
-        if min(start[j, 2], end[j, 2]) >= box[1, 2]:
+    for j in range(last, -1, -1):
+        dx, dy = 0.5 * swept[j, 3], 0.5 * swept[j, 4]
+        x, y = swept[j, 0] + dx - p[0], swept[j, 1] + dy - p[1]  # the middle of the piece
+        if swept[j, 2] + min(swept[j, 5], 0.0) >= top:
             continue
-        if p[0] < min(start[j, 0], end[j, 0]) - reach or p[0] > max(start[j, 0], end[j, 0]) + reach:
+        if abs(x) > 2.0 * radius + abs(dx) or abs(y) > 2.0 * radius + abs(dy):
             continue
-        if p[1] < min(start[j, 1], end[j, 1]) - reach or p[1] > max(start[j, 1], end[j, 1]) + reach:
+        if fx * x + fy * y + abs(fx * dx + fy * dy) < -radius:  # too far behind to reach the front
             continue
-        chosen[count] = j
-        shares[count] = share if j == last else 1.0
+        for c in range(6):
+            near[count, c] = swept[j, c] if c < 3 or j < last else share * swept[j, c]
         count += 1
     return count
 
@@ -118,7 +133,8 @@ def _teeth(phi, width, depth, advance, cos_ramp, k, edge, offsets, exponent, out
     for tooth in range(n):
         h = np.inf
         for back in range(1, n + 1):
-            h = min(h, back * advance * s * cos_ramp + offsets[tooth] - offsets[(tooth - back) % n])
+            other = offsets[tooth - back]  # below zero it counts from the last
+            h = min(h, back * advance * s * cos_ramp + offsets[tooth] - other)
         if h <= 0.0:
             continue
         load = h if exponent == 0.0 else h * (h / 0.05) ** (-exponent)
@@ -135,102 +151,122 @@ def _teeth(phi, width, depth, advance, cos_ramp, k, edge, offsets, exponent, out
         out[5] += 0.5 * depth * normal
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _height(co, si, p, fx, fy, radius, flute, box, turn, near, count):
+    """Height of the cut at an angle of the rim (cosine and sine), counted from the left of the feed."""
+    x, y = p[0] + radius * (fx * si - fy * co), p[1] + radius * (fy * si + fx * co)
+    thin = radius - SKIN_mm
+    left = _left(x, y, p[2], box, turn, near, count, thin)
+    return min(max(left - p[2], 0.0), flute)
+
+
 @njit(cache=True, nogil=True)
-def _engaged(place, velocity, last, shares_now, start, end, box, turn, cutter, k, edge, offsets, m):
-    """Loads of all samples (n, 6) as in `_teeth`, and depth and width of cut (n, 2)."""
+def _engaged(place, advance, last, share, swept, box, turn, cutter, k, edge, offsets, m):
+    """Loads of all samples (n, 6) as in `_teeth`, depth of cut (n,), first and last angle (n, 2).
+
+    `advance`: way since the tooth before (n, 3); `last`, `share`: how far the motion was then.
+    """
     n, cells = len(place), CELLS
-    radius, flute, teeth_s = cutter
-    loads, sizes = np.zeros((n, 6)), np.zeros((n, 2))
-    chosen, shares = np.empty(len(start), np.int64), np.empty(len(start))
+    radius, flute = cutter
+    loads, deepest, arc = np.zeros((n, 6)), np.zeros(n), np.zeros((n, 2))
+    near = np.empty(swept.shape)
     depth, border = np.empty(cells), np.empty(cells + 1)
-    step, thin = np.pi / cells, radius - SKIN_mm
-    cos_turn, sin_turn = np.cos(turn), np.sin(turn)
+    step, rim = np.pi / cells, np.empty((cells, 2))
+    for c in range(cells):
+        rim[c] = np.cos((c + 0.5) * step), np.sin((c + 0.5) * step)
     for i in range(n):
-        p, v = place[i], velocity[i]
-        flat = np.hypot(v[0], v[1])
-        if flat < 1e-6 or p[2] >= box[1, 2]:
+        p, way = place[i], advance[i]
+        flat = np.hypot(way[0], way[1])
+        if flat < STILL_mm or p[2] >= box[1, 2]:
             continue
-        speed = np.sqrt(flat * flat + v[2] * v[2])
-        fx, fy = v[0] / flat, v[1] / flat
-        count = _near(p, last[i], shares_now[i], start, end, box, radius, chosen, shares)
-        for c in range(cells + 1):
-            border[c] = c * step
-        cut = 0.0
+        h = np.sqrt(flat * flat + way[2] * way[2])
+        fx, fy = way[0] / flat, way[1] / flat
+        count = _near(p, fx, fy, last[i], share[i], swept, box[1, 2], radius, near)
+        border[0], border[cells] = 0.0, np.pi
         for c in range(cells):
-            co, si = np.cos((c + 0.5) * step), np.sin((c + 0.5) * step)
-            x, y = p[0] + radius * (fx * si - fy * co), p[1] + radius * (fy * si + fx * co)
-            left = _left(x, y, box, cos_turn, sin_turn, start, end, shares, chosen, count, thin)
-            depth[c] = min(max(left - p[2], 0.0), flute)
-            cut = max(cut, depth[c])
-            if c > 0 and abs(depth[c] - depth[c - 1]) > 0.02:  # where between the two is the step?
+            depth[c] = _height(rim[c, 0], rim[c, 1], p, fx, fy, radius, flute, box, turn, near, count)
+            if c == 0:
+                continue
+            border[c] = c * step
+            if abs(depth[c] - depth[c - 1]) > 0.02:  # where between the two is the step?
                 low, high, half = (c - 0.5) * step, (c + 0.5) * step, 0.5 * (depth[c] + depth[c - 1])
                 for _ in range(7):
                     mid = 0.5 * (low + high)
-                    co, si = np.cos(mid), np.sin(mid)
-                    x, y = p[0] + radius * (fx * si - fy * co), p[1] + radius * (fy * si + fx * co)
-                    left = _left(x, y, box, cos_turn, sin_turn, start, end, shares, chosen, count, thin)
-                    inside = min(max(left - p[2], 0.0), flute)
+                    inside = _height(
+                        np.cos(mid), np.sin(mid), p, fx, fy, radius, flute, box, turn, near, count
+                    )
                     if (inside > half) == (depth[c - 1] > half):
                         low = mid
                     else:
                         high = mid
                 border[c] = 0.5 * (low + high)
-        if cut == 0.0:
+        deepest[i] = depth.max()
+        if deepest[i] == 0.0:
             continue
-        sides_low, sides_high = np.pi, 0.0
+        arc[i] = np.pi, 0.0
         for c in range(cells):
             if depth[c] > 0.0:
                 centre, width = 0.5 * (border[c] + border[c + 1]), border[c + 1] - border[c]
-                _teeth(centre, width, depth[c], speed / teeth_s, flat / speed, k, edge, offsets, m, loads[i])
-                sides_low, sides_high = min(sides_low, border[c]), max(sides_high, border[c + 1])
-        sizes[i] = cut, radius * (np.cos(sides_low) - np.cos(sides_high))
-    return loads, sizes
+                _teeth(centre, width, depth[c], h, flat / h, k, edge, offsets, m, loads[i])
+                arc[i] = min(arc[i, 0], border[c]), max(arc[i, 1], border[c + 1])
+    return loads, deepest, arc
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Force and moment about the tip along `$BASE`'s axes on the tool, and the size of the cut."""
+    """Force and moment about the tip along `$BASE`'s axes on the tool, and the size of the cut.
+
+    `arc_rad` (n, 2): first and last engaged angle of the rim, from the left of the feed over its front.
+    """
 
     force_N: np.ndarray
     moment_Nmm: np.ndarray
     depth_mm: np.ndarray
     width_mm: np.ndarray
+    arc_rad: np.ndarray
 
 
-def cut(place_mm, velocity_mm_s, chain, s_mm, work: Pieces, world: World) -> Cut:
+def cut(place_mm, before_mm, chain, s_before_mm, work: Pieces, world: World) -> Cut:
     """Mean forces of a revolution at places (n, 3); the tool stands upright, its axis is z.
 
-    `chain` and `s_mm` say how far the motion has come at each sample.
+    `before_mm` is where the cutter was when the tooth before passed; `chain` and `s_before_mm` say how far
+    the motion had come then.
     """
     cutter = world.cutter
     key = work.chain * 1e6 + work.from_mm
-    last = np.clip(np.searchsorted(key, chain * 1e6 + s_mm, side="right") - 1, 0, len(key) - 1)
+    last = np.clip(np.searchsorted(key, chain * 1e6 + s_before_mm, side="right") - 1, 0, len(key) - 1)
     length = np.maximum(work.to_mm[last] - work.from_mm[last], 1e-12)
-    share = np.clip((s_mm - work.from_mm[last]) / length, 0.0, 1.0)
-    loads, sizes = _engaged(
+    share = np.clip((s_before_mm - work.from_mm[last]) / length, 0.0, 1.0)
+    turn = np.radians(world.stock_turn_deg)
+    advance_mm = place_mm - before_mm
+    loads, depth_mm, arc_rad = _engaged(
         place_mm,
-        velocity_mm_s,
+        advance_mm,
         last,
         share,
-        work.start_mm,
-        work.end_mm,
+        _swept(work),
         world.stock_mm,
-        np.radians(world.stock_turn_deg),
-        (cutter.diameter_mm / 2.0, cutter.flute_mm, cutter.teeth * cutter.spindle_rad_s / (2.0 * np.pi)),
+        (np.cos(turn), np.sin(turn)),
+        (cutter.diameter_mm / 2.0, cutter.flute_mm),
         cutter.coefficients,
         cutter.edge_of_shares,
         _offsets(cutter),
         cutter.chip_exponent,
     )
-    flat = np.hypot(velocity_mm_s[:, 0], velocity_mm_s[:, 1])
-    flat[flat < 1e-6] = 1.0
-    fx, fy = velocity_mm_s[:, 0] / flat, velocity_mm_s[:, 1] / flat
+    flat = np.maximum(np.hypot(advance_mm[:, 0], advance_mm[:, 1]), STILL_mm)
+    fx, fy = advance_mm[:, 0] / flat, advance_mm[:, 1] / flat
     feed, normal, axial, tangential, lever_feed, lever_normal = loads.T
     force = np.stack([feed * fx - normal * fy, feed * fy + normal * fx, -axial], axis=1)
     lever = np.stack([lever_feed * fx - lever_normal * fy, lever_feed * fy + lever_normal * fx], axis=1)
     torque = tangential * cutter.diameter_mm / 2.0
     moment = np.stack([-lever[:, 1], lever[:, 0], torque], axis=1)  # height x force, and what resists turning
-    return Cut(force, moment, sizes[:, 0], sizes[:, 1])
+    width_mm = cutter.diameter_mm / 2.0 * (np.cos(arc_rad[:, 0]) - np.cos(arc_rad[:, 1]))
+    return Cut(force, moment, depth_mm, width_mm, arc_rad)
+
+
+def _swept(work: Pieces) -> np.ndarray:
+    """Start and way of each piece, (n, 6)."""
+    return np.hstack([work.start_mm, work.end_mm - work.start_mm])
 
 
 def _offsets(cutter: Cutter) -> np.ndarray:
@@ -240,21 +276,15 @@ def _offsets(cutter: Cutter) -> np.ndarray:
 
 def left_heights(points_mm: np.ndarray, work: Pieces, world: World) -> np.ndarray:
     """Height of the finished part at plan points (n, 2)."""
-    return _heights(
-        points_mm,
-        world.stock_mm,
-        np.radians(world.stock_turn_deg),
-        work.start_mm,
-        work.end_mm,
-        world.cutter.diameter_mm / 2.0 - SKIN_mm,
-    )
+    turn = np.radians(world.stock_turn_deg)
+    thin = world.cutter.diameter_mm / 2.0 - SKIN_mm
+    return _heights(points_mm, world.stock_mm, (np.cos(turn), np.sin(turn)), _swept(work), thin)
 
 
 @njit(cache=True, nogil=True)
-def _heights(points, box, turn, start, end, radius):
-    chosen, shares = np.arange(len(start)), np.ones(len(start))
+def _heights(points, box, turn, swept, radius):
     out = np.empty(len(points))
     for i in range(len(points)):
         x, y = points[i, 0], points[i, 1]
-        out[i] = _left(x, y, box, np.cos(turn), np.sin(turn), start, end, shares, chosen, len(start), radius)
+        out[i] = _left(x, y, -np.inf, box, turn, swept, len(swept), radius)
     return out

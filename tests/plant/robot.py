@@ -127,20 +127,21 @@ def _gear(run: Run) -> None:
             run.q_load[:, j] += ripple(q, j, m.transmission_deg[j], 1, m.phase[j])
 
 
-def chain_of(run: Run) -> np.ndarray:
-    """Which chain each slow sample belongs to."""
-    starts = np.array([c.start_s for c in run.links])
-    return np.clip(np.searchsorted(starts, run.slow_s, side="right") - 1, 0, None)
+def cut_at(run: Run, t_s: np.ndarray, place_mm: np.ndarray) -> chips.Cut:
+    """What the cutter meets at times, at their commanded places, after all that the tooth before has left."""
+    starts, before_mm, gone_mm = [c.start_s for c in run.links], place_mm.copy(), np.zeros(len(t_s))
+    owner = np.clip(np.searchsorted(starts, t_s, side="right") - 1, 0, None)
+    for i, chain in enumerate(run.links):
+        mine = owner == i
+        gone_mm[mine] = path.distance(chain, t_s[mine] - run.world.cutter.tooth_s)
+        before_mm[mine] = path.at_distance(chain, gone_mm[mine], run.believed)
+    return chips.cut(place_mm, before_mm, owner.astype(float), gone_mm, run.pieces, run.world)
 
 
 def take_cut(run: Run) -> None:
-    owner = chain_of(run)
-    s = np.zeros(len(owner))
-    for i, chain in enumerate(run.links):
-        s[owner == i] = path.distance(chain, run.slow_s[owner == i])
     run.pieces = chips.pieces(run.links, run.believed)
     place = run.place_mm[::SLOW]
-    run.cut = chips.cut(place, run.velocity_mm_s, owner.astype(float), s, run.pieces, run.world)
+    run.cut = cut_at(run, run.slow_s, place)
     turn = run.world.base.axes.T
     run.force_N = run.cut.force_N @ turn  # along the root's axes
     run.moment_Nmm = run.cut.moment_Nmm @ turn

@@ -74,6 +74,11 @@ class Cutter:
     chip_exponent: float = 0.0  # chip load h·(h/h0)^-m: 0 is the linear law
     edge_of_shares: np.ndarray = field(default_factory=lambda: np.ones(3))
 
+    @property
+    def tooth_s(self) -> float:
+        """From one tooth to the next."""
+        return 2.0 * np.pi / (self.teeth * self.spindle_rad_s)
+
 
 @dataclass(frozen=True)
 class World:

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.plant import arm, chips, memory, path
-from tests.plant.robot import Run, joints_for, simulate
+from tests.plant import arm, chips, memory, path, pixels
+from tests.plant.robot import Run, cut_at, joints_for, simulate
 from tests.plant.scene import DEGREE, Frame, World, euler
 from tests.plant.waypoints import PROGRAMS
 
@@ -129,15 +129,14 @@ def test_joints_turn_round_in_the_programs(plain):
 
 def steady_cut(width_mm: float, side: float) -> np.ndarray:
     """Feed, normal and axial force 5 mm deep at 0.1 mm a tooth in the middle of a straight pass along x."""
-    speed = 0.1 * 3 * 13000 / 60
     stock = np.array([[-500.0, -8.0, -20.0], [500.0, width_mm - 8.0, 0.0]])
     if side < 0.0:
         stock[:, 1] = -stock[::-1, 1]
     work = chips.Pieces(
         np.array([[-600.0, 0, -5]]), np.array([[600.0, 0, -5]]), np.zeros(1), np.zeros(1), np.full(1, 1200.0)
     )
-    place, velocity = np.array([[0.0, 0.0, -5.0]]), np.array([[speed, 0.0, 0.0]])
-    cut = chips.cut(place, velocity, np.zeros(1), np.array([600.0]), work, WORLD.but(stock_mm=stock))
+    place, before = np.array([[0.0, 0.0, -5.0]]), np.array([[-0.1, 0.0, -5.0]])
+    cut = chips.cut(place, before, np.zeros(1), np.array([599.9]), work, WORLD.but(stock_mm=stock))
     assert cut.depth_mm[0] == pytest.approx(5.0)
     assert cut.width_mm[0] == pytest.approx(width_mm, rel=0.01)
     return cut.force_N[0] * [1, 1, -1]
@@ -161,15 +160,15 @@ def test_mean_force_of_the_worked_example(width_mm, side, expected):
 def test_entry_into_a_wall_follows_the_exact_arc():
     """d after contact the rim cuts from asin(1 - d/R) to pi minus that."""
     stock = np.array([[0.0, -100.0, -20.0], [400.0, 100.0, 0.0]])
-    world, speed = WORLD.but(stock_mm=stock), 50.0
-    k, f_z = world.cutter.coefficients, speed / (3 * 13000 / 60)
+    world, f_z = WORLD.but(stock_mm=stock), 0.077
+    k = world.cutter.coefficients
     for d in (0.2, 1.0, 4.0, 7.9):
         x = d - 8.0
         work = chips.Pieces(
             np.array([[-50.0, 0, -5]]), np.array([[50.0, 0, -5]]), np.zeros(1), np.zeros(1), np.full(1, 100.0)
         )
-        place, velocity = np.array([[x, 0.0, -5.0]]), np.array([[speed, 0.0, 0.0]])
-        cut = chips.cut(place, velocity, np.zeros(1), np.array([x + 50.0]), work, world)
+        place, before = np.array([[x, 0.0, -5.0]]), np.array([[x - f_z, 0.0, -5.0]])
+        cut = chips.cut(place, before, np.zeros(1), np.array([x + 50.0 - f_z]), work, world)
         phi = np.linspace(np.arcsin(1 - d / 8), np.pi - np.arcsin(1 - d / 8), 20001)
         ft = k[0] * f_z * np.sin(phi) + k[3]
         fr = k[1] * f_z * np.sin(phi) + k[4]
@@ -177,6 +176,45 @@ def test_entry_into_a_wall_follows_the_exact_arc():
         feed = share * np.trapezoid(-ft * np.cos(phi) - fr * np.sin(phi), phi)
         normal = share * np.trapezoid(ft * np.sin(phi) - fr * np.cos(phi), phi)
         np.testing.assert_allclose(cut.force_N[0, :2], [feed, normal], rtol=0.01, atol=0.5)
+
+
+@pytest.mark.parametrize("corner", ["parabola", "quartic"])
+def test_chords_lie_within_the_skin_of_the_rounded_corners(corner):
+    world, share = WORLD.but(corner=corner), np.linspace(0.0, 1.0, 21)
+    for program in PROGRAMS.values():
+        links = path.chains(program().waypoints(), world)
+        work = chips.pieces(links, world)
+        for j in range(len(work.chain)):
+            s = work.from_mm[j] + share * (work.to_mm[j] - work.from_mm[j])
+            chord = work.start_mm[j] + share[:, None] * (work.end_mm[j] - work.start_mm[j])
+            off = chord - path.at_distance(links[int(work.chain[j])], s, world)
+            assert np.linalg.norm(off, axis=1).max() <= chips.SKIN_mm * 1.001
+
+
+@pytest.mark.parametrize(
+    ("name", "begin_s", "end_s"),
+    [
+        ("ramps", 12.64, 12.76),  # from a level slot into a rising one that leads a little aside
+        ("pocket", 2.2, 3.0),  # an arc of short moves, full slot
+        ("pocket", 7.6, 8.6),  # the next round, half of the width
+        ("contour", 16.54, 16.66),  # 90°, out of the air into the side
+    ],
+)
+def test_cut_in_corners_and_arcs_is_that_of_a_map_of_pixels(plain, name, begin_s, end_s):
+    """Left over: the map's arcs are those of a whole turn, three passings, and known to a pixel or two."""
+    run = plain[name]
+    time_s, force_N, arc_rad = pixels.tooth_passings(run, begin_s, end_s, 0.02)
+    cut = cut_at(run, time_s, path.commanded(run.links, time_s, WORLD))
+    off = np.linalg.norm(cut.force_N - force_N, axis=1)
+    peak = np.linalg.norm(force_N, axis=1).max()
+    assert peak > 200.0
+    assert off.max() < 0.03 * peak
+    assert np.sqrt(np.mean(off**2)) < 0.015 * peak
+    rows = (cut.depth_mm > 0.0) & np.isfinite(arc_rad).all(axis=1)
+    aside = np.degrees(cut.arc_rad[rows] - arc_rad[rows])
+    assert np.count_nonzero(rows) > 30
+    assert np.abs(aside).max() < 6.0
+    assert np.sqrt(np.mean(aside**2)) < 1.5
 
 
 @pytest.mark.parametrize("name", ["ramps", "pocket"])
