@@ -220,6 +220,11 @@ class Effect:
     def _sizes(self) -> tuple[Parameter, ...]:
         return tuple(p for p in self.parameters if not p.is_shape and p.name not in (self.direction or ()))
 
+    @property
+    def is_linear(self) -> bool:
+        """Tell whether the signals are proportional to its size."""
+        return all(p.linear for p in self._sizes())
+
     # What it does: the hooks, in the order in which `simulate` calls them
 
     def replan(self, inputs: "Inputs", applied: Applied) -> "Inputs":

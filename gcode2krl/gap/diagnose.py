@@ -17,7 +17,7 @@ from gcode2krl.gap.fine import refined_prediction
 from gcode2krl.gap.fitted import with_fitted
 from gcode2krl.gap.from_log import log_sides
 from gcode2krl.gap.judge import Judgement, judge
-from gcode2krl.gap.links import EXAMINED, parts_of
+from gcode2krl.gap.links import EXAMINED, MODEL_RAD, parts_of
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.replan import remembered_plan
 from gcode2krl.gap.result import Gap
@@ -34,6 +34,8 @@ _SLIPS_THAT_ARE_CAUSES = {"path": ("absolute_accuracy",), "servo": ("rsi_on",)}
 _SET = 0.1
 """The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
 _PEAKS = 4
+_LOST, _CLOCKS_LOST = ("unexplained", "partly_explained"), 4
+"""Where the run's own timing replaced the plan's, an instrument's clock is known so many times worse."""
 _TIMING = ("velocity_rule", "corner", "advance_stop", "override")
 
 
@@ -112,6 +114,7 @@ class _State:
     slips: list[Applied] = field(default_factory=list)
     judgements: list[Judgement] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    clocks_set: bool = False
     clock_s: dict[str, list[float]] = field(default_factory=dict)
 
 
@@ -221,7 +224,9 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
                 else:
                     blocks += blocks_of(effect, target)
     clocks = 2 if link == "mechanics" and "path" not in state.examined and "servo" in state.examined else 1
-    share = _SET if link == "path" else 1.0
+    if link != "path" and any(each.link == "path" and each.verdict in _LOST for each in state.judgements):
+        clocks = _CLOCKS_LOST
+    share = _SET if link == "path" and state.clocks_set else 1.0
     return Question(state.known, blocks, state.mismatch, upstream, clocks, share, state.seed)
 
 
@@ -261,7 +266,11 @@ def _question_of(judgement: Judgement) -> Question:
 
 
 def _set_controller_clocks(state: _State) -> None:
-    """Set the controllers' clocks run by run; what all of them are off by stays, where it is a finding."""
+    """Set the controllers' clocks run by run where the runs then keep to the plan's times.
+
+    What all of them are off by stays, where it is a finding. Where they do not keep to the plan, their clocks
+    are fitted along with what the law of time is.
+    """
     offsets = []
     for side in state.sides:
         parts = parts_of("path", [side])
@@ -269,10 +278,16 @@ def _set_controller_clocks(state: _State) -> None:
         offsets.append(offset if np.isfinite(deviation) else 0.0)
     common = float(np.median(offsets)) if offsets else 0.0
     kept = common if abs(common) > state.mismatch.clock_s else 0.0
-    state.sides = [
-        replace(side, clock_s=_later(side, offset - kept))
-        for side, offset in zip(state.sides, offsets, strict=True)
-    ]
+
+    def later(by: float) -> list[Side]:
+        return [
+            replace(side, clock_s=_later(side, offset - by))
+            for side, offset in zip(state.sides, offsets, strict=True)
+        ]
+
+    left = [part.residual for side in later(0.0) for part in parts_of("path", [side])]
+    if left and float(np.sqrt(np.mean(np.concatenate(left) ** 2))) < MODEL_RAD:
+        state.sides, state.clocks_set = later(kept), True
 
 
 def _later(side: Side, offset_s: float) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.noise_source import noise_of
 from gcode2krl.gap.nuisance import Nuisance, nuisance_of
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Fitted, Target, inflation_of, refit
+from gcode2krl.gap.place_time import PlaceTimes
+from gcode2krl.gap.refit import Fitted, Target, free_of, inflation_of, refit, searched
 from gcode2krl.gap.select import (
     LEAST_RATIO,
     Column,
@@ -27,7 +29,7 @@ from gcode2krl.gap.signatures import Block, Signatures
 
 Floats = NDArray[np.float64]
 MOST_EFFECTS = 4
-_SHORTLIST = 4
+_SHORTLIST = 5
 _MOST_TRIED = 12
 _GROUPS = 4
 _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
@@ -35,6 +37,8 @@ _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
 PRUNE = 0.05
 _MARGIN = 2.0
 _STARTS = (1.0, -0.7, 3.0)
+_BENT_SHARE = 0.4
+"""An effect that is not proportional to its size may look so much worse before its refit."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,11 @@ class Examination:
     def causes(self) -> tuple[Applied, ...]:
         """Return the accepted effects that are more than normal mismatch."""
         return tuple(a for a, usual in zip(self.fitted.applied, self.usual, strict=True) if not usual)
+
+    @cached_property
+    def place_times(self) -> PlaceTimes:
+        """The times at which the runs are at each place."""
+        return PlaceTimes(self.parts)
 
     @property
     def values(self) -> int:
@@ -170,6 +179,7 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
         score
         for score in scores(evidence, allowed, range(found.ledger.given))
         if (score.within or replans(found.blocks[score.column.block].effect))
+        and not _left_out(found, found.blocks[score.column.block])
         and score.surprise > found.level
         and score.gain > LEAST_RATIO**2 * found.times
     ]
@@ -182,6 +192,12 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
         if surprise(score.gain / inflation, score.column.width) > found.level:
             sure.append(score)
     return sure
+
+
+def _left_out(found: Examination, block: Block) -> bool:
+    """Tell whether an effect that plans anew is not tried, as all runs together have not named it."""
+    starts = found.question.starts
+    return bool(starts) and replans(block.effect) and block.key not in starts
 
 
 def _accept(
@@ -270,9 +286,11 @@ def _shortlist(found: Examination, ranked: list[Score], rows: int) -> list[Score
     for score in ranked:
         block = found.blocks[score.column.block]
         key = block.key
-        if replans(block.effect) and key not in short:
-            short[key] = score
-        if _worth(score, rows) >= least and key not in short:
+        if replans(block.effect):
+            short.setdefault(key, score)
+            continue
+        bent = not block.effect.is_linear and score.gain > _BENT_SHARE * ranked[0].gain
+        if (_worth(score, rows) >= least or bent) and key not in short:
             short[key] = score
     near = [score for score in short.values() if not replans(found.blocks[score.column.block].effect)]
     return [*near[:_SHORTLIST], *(score for score in short.values() if score not in near)]
@@ -284,14 +302,14 @@ def replans(effect: Effect) -> bool:
 
 
 def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
-    """Return the best refit from several starts."""
-    nominal = block.effect.nominal(found.parts[0].inputs, block.target)
-    typical = block.effect.start(found.parts[0].inputs, block.target)
+    """Return the best refit from the numbers that meet the times at which the runs are at each place."""
     known = found.question.starts.get(block.key)
     if known is not None:
-        return refit(found.target, (*found.applied, known))
+        return refit(found.target, (*found.applied, searched(found.target, found.applied, known, 0.03)))
+    nominal = block.effect.nominal(found.parts[0].inputs, block.target)
+    typical = block.effect.start(found.parts[0].inputs, block.target)
     starts = [linear]
-    for factor in () if found.question.starts else _STARTS:
+    for factor in _STARTS:
         values = dict(linear.values) | {
             p.name: float(
                 np.clip(nominal[p.name] + factor * (typical[p.name] - nominal[p.name]), p.low, p.high)
@@ -300,9 +318,13 @@ def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
             if not p.is_shape and np.isfinite(nominal[p.name])
         }
         starts.append(Applied(block.effect, block.target, values | dict(block.shape)))
-    rough = [refit(found.target, (*found.applied, start), steps=3) for start in starts]
-    best = min(rough, key=lambda each: each.chi2)
-    return refit(found.target, best.applied)
+    times = found.place_times
+    free = free_of(starts[-1], found.parts[0])
+    ranked = sorted(starts, key=lambda start: times.size((*found.applied, start)))
+    placed = [times.fitted(found.applied, free, start) for start in ranked[:2]]
+    tried = [searched(found.target, found.applied, start) for start in placed]
+    fits = [refit(found.target, (*found.applied, each)) for each in tried]
+    return min(fits, key=lambda each: each.chi2)
 
 
 def _worth(score: Score, rows: int) -> float:

@@ -1,7 +1,8 @@
 """What a link's model says, mismatch included, as the input of the links behind it.
 
 Encoders' noise would go into the tip otherwise, magnified by the arm's length, and smoothing would smear the
-steps that effects make. What a load encoder shows but the joint does not do, its zero and its clock, stays out.
+steps that effects make. What a load encoder shows but the joint does not do, its zero and its clock, stays
+out.
 """
 
 from collections.abc import Sequence

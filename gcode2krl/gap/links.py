@@ -23,7 +23,7 @@ JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
 EXAMINED = ("path", "servo", "gear", "force", "mechanics")
 """Links with a model of their own; timing is the tangential part of path."""
-_MODEL_RAD = 4e-4 * RAD_PER_DEG
+MODEL_RAD = 4e-4 * RAD_PER_DEG
 """The predicted path is right to 0.01 mm (design/gap.md), 4e-4 degrees at an arm's length."""
 _JUMP_S, _JUMP, _AROUND_S = 0.012, 0.1, 0.02
 """A change by a tenth of the largest force within 12 ms is a jump; a cutter enters in tenths of a second."""
@@ -128,7 +128,7 @@ def _joint_part(
         return None
     noise = side.run.head.noise
     stated = {"gear": noise.q_load_deg, "servo": noise.q_act_deg}.get(link)
-    sigma = _MODEL_RAD if link == "path" else None if stated is None else stated * RAD_PER_DEG
+    sigma = MODEL_RAD if link == "path" else None if stated is None else stated * RAD_PER_DEG
     columns = tuple(np.flatnonzero(there).tolist())
     return Part(
         link=link,

@@ -103,6 +103,10 @@ class Part:
             return self._at(self._plain, self.time_s)
         return self._at(self._simulated((*self.base, *applied)), self.time_s)
 
+    def signals(self, applied: Sequence[Applied]) -> Signals:
+        """Return all signals of the model with these effects at work besides the base."""
+        return self._simulated((*self.base, *applied))
+
     def _simulated(self, applied: tuple[Applied, ...]) -> Signals:
         """Return the signals of the model; the commanded path is one for all runs and simulated once."""
         if self.link != "path":

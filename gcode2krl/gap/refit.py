@@ -21,6 +21,7 @@ _FIXED = ("harmonic",)
 """Shapes that are counts: a fit keeps the value of the grid."""
 _MOST_STEPS = 12
 _AT_BOUND = 1e-3
+_SEARCH_ROUNDS, _FINEST = 60, 0.003
 _MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
 
@@ -258,6 +259,46 @@ def refit(target: Target, start: Sequence[Applied], steps: int = _MOST_STEPS, sc
     return Fitted(effects(x), best, x, covariance, frees, bound)
 
 
+def searched(target: Target, others: Sequence[Applied], start: Applied, step: float = 0.3) -> Applied:
+    """Return the effect at the numbers that fit best nearby (Hooke and Jeeves 1961).
+
+    For effects that plan anew: a controller's times are whole cycles, and what is flat has no slope.
+    """
+    free = free_of(start, target.parts[0])
+
+    def chi2(x: Floats) -> float:
+        try:
+            r = target.residual((*others, free.applied(x)))
+        except Gcode2KrlError:
+            return np.inf
+        return float(r @ r)
+
+    x = free.start(start)
+    best, steps, before = chi2(x), step * free.scale, x
+    for _ in range(_SEARCH_ROUNDS):
+        reached = x
+        for i in range(len(x)):
+            for way in (1.0, -1.0):
+                trial = reached.copy()
+                trial[i] = np.clip(reached[i] + way * steps[i], free.low[i], free.high[i])
+                found = chi2(trial)
+                if found < best:
+                    reached, best = trial, found
+                    break
+        if reached is x:
+            steps = steps / 2.0
+            if np.all(steps < _FINEST * free.scale):
+                break
+            continue
+        # on along the way that brought gains: numbers of a time law make up for each other
+        before, x = x, reached
+        trial = np.clip(2.0 * x - before, free.low, free.high)
+        found = chi2(trial)
+        if found < best:
+            x, best = trial, found
+    return free.applied(x)
+
+
 def _scanned(
     target: Target, effects: Callable[[Floats], tuple[Applied, ...]], x: Floats, first: int, low: Floats,
     high: Floats,
@@ -297,7 +338,7 @@ def inflation_of(target: Target, fitted: Fitted, number: int) -> float:
     np.add.at(sums, at, mine[: len(clusters)] * residual[: len(clusters), None])
     info = np.linalg.pinv(mine.T @ mine, rcond=1e-9, hermitian=True)
     grown = float(np.trace(info @ (sums.T @ sums))) / mine.shape[1]
-    return max(1.0, grown * len(names) / max(len(names) - mine.shape[1], 1))
+    return float(max(1.0, grown * len(names) / max(len(names) - mine.shape[1], 1)))
 
 
 def stretches_of_all(parts: Sequence[Part]) -> NDArray[np.int64]:

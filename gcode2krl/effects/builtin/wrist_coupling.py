@@ -9,7 +9,7 @@ from gcode2krl.effects.inputs import Inputs
 class WristCoupling(Effect):
     """The controller's decoupling of the wrist is off: q5 += ratio·q4, q6 += ratio·(q4 + q5).
 
-    q4 and q5 on the right are the indicated ones. The motors' encoders do not see it; encoders behind the gears
+    q4 and q5 on the right are the indicated ones. The motors' encoders do not see it, those behind the gears
     do.
     """
 
