@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.gap.bounds import sigma
-from gcode2krl.gap.examine import Question, columns_of, nuisance_for
+from gcode2krl.gap.examine import Question, nuisance_for
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.signatures import Signatures
 
 Floats = NDArray[np.float64]
-LINKS = ("gear", "force", "mechanics")
+LINKS = ("gear", "mechanics")
+"""Links whose signals change fast all the time; a force does where the cutter enters and leaves only."""
 _ROUNDS = 2
 _MOST_S = 0.02
 _RIDGE = 1e-6
@@ -30,8 +31,6 @@ def with_set_clocks(parts: Sequence[Part], question: Question, known: Signatures
     parts = list(parts)
     if not parts or parts[0].link not in LINKS:
         return parts
-    blocks = [block for block in question.blocks if block.effect.name != "clock"]
-    _, _, stacks = columns_of(blocks, parts, known)
     nuisance = nuisance_for(parts, question, known)
     total = np.zeros(len(parts))
     current = parts
@@ -40,12 +39,12 @@ def with_set_clocks(parts: Sequence[Part], question: Question, known: Signatures
             others = [each.columns for each in nuisance[number] if each.name != "clock"]
             clock = [each.columns for each in nuisance[number] if each.name == "clock"]
             if clock:
-                share = _coefficient(part, clock[0], np.concatenate([stacks[number], *others], axis=2))
+                share = _coefficient(part, clock[0], others)
                 total[number] += share * sigma(question.mismatch.clock_s) * question.clocks**0.5
-        total = np.clip(total, -_MOST_S, _MOST_S)
-        common = float(np.median(total))
         limit = question.mismatch.clock_s * question.clocks
+        common = float(np.median(np.clip(total, -_MOST_S, _MOST_S)))
         kept = common if abs(common) > limit else 0.0
+        total = kept + np.clip(total - kept, -limit, limit)
         current = [_later(part, offset - kept) for part, offset in zip(parts, total.tolist(), strict=True)]
         if kept:
             break
@@ -61,10 +60,10 @@ def _later(part: Part, offset_s: float) -> Part:
     return replace(part, time_s=part.time_s - offset_s)
 
 
-def _coefficient(part: Part, clock: Floats, others: Floats) -> float:
-    """Return the coefficient of the clock's column beside all that any effect or mismatch could explain."""
+def _coefficient(part: Part, clock: Floats, others: Sequence[Floats]) -> float:
+    """Return the coefficient of the clock's column beside all that other mismatch could explain."""
     k, n, _ = clock.shape
-    flat = np.concatenate([clock, others], axis=2).reshape(k * n, -1)
+    flat = np.concatenate([clock, *others], axis=2).reshape(k * n, -1)
     scale = np.sqrt(np.sum(flat**2, axis=0))
     good = scale > 0.0
     if not good[0]:

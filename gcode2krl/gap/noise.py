@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 ORDER = 3
 _LEAST_ROWS = 60
+_SETTLED = 500
 
 
 @dataclass(frozen=True)
@@ -44,15 +45,10 @@ def white(sigma: float) -> Noise:
     return Noise(np.zeros(0), sigma, sigma)
 
 
-def fit(
-    residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = ORDER, dof: float = 1.0
-) -> Noise:
+def fit(residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = ORDER) -> Noise:
     """Return the model of some residuals (n,) with their segments, by least squares over all of them.
 
-    Parameters
-    ----------
-    floor : smallest rms, from the last decimal of the data; noise is never taken to be less.
-    dof : share of the rows that is noise after what was fitted before; variances are divided by it.
+    ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less.
     """
     past, now = [], []
     for values, segments in residuals:
@@ -62,14 +58,43 @@ def fit(
                 past.append(np.stack([x[order - i - 1 : len(x) - i - 1] for i in range(order)], axis=1))
                 now.append(x[order:])
     everything = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
-    rms = max(float(np.sqrt(np.mean(everything**2) / dof)), floor)
+    rms = max(float(np.sqrt(np.mean(everything**2))), floor)
     if sum(len(each) for each in now) < _LEAST_ROWS:
         return white(rms)
     x, y = np.concatenate(past), np.concatenate(now)
     ridge = 1e-6 * float(np.sum(x**2)) + len(y) * floor**2 * 0.1 + 1e-30
     a = _stable(np.asarray(np.linalg.solve(x.T @ x + ridge * np.eye(order), x.T @ y), dtype=np.float64))
-    scale = max(float(np.sqrt(np.mean((y - x @ a) ** 2) / dof)), 0.3 * floor)
+    scale = max(float(np.sqrt(np.mean((y - x @ a) ** 2))), 0.3 * floor)
     return Noise(a, scale, max(rms, scale))
+
+
+def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Floats:
+    """Return noise (count,) of a model, in its steady state."""
+    from scipy.signal import lfilter
+
+    white_ = noise.scale * generator.standard_normal(count + _SETTLED)
+    drawn: Floats = lfilter([1.0], np.concatenate([[1.0], -noise.a]), white_)[_SETTLED:]
+    return drawn
+
+
+def unbiased(found: Noise, again: Noise, floor: float) -> Noise:
+    """Return a model, corrected by what a model of noise drawn from it came out as."""
+    if len(found.a) != len(again.a) or len(found.a) == 0:
+        return found
+    a = _stable(2.0 * found.a - again.a)
+    scale = max(found.scale**2 / again.scale, 0.3 * floor)
+    steady = _gain(found.a) * found.scale
+    sigma = max(found.sigma * steady / again.sigma, floor, scale)
+    return Noise(a, scale, sigma)
+
+
+def _gain(a: Floats) -> float:
+    """Return the rms of x for white e of unit variance, by its impulse response."""
+    from scipy.signal import lfilter
+
+    pulse = np.zeros(_SETTLED)
+    pulse[0] = 1.0
+    return float(np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), pulse) ** 2)))
 
 
 def _stable(a: Floats) -> Floats:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.gap.noise import Noise, fit, resolution
+from gcode2krl.gap.noise import Noise, drawn_noise, fit, resolution, unbiased
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part, nearest_rows
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _SLOW_S = 0.5
 _RIDGE = 1e-6
-_TRUST = 0.7
+_TRUST = 0.9
 """Noise is never taken below this share of what run.toml states."""
 
 
@@ -24,45 +24,74 @@ def noise_of(
 
     From every run is taken what any effect or nuisance could explain of that run alone. If the runs repeat
     one program, what differs between them is noise, whatever its colour; else everything slower than half a
-    second is taken out too, since it may be structure.
+    second is taken out too, since it may be structure. What this takes of the noise itself is found by doing
+    the same to drawn noise of the model (Efron's bootstrap bias).
     """
-    rests, shares = [], []
-    for part, columns, own in zip(parts, signatures, nuisance, strict=True):
-        rest, share = _rest(part, columns, own)
-        rests.append(rest)
-        shares.append(share)
-    k = parts[0].shape[1]
+    taken = [
+        _Taken(part, columns, own) for part, columns, own in zip(parts, signatures, nuisance, strict=True)
+    ]
     repeats = _repeats(parts)
-    found = []
-    for j in range(k):
-        mine = [(rest[:, j], part.segments) for rest, part in zip(rests, parts, strict=True)]
-        if repeats is not None:
-            mine = _apart(mine, parts, repeats)
-            dof = float(np.mean([share[j] for share in shares]))
-        else:
-            mine, slow = _fast(mine, parts)
-            dof = float(np.mean([share[j] for share in shares])) - slow
-        floor = max(resolution(part.measured[:, j]) for part in parts)
-        stated = [part.declared_sigma for part in parts if part.declared_sigma is not None]
-        floor = max(floor, _TRUST * max(stated)) if stated else floor
-        found.append(fit(mine, max(floor, 1e-9), dof=max(dof, 0.3)))
-    return found
+
+    def fits(values: Sequence[Floats], floors: Floats) -> list[Noise]:
+        rests = [each.off(value) for each, value in zip(taken, values, strict=True)]
+        if repeats is None:
+            rests = [each.fast(rest) for each, rest in zip(taken, rests, strict=True)]
+        found = []
+        for j in range(parts[0].shape[1]):
+            mine = [(rest[:, j], part.segments) for rest, part in zip(rests, parts, strict=True)]
+            found.append(fit(mine if repeats is None else _apart(mine, parts, repeats), float(floors[j])))
+        return found
+
+    floors = np.array([_floor(parts, j) for j in range(parts[0].shape[1])])
+    first = fits([part.residual for part in parts], floors)
+    generator = np.random.default_rng(0)
+    drawn = [
+        np.stack([drawn_noise(noise, len(part.time_s), generator) for noise in first], axis=1)
+        for part in parts
+    ]
+    again = fits(drawn, np.full(len(first), 1e-12))
+    return [
+        unbiased(one, other, float(floor)) for one, other, floor in zip(first, again, floors, strict=True)
+    ]
 
 
-def _rest(part: Part, signatures: Floats, nuisance: Sequence[Nuisance]) -> tuple[Floats, Floats]:
-    """Return what no effect explains (n, k), and the share (k,) of each component's values that is left."""
-    columns = np.concatenate([signatures, *(each.columns for each in nuisance)], axis=2)
-    k, n, c = columns.shape
-    flat = columns.reshape(k * n, c)
-    y = part.residual.T.reshape(k * n)
-    scale = np.sqrt(np.sum(flat**2, axis=0))
-    flat = flat[:, scale > 0.0] / scale[scale > 0.0]
-    if flat.shape[1] == 0:
-        return part.residual, np.ones(k)
-    gram = flat.T @ flat
-    gram[np.diag_indices_from(gram)] += _RIDGE
-    rest = y - flat @ np.linalg.solve(gram, flat.T @ y)
-    return rest.reshape(k, n).T, np.full(k, 1.0 - min(flat.shape[1] / (k * n), 0.5))
+def _floor(parts: Sequence[Part], component: int) -> float:
+    """Return the least rms: the last decimal's, and what run.toml states."""
+    floor = max(resolution(part.measured[:, component]) for part in parts)
+    stated = [part.declared_sigma for part in parts if part.declared_sigma is not None]
+    return max(floor, _TRUST * max(stated) if stated else 0.0, 1e-9)
+
+
+class _Taken:
+    """What is taken out of one part before its noise is looked at."""
+
+    def __init__(self, part: Part, signatures: Floats, nuisance: Sequence[Nuisance]) -> None:
+        columns = np.concatenate([signatures, *(each.columns for each in nuisance)], axis=2)
+        k, n, c = columns.shape
+        flat = columns.reshape(k * n, c)
+        scale = np.sqrt(np.sum(flat**2, axis=0))
+        self.flat = flat[:, scale > 0.0] / scale[scale > 0.0]
+        gram = self.flat.T @ self.flat
+        gram[np.diag_indices_from(gram)] += _RIDGE
+        self.gram = gram
+        t = part.time_s
+        count = max(2, round((t[-1] - t[0]) / _SLOW_S) + 1)
+        knots = np.linspace(t[0], t[-1], count)
+        self.hats = np.maximum(0.0, 1.0 - np.abs(t[:, None] - knots) / (knots[1] - knots[0]))
+        self.hats_gram = self.hats.T @ self.hats + 1e-9 * len(t) * np.eye(count)
+
+    def off(self, values: Floats) -> Floats:
+        """Return values (n, k) without what effects and nuisance explain."""
+        if self.flat.shape[1] == 0:
+            return values
+        y = values.T.reshape(-1)
+        rest = y - self.flat @ np.linalg.solve(self.gram, self.flat.T @ y)
+        return rest.reshape(values.shape[1], -1).T
+
+    def fast(self, values: Floats) -> Floats:
+        """Return values (n, k) without what is slower than half a second."""
+        found: Floats = values - self.hats @ np.linalg.solve(self.hats_gram, self.hats.T @ values)
+        return found
 
 
 def _repeats(parts: Sequence[Part]) -> list[Ints] | None:
@@ -86,17 +115,3 @@ def _apart(
     values = np.stack([rest[row] for (rest, _), row in zip(mine, rows, strict=True)])
     apart = (values - values.mean(axis=0)) * np.sqrt(len(parts) / (len(parts) - 1.0))
     return [(each, parts[0].segments) for each in apart]
-
-
-def _fast(mine: list[tuple[Floats, Ints]], parts: Sequence[Part]) -> tuple[list[tuple[Floats, Ints]], float]:
-    """Return the values less all that is slower than half a second, and the share of them that this takes."""
-    out, used, total = [], 0, 0
-    for (rest, segments), part in zip(mine, parts, strict=True):
-        t = part.time_s
-        count = max(2, round((t[-1] - t[0]) / _SLOW_S) + 1)
-        knots = np.linspace(t[0], t[-1], count)
-        hats = np.maximum(0.0, 1.0 - np.abs(t[:, None] - knots) / (knots[1] - knots[0]))
-        gram = hats.T @ hats + 1e-9 * len(t) * np.eye(count)
-        out.append((rest - hats @ np.linalg.solve(gram, hats.T @ rest), segments))
-        used, total = used + count, total + len(t)
-    return out, used / total

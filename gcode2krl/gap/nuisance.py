@@ -79,6 +79,7 @@ def _all(
         yield from present([
             effect("force_scale", way, "scale", m.coefficients) for way in ("tangential", "radial", "axial")
         ])  # fmt: skip
+        yield from present([effect("edge_force", None, "scale", m.coefficients)])
     if part.link == "force":
         yield Nuisance("force zero", False, _force_zero(part) * sigma(m.force_zero_N))
         yield Nuisance("sensor gain", False, _diagonal(part.nominal) * sigma(m.sensor_gain))
