@@ -23,15 +23,17 @@ _CLOSE_SHARE, _CLOSE_GAIN = 0.25, 15.0
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect in place of a cause, and by how much chi2 is higher with it, numbers accounted for."""
+    """An effect in place of a cause, and by how much chi2 and the cost of its numbers are higher with it."""
 
     applied: Applied
     worse: float
+    apart: float
+    """By how much chi2 itself is higher."""
 
     @property
     def alike(self) -> bool:
-        """Tell whether the data cannot tell the rival from the cause."""
-        return self.worse < ALIKE
+        """Tell whether the data cannot tell the rival from the cause: it does the same, or would."""
+        return min(self.worse, self.apart) < ALIKE
 
 
 def rivals_of(found: Examination, number: int) -> list[Rival]:
@@ -51,12 +53,11 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
     ]
     ranked = sorted(
         (score for score in scores(evidence, columns, given) if score.within),
-        key=lambda score: -(score.gain - score.column.width * np.log(evidence.rows)),
+        key=lambda score: -score.gain,
     )
     gain = refit_gain(found.target, others, found)
     best: dict[tuple[str, str | None], Rival] = {}
     spread = max(1.0, found.fitted.chi2 / max(evidence.rows, 1))
-    log_rows = np.log(max(evidence.rows, 2))
     for score in ranked:
         block = found.blocks[score.column.block]
         if block.key in best or len(best) >= _RIVALS:
@@ -66,9 +67,9 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
         fitted = refit(found.target, (*others, block.applied(score.coefficients, parts[0])), steps=6)
         if fitted.bound[-1]:
             continue
-        extra = len(fitted.free[-1].names) - len(found.fitted.free[number].names)
-        worse = (fitted.chi2 - found.fitted.chi2) / spread + extra * log_rows
-        best[block.key] = Rival(fitted.applied[-1], float(worse))
+        apart = (fitted.chi2 - found.fitted.chi2) / spread
+        worse = apart + fitted.occam - found.fitted.occam
+        best[block.key] = Rival(fitted.applied[-1], float(worse), float(apart))
     return sorted(best.values(), key=lambda rival: rival.worse)
 
 

@@ -1,6 +1,7 @@
 """The diagnosis: runs beside their predictions, link by link, to one answer."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,7 +30,10 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run, check_program
 
 _S_PER_H = 3600.0
-_SLIPS_THAT_ARE_CAUSES = {"path": ("absolute_accuracy",), "servo": ("rsi_on",)}
+_SLIPS_THAT_ARE_CAUSES = {
+    "path": ("absolute_accuracy",), "servo": ("rsi_on",), "force": ("swapped_tool",),
+    "mechanics": ("swapped_tool", "load"),
+}  # fmt: skip
 """Slips that are searched for as every effect is; the others have tests of their own."""
 _SET = 0.1
 """The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
@@ -180,8 +184,17 @@ def _apply_slips(state: _State, slips: Sequence[Slip]) -> None:
                 for side in state.sides
             ]
         elif slip.applied.effect.name != "clock":
-            state.found.append(slip.applied)
-            state.slips.append(slip.applied)
+            planned = _planned_once(state, slip.applied)
+            state.found.append(planned)
+            state.slips.append(planned)
+
+
+def _planned_once(state: _State, applied: Applied) -> Applied:
+    """Take what a cause does to the commanded joints into the inputs; return the rest of what it does."""
+    state.sides = [replace(side, inputs=applied.effect.replan(side.inputs, applied)) for side in state.sides]
+    rest = copy(applied.effect)
+    rest.replan = lambda inputs, applied: inputs  # type: ignore[method-assign]
+    return replace(applied, effect=rest)
 
 
 def _examined(state: _State) -> Iterator[str]:
@@ -201,7 +214,7 @@ def _parts(state: _State, link: str) -> list[Part]:
 
 def _belongs(one: Applied, link: str) -> bool:
     """Tell whether a cause found before is part of the model of a link."""
-    return link == "mechanics" and one.effect.family in ("force", "part")
+    return link == "mechanics"
 
 
 def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
@@ -209,7 +222,7 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
     upstream = frozenset(each for each in EXAMINED if each not in state.examined)
     blocks: list[Block] = []
     for effect in state.known.values():
-        if effect.kind == "slip" and effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ()):
+        if effect.kind == "slip" and (state.slips or effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ())):
             continue
         for target in effect.targets(cell):
             if link in effect.visible_links(state.examined, target) and _relevant(
@@ -248,7 +261,13 @@ def _relevant(effect: Effect, target: str | None, link: str, state: _State) -> b
 def _learn(state: _State, judgement: Judgement) -> None:
     """Take what a link says into the model of the later ones."""
     named = list(judgement.applied)
-    state.found += [one for one in named if one.effect.family in ("force", "part")]
+    if judgement.link == "force":
+        state.found += [one for one in named if one.effect.family != "sensor"]
+        if judgement.verdict in _LOST:
+            state.sides = [side.with_measured_load() for side in state.sides]
+    for one in named:
+        if one.effect.name == "absolute_accuracy":
+            _planned_once(state, one)
     if judgement.link in ("servo", "gear") and judgement.verdict in ("no_gap", "explained"):
         state.sides = with_fitted(state.sides, judgement, _question_of(judgement))
     if judgement.link != "path":

@@ -35,7 +35,9 @@ _GROUPS = 4
 _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
 """Rivals within this of the best linear gain are refitted too: signatures hold for small effects only."""
 PRUNE = 0.05
-_MARGIN = 2.0
+_MARGIN = 1.0
+_SLACK = 1.15
+"""Bounds of normal mismatch are round numbers."""
 _STARTS = (1.0, -0.7, 3.0)
 _BENT_SHARE = 0.4
 """An effect that is not proportional to its size may look so much worse before its refit."""
@@ -215,8 +217,7 @@ def _accept(
             else:
                 alone = len(start.effect.parameters) == 1
                 fitted = refit(found.target, (*found.applied, start), scan=alone)
-            penalty = _width(fitted) * np.log(rows)
-            tried.append((fitted.chi2 + penalty, score, fitted))
+            tried.append((fitted.chi2 + fitted.occam, score, fitted))
         tried.sort(key=lambda each: each[0])
         for _, score, fitted in tried:
             gain = found.fitted.chi2 - fitted.chi2
@@ -251,7 +252,7 @@ def within_mismatch(found: Examination, number: int) -> bool:
     deviation = found.fitted.deviations(number)
     return all(
         abs(applied.values[name] - nominal[name])
-        <= limits.get(name, 0.0) + _MARGIN * deviation.get(name, 0.0)
+        <= _SLACK * limits.get(name, 0.0) + _MARGIN * deviation.get(name, 0.0)
         for name in applied.effect.names
         if not applied.effect.parameter(name).is_shape
     )
@@ -330,10 +331,6 @@ def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
 def _worth(score: Score, rows: int) -> float:
     """Return the gain less what so many numbers gain by themselves (Schwarz 1978)."""
     return score.gain - score.column.width * float(np.log(rows))
-
-
-def _width(fitted: Fitted) -> int:
-    return len(fitted.free[-1].names) if fitted.free else 0
 
 
 def _update(found: Examination) -> None:

@@ -128,6 +128,8 @@ def _joint_part(
         return None
     noise = side.run.head.noise
     stated = {"gear": noise.q_load_deg, "servo": noise.q_act_deg}.get(link)
+    if link == "gear" and stated is not None:
+        stated = float(np.hypot(stated, noise.q_act_deg or stated))
     sigma = MODEL_RAD if link == "path" else None if stated is None else stated * RAD_PER_DEG
     columns = tuple(np.flatnonzero(there).tolist())
     return Part(

@@ -77,6 +77,11 @@ def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Flo
     return drawn
 
 
+def at_most(found: Noise, sigma: float) -> Noise:
+    """Return a model of no more than this rms, white where it was larger: the rest is no noise."""
+    return found if found.sigma <= sigma else white(sigma)
+
+
 def unbiased(found: Noise, again: Noise, floor: float) -> Noise:
     """Return a model, corrected by what a model of noise drawn from it came out as."""
     if len(found.a) != len(again.a) or len(found.a) == 0:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.gap.noise import Noise, drawn_noise, fit, resolution, unbiased
+from gcode2krl.gap.noise import Noise, at_most, drawn_noise, fit, resolution, unbiased
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part, nearest_rows
 
@@ -15,6 +15,8 @@ _SLOW_S = 0.5
 _RIDGE = 1e-6
 _TRUST = 0.9
 """Noise is never taken below this share of what run.toml states."""
+_MOST_STATED = 1.4
+"""Nor above this: what is more than that is structure."""
 
 
 def noise_of(
@@ -50,16 +52,21 @@ def noise_of(
         for part in parts
     ]
     again = fits(drawn, np.full(len(first), 1e-12))
+    most = _MOST_STATED * min(_stated(parts), default=np.inf)
     return [
-        unbiased(one, other, float(floor)) for one, other, floor in zip(first, again, floors, strict=True)
+        at_most(unbiased(one, other, float(floor)), most)
+        for one, other, floor in zip(first, again, floors, strict=True)
     ]
+
+
+def _stated(parts: Sequence[Part]) -> list[float]:
+    return [part.declared_sigma for part in parts if part.declared_sigma is not None]
 
 
 def _floor(parts: Sequence[Part], component: int) -> float:
     """Return the least rms: the last decimal's, and what run.toml states."""
     floor = max(resolution(part.measured[:, component]) for part in parts)
-    stated = [part.declared_sigma for part in parts if part.declared_sigma is not None]
-    return max(floor, _TRUST * max(stated) if stated else 0.0, 1e-9)
+    return max(floor, _TRUST * max(_stated(parts), default=0.0), 1e-9)
 
 
 class _Taken:
@@ -86,7 +93,8 @@ class _Taken:
             return values
         y = values.T.reshape(-1)
         rest = y - self.flat @ np.linalg.solve(self.gram, self.flat.T @ y)
-        return rest.reshape(values.shape[1], -1).T
+        found: Floats = rest.reshape(values.shape[1], -1).T
+        return found
 
     def fast(self, values: Floats) -> Floats:
         """Return values (n, k) without what is slower than half a second."""

@@ -21,6 +21,9 @@ _FIXED = ("harmonic",)
 """Shapes that are counts: a fit keeps the value of the grid."""
 _MOST_STEPS = 12
 _AT_BOUND = 1e-3
+PRIOR = 3.0
+_NUMBER = 0.5
+"""Of two effects that are one to the data the one with fewer numbers is named."""
 _SEARCH_ROUNDS, _FINEST = 60, 0.003
 _MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
@@ -127,6 +130,18 @@ class Fitted:
     covariance: Floats
     free: tuple[Free, ...]
     bound: tuple[bool, ...]
+    information: Floats
+    """(p, p) curvature of chi2/2, nuisance taken out, each number in units of its typical size."""
+
+    @property
+    def occam(self) -> float:
+        """Return what so many numbers cost, as chi2: twice the log of how far data narrow the prior.
+
+        Prior: normal about nominal with `PRIOR` typical sizes (Laplace's approximation, MacKay 1992). A
+        number that the data do not see costs next to nothing.
+        """
+        grown = np.eye(len(self.information)) + PRIOR**2 * self.information
+        return float(np.linalg.slogdet(grown)[1]) + _NUMBER * len(grown)
 
     def deviations(self, number: int) -> dict[str, float]:
         """Return the standard deviation of each number of an effect, by the curvature of chi2."""
@@ -252,11 +267,11 @@ def refit(target: Target, start: Sequence[Applied], steps: int = _MOST_STEPS, sc
         gain, x, r, best = best - chi2, trial, r_new, chi2
         if gain < 0.02 + 1e-5 * best:
             break
-    normal = jacobian.T @ jacobian / np.outer(1.0 / scale, 1.0 / scale) if len(x) else np.zeros((0, 0))
+    normal = jacobian.T @ jacobian * np.outer(scale, scale) if len(x) else np.zeros((0, 0))
     inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-10, hermitian=True), dtype=np.float64)
     covariance: Floats = inverse * np.outer(scale, scale)
     bound = tuple(free.at_bound(x[a:b]) for free, a, b in zip(frees, edges[:-1], edges[1:], strict=True))
-    return Fitted(effects(x), best, x, covariance, frees, bound)
+    return Fitted(effects(x), best, x, covariance, frees, bound, normal)
 
 
 def searched(target: Target, others: Sequence[Applied], start: Applied, step: float = 0.3) -> Applied:

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.effects import Inputs
-from gcode2krl.gap.part import cubic, linear
+from gcode2krl.gap.part import cubic, linear, nearest_rows
 from gcode2krl.runs import Controller, Measured, Run
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+_SMOOTH_S = 0.05
 SAME_PATH_RAD = 2e-5
 """A log this close to the prediction, 0.03 mm at an arm's length, is that path and its last decimal."""
 
@@ -39,6 +40,24 @@ class Side:
         """Return the time stamps of a table less its coarse clock error."""
         stamps: Floats = table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)
         return stamps
+
+    def with_measured_load(self) -> "Side":
+        """Return the side with the measured force as what bends the arm, as its model does not hold.
+
+        It is the mean over 50 ms, and none where the cutter is predicted in air.
+        """
+        table, inputs = self.run.force, self.inputs
+        if table is None or inputs.forces is None:
+            return self
+        own_s, force_N = self.stamps(table), table.force_N
+        frame = self.run.head.frames.force
+        if frame in ("sensor", "tcp"):
+            turn = inputs.sensor_rotation if frame == "sensor" else inputs.tool_rotation
+            force_N = np.einsum("nij,nj->ni", turn[nearest_rows(inputs.time_s, own_s)], force_N)
+        rows = round(_SMOOTH_S / float(np.median(np.diff(own_s))))
+        load = linear(inputs.time_s, own_s, _smooth(force_N, rows))
+        load[~inputs.force_base_N.any(axis=1)] = 0.0
+        return replace(self, inputs=replace(inputs, load_base_N=load))
 
     def with_measured_joints(self, upto: str) -> "Side":
         """Return the side with what the controller measured in place of the model: q_cmd, q_act or q_load.
@@ -70,6 +89,14 @@ class Side:
         apart = self.fitted.get("gear", q_load - reference)
         load = before + linear(here, own_s, np.nan_to_num(apart))
         return replace(self, inputs=replace(inputs, q_act_rad=actual, q_load_rad=load))
+
+
+def _smooth(values: Floats, rows: int) -> Floats:
+    """Return the mean of ``rows`` neighbours of each row of (n, c)."""
+    kernel = np.ones(max(rows, 1))
+    count = np.convolve(np.ones(len(values)), kernel, mode="same")
+    found: Floats = np.stack([np.convolve(v, kernel, mode="same") / count for v in values.T], axis=1)
+    return found
 
 
 def usable_rows(table: Measured, stamps: Floats, inputs: Inputs) -> tuple[Ints, Ints]:

@@ -13,8 +13,12 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.errors import Gcode2KrlError, Issue
-from gcode2krl.gap.links import parts_of
+from gcode2krl.gap.clocks import fitted_offset
+from gcode2krl.gap.links import MODEL_RAD, parts_of
+from gcode2krl.gap.noise import white
+from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
+from gcode2krl.gap.refit import Target, refit
 from gcode2krl.gap.side import Side
 from gcode2krl.runs import check_against
 from gcode2krl.runs.matching import rotation_between
@@ -27,6 +31,12 @@ _LARGE_MM = 20.0
 _EXPLAINS = 0.9
 _SPEED = 5.0
 """Per cent by which the override must differ."""
+_FORCE_UNITS = {
+    1e-3: "kilonewtons", 0.1019716: "kilograms-force", 0.2248089: "pounds-force", 1e3: "millinewtons",
+    10.0: "decinewtons",
+}  # fmt: skip
+_NEAR_UNIT = 0.15
+_CLOCK_S = 2e-3
 _FATAL = ("run-unit", "run-axes", "run-program")
 
 
@@ -51,7 +61,7 @@ def slips_of(sides: Sequence[Side], library: Mapping[str, Effect]) -> tuple[list
     found = [*_override(sides, library), *_other_frame(sides, library)]
     if found:
         return found[:1], issues
-    found = _tracker_frame(sides, library)
+    found = _tracker_frame(sides, library) or _force_unit(sides, library)
     if found:
         return found, issues
     for issue in issues:
@@ -168,9 +178,22 @@ def _other_frame(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[S
     if not tried:
         return []
     best, rms = _best(parts, tried)
+    if best.effect.name == "base_number":
+        best = _refined(parts, best)
+        rms = _rms([part.measured - part.sample([best]) for part in parts])
     name = best.target if best.effect.name == "tool_number" else "another one"
     what = "tool" if best.effect.name == "tool_number" else "base"
     return _slip_if_explained(parts, best, rms, f"the commanded joints are those of {what} {name}")
+
+
+def _refined(parts: Sequence[Part], best: Applied) -> Applied:
+    """Return the frame that fits the commanded joints of all runs, whose clocks may be off."""
+    nuisance = [
+        [Nuisance("clock", False, -np.ascontiguousarray(part.rate.T)[:, :, None] * _CLOCK_S)]
+        for part in parts
+    ]
+    target = Target(parts, nuisance, [white(MODEL_RAD)] * parts[0].shape[1])
+    return refit(target, (best,), steps=3).applied[0]
 
 
 def _base_number(side: Side, effect: Effect) -> Applied:
@@ -184,7 +207,9 @@ def _base_number(side: Side, effect: Effect) -> Applied:
         return Applied(effect, None, values)
     tool = int(np.bincount(np.maximum(side.inputs.tool, 0)).argmax())
     tips, turned = robot.forward(table.q_cmd_rad, side.inputs.cell, tool)
-    stamps = side.stamps(table)
+    parts = parts_of("path", [side])
+    late_s, deviation = fitted_offset(parts[0]) if parts else (0.0, np.inf)
+    stamps = side.stamps(table) - (late_s if np.isfinite(deviation) else 0.0)
     wanted = cubic(stamps, side.inputs.time_s, side.inputs.position_mm)
     row = len(tips) // 2
     near = int(np.argmin(np.abs(side.inputs.time_s - stamps[row])))
@@ -216,6 +241,22 @@ def _tracker_frame(sides: Sequence[Side], library: Mapping[str, Effect]) -> list
     one = Applied(effect, None, dict(zip(names, numbers, strict=True)))
     rms = _rms([part.measured - part.sample([one]) for part in parts])
     words = f"the tracker is in another frame: $BASE shifted by {np.linalg.norm(shift):.0f} mm and turned"
+    return _slip_if_explained(parts, one, rms, words)
+
+
+def _force_unit(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the unit of the force table, if it is none of newtons."""
+    parts = parts_of("force", sides)
+    if "unit" not in library or not parts or not any(part.nominal.any() for part in parts):
+        return []
+    power = sum(float(np.sum(part.nominal**2)) for part in parts)
+    factor = sum(float(np.sum(part.nominal * part.measured)) for part in parts) / power
+    near = min(_FORCE_UNITS, key=lambda unit: abs(np.log(max(factor, 1e-12) / unit)))
+    if abs(np.log(max(factor, 1e-12) / near)) > _NEAR_UNIT:
+        return []
+    one = Applied(library["unit"], "force", {"factor": near})
+    rms = _rms([part.measured - part.sample([one]) for part in parts])
+    words = f"force.csv is {near:g} times the predicted force: {_FORCE_UNITS[near]} in place of newtons"
     return _slip_if_explained(parts, one, rms, words)
 
 

@@ -88,6 +88,8 @@ def _moved(inputs: Inputs, frames: dict[int, Floats]) -> tuple[Floats, Floats]:
 def _with_joints(inputs: Inputs, position_mm: Floats, rotation: Floats) -> Inputs:
     """Return the inputs with the joints (m, 6) that bring the tool there, of the branch nearest to theirs.
 
+    Where forces are known the material is removed again along the moved path.
+
     Raises an input error where a pose is out of reach.
     """
     q = np.empty_like(inputs.q_cmd_rad)
@@ -101,7 +103,11 @@ def _with_joints(inputs: Inputs, position_mm: Floats, rotation: Floats) -> Input
         q[rows] = found[np.arange(len(found)), nearest]
     if np.isnan(q).any():
         raise input_error("effect-impossible", "with this frame the path is out of the robot's reach")
-    return replace(inputs, q_cmd_rad=q)
+    moved = replace(inputs, q_cmd_rad=q)
+    if "cut" not in inputs.offers:
+        return moved
+    force_N, moment_Nmm = inputs.recut(shift_mm=position_mm - inputs.position_mm)
+    return replace(moved, force_base_N=force_N, moment_base_Nmm=moment_Nmm)
 
 
 EFFECT = (ToolNumber(), BaseNumber())

@@ -11,8 +11,8 @@ from gcode2krl.effects.signals import Signals
 class SwappedTool(Effect):
     """The cutter is larger in diameter, or longer, than the stated one by these amounts.
 
-    A longer one has its tip further from the holder; where forces are known the material is removed again for
-    the diameter (the depth stays the nominal one).
+    A longer one has its tip further from the holder and cuts deeper; where forces are known the material is
+    removed again.
     """
 
     name = "swapped_tool"
@@ -32,9 +32,11 @@ class SwappedTool(Effect):
 
     def cut(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load of that cutter."""
-        if applied["diameter_mm"] == 0.0 or "cut" not in inputs.offers:
+        larger_mm, longer_mm = applied["diameter_mm"], applied["length_mm"]
+        if (larger_mm == 0.0 and longer_mm == 0.0) or "cut" not in inputs.offers:
             return load
-        force_N, moment_Nmm = inputs.recut(with_larger_tools(inputs.cell, applied["diameter_mm"]))
+        shift_mm = -longer_mm * inputs.tool_rotation[:, :, 2] if longer_mm else None
+        force_N, moment_Nmm = inputs.recut(with_larger_tools(inputs.cell, larger_mm), shift_mm)
         return load[0] + force_N - inputs.force_base_N, load[1] + moment_Nmm - inputs.moment_base_Nmm
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
