@@ -67,6 +67,28 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     return signals
 
 
+def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
+    """Return what `simulate` does as far as commanded joints and clocks go; the rest is nominal or zero."""
+    for one in applied:
+        inputs = one.effect.replan(inputs, one)
+    q_cmd, nothing = inputs.q_cmd_rad, np.zeros_like(inputs.position_mm)
+    signals = Signals(
+        inputs=inputs,
+        q_cmd_rad=q_cmd,
+        q_act_rad=q_cmd,
+        q_load_rad=q_cmd,
+        q_true_rad=q_cmd,
+        tcp_base_mm=inputs.position_mm,
+        force_base_N=nothing,
+        moment_base_Nmm=nothing,
+        force_meas_base_N=nothing,
+        moment_meas_base_Nmm=nothing,
+    )
+    for one in applied:
+        signals = one.effect.instruments(signals, one)
+    return signals
+
+
 def _pose(
     inputs: Inputs, applied: Sequence[Applied], q_true: Floats, load: Load, rotation: bool
 ) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from gcode2krl.gap.retime import refined, retimed
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
 from gcode2krl.gap.slips import Slip, clock_slips, slips_of
+from gcode2krl.gap.stops import unplanned_stops
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run, check_program
 
@@ -133,6 +134,8 @@ def _diagnosed(
     if any(slip.final for slip in slips):
         return answer(state.sides, [], slips, issues, state.examined, state.notes)
     _apply_slips(state, slips)
+    if not slips:
+        slips, state.sides = unplanned_stops(state.sides, known)
     _set_controller_clocks(state)
     state.examined = frozenset(_examined(state))
     for link in EXAMINED:

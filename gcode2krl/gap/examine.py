@@ -32,6 +32,8 @@ MOST_EFFECTS = 4
 _SHORTLIST = 5
 _MOST_TRIED = 12
 _GROUPS = 4
+_HOPELESS = 3.0
+"""An effect that plans anew and leaves so many times more than another one is no match for it."""
 _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
 """Rivals within this of the best linear gain are refitted too: signatures hold for small effects only."""
 PRUNE = 0.05
@@ -209,11 +211,13 @@ def _accept(
     while ranked:
         short = _shortlist(found, ranked, rows)
         tried: list[tuple[float, Score, Fitted]] = []
+        best = np.inf
         for score in short:
             block = found.blocks[score.column.block]
             start = block.applied(score.coefficients, found.parts[0])
             if replans(block.effect):
-                fitted = _replanned(found, block, start)
+                fitted = _replanned(found, block, start, _HOPELESS * best)
+                best = min(best, fitted.chi2)
             else:
                 alone = len(start.effect.parameters) == 1
                 fitted = refit(found.target, (*found.applied, start), scan=alone)
@@ -299,11 +303,14 @@ def _shortlist(found: Examination, ranked: list[Score], rows: int) -> list[Score
 
 def replans(effect: Effect) -> bool:
     """Tell whether an effect plans the motion anew: its linear signature then tells little of its size."""
-    return type(effect).replan is not Effect.replan
+    return type(effect).replan is not Effect.replan and not effect.is_linear
 
 
-def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
-    """Return the best refit from the numbers that meet the times at which the runs are at each place."""
+def _replanned(found: Examination, block: Block, linear: Applied, hopeless: float) -> Fitted:
+    """Return the best refit from the numbers that meet the times at which the runs are at each place.
+
+    Where these leave more than ``hopeless`` as chi2 no better ones are searched for.
+    """
     known = found.question.starts.get(block.key)
     if known is not None:
         return refit(found.target, (*found.applied, searched(found.target, found.applied, known, 0.03)))
@@ -323,8 +330,12 @@ def _replanned(found: Examination, block: Block, linear: Applied) -> Fitted:
     free = free_of(starts[-1], found.parts[0])
     ranked = sorted(starts, key=lambda start: times.size((*found.applied, start)))
     placed = [times.fitted(found.applied, free, start) for start in ranked[:2]]
+    rough = [refit(found.target, (*found.applied, start), steps=2) for start in placed]
+    best = min(rough, key=lambda each: each.chi2)
+    if best.chi2 > hopeless:
+        return best
     tried = [searched(found.target, found.applied, start) for start in placed]
-    fits = [refit(found.target, (*found.applied, each)) for each in tried]
+    fits = [best, *(refit(found.target, (*found.applied, each)) for each in tried)]
     return min(fits, key=lambda each: each.chi2)
 
 

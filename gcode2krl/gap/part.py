@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.effects import Applied, Inputs, Signals, simulate
+from gcode2krl.effects import Applied, Inputs, Signals, commanded, simulate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,7 +95,7 @@ class Part:
 
     @cached_property
     def _plain(self) -> Signals:
-        return simulate(self.inputs, self.base)
+        return self._simulated(self.base)
 
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
@@ -114,7 +114,7 @@ class Part:
         values = tuple((one.effect.name, one.target, *one.values.items()) for one in applied)
         key = (id(self.inputs.plan), id(self.inputs.time_s), values)
         if key not in _PATHS_KNOWN:
-            _PATHS_KNOWN[key] = (self.inputs, simulate(self.inputs, applied))
+            _PATHS_KNOWN[key] = (self.inputs, commanded(self.inputs, applied))
             if len(_PATHS_KNOWN) > _MOST_KNOWN:
                 _PATHS_KNOWN.popitem(last=False)
         return _PATHS_KNOWN[key][1]

@@ -27,7 +27,7 @@ class PlaceTimes:
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self.parts = list(parts)
-        self.measured = [_gone(part.time_s, part.measured, _LEAST_STEP[part.link]) for part in parts]
+        self.measured = [gone(part.time_s, part.measured, _LEAST_STEP[part.link]) for part in parts]
 
     def late(self, applied: Sequence[Applied]) -> Floats:
         """Return how late (runs · places,) the runs are beside a plan with these effects, in s.
@@ -38,7 +38,7 @@ class PlaceTimes:
         for part, (own_s, own_way) in zip(self.parts, self.measured, strict=True):
             signals = part.signals(applied)
             values = signals.q_cmd_rad if part.link == "path" else signals.tcp_base_mm
-            time_s, way = _gone(signals.time_s, values[:, list(part.columns)], 0.0)
+            time_s, way = gone(signals.time_s, values[:, list(part.columns)], 0.0)
             at = own_way[-1] * (np.arange(_PLACES) + 0.5) / _PLACES
             behind = np.interp(at, own_way, own_s) - np.interp(at, way, time_s)
             late.append(behind - behind.mean())
@@ -80,7 +80,7 @@ class PlaceTimes:
         return free.applied(x)
 
 
-def _gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:
+def gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:
     """Return times and how far the signal has gone by them; ways below ``least`` count once they add up."""
     kept = _anchors(values, least) if least > 0.0 else slice(None)
     time_s, values = time_s[kept], values[kept]

@@ -18,31 +18,31 @@ Bools = NDArray[np.bool_]
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")
 _NEAR_S = 0.3
 """What happens so soon after a reversal, an entry or an exit belongs to it."""
-_JOIN_S, _LEAST_S = 0.25, 0.05
-_SMOOTH_S = 0.15
-_MOST = 20
-_HALF = 0.5
+_JOIN_S = 0.2
+_SMOOTH_S = 0.1
 _MOVES_RAD = 1e-4
 
 
 def place(parts: Sequence[Part], noise: Sequence[Noise], applied: Sequence[Applied]) -> dict[str, Any]:
     """Return intervals, direction, phases, joints and band of the gap of one link.
 
+    Intervals are where the gap, as the rms over 0.1 s, is larger than its rms over all runs.
     Of a gap that effects explain, the place is that of the effects; else that of the smoothed residual.
     """
     shapes = [structure(part, applied) for part in parts]
     sigma = float(np.sqrt(sum(each.sigma**2 for each in noise)))
+    sizes = [_size(part, shape) for part, shape in zip(parts, shapes, strict=True)]
     level = float(np.sqrt(np.mean(np.concatenate([np.sum(s**2, axis=1) for s in shapes]))))
     intervals = []
-    for part, shape in zip(parts, shapes, strict=True):
-        least = max(_HALF * level, 0.0 if applied else sigma)
+    for part, size in zip(parts, sizes, strict=True):
+        least = max(level, 0.0 if applied else sigma)
         intervals += _intervals(
-            part, shape, least, [JOINTS.index(a.target) for a in applied if a.target in JOINTS]
+            part, size, least, [JOINTS.index(a.target) for a in applied if a.target in JOINTS]
         )
     intervals.sort(key=lambda each: -each["rms"])
     vector = parts[0].signal in ("tcp", "force") and not parts[0].in_sensor_frame
     return {
-        "intervals": intervals[:_MOST],
+        "intervals": intervals,
         "direction_base": _direction(shapes) if vector else None,
         "phases": _phases(parts, shapes),
         "joints": _joints(parts, shapes, applied),
@@ -51,17 +51,23 @@ def place(parts: Sequence[Part], noise: Sequence[Noise], applied: Sequence[Appli
 
 
 def structure(part: Part, applied: Sequence[Applied]) -> Floats:
-    """Return (n, k) what the effects do to the signal; without any, the residual smoothed over 0.15 s."""
+    """Return (n, k) what the effects do to the signal; without any, the residual smoothed over 0.1 s."""
     if applied:
         return part.sample(applied) - part.nominal
-    step = float(np.median(np.diff(part.time_s)))
-    width = max(1, round(_SMOOTH_S / step))
-    kernel = np.ones(width) / width
-    residual = part.residual
-    weight = np.convolve(np.ones(len(residual)), kernel, mode="same")
-    smooth = np.stack([np.convolve(column, kernel, mode="same") for column in residual.T], axis=1)
-    found: Floats = smooth / weight[:, None]
-    return found
+    return np.stack([_smooth(part, column) for column in part.residual.T], axis=1)
+
+
+def _size(part: Part, shape: Floats) -> Floats:
+    """Return the length (n,) of vectors (n, k), as the rms over 0.1 s."""
+    size: Floats = np.sqrt(np.maximum(_smooth(part, np.sum(shape**2, axis=1)), 0.0))
+    return size
+
+
+def _smooth(part: Part, values: Floats) -> Floats:
+    """Return the mean of (n,) over 0.1 s."""
+    kernel = np.ones(max(1, round(_SMOOTH_S / float(np.median(np.diff(part.time_s))))))
+    found: Floats = np.convolve(values, kernel, mode="same")
+    return found / np.convolve(np.ones(len(values)), kernel, mode="same")
 
 
 def phase_of(inputs: Inputs) -> tuple[NDArray[np.int64], Ints]:
@@ -89,8 +95,7 @@ def phase_of(inputs: Inputs) -> tuple[NDArray[np.int64], Ints]:
     return phase, joint
 
 
-def _intervals(part: Part, shape: Floats, level: float, suspects: Sequence[int]) -> list[dict[str, Any]]:
-    size = np.sqrt(np.sum(shape**2, axis=1))
+def _intervals(part: Part, size: Floats, level: float, suspects: Sequence[int]) -> list[dict[str, Any]]:
     inside = np.flatnonzero(size > level)
     if len(inside) == 0:
         return []
@@ -99,8 +104,6 @@ def _intervals(part: Part, shape: Floats, level: float, suspects: Sequence[int])
     found = []
     for rows in np.split(inside, breaks):
         start, end = float(part.time_s[rows[0]]), float(part.time_s[rows[-1]])
-        if end - start < _LEAST_S:
-            continue
         own = nearest_rows(part.inputs.time_s, part.time_s[rows])
         lines = part.inputs.source_line[own]
         lines = lines[lines > 0]

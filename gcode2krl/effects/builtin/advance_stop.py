@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.effects.effect import Applied, Effect, Parameter
 from gcode2krl.effects.inputs import Inputs
@@ -40,9 +41,17 @@ class AdvanceStop(Effect):
         if len(corners) == 0:
             return inputs
         chosen = corners[((np.arange(count) + 0.5) / count * len(corners)).astype(int)]
-        cdis_mm, wait_s = np.array(targets.cdis_mm), np.array(targets.wait_s)
-        cdis_mm[chosen], wait_s[chosen] = 0.0, wait_s[chosen] + applied["hold_s"]
-        return inputs.replanned(replace(targets, cdis_mm=cdis_mm, wait_s=wait_s), inputs.cell)
+        return with_stops(inputs, chosen, applied["hold_s"])
+
+
+def with_stops(inputs: Inputs, rows: NDArray[np.int64], hold_s: float) -> Inputs:
+    """Return the inputs of the motion that stops exactly at some targets and stands there so long."""
+    targets = inputs.targets
+    if targets is None or len(rows) == 0:
+        return inputs
+    cdis_mm, wait_s = np.array(targets.cdis_mm), np.array(targets.wait_s)
+    cdis_mm[rows], wait_s[rows] = 0.0, wait_s[rows] + hold_s
+    return inputs.replanned(replace(targets, cdis_mm=cdis_mm, wait_s=wait_s), inputs.cell)
 
 
 EFFECT = AdvanceStop()
