@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.gap.evidence import stretches_of
 from gcode2krl.gap.examine import Examination
-from gcode2krl.gap.refit import residual_jacobian
+from gcode2krl.gap.refit import unbounded_jacobian
 
 Floats = NDArray[np.float64]
 _DRAWS = 400
@@ -50,9 +50,9 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
 
 
 def _covariance(found: Examination) -> Floats:
-    residual, jacobian = residual_jacobian(found.target, found.fitted)
+    residual = found.target.residual(found.applied)
     scale = np.concatenate([free.scale for free in found.fitted.free])
-    scaled = jacobian * scale
+    scaled = unbounded_jacobian(found.target, found.fitted) * scale
     inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True)
     clusters = np.concatenate([
         np.tile(1000 * number + stretches_of(part), part.shape[1]) for number, part in enumerate(found.parts)

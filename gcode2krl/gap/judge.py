@@ -19,6 +19,8 @@ from gcode2krl.gap.signatures import Signatures
 NAMED = 0.5
 MOST_TOGETHER = 2
 """More effects in one link than this at once imitate something that the library does not have."""
+LEAST_BROUGHT = 0.4
+"""A cause that takes less than this of the gap on held-out data, shared by all causes, is not named."""
 CROWDED = 0.4
 """Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
 
@@ -159,7 +161,7 @@ def _judgement(
         rivals = rivals_of(found, number)
         own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
         brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        if brings < PRUNE:
+        if brings < max(PRUNE, LEAST_BROUGHT / len(positions)):
             own *= CROWDED
         causes.append(
             Cause(
@@ -179,5 +181,5 @@ def _judgement(
     elif named:
         verdict = "partly_explained"
     else:
-        verdict = "unexplained"
+        verdict = "unexplained" if sizes[0].significant else "no_gap"
     return Judgement(link, tuple(parts), verdict, tuple(causes), last, held_out, found, usual)

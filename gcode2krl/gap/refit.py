@@ -217,6 +217,15 @@ class Target:
             at += len(columns)
         return boxed(self.gram, sums)
 
+    def projected(self, y: Floats) -> Floats:
+        """Return vectors (k·n, c) with unbounded nuisance taken out, its coefficients behind them."""
+        at, sums = 0, np.zeros((len(self.gram), y.shape[1]))
+        for columns in self.columns:
+            sums += columns.T @ y[at : at + len(columns)]
+            at += len(columns)
+        b = np.linalg.solve(self.gram, sums)
+        return np.concatenate([y - np.concatenate([columns @ b for columns in self.columns]), b])
+
     def residual(self, applied: Sequence[Applied]) -> Floats:
         """Return the marginal residual vector with some effects."""
         return self.without_nuisance(
@@ -378,6 +387,28 @@ def residual_jacobian(target: Target, fitted: Fitted) -> tuple[Floats, Floats]:
     )
     residual = target.residual(fitted.applied)
     return residual, _jacobian(target, effects, fitted.x, residual, low, high, scale)
+
+
+def unbounded_jacobian(target: Target, fitted: Fitted) -> Floats:
+    """Return the derivative (r, p) of the marginal residual, as if no nuisance were at its bounds.
+
+    Nuisance that is held there has an uncertainty of its own all the same.
+    """
+    base = target.whiten([part.sample(fitted.applied) for part in target.parts])
+    columns, number = [], 0
+    for free in fitted.free:
+        x = fitted.x[number : number + len(free.names)]
+        number += len(free.names)
+        for i in range(len(x)):
+            step = 0.02 * free.scale[i] * (-1.0 if x[i] + 0.02 * free.scale[i] > free.high[i] else 1.0)
+            moved = x.copy()
+            moved[i] += step
+            own = [
+                free.applied(moved) if f is free else a
+                for f, a in zip(fitted.free, fitted.applied, strict=True)
+            ]
+            columns.append((base - target.whiten([part.sample(own) for part in target.parts])) / step)
+    return target.projected(np.stack(columns, axis=1)) if columns else np.zeros((len(base), 0))
 
 
 def _jacobian(

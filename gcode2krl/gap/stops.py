@@ -26,7 +26,9 @@ _LEAST_S = 0.02
 """A stop from a slow feed costs some hundredths of a second; time laws agree to 2 ms (design/gap.md)."""
 _MOST_SHARE = 0.5
 """Where more of the corners are late, it is the time law."""
-_STEP_RAD = 1e-4
+_STEP = {"path": 1e-4, "mechanics": 0.5}
+"""rad, mm: shorter ways are noise of the instrument, not motion."""
+_LEAST_OFF = {"path": 2.0 * MODEL_RAD, "mechanics": 0.5}
 _EXPLAINS = 0.95
 _REFINED, _SETTLED_S = 4, 1e-3
 _NEAR_MM = 0.3
@@ -35,15 +37,17 @@ _NEAR_MM = 0.3
 def unplanned_stops(sides: Sequence[Side], library: Mapping[str, Effect]) -> tuple[list[Slip], list[Side]]:
     """Return the stops as one finding, and the sides with them in the plan; as they are without any."""
     effect, unchanged = library.get("advance_stop"), list(sides)
-    parts = parts_of("path", sides)
+    parts = _parts(sides)
     plannable = all("plan" in side.inputs.offers for side in sides)
-    if effect is None or not plannable or len(parts) < len(sides) or _rms(parts) < 2.0 * MODEL_RAD:
+    if effect is None or not plannable or len(parts) < len(sides):
+        return [], unchanged
+    if _rms(parts) < _LEAST_OFF[parts[0].link]:
         return [], unchanged
     stops = [_stops_of(side) for side in sides]
     if not any(len(rows) for rows in stops):
         return [], unchanged
     hold_s, stopped = _held(sides, stops)
-    before, after = _rms(parts), _rms(parts_of("path", [_on_time(side) for side in stopped]))
+    before, after = _rms(parts), _rms(_parts([_on_time(side) for side in stopped]))
     if after**2 > (1.0 - _EXPLAINS) * before**2:
         return [], unchanged
     count = max(len(rows) for rows in stops)
@@ -52,7 +56,7 @@ def unplanned_stops(sides: Sequence[Side], library: Mapping[str, Effect]) -> tup
     lines = sorted({int(line) for side, rows in places for line in _lines(side, rows)})
     words = f"the robot stopped exactly at {count} corners that are blended in the plan, lines {lines}"
     factor, unit = parts[0].factor, parts[0].unit
-    return [Slip(one, "path", before * factor, after * factor, unit, words, False)], stopped
+    return [Slip(one, parts[0].link, before * factor, after * factor, unit, words, False)], stopped
 
 
 def _held(sides: Sequence[Side], stops: Sequence[Ints]) -> tuple[float, list[Side]]:
@@ -88,12 +92,13 @@ def _corners(side: Side) -> Ints:
 
 def _lateness(side: Side, corners: Ints) -> Floats:
     """Return by how much later (s) the run is behind each corner than before it; 0 where nothing shows it."""
-    parts, targets = parts_of("path", [side]), side.inputs.targets
-    if not parts or targets is None or parts[0].shape[1] < len(side.inputs.q_cmd_rad.T) or not len(corners):
+    parts, targets = _parts([side]), side.inputs.targets
+    if not parts or targets is None or not len(corners):
         return np.zeros(len(corners))
     part = parts[0]
-    own_s, own_way = gone(part.time_s, part.measured, _STEP_RAD)
-    time_s, way = gone(side.inputs.time_s, side.inputs.q_cmd_rad, 0.0)
+    own_s, own_way = gone(part.time_s, part.measured, _STEP[part.link])
+    planned = side.inputs.q_cmd_rad if part.link == "path" else side.inputs.position_mm
+    time_s, way = gone(side.inputs.time_s, planned[:, list(part.columns)], 0.0)
     rows = _nearest_in_order(side.inputs.position_mm, targets.position_mm[corners])
     edges = way[np.concatenate([[0], rows, [len(way) - 1]])]
     late = [
@@ -128,13 +133,18 @@ def _stopped(side: Side, rows: Ints, hold_s: float) -> Side:
 
 
 def _on_time(side: Side) -> Side:
-    """Return the side with the controller's clock as it fits best."""
-    parts = parts_of("path", [side])
+    """Return the side with the clock of its table as it fits best."""
+    parts = _parts([side])
     offset, deviation = fitted_offset(parts[0]) if parts else (0.0, np.inf)
     if not np.isfinite(deviation):
         return side
-    clock_s = {**side.clock_s, "controller": side.clock_s.get("controller", 0.0) + offset}
-    return replace(side, clock_s=clock_s)
+    table = "controller" if parts[0].link == "path" else "tracker"
+    return replace(side, clock_s={**side.clock_s, table: side.clock_s.get(table, 0.0) + offset})
+
+
+def _parts(sides: Sequence[Side]) -> list[Part]:
+    """Return what shows how far the runs have come: the commanded joints, without them the tips."""
+    return parts_of("path", sides) or parts_of("mechanics", sides)
 
 
 def _lines(side: Side, rows: Ints) -> Ints:
