@@ -17,7 +17,7 @@ ALIKE = 4.6
 UNKNOWN_SHARE = 0.15
 """A rest above this share of the structured gap is more than the form of an effect is off by (gap.md)."""
 _UNKNOWN_WIDTH = 0.03
-_RIVALS = 4
+_RIVALS = 6
 _CLOSE_SHARE, _CLOSE_GAIN = 0.25, 15.0
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-MOST = 2.0
-"""A uniform draw within bounds stays within sqrt(3) of its standard deviation; some room for the rest."""
+MOST = 3.0**0.5
+"""A uniform draw within bounds stays within sqrt(3) of its standard deviation."""
 _ROUNDS = 20
 
 

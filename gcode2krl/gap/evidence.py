@@ -111,6 +111,18 @@ def marginal(gram: Floats, keep: int) -> Floats:
     return result
 
 
+def _bounded(total: Floats, kept: int, free: Ints) -> tuple[Floats, float]:
+    """Return nuisance within its bounds (m,) beside free signatures, and chi2 with both."""
+    here = np.r_[0, np.arange(kept, len(total))]
+    gram = total[np.ix_(here, here)]
+    if len(free):
+        cross = total[np.ix_(free, here)]
+        gram = gram - cross.T @ solve(total[np.ix_(free, free)], cross)
+    cost = gram[1:, 1:] + np.eye(len(here) - 1)
+    b = boxed(cost, gram[1:, 0])
+    return b, float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)
+
+
 def _less(total: Floats, held: Floats) -> Floats:
     """Return the Gram matrix with held columns, at their values, taken off the data and out of the rest."""
     found = total.copy()
@@ -138,7 +150,7 @@ class Ledger:
             for each, members in zip(self.rows, self._members, strict=True)
         ]
         self._grams: list[dict[int, tuple[Floats, int]]] = []
-        self._held = np.zeros(0)
+        self._held, self._chi2, self._total = np.zeros(0), 0.0, np.zeros((0, 0))
         self.given = 0
 
     def set_data(self, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> None:
@@ -171,22 +183,17 @@ class Ledger:
             if mine:
                 total[np.ix_(into, into)] += np.sum([gram for gram, _ in mine], axis=0)[np.ix_(at, at)]
                 count += sum(rows for _, rows in mine)
-        self._held = self._at_bounds(total, kept)
-        total = _less(total, self._held)
-        return Evidence(marginal(total, kept), count)
+        b, self._chi2 = _bounded(total, kept, np.arange(1, 1 + self.given))
+        self._held = np.zeros(len(total))
+        self._held[kept:] = np.where(np.abs(b) >= MOST, b, 0.0)
+        self._total = total
+        return Evidence(marginal(_less(total, self._held), kept), count)
 
-    def _at_bounds(self, total: Floats, kept: int) -> Floats:
-        """Return what is held of each column: -bound or bound of nuisance at its bounds, else 0."""
-        here = np.r_[0, np.arange(kept, len(total))]
-        gram = total[np.ix_(here, here)]
-        if self.given:
-            tangents = np.arange(1, 1 + self.given)
-            cross = total[np.ix_(tangents, here)]
-            gram = gram - cross.T @ solve(total[np.ix_(tangents, tangents)], cross)
-        b = boxed(gram[1:, 1:] + np.eye(len(here) - 1), gram[1:, 0])
-        held = np.zeros(len(total))
-        held[kept:] = np.where(np.abs(b) >= MOST, b, 0.0)
-        return held
+    def bounded_gain(self, columns: Ints) -> float:
+        """Return by how much chi2 of the last evidence falls with some signatures, nuisance fitted anew."""
+        kept = 1 + self.given + self.rows[0].signatures
+        free = np.r_[np.arange(1, 1 + self.given), np.asarray(columns, dtype=int) + 1]
+        return self._chi2 - _bounded(self._total, kept, free)[1]
 
     def inflation(self, columns: Ints) -> float:
         """Return by how much the gain of signatures varies more than white noise lets it, at least 1.

@@ -1,7 +1,7 @@
 """One link: noise, candidates, forward selection with refits, and what is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,7 @@ from gcode2krl.gap.signatures import Block, Signatures
 Floats = NDArray[np.float64]
 MOST_EFFECTS = 4
 _SHORTLIST = 5
-_MOST_TRIED = 12
+_MOST_LOOKED_AT, _MOST_TRIED = 40, 12
 _GROUPS = 4
 _HOPELESS = 3.0
 """An effect that plans anew and leaves so many times more than another one is no match for it."""
@@ -186,6 +186,11 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
         and not _left_out(found, found.blocks[score.column.block])
         and score.surprise > found.level
         and score.gain > LEAST_RATIO**2 * found.times
+    ]
+    plain.sort(key=lambda score: -_worth(score, evidence.rows))
+    plain = [
+        replace(score, gain=max(score.gain, found.ledger.bounded_gain(score.column.index)))
+        for score in plain[:_MOST_LOOKED_AT]
     ]
     plain.sort(key=lambda score: -_worth(score, evidence.rows))
     sure = []

@@ -20,7 +20,7 @@ NAMED = 0.5
 MOST_TOGETHER = 2
 """More effects in one link than this at once imitate something that the library does not have."""
 LEAST_BROUGHT = 0.4
-"""A cause that takes less than this of the gap on held-out data, shared by all causes, is not named."""
+"""A cause that takes less than this of what those above it leave on held-out data is not named."""
 CROWDED = 0.4
 """Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
 
@@ -161,7 +161,7 @@ def _judgement(
         rivals = rivals_of(found, number)
         own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
         brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        if brings < max(PRUNE, LEAST_BROUGHT / len(positions)):
+        if brings < max(PRUNE, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
             own *= CROWDED
         causes.append(
             Cause(

@@ -12,9 +12,9 @@ from gcode2krl.gap.evidence import Evidence, Ledger
 Floats = NDArray[np.float64]
 FALSE_ALARMS = 1e-3
 """Of each link; five links together stay below the one in a hundred runs of design/gap.md."""
-LEAST_RATIO = 0.1
-"""An effect whose trace, nuisance taken out, is below a tenth of the noise is not reported: models of sound
-machines differ by so much."""
+LEAST_RATIO = 0.08
+"""An effect whose trace, nuisance taken out, is below this share of the noise is not reported: models of
+sound machines differ by so much."""
 SEEN = 0.02
 """A block of whose energy less than this is left beside the nuisance is not observable (gap.md)."""
 
