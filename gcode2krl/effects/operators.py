@@ -21,7 +21,11 @@ def play(values: Floats, half_width: float) -> Floats:
 
 
 def lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
-    """Return tau·y' + y = x for (m,), from rest; exact for an input that is linear between samples."""
+    """Return tau·y' + y = x for (m,), from rest; exact for an input whose slope is linear between samples.
+
+    Slopes are central differences; with those of single intervals a lag of a tenth of the step would come out
+    half a step late.
+    """
     if tau_s <= 0.0:
         return values
     return _lag(np.ascontiguousarray(values), np.ascontiguousarray(time_s), tau_s)
@@ -59,13 +63,20 @@ def _play(values: Floats, half_width: float) -> Floats:
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
     out = np.empty_like(values)
-    behind = 0.0  # y - x
+    behind = slope = 0.0  # y - x, x'
+    last = len(values) - 1
     for i in range(len(values)):
-        if i > 0:
-            dt = time_s[i] - time_s[i - 1]
-            slope = (values[i] - values[i - 1]) / dt if dt > 0.0 else 0.0
-            forgotten = math.exp(-dt / tau_s)
-            behind = behind * forgotten - slope * tau_s * (1.0 - forgotten)
+        before, slope = slope, 0.0
+        a, b = max(i - 1, 0), min(i + 1, last)
+        if time_s[b] > time_s[a]:
+            slope = (values[b] - values[a]) / (time_s[b] - time_s[a])
+        if i == 0 and last > 1 and time_s[2] > time_s[1] > time_s[0]:  # as a parabola begins
+            slope = 2.0 * slope - (values[2] - values[0]) / (time_s[2] - time_s[0])
+        dt = time_s[i] - time_s[i - 1] if i > 0 else 0.0
+        if dt > 0.0:
+            kept = math.exp(-dt / tau_s)
+            gone = tau_s * (1.0 - kept)
+            behind = behind * kept - before * gone - (slope - before) * (tau_s - tau_s * gone / dt)
         out[i] = values[i] + behind
     return out
 

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from gcode2krl import robot
 from gcode2krl.compliance import deflection_of
@@ -30,10 +31,11 @@ def test_servo_lag(swinging, known):
     signals = run(swinging, known, "servo_lag:target=A3,tau_s=0.03")
     q, t = swinging.q_cmd_rad[:, 2], swinging.time_s
     fine = np.arange(0.0, t[-1], 1e-4)
-    x, y = np.interp(fine, t, q), np.empty(len(fine))
+    x, y = CubicSpline(t, q)(fine), np.empty(len(fine))
     y[0] = x[0]
-    for i in range(1, len(fine)):  # implicit Euler
-        y[i] = (y[i - 1] + 1e-4 / 0.03 * x[i]) / (1.0 + 1e-4 / 0.03)
+    for i in range(1, len(fine)):  # trapezoidal rule
+        half = 0.5e-4 / 0.03
+        y[i] = (y[i - 1] * (1.0 - half) + half * (x[i] + x[i - 1])) / (1.0 + half)
     np.testing.assert_allclose(signals.q_act_rad[:-1, 2], np.interp(t[:-1], fine, y), atol=3e-6)
     others = [0, 1, 3, 4, 5]
     np.testing.assert_array_equal(signals.q_act_rad[:, others], swinging.q_cmd_rad[:, others])
