@@ -7,13 +7,13 @@ import numpy as np
 from gcode2krl.effects import Applied
 from gcode2krl.gap.evidence import Ledger
 from gcode2krl.gap.examine import Examination, tangents_of
-from gcode2krl.gap.refit import Target, refit
+from gcode2krl.gap.refit import Target, inflation_of, refit
 from gcode2krl.gap.select import scores
 
 TEMPERATURE = 3.0
 """Differences of chi2 are divided by it: noise and effects are not exactly what they are modelled as."""
-ALIKE = 4.6
-"""Twice log 10: data that favour one of two effects by less than ten to one do not tell them apart."""
+ALIKE = 9.2
+"""Twice log 100: data that favour one of two effects by less than that do not tell them apart."""
 UNKNOWN_SHARE = 0.15
 """A rest above this share of the structured gap is more than the form of an effect is off by (gap.md)."""
 _UNKNOWN_WIDTH = 0.03
@@ -57,7 +57,7 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
     )
     gain = refit_gain(found.target, others, found)
     best: dict[tuple[str, str | None], Rival] = {}
-    spread = max(1.0, found.fitted.chi2 / max(evidence.rows, 1))
+    spread = inflation_of(found.target, found.fitted, number)
     for score in ranked:
         block = found.blocks[score.column.block]
         if block.key in best or len(best) >= _RIVALS:

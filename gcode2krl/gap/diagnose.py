@@ -227,6 +227,8 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
     for effect in state.known.values():
         if effect.kind == "slip" and (state.slips or effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ())):
             continue
+        if effect.name == "swapped_tool" and link == "mechanics" and "force" in state.examined:
+            continue  # the force has shown it, and each try removes the material again
         for target in effect.targets(cell):
             if link in effect.visible_links(state.examined, target) and _relevant(
                 effect, target, link, state

@@ -196,7 +196,8 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
     sure = []
     for score in plain[:_MOST_TRIED]:
         # a signature holds for small effects only: that of a large one is judged after its refit
-        small = score.gain < found.times and not replans(found.blocks[score.column.block].effect)
+        effect = found.blocks[score.column.block].effect
+        small = score.gain < found.times and effect.is_linear
         inflation = found.ledger.inflation(score.column.index) if small else 1.0
         if surprise(score.gain / inflation, score.column.width) > found.level:
             sure.append(score)
@@ -229,15 +230,8 @@ def _accept(
             tried.append((fitted.chi2 + fitted.occam, score, fitted))
         tried.sort(key=lambda each: each[0])
         for _, score, fitted in tried:
-            gain = found.fitted.chi2 - fitted.chi2
-            number = len(fitted.applied) - 1
-            certain = surprise(gain / inflation_of(found.target, fitted, number), score.column.width)
-            if (
-                fitted.bound[-1]
-                or certain < found.level
-                or gain < LEAST_RATIO**2 * found.times
-                or not (replans(score_effect(found, score)) or _holds(found, score))
-            ):
+            certain = _certain(found, score, fitted)
+            if certain is None:
                 rejected.add(found.blocks[score.column.block].key)
                 continue
             found.fitted = fitted
@@ -247,6 +241,18 @@ def _accept(
             return True
         ranked = [score for score in ranked if found.blocks[score.column.block].key not in rejected]
     return False
+
+
+def _certain(found: Examination, score: Score, fitted: Fitted) -> float | None:
+    """Return how surprising the last effect of a refit is without it; None where it is not to be accepted."""
+    gain = found.fitted.chi2 - fitted.chi2
+    if fitted.bound[-1] or gain < LEAST_RATIO**2 * found.times:
+        return None
+    inflation = inflation_of(found.target, fitted, len(fitted.applied) - 1)
+    certain = surprise(gain / inflation, score.column.width)
+    if certain < found.level or not (replans(score_effect(found, score)) or _holds(found, score)):
+        return None
+    return certain
 
 
 def within_mismatch(found: Examination, number: int) -> bool:

@@ -9,36 +9,53 @@ from numpy.typing import NDArray
 from gcode2krl.gap.evidence import STRETCH_S
 from gcode2krl.gap.part import Part
 
+Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 _GUARD_S = STRETCH_S
 _QUARTERS = 4
-_NEARLY_ALL = 0.75
+_NEARLY_ALL, _EVENLY = 0.75, 0.2
 _LEAST_KEPT, _LEAST_HELD = 30, 10
 
 
-def folds_of(parts: Sequence[Part], power: Sequence[float] = ()) -> list[tuple[list[Part], list[Part]]]:
+def folds_of(parts: Sequence[Part], power: Sequence[Floats] = ()) -> list[tuple[list[Part], list[Part]]]:
     """Return (to explain, held out) pairs: whole runs by turns; of a single run quarters with guard gaps.
 
-    ``power``: what a gap has in each part. Where one run has nearly all of it the others cannot tell of it,
-    and quarters of all runs are held out by turns.
+    ``power``: what a gap has in each row of each part. Where one run has nearly all of it the others cannot
+    tell of it, and what has a quarter of the power is held out by turns.
     """
-    alone = len(parts) == 1 or (len(power) > 0 and max(power) > _NEARLY_ALL * sum(power))
-    if not alone:
+    sums = [float(each.sum()) for each in power]
+    if len(parts) > 1 and not (sums and max(sums) > _NEARLY_ALL * sum(sums)):
         return [([part for part in parts if part is not held], [held]) for held in parts]
-    found = []
+    weights = list(power) if sum(sums) > 0.0 else [np.ones(len(part.time_s)) for part in parts]
+    # a little for every row, so that rows without power belong somewhere too
+    total = sum(float(each.sum()) for each in weights)
+    rows = sum(len(each) for each in weights)
+    gone, found = 0.0, []
+    quarters = []
+    for each in weights:
+        share = gone + np.cumsum(each / total + _EVENLY / rows) / (1.0 + _EVENLY)
+        gone = float(share[-1]) if len(share) else gone
+        quarters.append(np.minimum((_QUARTERS * share).astype(int), _QUARTERS - 1))
     for quarter in range(_QUARTERS):
         kept, held = [], []
-        for part in parts:
-            edges = np.linspace(part.time_s[0], part.time_s[-1] + 1e-9, _QUARTERS + 1)
-            first, last = edges[quarter], edges[quarter + 1]
-            near = (part.time_s >= first - _GUARD_S) & (part.time_s < last + _GUARD_S)
-            kept.append(with_rows(part, ~near))
-            held.append(with_rows(part, (part.time_s >= first) & (part.time_s < last)))
+        for part, own in zip(parts, quarters, strict=True):
+            mine = own == quarter
+            held.append(with_rows(part, mine))
+            kept.append(with_rows(part, ~_near(part.time_s, mine)))
         kept = [part for part in kept if len(part.time_s) >= _LEAST_KEPT]
         held = [part for part in held if len(part.time_s) >= _LEAST_HELD]
         if kept and held:
             found.append((kept, held))
     return found
+
+
+def _near(time_s: Floats, mine: Bools) -> Bools:
+    """Return the rows within the guard of the held ones, which are one stretch."""
+    if not mine.any():
+        return mine
+    first, last = time_s[mine][[0, -1]]
+    near: Bools = (time_s >= first - _GUARD_S) & (time_s <= last + _GUARD_S)
+    return near
 
 
 def with_rows(part: Part, chosen: Bools) -> Part:

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 from gcode2krl.gap.evidence import stretches_of
 from gcode2krl.gap.examine import Examination
 from gcode2krl.gap.refit import unbounded_jacobian
+from gcode2krl.gap.signatures import PHASE
 
 Floats = NDArray[np.float64]
 _DRAWS = 400
+_LAW = 0.03
+"""A path is met to the accuracy of the time law, not to that of noise: so much of a number is not known."""
 _LEAST_STRETCHES = 8
 
 
@@ -35,6 +38,7 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = found.fitted.x + generator.standard_normal((_DRAWS, len(found.fitted.x))) @ root.T
+    least = _LAW if found.link == "path" else 0.0
     result, at = [], 0
     for number, free in enumerate(found.fitted.free):
         width = len(free.names)
@@ -43,10 +47,19 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
         drawn = [free.applied(x).values for x in mine]
         own = found.applied[number].values
         result.append({
-            name: Interval(own[name], *np.quantile([d[name] for d in drawn], [0.05, 0.95]).tolist())
+            name: _interval(name, own[name], np.array([d[name] for d in drawn]), least * abs(own[name]))
             for name in own
         })  # fmt: skip
     return result
+
+
+def _interval(name: str, value: float, drawn: Floats, least: float) -> Interval:
+    """Return the 90 % interval of draws (d,), an angle's about its value, at least ± ``least``."""
+    away = drawn - value
+    if name == PHASE:
+        away = (away + np.pi) % (2.0 * np.pi) - np.pi
+    low, high = np.quantile(away, [0.05, 0.95]).tolist()
+    return Interval(value, value + min(low, -least), value + max(high, least))
 
 
 def _covariance(found: Examination) -> Floats:

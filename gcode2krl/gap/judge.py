@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied
 from gcode2krl.gap.align import with_set_clocks
@@ -16,6 +17,7 @@ from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.signatures import Signatures
 
+Floats = NDArray[np.float64]
 NAMED = 0.5
 MOST_TOGETHER = 2
 """More effects in one link than this at once imitate something that the library does not have."""
@@ -92,9 +94,9 @@ def _trials(
     ]
 
 
-def _power(parts: Sequence[Part], found: Examination) -> list[float]:
-    """Return the power of what the causes do in each part."""
-    return [float(np.sum((part.sample(found.causes) - part.nominal) ** 2)) for part in parts]
+def _power(parts: Sequence[Part], found: Examination) -> list[Floats]:
+    """Return the power (n,) of what the causes do in each row of each part."""
+    return [np.sum((part.sample(found.causes) - part.nominal) ** 2, axis=1) for part in parts]
 
 
 @dataclass(frozen=True, eq=False)

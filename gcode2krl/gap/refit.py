@@ -15,6 +15,7 @@ from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.signatures import PHASE
+from gcode2krl.units import RAD_PER_REV
 
 Floats = NDArray[np.float64]
 _FIXED = ("harmonic",)
@@ -24,7 +25,7 @@ _AT_BOUND = 1e-3
 PRIOR = 3.0
 _NUMBER = 0.5
 """Of two effects that are one to the data the one with fewer numbers is named."""
-_SEARCH_ROUNDS, _FINEST = 60, 0.003
+_SEARCH_ROUNDS, _FINEST = 30, 0.005
 _MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
 
@@ -58,7 +59,7 @@ class Free:
         if PHASE in self.names:
             size = self._size()
             a, b = values[size], values[PHASE]
-            values[size], values[PHASE] = math.hypot(a, b), math.atan2(b, a)
+            values[size], values[PHASE] = math.hypot(a, b), math.atan2(b, a) % RAD_PER_REV
         return Applied(self.effect, self.target, values)
 
     def _size(self) -> str:
@@ -250,7 +251,11 @@ def refit(target: Target, start: Sequence[Applied], steps: int = _MOST_STEPS, sc
     x = np.concatenate([free.start(each) for free, each in zip(frees, start, strict=True)]) if frees else low
     if scan and frees:
         x = _scanned(target, effects, x, int(edges[-2]), low, high)
-    r = target.residual(effects(x))
+    try:
+        r = target.residual(effects(x))
+    except Gcode2KrlError:  # such a tool, such a path cannot be
+        nothing = np.zeros((len(x), len(x)))
+        return Fitted(tuple(start), np.inf, x, nothing, frees, (True,) * len(frees), nothing)
     best = float(r @ r)
     jacobian = np.zeros((len(r), len(x)))
     damping = 1e-3
@@ -425,10 +430,27 @@ def _jacobian(
         step = 0.02 * scale[i]
         if x[i] + step > high[i]:
             step = -step
-        moved = x.copy()
-        moved[i] += step
-        columns.append((target.residual(effects(moved)) - r) / step)
+        columns.append(_slope(target, effects, x, r, i, step))
     return np.stack(columns, axis=1) if columns else np.zeros((len(r), 0))
+
+
+def _slope(
+    target: Target,
+    effects: Callable[[Floats], tuple[Applied, ...]],
+    x: Floats,
+    r: Floats,
+    i: int,
+    step: float,
+) -> Floats:
+    """Return the derivative (r,) by one number; 0 where neither side can be simulated."""
+    for way in (step, -step):
+        moved = x.copy()
+        moved[i] += way
+        try:
+            return (target.residual(effects(moved)) - r) / way
+        except Gcode2KrlError:
+            continue
+    return np.zeros_like(r)
 
 
 def _bounded_step(

@@ -66,11 +66,7 @@ def same_branch(path: Path, q_rad: Floats, cell: Cell) -> Floats:
     """Return the joints (n, 6) along a path in the branch and turns of the joints (6,) near its first row."""
     position, rotation = flange_frames(path.position_mm, path.rotation, path.tool, cell)
     geometry = cell.robot.geometry.array()
-    apart = [
-        np.abs(one_branch(position[:1], rotation[:1], geometry, number, q_rad)[0] - q_rad).sum()
-        for number in range(8)
-    ]
-    number = int(np.argmin(np.nan_to_num(apart, nan=np.inf)))
+    number = int(status_turn(q_rad[None, :], geometry)[0][0])
     return one_branch(position, rotation, geometry, number, q_rad)
 
 
