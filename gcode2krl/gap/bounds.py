@@ -47,7 +47,7 @@ class Mismatch:
             "force_scale": {"scale": self.coefficients},
             "edge_force": {"scale": self.coefficients},
             "clock": {"offset_s": clocks * self.clock_s, "skew": clocks * self.clock_s / duration_s},
-            "force_delay": {"delay_s": self.clock_s},
+            "force_delay": {"delay_s": clocks * self.clock_s},
             "servo_lag": {"tau_s": self.lag_s},
             "backlash": {"gap_deg": degrees},
             "transmission": {"amplitude_deg": degrees},

@@ -9,11 +9,11 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Applied, Effect, inputs_of, library
-from gcode2krl.errors import input_error
+from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.answer import answer
 from gcode2krl.gap.bounds import Mismatch
 from gcode2krl.gap.clocks import coarse_offset, fitted_offset
-from gcode2krl.gap.examine import Question
+from gcode2krl.gap.examine import Question, replans
 from gcode2krl.gap.fine import refined_prediction
 from gcode2krl.gap.fitted import with_fitted
 from gcode2krl.gap.from_log import log_sides
@@ -120,6 +120,8 @@ class _State:
     judgements: list[Judgement] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     clocks_set: bool = False
+    stopped: bool = False
+    """Stops that nobody planned are in the plan."""
     clock_s: dict[str, list[float]] = field(default_factory=dict)
 
 
@@ -127,15 +129,20 @@ def _diagnosed(
     sides: list[Side], explaining: int, known: Mapping[str, Effect], mismatch: Mismatch, seed: int,
     kinematics: bool = True,
 ) -> Gap:  # fmt: skip
-    sides = [_with_coarse_clocks(side) for side in sides]
-    slips, issues = slips_of(sides, known)
-    slips += clock_slips(sides, known)
-    state = _State(sides, explaining, known, mismatch, seed, kinematics)
+    # stops first: what a run falls behind at them looks like a wrong clock
+    slips, stopped = unplanned_stops(sides, known)
+    issues: list[Issue] = []
+    if slips:
+        state = _State(stopped, explaining, known, mismatch, seed, kinematics, stopped=True)
+    else:
+        sides = [_with_coarse_clocks(side) for side in sides]
+        slips, issues = slips_of(sides, known)
+        slips += clock_slips(sides, known)
+        state = _State(sides, explaining, known, mismatch, seed, kinematics)
     if any(slip.final for slip in slips):
         return answer(state.sides, [], slips, issues, state.examined, state.notes)
-    _apply_slips(state, slips)
-    if not slips:
-        slips, state.sides = unplanned_stops(state.sides, known)
+    if not state.stopped:
+        _apply_slips(state, slips)
     _set_controller_clocks(state)
     state.examined = frozenset(_examined(state))
     for link in EXAMINED:
@@ -227,6 +234,8 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
     for effect in state.known.values():
         if effect.kind == "slip" and (state.slips or effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ())):
             continue
+        if state.stopped and replans(effect):
+            continue
         if effect.name == "swapped_tool" and link == "mechanics" and "force" in state.examined:
             continue  # the force has shown it, and each try removes the material again
         for target in effect.targets(cell):
@@ -242,8 +251,9 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
                 else:
                     blocks += blocks_of(effect, target)
     clocks = 2 if link == "mechanics" and "path" not in state.examined and "servo" in state.examined else 1
-    if link != "path" and any(each.link == "path" and each.verdict in _LOST for each in state.judgements):
-        clocks = _CLOCKS_LOST
+    if link != "path":
+        path = next((each.verdict for each in state.judgements if each.link == "path"), "no_gap")
+        clocks = _CLOCKS_LOST if path in _LOST else max(clocks, 1 if path == "no_gap" else 2)
     share = _SET if link == "path" and state.clocks_set else 1.0
     return Question(state.known, blocks, state.mismatch, upstream, clocks, share, state.seed)
 

@@ -85,6 +85,8 @@ def clock_slips(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Sl
         if not after or not before:
             continue
         offset = float(np.median(offsets))
+        if offset == 0.0:
+            continue
         one = Applied(library["clock"], name, {"offset_s": offset, "skew": 0.0})
         words = f"the clock of {name} is {offset:+.3f} s off the prediction's"
         rms = [_rms([part.residual for part in parts]) * after[0].factor for parts in (before, after)]

@@ -101,11 +101,12 @@ def _lateness(side: Side, corners: Ints) -> Floats:
     time_s, way = gone(side.inputs.time_s, planned[:, list(part.columns)], 0.0)
     rows = _nearest_in_order(side.inputs.position_mm, targets.position_mm[corners])
     edges = way[np.concatenate([[0], rows, [len(way) - 1]])]
-    late = [
-        np.median(np.interp(at, own_way, own_s) - np.interp(at, way, time_s))
-        for at in (_leg(a, b) for a, b in pairwise(edges))
-    ]
-    return np.diff(late)
+    late = [0.0]
+    for at in (_leg(a, b) for a, b in pairwise(edges)):
+        behind = np.median(np.interp(at, own_way, own_s) - np.interp(at, way, time_s))
+        # what the run did after the prediction's end was not looked at
+        late.append(float(behind) if at[-1] < own_way[-1] else late[-1])
+    return np.diff(late[1:])
 
 
 def _leg(start: float, end: float) -> Floats:
