@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _LEAST_S = 0.02
 """A stop from a slow feed costs some hundredths of a second; time laws agree to 2 ms (design/gap.md)."""
+_MOST_LEFT_OUT = 4
+"""So many of the least are left out by and by: a last leg, say, may only look late."""
 _MOST_SHARE = 0.5
 """Where more of the corners are late, it is the time law."""
 _STEP = {"path": 1e-4, "mechanics": 0.5}
@@ -43,12 +45,17 @@ def unplanned_stops(sides: Sequence[Side], library: Mapping[str, Effect]) -> tup
         return [], unchanged
     if _rms(parts) < _LEAST_OFF[parts[0].link]:
         return [], unchanged
-    stops = [_stops_of(side) for side in sides]
-    if not any(len(rows) for rows in stops):
-        return [], unchanged
-    hold_s, stopped = _held(sides, stops)
-    before, after = _rms(parts), _rms(_parts([_on_time(side) for side in stopped]))
-    if after**2 > (1.0 - _EXPLAINS) * before**2:
+    jumps = [_stops_of(side) for side in sides]
+    before = _rms(parts)
+    for least_s in sorted({0.0, *(late for own in jumps for late in own.values())})[:_MOST_LEFT_OUT]:
+        stops = [np.array([row for row, late in own.items() if late > least_s], np.int64) for own in jumps]
+        if not any(len(rows) for rows in stops):
+            return [], unchanged
+        hold_s, stopped = _held(sides, stops)
+        after = _rms(_parts([_on_time(side) for side in stopped]))
+        if after**2 < (1.0 - _EXPLAINS) * before**2:
+            break
+    else:
         return [], unchanged
     count = max(len(rows) for rows in stops)
     one = Applied(effect, None, {"count": float(count), "hold_s": hold_s})
@@ -76,12 +83,14 @@ def _held(sides: Sequence[Side], stops: Sequence[Ints]) -> tuple[float, list[Sid
     return hold_s, stopped
 
 
-def _stops_of(side: Side) -> Ints:
-    """Return the targets at which a run stopped."""
+def _stops_of(side: Side) -> dict[int, float]:
+    """Return the targets at which a run stopped, and how late it was behind each."""
     corners = _corners(side)
-    late = _lateness(side, corners) > _LEAST_S
-    few = late.sum() <= _MOST_SHARE * max(len(corners), 1)
-    return corners[late] if few else corners[:0]
+    jumps = _lateness(side, corners)
+    late = jumps > _LEAST_S
+    if late.sum() > _MOST_SHARE * max(len(corners), 1):
+        return {}
+    return dict(zip(corners[late].tolist(), jumps[late].tolist(), strict=True))
 
 
 def _corners(side: Side) -> Ints:
