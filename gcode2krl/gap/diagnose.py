@@ -23,6 +23,8 @@ from gcode2krl.gap.part import Part
 from gcode2krl.gap.replan import remembered_plan
 from gcode2krl.gap.result import Gap
 from gcode2krl.gap.retime import refined, retimed
+from gcode2krl.gap.scan import examine_scans
+from gcode2krl.gap.scan_answer import with_scan
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
 from gcode2krl.gap.slips import Slip, clock_slips, slips_of
@@ -50,6 +52,7 @@ def diagnose(
     holdout: Sequence[Run] = (),
     *,
     effects: Sequence[str | Path | Effect] = (),
+    exclude: Sequence[str] = (),
     mismatch: Mismatch | None = None,
     seed: int = 0,
 ) -> Gap:
@@ -60,6 +63,7 @@ def diagnose(
     runs : measured runs that explain; one whose ``run.toml`` names a prediction is compared with that one.
     holdout : runs that only test; without any, whole runs by turns, of a single run stretches of the path.
     effects : effects besides the library's, or folders of them.
+    exclude : names of effects that are no candidates; as normal mismatch they still count.
     mismatch : what is no gap; by default the bounds of `Mismatch`.
 
     Raises
@@ -72,7 +76,7 @@ def diagnose(
     everything = [*runs, *holdout]
     sides = list(_sides(prediction, everything))
     known = known_effects(effects)
-    return _diagnosed(sides, len(runs), known, mismatch or Mismatch(), seed)
+    return _diagnosed(sides, len(runs), known, mismatch or Mismatch(), seed, exclude=frozenset(exclude))
 
 
 def diagnose_log(
@@ -113,6 +117,7 @@ class _State:
     mismatch: Mismatch
     seed: int
     kinematics: bool = True
+    exclude: frozenset[str] = frozenset()
     examined: frozenset[str] = frozenset()
     found: list[Applied] = field(default_factory=list)
     """Causes that belong to the model of later links."""
@@ -127,18 +132,19 @@ class _State:
 
 def _diagnosed(
     sides: list[Side], explaining: int, known: Mapping[str, Effect], mismatch: Mismatch, seed: int,
-    kinematics: bool = True,
+    kinematics: bool = True, exclude: frozenset[str] = frozenset(),
 ) -> Gap:  # fmt: skip
+    offered = {name: effect for name, effect in known.items() if name not in exclude}
     # stops first: what a run falls behind at them looks like a wrong clock
-    slips, stopped = unplanned_stops(sides, known)
+    slips, stopped = unplanned_stops(sides, offered)
     issues: list[Issue] = []
     if slips:
-        state = _State(stopped, explaining, known, mismatch, seed, kinematics, stopped=True)
+        state = _State(stopped, explaining, known, mismatch, seed, kinematics, exclude, stopped=True)
     else:
         sides = [_with_coarse_clocks(side) for side in sides]
-        slips, issues = slips_of(sides, known)
-        slips += clock_slips(sides, known)
-        state = _State(sides, explaining, known, mismatch, seed, kinematics)
+        slips, issues = slips_of(sides, offered)
+        slips += clock_slips(sides, offered)
+        state = _State(sides, explaining, known, mismatch, seed, kinematics, exclude)
     if any(slip.final for slip in slips):
         return answer(state.sides, [], slips, issues, state.examined, state.notes)
     if not state.stopped:
@@ -153,7 +159,10 @@ def _diagnosed(
             judgement = judge(link, mine or held, held if mine else [], _question(state, link, parts))
             state.judgements.append(judgement)
             _learn(state, judgement)
-    return answer(state.sides, state.judgements, slips, issues, state.examined, state.notes)
+    gap = answer(state.sides, state.judgements, slips, issues, state.examined, state.notes)
+    if not state.kinematics or any(side.from_log for side in state.sides):
+        return gap
+    return with_scan(gap, examine_scans(state.sides, state.found, offered, mismatch))
 
 
 def _sides(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Side]:
@@ -234,7 +243,7 @@ def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
     for effect in state.known.values():
         if effect.kind == "slip" and (state.slips or effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ())):
             continue
-        if state.stopped and replans(effect):
+        if effect.name in state.exclude or (state.stopped and replans(effect)):
             continue
         if effect.name == "swapped_tool" and link == "mechanics" and "force" in state.examined:
             continue  # the force has shown it, and each try removes the material again

@@ -48,7 +48,7 @@ _NEEDS = {
     "gear": "controller.csv with q1_load_deg … (encoders behind the gear)",
     "force": "force.csv, and a prediction with forces",
     "mechanics": "tracker.csv, absolute angles and a known robot",
-    "part": "scan.csv; it is read, but not compared with the predicted part",
+    "part": "scan.csv with walls that the cutter has left, a prediction with forces, one tool axis",
 }
 
 
