@@ -232,15 +232,12 @@ def _fit(x: Floats, y: Floats, prior: Floats, block: NDArray[np.int64]) -> tuple
 
 def _held_out(x: Floats, y: Floats, prior: Floats, chosen: Bools, test: Bools) -> tuple[float, float]:
     """Return the mean squares of held-out points without and with the radius of the others."""
-    b = _solved(x[chosen], y[chosen], prior)
-    own = _solved(x[test], y[test], prior)
-    own[0] = 0.0
-    radius = x[test, 0] * b[0]
+    radius = x[test, 0] * _solved(x[chosen], y[chosen], prior)[0]
     # the other numbers belong to the held-out points themselves
-    rest = y[test] - x[test, 1:] @ own[1:]
-    free = _solved(x[test], y[test] - radius, prior)
-    free[0] = 0.0
-    return float(np.mean(rest**2)), float(np.mean((y[test] - radius - x[test] @ free) ** 2))
+    own, others = _solved(x[test], y[test], prior)[1:], x[test, 1:]
+    left = y[test] - radius
+    left = left - others @ _solved(others, left, prior[1:])
+    return float(np.mean((y[test] - others @ own) ** 2)), float(np.mean(left**2))
 
 
 def _corner(tool: object) -> float:

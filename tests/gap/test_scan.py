@@ -1,0 +1,66 @@
+"""Scans against the swept surface: the diameter comes back, and nothing else is taken for it."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.gap.bounds import Mismatch
+from gcode2krl.gap.diagnose import known_effects
+from gcode2krl.gap.scan import examine_scans
+from gcode2krl.runs.scan import Scan
+from tests.gap.synthetic import prediction, runs
+
+SHIFT_MM = np.array([0.03, -0.02, 0.15])
+
+
+def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
+    """Return a run whose scan is that of walls and floors of the nominal motion with another diameter."""
+    generator = np.random.default_rng(seed)
+    some = runs([], 1, 5, controller=False, tracker=False, normal=False)
+    (side,) = sys.modules["gcode2krl.gap.diagnose"]._sides(prediction(), some)
+    inputs = side.inputs
+    tip = inputs.position_mm + inputs.deflection_mm
+    radius = prediction().cell.tool[1].diameter_mm / 2.0 + larger_mm / 2.0
+    feed = np.gradient(tip, axis=0)
+    level = inputs.force_base_N.any(axis=1) & (np.hypot(feed[:, 0], feed[:, 1]) > 1e-3)
+    # two straight slots of the part: 80 mm apart, so that no pass takes the walls of the other
+    rows = np.flatnonzero(level & (np.abs(feed[:, 1]) < 1e-3) & (tip[:, 2] < -3.5))[::6]
+    left = np.stack([-feed[rows, 1], feed[rows, 0], 0.0 * rows], axis=1)
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    up = np.array([0.0, 0.0, 1.0])
+    points = [
+        tip[rows] + way * radius * left + generator.uniform(1.0, 2.5, (len(rows), 1)) * up for way in (-1, 1)
+    ]
+    cloud = np.concatenate([tip[rows], *points]) + SHIFT_MM
+    cloud = cloud + generator.normal(0.0, noise_mm, cloud.shape)
+    return replace(side, run=replace(side.run, scan=Scan(cloud)))
+
+
+@pytest.mark.parametrize("larger_mm", [0.12, -0.2])
+def test_a_diameter_comes_back(larger_mm):
+    found = examine_scans([_side(larger_mm)], (), known_effects([]), Mismatch())
+    assert found is not None
+    assert found.offset.value == pytest.approx(larger_mm, abs=0.015)
+    assert found.offset.low < larger_mm < found.offset.high
+    assert found.applied is not None
+    assert found.shrink > 0.9
+    assert found.rms_after < found.rms_before
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_right_cutter_is_no_finding(seed):
+    found = examine_scans([_side(seed=seed)], (), known_effects([]), Mismatch())
+    assert found is not None
+    assert found.applied is None
+    assert abs(found.offset.value) < 0.015
+
+
+def test_without_scan_or_library_nothing_is_said():
+    side = _side()
+    assert (
+        examine_scans([replace(side, run=replace(side.run, scan=None))], (), known_effects([]), Mismatch())
+        is None
+    )
+    assert examine_scans([side], (), {}, Mismatch()) is None
