@@ -1,4 +1,4 @@
-"""Three measured runs of a robot with play in axis 2, made by the independent plant, and what `diagnose` says.
+"""Three measured runs of a robot with play in axis 3, made by the independent plant, and the diagnosis.
 
 `python docs/diagnose_example.py` prints the report that the README shows.
 """
@@ -15,7 +15,7 @@ from gap_blind_cases import predictions  # noqa: E402
 
 from tests.plant.cases import make_case  # noqa: E402
 
-SEED, EFFECT = 12, "backlash@A2"
+SEED, EFFECT = 1032, "backlash@A3"
 
 
 def report() -> str:

@@ -1,6 +1,7 @@
 """The answer: judgements of the links, slips and clocks, put together."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,9 @@ def answer(
     verdict = _verdict(gapped, slips)
     named = [slip.applied for slip in slips if not slip.final]
     named += [one for each in gapped for one in each.applied]
-    every = [issue for side in sides for issue in side.run.issues]
+    every = [
+        replace(issue, message=f"{side.name}: {issue.message}") for side in sides for issue in side.run.issues
+    ]
     return Gap(
         verdict=verdict,
         gap=_gap(main, slips),

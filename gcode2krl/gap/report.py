@@ -86,7 +86,7 @@ def describe(cause: Mapping[str, Any]) -> str:
         stem, _, unit = key.rpartition("_")
         half = (each["high"] - each["low"]) / 2.0
         name, unit = ((stem or key).replace("_", " "), unit if stem else "")
-        shown.append(f"{name} {number(each['value'])} ± {number(half)} {unit}".rstrip())
+        shown.append(f"{name} {number(each['value'])} ± {half:.2g} {unit}".rstrip())
     return f"{text}, {', '.join(shown)}" if shown else text
 
 
