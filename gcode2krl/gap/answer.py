@@ -9,6 +9,7 @@ import numpy as np
 from gcode2krl.errors import Issue
 from gcode2krl.gap.judge import Cause, Judgement
 from gcode2krl.gap.links import JOINTS, LINKS, SIGNAL, UNIT, needs
+from gcode2krl.gap.observable import observable
 from gcode2krl.gap.result import Gap
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.slips import Slip
@@ -44,6 +45,7 @@ def answer(
         causes=causes,
         unexplained=_rest(main),
         not_examined=_not_examined(judgements, slips),
+        observable=[entry for each in judgements for entry in observable(each.examination)],
         named=tuple(named),
         issues=(*issues, *every),
         runs=tuple(side.name for side in sides),

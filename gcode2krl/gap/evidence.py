@@ -195,6 +195,12 @@ class Ledger:
         free = np.r_[np.arange(1, 1 + self.given), np.asarray(columns, dtype=int) + 1]
         return self._chi2 - _bounded(self._total, kept, free)[1]
 
+    def seen(self, evidence: Evidence, columns: Ints) -> tuple[float, float]:
+        """Return the least share of signatures' power that nuisance leaves, and the least power left."""
+        at = np.asarray(columns, dtype=int) + 1
+        left, whole = np.diag(evidence.gram)[at], np.diag(self._total)[at]
+        return float(np.min(left / np.maximum(whole, 1e-300))), float(np.min(left))
+
     def inflation(self, columns: Ints) -> float:
         """Return by how much the gain of signatures varies more than white noise lets it, at least 1.
 

@@ -80,6 +80,9 @@ class Examination:
     chi2_before: float
     question: Question
     surprises: list[float] = field(default_factory=list)
+    seen: list[tuple[float, float]] = field(default_factory=list)
+    """Of each block the share of its power that nuisance leaves, and that power over the noise's."""
+    first_level: float = 0.0
     usual: list[bool] = field(default_factory=list)
     """Which of the fitted effects are within normal mismatch: in the model, but no finding."""
 
@@ -163,6 +166,9 @@ def _select(found: Examination) -> None:
         _update(found)
         evidence = found.ledger.evidence()
         columns = [column.moved(found.ledger.given) for column in found.columns]
+        if not found.seen:
+            found.seen = [found.ledger.seen(evidence, column.index) for column in columns]
+            found.first_level = threshold(len(columns))
         taken = {(each.effect.name, each.target) for each in found.applied} | rejected
         allowed = [column for column in columns if found.blocks[column.block].key not in taken]
         found.level = threshold(len(allowed))

@@ -25,6 +25,8 @@ class Gap:
     causes: Sequence[Mapping[str, Any]]
     unexplained: Mapping[str, Any]
     not_examined: Sequence[Mapping[str, Any]]
+    observable: Sequence[Mapping[str, Any]] = ()
+    """The smallest size of each effect that these data could have shown."""
     next_run: str | None = None
     named: tuple[Applied, ...] = ()
     """The causes with a probability of at least 0.5, as effects that `predict` takes."""
@@ -43,6 +45,7 @@ class Gap:
             "causes": plain(self.causes),
             "unexplained": plain(self.unexplained),
             "not_examined": plain(self.not_examined),
+            "observable": plain(self.observable),
             "next_run": self.next_run,
             "runs": list(self.runs),
             "notes": list(self.notes),

@@ -1,4 +1,4 @@
-"""Grouped forward selection: how surprising a block of signatures is, and what cannot be seen at all."""
+"""Grouped forward selection: how surprising a block of signatures is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,8 +15,6 @@ FALSE_ALARMS = 1e-3
 LEAST_RATIO = 0.08
 """An effect whose trace, nuisance taken out, is below this share of the noise is not reported: models of
 sound machines differ by so much."""
-SEEN = 0.02
-"""A block of whose energy less than this is left beside the nuisance is not observable (gap.md)."""
 
 
 @dataclass(frozen=True)
