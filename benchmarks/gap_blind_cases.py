@@ -42,6 +42,10 @@ DELETED = (
 """Effects that are also tried with themselves taken out of the library."""
 
 
+NOT_SIMULATED = ("other_program",)
+"""What can be found but not predicted: no oracle can."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One case: its seed, its kind, and what the plant is asked for."""
@@ -196,7 +200,9 @@ def _beside(case: Case, place: Path, how: How, record: dict[str, Any]) -> None:
     """Add what an oracle and simple methods make of the same case."""
     label = record["label"]
     names = [run["run"] for run in label["runs"]]
-    if how.oracle and case.kind in ("single", "slip") and label["effects"][0]["ratio"] >= 1.0:
+    first = label["effects"][0] if label["effects"] else {"effect": "", "ratio": 0.0}
+    possible = case.kind in ("single", "slip") and first["effect"] not in NOT_SIMULATED
+    if how.oracle and possible and first["ratio"] >= 1.0:
         from gap_blind_oracle import oracle
 
         record["oracle"] = oracle(label, record["result"], place, names)
