@@ -194,12 +194,9 @@ def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
 
 def _slip_cause(slip: Slip) -> dict[str, Any]:
     values = {name: {"value": v, "low": v, "high": v} for name, v in slip.applied.values.items()}
-    shrink = None
-    if slip.rms_after is not None and slip.rms_before > 0.0:
-        shrink = float(np.clip(1.0 - slip.rms_after**2 / slip.rms_before**2, 0.0, 1.0))
     return {
         "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,
-        "probability": _SURE, "parameters": {} if slip.final else values, "shrink": shrink,
+        "probability": _SURE, "parameters": {} if slip.final else values, "shrink": None,
         "rms_after": slip.rms_after, "indistinguishable_from": [], "words": slip.words,
     }  # fmt: skip
 

@@ -127,7 +127,6 @@ class _State:
     clocks_set: bool = False
     stopped: bool = False
     """Stops that nobody planned are in the plan."""
-    clock_s: dict[str, list[float]] = field(default_factory=dict)
 
 
 def _diagnosed(
@@ -227,13 +226,8 @@ def _examined(state: _State) -> Iterator[str]:
 def _parts(state: _State, link: str) -> list[Part]:
     if link == "mechanics" and not state.kinematics:
         return []
-    base = [one for one in state.found if _belongs(one, link) or one in state.slips]
+    base = state.found if link == "mechanics" else state.slips
     return parts_of(link, state.sides, base)
-
-
-def _belongs(one: Applied, link: str) -> bool:
-    """Tell whether a cause found before is part of the model of a link."""
-    return link == "mechanics"
 
 
 def _question(state: _State, link: str, parts: Sequence[Part]) -> Question:
@@ -299,7 +293,7 @@ def _learn(state: _State, judgement: Judgement) -> None:
     planned = [one for one in named if one.effect.name in _TIMING]
     for one in planned:
         state.sides = [replace(side, inputs=one.effect.replan(side.inputs, one)) for side in state.sides]
-    if judgement.verdict in ("unexplained", "partly_explained"):
+    if judgement.verdict in _LOST:
         state.sides = [retimed(side) for side in state.sides]
     state.sides = [refined(_with_controller_clock(side)) for side in state.sides]
 

@@ -58,8 +58,6 @@ class Question:
     clock_share: float = 1.0
     """Of the clocks' normal mismatch, what is left after they were set."""
     seed: int = 0
-    starts: Mapping[tuple[str, str | None], Applied] = field(default_factory=dict)
-    """Where to begin the fit of effects that plan the motion anew."""
 
 
 @dataclass(eq=False)
@@ -189,7 +187,6 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
         score
         for score in scores(evidence, allowed, range(found.ledger.given))
         if (score.within or replans(found.blocks[score.column.block].effect))
-        and not _left_out(found, found.blocks[score.column.block])
         and score.surprise > found.level
         and score.gain > LEAST_RATIO**2 * found.times
     ]
@@ -208,12 +205,6 @@ def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column
         if surprise(score.gain / inflation, score.column.width) > found.level:
             sure.append(score)
     return sure
-
-
-def _left_out(found: Examination, block: Block) -> bool:
-    """Tell whether an effect that plans anew is not tried, as all runs together have not named it."""
-    starts = found.question.starts
-    return bool(starts) and replans(block.effect) and block.key not in starts
 
 
 def _accept(
@@ -262,7 +253,7 @@ def _certain(found: Examination, score: Score, fitted: Fitted) -> float | None:
 
 
 def within_mismatch(found: Examination, number: int) -> bool:
-    """Tell whether every number of an accepted effect may be what normal mismatch allows, to 2 sigma."""
+    """Tell whether every number of an accepted effect may be what normal mismatch allows, to 1 sigma."""
     applied, question = found.fitted.applied[number], found.question
     part = found.parts[0]
     duration = float(part.time_s[-1] - part.time_s[0])
@@ -328,9 +319,6 @@ def _replanned(found: Examination, block: Block, linear: Applied, hopeless: floa
 
     Where these leave more than ``hopeless`` as chi2 no better ones are searched for.
     """
-    known = found.question.starts.get(block.key)
-    if known is not None:
-        return refit(found.target, (*found.applied, searched(found.target, found.applied, known, 0.03)))
     nominal = block.effect.nominal(found.parts[0].inputs, block.target)
     typical = block.effect.start(found.parts[0].inputs, block.target)
     starts = [linear]

@@ -87,7 +87,6 @@ def _trials(
     """Return one trial a split: what was chosen without the held-out data, and these."""
     if held:
         return [_Trial(found, list(held), question, known, found)]
-    question = replace(question, starts={(each.effect.name, each.target): each for each in found.applied})
     return [
         _Trial(examine(link, train, question, known, found.noise), test, question, known, found)
         for train, test in folds_of(parts, _power(parts, found))

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _PLACES = 400
 _STEPS = 8
 _STEP_SHARE = 0.1
-_LEAST_STEP = {"path": 1e-4, "mechanics": 0.5}
+LEAST_STEP = {"path": 1e-4, "mechanics": 0.5}
 """rad, mm: shorter ways are noise of the instrument, not motion."""
 
 
@@ -27,7 +27,7 @@ class PlaceTimes:
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self.parts = list(parts)
-        self.measured = [gone(part.time_s, part.measured, _LEAST_STEP[part.link]) for part in parts]
+        self.measured = [gone(part.time_s, part.measured, LEAST_STEP[part.link]) for part in parts]
 
     def late(self, applied: Sequence[Applied]) -> Floats:
         """Return how late (runs · places,) the runs are beside a plan with these effects, in s.

@@ -16,7 +16,7 @@ from gcode2krl.effects.builtin.advance_stop import with_stops
 from gcode2krl.gap.clocks import fitted_offset
 from gcode2krl.gap.links import MODEL_RAD, parts_of
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.place_time import gone
+from gcode2krl.gap.place_time import LEAST_STEP, gone
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.slips import Slip
 
@@ -28,8 +28,6 @@ _MOST_LEFT_OUT = 4
 """So many of the least are left out by and by: a last leg, say, may only look late."""
 _MOST_SHARE = 0.5
 """Where more of the corners are late, it is the time law."""
-_STEP = {"path": 1e-4, "mechanics": 0.5}
-"""rad, mm: shorter ways are noise of the instrument, not motion."""
 _LEAST_OFF = {"path": 2.0 * MODEL_RAD, "mechanics": 0.5}
 _EXPLAINS = 0.95
 _REFINED, _SETTLED_S = 4, 1e-3
@@ -105,7 +103,7 @@ def _lateness(side: Side, corners: Ints) -> Floats:
     if not parts or targets is None or not len(corners):
         return np.zeros(len(corners))
     part = parts[0]
-    own_s, own_way = gone(part.time_s, part.measured, _STEP[part.link])
+    own_s, own_way = gone(part.time_s, part.measured, LEAST_STEP[part.link])
     planned = side.inputs.q_cmd_rad if part.link == "path" else side.inputs.position_mm
     time_s, way = gone(side.inputs.time_s, planned[:, list(part.columns)], 0.0)
     rows = _nearest_in_order(side.inputs.position_mm, targets.position_mm[corners])
