@@ -7,7 +7,7 @@ import numpy as np
 from gcode2krl.effects import Applied
 from gcode2krl.gap.evidence import Ledger
 from gcode2krl.gap.examine import Examination, tangents_of
-from gcode2krl.gap.refit import Target, inflation_of, refit
+from gcode2krl.gap.refit import Target, refit, slope_of
 from gcode2krl.gap.select import scores
 
 TEMPERATURE = 3.0
@@ -17,8 +17,9 @@ ALIKE = 9.2
 UNKNOWN_SHARE = 0.15
 """A rest above this share of the structured gap is more than the form of an effect is off by (gap.md)."""
 _UNKNOWN_WIDTH = 0.03
-_RIVALS = 6
-_CLOSE_SHARE, _CLOSE_GAIN = 0.25, 15.0
+_RIVALS = 8
+_CLOSE_SHARE, _BENT_SHARE, _CLOSE_GAIN = 0.25, 0.7, 15.0
+"""Rivals whose first order gains less than this below the cause are refitted; of a bent one, this."""
 
 
 @dataclass(frozen=True)
@@ -45,26 +46,27 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
         [part.measured - part.sample(others) for part in parts],
         [tangents_of(part, found.fitted, without=number) for part in parts],
     )
-    evidence = ledger.evidence()
-    given = range(ledger.given)
+    ledger.evidence()
     taken = {(each.effect.name, each.target) for each in found.applied}
     columns = [
         column.moved(ledger.given) for column in found.columns if found.blocks[column.block].key not in taken
     ]
     ranked = sorted(
-        (score for score in scores(evidence, columns, given) if score.within),
+        (score for score in scores(ledger, columns) if score.within),
         key=lambda score: -score.gain,
     )
     gain = refit_gain(found.target, others, found)
     best: dict[tuple[str, str | None], Rival] = {}
-    spread = inflation_of(found.target, found.fitted, number)
+    spread = slope_of(found.target, found.fitted, number).inflation()
     for score in ranked:
         block = found.blocks[score.column.block]
         if block.key in best or len(best) >= _RIVALS:
             continue
-        if score.gain < gain - max(_CLOSE_SHARE * gain, _CLOSE_GAIN * spread):
+        bent = not block.effect.is_linear
+        if score.gain < gain - max((_BENT_SHARE if bent else _CLOSE_SHARE) * gain, _CLOSE_GAIN * spread):
             continue
-        fitted = refit(found.target, (*others, block.applied(score.coefficients, parts[0])), steps=6)
+        start = block.applied(score.coefficients, parts[0])
+        fitted = refit(found.target, (*others, start), steps=6, scan=bent)
         if fitted.bound[-1]:
             continue
         apart = (fitted.chi2 - found.fitted.chi2) / spread

@@ -43,6 +43,8 @@ _SET = 0.1
 _PEAKS = 4
 _LOST, _CLOCKS_LOST = ("unexplained", "partly_explained"), 4
 """Where the run's own timing replaced the plan's, an instrument's clock is known so many times worse."""
+_CLOCKS_OF_TWO = 2
+"""Two clocks are the same where they differ by no more than normal mismatch of both."""
 _TIMING = ("velocity_rule", "corner", "advance_stop", "override")
 
 
@@ -286,6 +288,8 @@ def _learn(state: _State, judgement: Judgement) -> None:
     for one in named:
         if one.effect.name == "absolute_accuracy":
             _planned_once(state, one)
+    if judgement.link == "servo":
+        _free_controller(state, judgement)
     if judgement.link in ("servo", "gear") and judgement.verdict in ("no_gap", "explained"):
         state.sides = with_fitted(state.sides, judgement, _question_of(judgement))
     if judgement.link != "path":
@@ -296,6 +300,28 @@ def _learn(state: _State, judgement: Judgement) -> None:
     if judgement.verdict in _LOST:
         state.sides = [retimed(side) for side in state.sides]
     state.sides = [refined(_with_controller_clock(side)) for side in state.sides]
+
+
+def _free_controller(state: _State, servo: Judgement) -> None:
+    """Take the clock off the controller's table where its commanded columns alone are off.
+
+    They then differ by the same time from the plan and from the drives.
+    """
+    path = next((each for each in state.judgements if each.link == "path"), None)
+    mine, own = _clock(path, "controller"), _clock(servo, "q_cmd")
+    if path is None or mine is None or own is None:
+        return
+    if abs(mine["offset_s"] - own["offset_s"]) > _CLOCKS_OF_TWO * state.mismatch.clock_s:
+        return
+    kept = tuple(cause for cause in path.causes if cause.applied.target != "controller")
+    state.judgements[state.judgements.index(path)] = replace(path, causes=kept)
+    state.sides = [replace(side, clock_s=_later(side, -mine["offset_s"])) for side in state.sides]
+
+
+def _clock(judgement: Judgement | None, target: str) -> Applied | None:
+    """Return the named clock of a table or of columns."""
+    named = judgement.applied if judgement is not None else ()
+    return next((one for one in named if (one.effect.name, one.target) == ("clock", target)), None)
 
 
 def _question_of(judgement: Judgement) -> Question:

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 STRETCH_S = 1.0
 """Longer than an instrument remembers; rows of one stretch are kept together in every split."""
+PRIOR = 3.0
+"""A size is expected within so many typical ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,16 +113,19 @@ def marginal(gram: Floats, keep: int) -> Floats:
     return result
 
 
-def _bounded(total: Floats, kept: int, free: Ints) -> tuple[Floats, float]:
-    """Return nuisance within its bounds (m,) beside free signatures, and chi2 with both."""
+def _bounded(total: Floats, kept: int, free: Ints, pull: Floats) -> tuple[Floats, Floats, float]:
+    """Return signatures' coefficients, pulled to zero by ``pull``, nuisance within its bounds (m,), and chi2.
+
+    chi2 is that of both; what the pull costs is in it.
+    """
     here = np.r_[0, np.arange(kept, len(total))]
-    gram = total[np.ix_(here, here)]
-    if len(free):
-        cross = total[np.ix_(free, here)]
-        gram = gram - cross.T @ solve(total[np.ix_(free, free)], cross)
+    gram, cross = total[np.ix_(here, here)], total[np.ix_(free, here)]
+    half = solve(total[np.ix_(free, free)] + np.diag(pull), cross)
+    gram = gram - cross.T @ half
     cost = gram[1:, 1:] + np.eye(len(here) - 1)
     b = boxed(cost, gram[1:, 0])
-    return b, float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)
+    coefficients = half[:, 0] - half[:, 1:] @ b
+    return coefficients, b, float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)
 
 
 def _less(total: Floats, held: Floats) -> Floats:
@@ -183,17 +188,23 @@ class Ledger:
             if mine:
                 total[np.ix_(into, into)] += np.sum([gram for gram, _ in mine], axis=0)[np.ix_(at, at)]
                 count += sum(rows for _, rows in mine)
-        b, self._chi2 = _bounded(total, kept, np.arange(1, 1 + self.given))
+        free = np.arange(1, 1 + self.given)
+        _, b, self._chi2 = _bounded(total, kept, free, np.zeros(len(free)))
         self._held = np.zeros(len(total))
         self._held[kept:] = np.where(np.abs(b) >= MOST, b, 0.0)
         self._total = total
         return Evidence(marginal(_less(total, self._held), kept), count)
 
-    def bounded_gain(self, columns: Ints) -> float:
-        """Return by how much chi2 of the last evidence falls with some signatures, nuisance fitted anew."""
+    def bounded_gain(self, columns: Ints) -> tuple[float, Floats]:
+        """Return by how much chi2 of the last evidence falls with some signatures, and their coefficients.
+
+        Nuisance is fitted anew within its bounds. A combination that the data hardly see stays small.
+        """
         kept = 1 + self.given + self.rows[0].signatures
         free = np.r_[np.arange(1, 1 + self.given), np.asarray(columns, dtype=int) + 1]
-        return self._chi2 - _bounded(self._total, kept, free)[1]
+        pull = np.r_[np.zeros(self.given), np.full(len(columns), PRIOR**-2)]
+        coefficients, _, chi2 = _bounded(self._total, kept, free, pull)
+        return self._chi2 - chi2, coefficients[self.given :]
 
     def seen(self, evidence: Evidence, columns: Ints) -> tuple[float, float]:
         """Return the least share of signatures' power that nuisance leaves, and the least power left."""

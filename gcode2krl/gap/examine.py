@@ -1,7 +1,7 @@
 """One link: noise, candidates, forward selection with refits, and what is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -9,18 +9,17 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.gap.bounds import Mismatch
-from gcode2krl.gap.evidence import Evidence, Ledger, rows_of
+from gcode2krl.gap.evidence import Ledger, rows_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.noise_source import noise_of
 from gcode2krl.gap.nuisance import Nuisance, nuisance_of
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.place_time import PlaceTimes
-from gcode2krl.gap.refit import Fitted, Target, free_of, inflation_of, refit, searched
+from gcode2krl.gap.refit import Fitted, Target, free_of, refit, searched, slope_of
 from gcode2krl.gap.select import (
     LEAST_RATIO,
     Column,
     Score,
-    left_out_gain,
     scores,
     surprise,
     threshold,
@@ -30,7 +29,7 @@ from gcode2krl.gap.signatures import Block, Signatures
 Floats = NDArray[np.float64]
 MOST_EFFECTS = 4
 _SHORTLIST = 5
-_MOST_LOOKED_AT, _MOST_TRIED = 40, 12
+_MOST_TRIED = 12
 _GROUPS = 4
 _HOPELESS = 3.0
 """An effect that plans anew and leaves so many times more than another one is no match for it."""
@@ -170,7 +169,7 @@ def _select(found: Examination) -> None:
         taken = {(each.effect.name, each.target) for each in found.applied} | rejected
         allowed = [column for column in columns if found.blocks[column.block].key not in taken]
         found.level = threshold(len(allowed))
-        ranked = _candidates(found, evidence, allowed)
+        ranked = _candidates(found, evidence.rows, allowed)
         if not _accept(found, ranked, evidence.rows, rejected):
             break
     _prune(found)
@@ -181,21 +180,16 @@ def _is_sound(found: Examination) -> bool:
     return found.link == "path" and found.fitted.chi2 < found.values
 
 
-def _candidates(found: Examination, evidence: Evidence, allowed: Sequence[Column]) -> list[Score]:
+def _candidates(found: Examination, rows: int, allowed: Sequence[Column]) -> list[Score]:
     """Return the plausible and surprising scores, the best first."""
     plain = [
         score
-        for score in scores(evidence, allowed, range(found.ledger.given))
+        for score in scores(found.ledger, allowed)
         if (score.within or replans(found.blocks[score.column.block].effect))
         and score.surprise > found.level
         and score.gain > LEAST_RATIO**2 * found.times
     ]
-    plain.sort(key=lambda score: -_worth(score, evidence.rows))
-    plain = [
-        replace(score, gain=max(score.gain, found.ledger.bounded_gain(score.column.index)))
-        for score in plain[:_MOST_LOOKED_AT]
-    ]
-    plain.sort(key=lambda score: -_worth(score, evidence.rows))
+    plain.sort(key=lambda score: -_worth(score, rows))
     sure = []
     for score in plain[:_MOST_TRIED]:
         # a signature holds for small effects only: that of a large one is judged after its refit
@@ -245,11 +239,14 @@ def _certain(found: Examination, score: Score, fitted: Fitted) -> float | None:
     gain = found.fitted.chi2 - fitted.chi2
     if fitted.bound[-1] or gain < LEAST_RATIO**2 * found.times:
         return None
-    inflation = inflation_of(found.target, fitted, len(fitted.applied) - 1)
-    certain = surprise(gain / inflation, score.column.width)
-    if certain < found.level or not (replans(score_effect(found, score)) or _holds(found, score)):
+    slope = slope_of(found.target, fitted, len(fitted.applied) - 1)
+    certain = surprise(gain / slope.inflation(), score.column.width)
+    if certain < found.level:
         return None
-    return certain
+    if replans(score_effect(found, score)):
+        return certain
+    before = found.target.residual(found.applied)
+    return certain if slope.left_out_gain(before, _GROUPS) > 0.0 else None
 
 
 def within_mismatch(found: Examination, number: int) -> bool:
@@ -273,22 +270,6 @@ def within_mismatch(found: Examination, number: int) -> bool:
 def score_effect(found: Examination, score: Score) -> Effect:
     """Return the effect of a score."""
     return found.blocks[score.column.block].effect
-
-
-def _holds(found: Examination, score: Score) -> bool:
-    """Tell whether the effect also helps on stretches that it was not fitted to.
-
-    Stretches in their order make four groups in which the block has the same power: a run in air tells
-    nothing of a force.
-    """
-    index = score.column.index
-    stretches = found.ledger.stretches()
-    power = np.cumsum([found.ledger.power(each, index) for each in stretches])
-    if len(stretches) < _GROUPS or power[-1] <= 0.0:
-        return True
-    group = np.minimum((_GROUPS * (power - power[0] / 2.0) / power[-1]).astype(int), _GROUPS - 1)
-    folds = [[each for each, own in zip(stretches, group, strict=True) if own == g] for g in range(_GROUPS)]
-    return left_out_gain(found.ledger, folds, score.column, range(found.ledger.given)) > 0.0
 
 
 def _shortlist(found: Examination, ranked: list[Score], rows: int) -> list[Score]:
@@ -409,7 +390,7 @@ def columns_of(
         if not any(np.any(each) for each in found):
             continue
         low, high = block.bounds(parts[0])
-        columns.append(Column(len(kept), at, width, low, high))
+        columns.append(Column(len(kept), at, width, low, high, not block.effect.is_linear))
         kept.append(block)
         at += width
         for stack, each in zip(stacks, found, strict=True):

@@ -15,6 +15,8 @@ _GUARD_S = STRETCH_S
 _QUARTERS = 4
 _NEARLY_ALL, _EVENLY = 0.75, 0.2
 _LEAST_KEPT, _LEAST_HELD = 30, 10
+_LEAST_SEEN = 0.1
+"""Stretches with less than this of the power that a gap has cannot tell of it, held out or not."""
 
 
 def folds_of(parts: Sequence[Part], power: Sequence[Floats] = ()) -> list[tuple[list[Part], list[Part]]]:
@@ -37,11 +39,15 @@ def folds_of(parts: Sequence[Part], power: Sequence[Floats] = ()) -> list[tuple[
         gone = float(share[-1]) if len(share) else gone
         quarters.append(np.minimum((_QUARTERS * share).astype(int), _QUARTERS - 1))
     for quarter in range(_QUARTERS):
-        kept, held = [], []
-        for part, own in zip(parts, quarters, strict=True):
+        kept, held, seen = [], [], 0.0
+        for part, own, each in zip(parts, quarters, weights, strict=True):
             mine = own == quarter
+            near = _near(part.time_s, mine)
             held.append(with_rows(part, mine))
-            kept.append(with_rows(part, ~_near(part.time_s, mine)))
+            kept.append(with_rows(part, ~near))
+            seen += float(each[~near].sum())
+        if seen < _LEAST_SEEN * total:
+            continue
         kept = [part for part in kept if len(part.time_s) >= _LEAST_KEPT]
         held = [part for part in held if len(part.time_s) >= _LEAST_HELD]
         if kept and held:

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied
 from gcode2krl.gap.align import with_set_clocks
-from gcode2krl.gap.attribute import Rival, probabilities, rivals_of, unknown_probability
+from gcode2krl.gap.attribute import (
+    UNKNOWN_SHARE,
+    Rival,
+    probabilities,
+    rivals_of,
+    unknown_probability,
+)
 from gcode2krl.gap.examine import PRUNE, Examination, Question, examine, nuisance_for
 from gcode2krl.gap.fold import folds_of
 from gcode2krl.gap.intervals import Interval, intervals_of
@@ -75,8 +81,13 @@ def judge(link: str, parts: Sequence[Part], held: Sequence[Part], question: Ques
         verdict = "unexplained" if size.significant else "no_gap"
         return Judgement(link, tuple(parts), verdict, (), size, True, found, usual, tuple(everything))
     trials = _trials(link, parts, held, question, known, found)
-    sizes = [_pooled([trial(count) for trial in trials]) for count in range(len(found.causes) + 1)]
-    judged = _judgement(link, parts, found, usual, sizes, bool(trials))
+    counts = range(len(found.causes) + 1)
+    if trials:
+        sizes = [_pooled([trial(count) for trial in trials]) for count in counts]
+    else:
+        sizes = [_size(parts, found, question, known, found.causes[:count], usual) for count in counts]
+    whole = _size(parts, found, question, known, found.causes, usual)
+    judged = _judgement(link, parts, found, usual, sizes, whole, bool(trials))
     return replace(judged, every=(*parts, *held))
 
 
@@ -149,10 +160,12 @@ def _pooled(sizes: Sequence[Size]) -> Size:
 
 def _judgement(
     link: str, parts: Sequence[Part], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
-    held_out: bool,
+    whole: Size, held_out: bool,
 ) -> Judgement:  # fmt: skip
     last = sizes[-1]
-    unknown = unknown_probability(last.share_left, last.significant)
+    # what is left on held-out data alone is what few runs do not settle of a cause's numbers
+    left = last.significant and whole.significant
+    unknown = unknown_probability(last.share_left, left)
     if len(found.causes) > MOST_TOGETHER:
         unknown = max(unknown, 1.0 - CROWDED)
     causes = []
@@ -162,7 +175,7 @@ def _judgement(
         rivals = rivals_of(found, number)
         own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
         brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        if brings < max(PRUNE, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
+        if held_out and brings < max(PRUNE, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
             own *= CROWDED
         causes.append(
             Cause(
@@ -170,14 +183,14 @@ def _judgement(
                 link=link,
                 probability=own,
                 parameters=intervals[number],
-                shrink=brings,
+                shrink=brings if held_out else None,
                 rms_after=sizes[order + 1].after ** 0.5,
                 rivals=tuple(zip(rivals, others, strict=True)),
             )
         )
     causes.sort(key=lambda cause: -cause.probability)
     named = [cause for cause in causes if cause.probability >= NAMED]
-    if named and not (last.significant and last.share_left > 0.15):
+    if named and not (left and last.share_left > UNKNOWN_SHARE):
         verdict = "explained"
     elif named:
         verdict = "partly_explained"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.box import boxed
-from gcode2krl.gap.evidence import stretches_of
+from gcode2krl.gap.evidence import PRIOR, stretches_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
@@ -22,9 +22,10 @@ _FIXED = ("harmonic",)
 """Shapes that are counts: a fit keeps the value of the grid."""
 _MOST_STEPS = 12
 _AT_BOUND = 1e-3
-PRIOR = 3.0
 _NUMBER = 0.5
 """Of two effects that are one to the data the one with fewer numbers is named."""
+_SLIGHT_SLIP = 9.2
+"""Twice log 100: slips are gross, the load of another tool, say; what is slight is another effect."""
 _SEARCH_ROUNDS, _FINEST = 30, 0.005
 _MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
@@ -142,7 +143,8 @@ class Fitted:
         number that the data do not see costs next to nothing.
         """
         grown = np.eye(len(self.information)) + PRIOR**2 * self.information
-        return float(np.linalg.slogdet(grown)[1]) + _NUMBER * len(grown)
+        slight = sum(_is_slight_slip(each, one) for each, one in zip(self.free, self.applied, strict=True))
+        return float(np.linalg.slogdet(grown)[1]) + _NUMBER * len(grown) + _SLIGHT_SLIP * slight
 
     def deviations(self, number: int) -> dict[str, float]:
         """Return the standard deviation of each number of an effect, by the curvature of chi2."""
@@ -150,6 +152,16 @@ class Fitted:
         names = self.free[number].names
         variance = np.diag(self.covariance)[first : first + len(names)]
         return dict(zip(names, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+
+
+def _is_slight_slip(free: Free, applied: Applied) -> bool:
+    """Tell whether a set-up slip is less than half of what slips are."""
+    sizes = zip(free.names, free.start(applied), free.scale, strict=True)
+    usual = [p.nominal for p in free.effect.parameters if p.name in free.names]
+    return free.effect.kind == "slip" and all(
+        abs(value - (nominal or 0.0)) < scale / 2.0
+        for (_, value, scale), nominal in zip(sizes, usual, strict=True)
+    )
 
 
 class Target:
@@ -348,12 +360,61 @@ def _scanned(
     return found
 
 
-def inflation_of(target: Target, fitted: Fitted, number: int) -> float:
-    """Return by how much the gain of an effect varies more than white noise lets it, at least 1.
+@dataclass(frozen=True)
+class Slope:
+    """The marginal residual (r,) at a fit, and how it changes (r, p) with the numbers of one of its effects.
 
-    From the scores of each stretch of time at the best fit (White 1980, by clusters): what a model is off by
-    here and there, of either sign, makes the noise of a gain larger than the noise of a sample says.
+    Those of the other effects are taken out; numbers are in units of their typical size.
     """
+
+    residual: Floats
+    mine: Floats
+    clusters: NDArray[np.int64]
+    """(rows of data,) the stretch of time of each."""
+
+    @property
+    def rows(self) -> int:
+        """Return the number of data; the residual's end is nuisance."""
+        return len(self.clusters)
+
+    def inflation(self) -> float:
+        """Return by how much the gain of the effect varies more than white noise lets it, at least 1.
+
+        From the scores of each stretch of time at the best fit (White 1980, by clusters): what a model is off
+        by here and there, of either sign, makes the noise of a gain larger than the noise of a sample says.
+        """
+        names, at = np.unique(self.clusters, return_inverse=True)
+        width = self.mine.shape[1]
+        sums = np.zeros((len(names), width))
+        np.add.at(sums, at, self.mine[: self.rows] * self.residual[: self.rows, None])
+        info = np.linalg.pinv(self.mine.T @ self.mine, rcond=1e-9, hermitian=True)
+        grown = float(np.trace(info @ (sums.T @ sums))) / width
+        return float(max(1.0, grown * len(names) / max(len(names) - width, 1)))
+
+    def left_out_gain(self, before: Floats, groups: int) -> float:
+        """Return the fall of chi2 from the residual ``before`` (r,) on data that numbers were not fitted to.
+
+        Stretches in their order make groups in which the effect does as much: a run in air tells nothing of a
+        force. Each is left out in turn; the numbers then are a step away from those of the fit. Infinite
+        where there are fewer stretches than groups.
+        """
+        names, at = np.unique(self.clusters, return_inverse=True)
+        change = before[: self.rows] - self.residual[: self.rows]
+        power = np.cumsum(np.bincount(at, weights=change**2))
+        if len(names) < groups or power[-1] <= 0.0:
+            return math.inf
+        group = np.minimum((groups * (power - power[0] / 2.0) / power[-1]).astype(int), groups - 1)[at]
+        total = 0.0
+        mine, rest = self.mine[: self.rows], self.residual[: self.rows]
+        for held in (group == number for number in range(groups)):
+            step = np.linalg.lstsq(mine[~held], -rest[~held], rcond=1e-9)[0]
+            left = rest[held] + mine[held] @ step
+            total += float(before[: self.rows][held] @ before[: self.rows][held] - left @ left)
+        return total
+
+
+def slope_of(target: Target, fitted: Fitted, number: int) -> Slope:
+    """Return the residual of a fit and how it changes with one of its effects."""
     residual, jacobian = residual_jacobian(target, fitted)
     first = sum(len(free.names) for free in fitted.free[:number])
     wide = jacobian * np.concatenate([free.scale for free in fitted.free])
@@ -361,13 +422,7 @@ def inflation_of(target: Target, fitted: Fitted, number: int) -> float:
     others = np.delete(wide, np.s_[first : first + mine.shape[1]], axis=1)
     if others.shape[1]:
         mine = mine - others @ np.linalg.lstsq(others, mine, rcond=1e-9)[0]
-    clusters = stretches_of_all(target.parts)
-    names, at = np.unique(clusters, return_inverse=True)
-    sums = np.zeros((len(names), mine.shape[1]))
-    np.add.at(sums, at, mine[: len(clusters)] * residual[: len(clusters), None])
-    info = np.linalg.pinv(mine.T @ mine, rcond=1e-9, hermitian=True)
-    grown = float(np.trace(info @ (sums.T @ sums))) / mine.shape[1]
-    return float(max(1.0, grown * len(names) / max(len(names) - mine.shape[1], 1)))
+    return Slope(residual, mine, stretches_of_all(target.parts))
 
 
 def stretches_of_all(parts: Sequence[Part]) -> NDArray[np.int64]:

@@ -1,13 +1,13 @@
 """Grouped forward selection: how surprising a block of signatures is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gcode2krl.gap.evidence import Evidence, Ledger
+from gcode2krl.gap.evidence import Ledger
 
 Floats = NDArray[np.float64]
 FALSE_ALARMS = 1e-3
@@ -15,6 +15,9 @@ FALSE_ALARMS = 1e-3
 LEAST_RATIO = 0.08
 """An effect whose trace, nuisance taken out, is below this share of the noise is not reported: models of
 sound machines differ by so much."""
+
+_REACH, _BENT_REACH = 0.02, 1.0
+"""Of their range, by how much coefficients may be beyond it: they are the first order of an effect."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,8 @@ class Column:
     width: int
     low: Floats
     high: Floats
+    bent: bool = False
+    """The signals are not proportional to the size: coefficients tell little of it."""
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -34,7 +39,7 @@ class Column:
 
     def moved(self, by: int) -> "Column":
         """Return the column behind ``by`` more."""
-        return Column(self.block, self.first + by, self.width, self.low, self.high)
+        return replace(self, first=self.first + by)
 
 
 @dataclass(frozen=True)
@@ -59,18 +64,23 @@ def surprise(gain: float, width: int) -> float:
     return float(x - (half - 1.0) * np.log(x) + special.gammaln(half))
 
 
-def scores(evidence: Evidence, columns: Sequence[Column], given: Sequence[int] = ()) -> list[Score]:
-    """Return the statistic of every block besides the given signature columns."""
+def scores(ledger: Ledger, columns: Sequence[Column]) -> list[Score]:
+    """Return the statistic of every block beside what is given in the ledger's last evidence."""
     found = []
     for column in columns:
         if column.width == 0:
             continue
-        gain, coefficients = evidence.gain(column.index, given)
-        reach = 1e-9 + 0.02 * np.abs(column.high - column.low)
+        gain, coefficients = ledger.bounded_gain(column.index)
+        span = np.abs(column.high - column.low)
+        reach = 1e-9 + (_BENT_REACH if column.bent else _REACH) * span
         within = bool(np.all((coefficients >= column.low - reach) & (coefficients <= column.high + reach)))
         if column.width == 1 and column.low[0] == 0.0 and coefficients[0] < 0.0:
             within = False
-        found.append(Score(column, gain, coefficients, surprise(gain, column.width), within))
+        plausible = np.clip(coefficients, column.low, column.high)
+        if column.bent and column.width > 1:  # of several, those that say nothing begin at nominal
+            within = True
+            plausible = np.where(plausible == coefficients, coefficients, 0.0)
+        found.append(Score(column, gain, plausible, surprise(gain, column.width), within))
     return found
 
 
@@ -78,29 +88,3 @@ def threshold(blocks: int) -> float:
     """Return the surprise that the largest of so many blocks stays below in all but one in a thousand
     effect-free data sets (Bonferroni; conservative, as blocks are alike)."""
     return float(np.log(max(blocks, 1) / FALSE_ALARMS))
-
-
-def left_out_gain(ledger: Ledger, folds: Sequence[Sequence[tuple[int, int]]], column: Column,
-                  given: Sequence[int] = ()) -> float:  # fmt: skip
-    """Return the fall of chi2 on stretches that the coefficients were not fitted to, over all folds."""
-    everything = ledger.stretches()
-    total = 0.0
-    for fold in folds:
-        held = set(fold)
-        chosen = [each for each in everything if each not in held]
-        if not chosen or not held:
-            continue
-        fitted = ledger.evidence(chosen)
-        index = np.concatenate([np.asarray(given, dtype=int), column.index])
-        _, both = fitted.gain(index)
-        _, alone = fitted.gain(np.asarray(given, dtype=int)) if len(given) else (0.0, np.zeros(0))
-        test = ledger.evidence(list(held)).gram
-        total += _fall(test, index, both) - _fall(test, np.asarray(given, dtype=int), alone)
-    return total
-
-
-def _fall(gram: Floats, index: NDArray[np.int64], coefficients: Floats) -> float:
-    if len(index) == 0:
-        return 0.0
-    at = index + 1
-    return float(2.0 * coefficients @ gram[at, 0] - coefficients @ gram[np.ix_(at, at)] @ coefficients)

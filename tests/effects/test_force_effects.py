@@ -102,9 +102,9 @@ def test_tool_diameter(part, milling, known):
     assert signals.radius_offset_mm == pytest.approx(0.2)
 
 
-def idle_edge_force(runout, f_z, teeth, a_p, k_te, k_re, k_ae, start, end):
+def idle_edge_force(runout, angle_rad, f_z, teeth, a_p, k_te, k_re, k_ae, start, end):
     """Edge force of idle teeth by walking each tooth over the arc, feed, normal, axial in N."""
-    radius = runout * np.cos(2 * np.pi * np.arange(teeth) / teeth)
+    radius = runout * np.cos(2 * np.pi * np.arange(teeth) / teeth + angle_rad)
     width = (end - start) / 20000
     phi = start + (np.arange(20000) + 0.5) * width
     total = np.zeros(3)
@@ -120,9 +120,10 @@ def idle_edge_force(runout, f_z, teeth, a_p, k_te, k_re, k_ae, start, end):
     return total * a_p * width / (2 * np.pi)
 
 
+@pytest.mark.parametrize("angle_deg", [0.0, 60.0, 100.0])
 @pytest.mark.parametrize("runout_mm", [0.005, 0.02, 0.08])
 @pytest.mark.parametrize(("start", "end"), [(0.0, np.pi), (0.0, np.pi / 2), (np.pi / 2, np.pi)])
-def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, start, end):
+def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, angle_deg, start, end):
     """A straight cut along +x with 13,000 rpm, 25 mm/s: f_z = 0.0385 mm with three teeth."""
     count, tool = 5, part.cell.tool[1]
     rows = slice(100, 100 + count)
@@ -144,10 +145,10 @@ def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, start
         source_line=whole.source_line[rows], force_base_N=np.zeros((count, 3)),
         moment_base_Nmm=np.zeros((count, 3)),
     )  # fmt: skip
-    signals = run(inputs, known, f"runout:runout_mm={runout_mm}")
+    signals = run(inputs, known, f"runout:runout_mm={runout_mm},angle_deg={angle_deg}")
     law, f_z = part.cell.material.linear_edge, 25.0 / (13000 / 60) / tool.teeth
     feed, normal, axial = idle_edge_force(
-        runout_mm, f_z, tool.teeth, 2.0, law.Kte, law.Kre, law.Kae or 0.0, start, end
+        runout_mm, np.radians(angle_deg), f_z, tool.teeth, 2.0, law.Kte, law.Kre, law.Kae or 0.0, start, end
     )
     wanted = -np.array([feed, normal, -axial])  # +x, its left is +y, axial is downwards
     np.testing.assert_allclose(signals.force_base_N, np.tile(wanted, (count, 1)), atol=0.05)

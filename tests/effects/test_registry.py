@@ -38,7 +38,7 @@ TABLE = {
     "vibration": ("hz", "damping", "participation", "direction"),
     "force_scale": ("scale",),
     "tool_wear": ("growth_per_m",),
-    "runout": ("runout_mm",),
+    "runout": ("runout_mm", "angle_deg"),
     "stock_offset": ("offset_mm",),
     "edge_force": ("scale",),
     "force_offset": ("fx_N", "fy_N", "fz_N"),

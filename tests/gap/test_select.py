@@ -29,7 +29,8 @@ def _columns() -> list[Column]:
 
 def _largest(ledger: Ledger, y: np.ndarray, inflated: bool = False) -> float:
     ledger.set_data([y[:, None]], [np.zeros((1, COUNT, 0))])
-    best = max(scores(ledger.evidence(), _columns()), key=lambda score: score.surprise)
+    ledger.evidence()
+    best = max(scores(ledger, _columns()), key=lambda score: score.surprise)
     by = ledger.inflation(best.column.index) if inflated else 1.0
     return surprise(best.gain / by, 1)
 
@@ -84,11 +85,11 @@ def test_a_gain_beside_bounded_nuisance_is_that_of_a_fit_with_both():
     y = generator.standard_normal(COUNT) + 2.0 * columns[:, 3] + 5.0 * columns[:, BLOCKS]
     ledger.set_data([y[:, None]], [np.zeros((1, COUNT, 0))])
     before = ledger.evidence().chi2
-    gain = ledger.bounded_gain(np.array([3]))
+    gain, _ = ledger.bounded_gain(np.array([3]))
     # by brute force over the one nuisance that is driven to its bound
     bound = y - 3.0**0.5 * columns[:, BLOCKS]
     a = np.column_stack([columns[:, 3], columns[:, BLOCKS + 1]])
-    a = np.vstack([a, [0.0, 1.0]])
-    rest = np.append(bound, 0.0)
+    a = np.vstack([a, [0.0, 1.0], [1.0 / 3.0, 0.0]])  # bounds and the expected size pull
+    rest = np.append(bound, [0.0, 0.0])
     left = rest - a @ np.linalg.lstsq(a, rest, rcond=None)[0]
     assert before - gain == pytest.approx(float(left @ left), rel=1e-6)

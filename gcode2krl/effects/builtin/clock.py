@@ -28,7 +28,7 @@ class WrongClock(Effect):
     links = frozenset().union(*_LINKS.values())
     parameters = (
         Parameter(
-            "offset_s", "s", -0.5, 0.5, nominal=0.0, start=0.01, linear=True,
+            "offset_s", "s", -0.5, 0.5, nominal=0.0, start=0.01,
             source="tables started by hand or over a network up to some 0.1 s; interpolator 40-100 ms ahead",
         ),
         Parameter(

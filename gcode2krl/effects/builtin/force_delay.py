@@ -15,7 +15,7 @@ class ForceDelay(Effect):
     links = frozenset({"force"})
     parameters = (
         Parameter(
-            "delay_s", "s", 0.0, 0.5, nominal=0.0, start=0.02, linear=True, minimum=0.0,
+            "delay_s", "s", 0.0, 0.5, nominal=0.0, start=0.02, minimum=0.0,
             source="force chain plus the robot's reaction 100-150 ms, the chain alone 5-50 ms",
         ),
     )  # fmt: skip

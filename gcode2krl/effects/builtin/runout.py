@@ -12,13 +12,14 @@ from gcode2krl.effects import arm
 from gcode2krl.effects.coefficients import edge_only
 from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Floats, Load, Parameter, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.units import RAD_PER_REV
+from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 
 class Runout(Effect):
     """The cutter's axis is off by ``runout_mm``: teeth that no longer cut drop their edge force.
 
-    Tooth j of N has the radius R + r_j, r_j = runout·cos(2·pi·j/N) (parallel offset; Kline and DeVor 1983).
+    Tooth j of N has the radius R + r_j, r_j = runout·cos(2·pi·j/N + angle) (parallel offset; Kline and DeVor
+    1983). With three teeth an angle of 60° is one tooth set back by 1.5·runout beside two equal ones.
     It cuts where its chip, min over k of k·f_z·sin(phi) + r_j - r_(j-k), is positive, that is where sin(phi)
     is above max over k of (r_(j-k) - r_j)/(k·f_z). What all teeth cut together in a turn is the same, so the
     mean of the chip's force stays, and the edge force of the idle ones is missing. Arcs and depth are those
@@ -33,6 +34,10 @@ class Runout(Effect):
         Parameter(
             "runout_mm", "mm", 0.0, 0.1, nominal=0.0, start=0.02, minimum=0.0,
             source="10-30 µm of a milling spindle with collet",
+        ),
+        Parameter(
+            "angle_deg", "deg", 0.0, 180.0, nominal=None, start=0.0, grid=(0.0, 30.0, 60.0, 90.0),
+            source="between the offset and a tooth: as the cutter happens to sit in its collet",
         ),
     )  # fmt: skip
 
@@ -51,12 +56,12 @@ class Runout(Effect):
             return load
         force_N, moment_Nmm = np.array(load[0]), np.array(load[1])
         for number, rows in arm.tool_rows(inputs.tool):
-            missing = _missing(number, np.arange(len(inputs))[rows], inputs, applied["runout_mm"])
+            missing = _missing(number, np.arange(len(inputs))[rows], inputs, applied)
             force_N[rows] -= missing
         return force_N, moment_Nmm
 
 
-def _missing(number: int, rows: NDArray[np.int64], inputs: Inputs, runout_mm: float) -> Floats:
+def _missing(number: int, rows: NDArray[np.int64], inputs: Inputs, applied: Applied) -> Floats:
     """Return the edge force (n, 3) along ``$BASE`` that idle teeth do not bring."""
     forces, motion, material = inputs.forces, inputs.motion, inputs.cell.material
     missing = np.zeros((len(rows), 3))
@@ -65,17 +70,18 @@ def _missing(number: int, rows: NDArray[np.int64], inputs: Inputs, runout_mm: fl
     tool = inputs.cell.tool[number]
     f_z = feed_per_tooth(motion.speed_mm_s[rows], inputs.spindle_rad_s[rows], tool.teeth)
     law = law_array(edge_only(material))
+    angle_rad = applied["angle_deg"] * RAD_PER_DEG
     for tooth in range(tool.teeth):
-        sine = idle_below(tooth, tool.teeth, runout_mm, f_z)
+        sine = idle_below(tooth, tool.teeth, applied["runout_mm"], f_z, angle_rad)
         arcs = idle_arcs(forces.phi_rad[rows], sine)
         load = cutting_load(tool, law, arcs, forces.a_p_mm[rows], f_z, peak=False)
         missing += load.force_N / tool.teeth
     return along_base(missing, inputs, rows)
 
 
-def idle_below(tooth: int, teeth: int, runout_mm: float, f_z_mm: Floats) -> Floats:
+def idle_below(tooth: int, teeth: int, runout_mm: float, f_z_mm: Floats, angle_rad: float) -> Floats:
     """Return sin(phi) (n,) up to which a tooth does not cut; 1 where it never does."""
-    radius = runout_mm * np.cos(RAD_PER_REV * np.arange(teeth) / teeth)
+    radius = runout_mm * np.cos(RAD_PER_REV * np.arange(teeth) / teeth + angle_rad)
     back = np.arange(1, teeth + 1)
     higher = radius[(tooth - back) % teeth] - radius[tooth]  # after a whole turn the tooth meets itself: 0
     moving = f_z_mm > 0.0

@@ -16,7 +16,7 @@ class Stiffness(Effect):
     targets = staticmethod(every_virtual_joint)
     parameters = (
         Parameter(
-            "scale", "", 0.3, 3.0, nominal=1.0, start=0.8, linear=True, minimum=0.01,
+            "scale", "", 0.2, 3.0, nominal=1.0, start=0.8, minimum=0.01,
             source="identified within 8 % (Haehn & Weigold 2020); a worn bearing or another arm: factors",
         ),
     )  # fmt: skip

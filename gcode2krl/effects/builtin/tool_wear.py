@@ -19,8 +19,8 @@ class ToolWear(Effect):
     links = frozenset({"force"})
     parameters = (
         Parameter(
-            "growth_per_m", "1/m", 0.0, 1.0, nominal=0.0, start=0.05, linear=True, minimum=0.0,
-            source="+20-100 % force over a tool's life of some metres (steel) to kilometres (aluminium)",
+            "growth_per_m", "1/m", 0.0, 3.0, nominal=0.0, start=0.05, linear=True, minimum=0.0,
+            source="+20-100 % force over a tool's life of 0.5 m (hard steel) to kilometres (aluminium)",
         ),
     )  # fmt: skip
 
