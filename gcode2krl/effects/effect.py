@@ -217,6 +217,10 @@ class Effect:
                 base |= dict(zip(self.direction, (part / length).tolist(), strict=True))
         return base
 
+    def alternatives(self, values: Values) -> tuple[dict[str, float], ...]:
+        """Return values that look the same to first order: a fit begins at the best of them."""
+        return (dict(values),)
+
     def _sizes(self) -> tuple[Parameter, ...]:
         return tuple(p for p in self.parameters if not p.is_shape and p.name not in (self.direction or ()))
 

@@ -1,7 +1,7 @@
 """One link: noise, candidates, forward selection with refits, and what is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,8 @@ _MARGIN = 1.0
 _SLACK = 1.15
 """Bounds of normal mismatch are round numbers."""
 _STARTS = (1.0, -0.7, 3.0)
+_QUIETER = 0.7
+"""Noise that has less than this of its power beside the causes is taken anew."""
 _BENT_SHARE = 0.4
 """An effect that is not proportional to its size may look so much worse before its refit."""
 
@@ -118,8 +120,8 @@ def examine(
     known = signatures or Signatures()
     nuisance = nuisance_for(parts, question, known)
     blocks, columns, stacked = columns_of(question.blocks, parts, known)
-    if noise is None:
-        noise = noise_of(parts, stacked, nuisance)
+    given = noise
+    noise = given or noise_of(parts, stacked, nuisance)
     ledger = Ledger([
         rows_of(part, s, own, noise) for part, s, own in zip(parts, stacked, nuisance, strict=True)
     ])  # fmt: skip
@@ -141,6 +143,11 @@ def examine(
         question,
     )
     _select(found)
+    if given is None and found.causes:
+        # what rings or hums looks like noise until its cause is known
+        less = noise_of(parts, stacked, nuisance, found.applied)
+        if sum(each.sigma**2 for each in less) < _QUIETER * sum(each.sigma**2 for each in noise):
+            return examine(link, parts, question, known, less)
     return found
 
 
@@ -217,7 +224,7 @@ def _accept(
                 best = min(best, fitted.chi2)
             else:
                 alone = len(start.effect.parameters) == 1
-                fitted = refit(found.target, (*found.applied, start), scan=alone)
+                fitted = refit(found.target, (*found.applied, _best_of(found, start)), scan=alone)
             tried.append((fitted.chi2 + fitted.occam, score, fitted))
         tried.sort(key=lambda each: each[0])
         for _, score, fitted in tried:
@@ -232,6 +239,14 @@ def _accept(
             return True
         ranked = [score for score in ranked if found.blocks[score.column.block].key not in rejected]
     return False
+
+
+def _best_of(found: Examination, start: Applied) -> Applied:
+    """Return the best of what looks like an effect to first order."""
+    tried = [replace(start, values=values) for values in start.effect.alternatives(start.values)]
+    if len(tried) == 1:
+        return start
+    return min(tried, key=lambda one: float(np.sum(found.target.residual((*found.applied, one)) ** 2)))
 
 
 def _certain(found: Examination, score: Score, fitted: Fitted) -> float | None:
@@ -257,6 +272,8 @@ def within_mismatch(found: Examination, number: int) -> bool:
     limits = question.mismatch.limits(applied, duration, question.clocks)
     if not limits:
         return False
+    if replans(applied.effect):
+        return _time_off_s(found, applied) <= question.mismatch.clock_s
     nominal = applied.effect.nominal(part.inputs, applied.target)
     deviation = found.fitted.deviations(number)
     return all(
@@ -265,6 +282,13 @@ def within_mismatch(found: Examination, number: int) -> bool:
         for name in applied.effect.names
         if not applied.effect.parameter(name).is_shape
     )
+
+
+def _time_off_s(found: Examination, applied: Applied) -> float:
+    """Return by how much an effect moves the signals in time, as the time by which they would do as much."""
+    change = sum(float(np.sum((part.sample([applied]) - part.nominal) ** 2)) for part in found.parts)
+    rate = sum(float(np.sum(part.rate**2)) for part in found.parts)
+    return float(np.sqrt(change / rate)) if rate > 0.0 else 0.0
 
 
 def score_effect(found: Examination, score: Score) -> Effect:

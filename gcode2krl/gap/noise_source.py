@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.effects import Applied
 from gcode2krl.gap.noise import Noise, at_most, drawn_noise, fit, resolution, unbiased
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part, nearest_rows
@@ -20,9 +21,10 @@ _MOST_STATED = 1.4
 
 
 def noise_of(
-    parts: Sequence[Part], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]]
-) -> list[Noise]:
-    """Return the noise of each component.
+    parts: Sequence[Part], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]],
+    applied: Sequence[Applied] = (),
+) -> list[Noise]:  # fmt: skip
+    """Return the noise of each component, beside effects that are known.
 
     From every run is taken what any effect or nuisance could explain of that run alone. If the runs repeat
     one program, what differs between them is noise, whatever its colour; else everything slower than half a
@@ -45,7 +47,7 @@ def noise_of(
         return found
 
     floors = np.array([_floor(parts, j) for j in range(parts[0].shape[1])])
-    first = fits([part.residual for part in parts], floors)
+    first = fits([part.measured - part.sample(applied) for part in parts], floors)
     generator = np.random.default_rng(0)
     drawn = [
         np.stack([drawn_noise(noise, len(part.time_s), generator) for noise in first], axis=1)

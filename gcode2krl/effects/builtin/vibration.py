@@ -18,6 +18,9 @@ from gcode2krl.effects.inputs import Inputs, gradient
 from gcode2krl.effects.operators import second_order
 from gcode2krl.units import RAD_PER_REV
 
+_NEARBY = (0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1.03)
+_DAMPINGS = (0.01, 0.02, 0.05)
+
 
 class Vibration(Effect):
     """One mode along a direction n in ``$BASE``: u'' + 2·zeta·w·u' + w²·u = drive, tip += participation·n·u.
@@ -42,7 +45,7 @@ class Vibration(Effect):
             source="structural damping 1-6 %",
         ),
         Parameter(
-            "participation", "", 0.0, 3.0, nominal=0.0, start=0.5, linear=True, minimum=0.0,
+            "participation", "", 0.0, 3.0, nominal=0.0, start=0.5, minimum=0.0,
             source="share of the mode in the static deflection; above 1 where several act as one",
         ),
         *direction_parameters("any"),
@@ -58,6 +61,22 @@ class Vibration(Effect):
         if parts.sum() > 0.0:
             values |= dict(zip(DIRECTION, np.sqrt(parts / parts.sum()).tolist(), strict=True))
         return values
+
+    def alternatives(self, values: Values) -> tuple[dict[str, float], ...]:
+        """Return these values with the direction's other signs, nearby frequencies and other dampings.
+
+        The first order goes with n·nᵀ; a mode rings for many turns, so that a frequency off by one in a
+        hundred is out of step soon.
+        """
+        return tuple(
+            dict(values)
+            | {"direction_y": sign_y * values["direction_y"], "direction_z": sign_z * values["direction_z"]}
+            | {"hz": factor * values["hz"], "damping": damping}
+            for sign_y in (1.0, -1.0)
+            for sign_z in (1.0, -1.0)
+            for factor in _NEARBY
+            for damping in _DAMPINGS
+        )
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the tip with the mode's motion."""
