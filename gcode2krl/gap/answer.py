@@ -193,11 +193,17 @@ def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
 
 
 def _slip_cause(slip: Slip) -> dict[str, Any]:
-    values = {name: {"value": v, "low": v, "high": v} for name, v in slip.applied.values.items()}
+    # what it leaves of the gap says how well its numbers are met
+    share = (slip.rms_after or 0.0) / slip.rms_before if slip.rms_before > 0.0 else 0.0
+    values = {
+        name: {"value": v, "low": v - share * abs(v), "high": v + share * abs(v)}
+        for name, v in slip.applied.values.items()
+    }
     return {
         "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,
         "probability": _SURE, "parameters": {} if slip.final else values, "shrink": None,
-        "rms_after": slip.rms_after, "indistinguishable_from": [], "words": slip.words,
+        "rms_after": slip.rms_after, "words": slip.words,
+        "indistinguishable_from": [{"effect": name, "target": target} for name, target in slip.alike],
     }  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Applied, Effect, inputs_of, library
@@ -32,6 +33,7 @@ from gcode2krl.gap.stops import unplanned_stops
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run, check_program
 
+Floats = NDArray[np.float64]
 _S_PER_H = 3600.0
 _SLIPS_THAT_ARE_CAUSES = {
     "path": ("absolute_accuracy",), "servo": ("rsi_on",), "force": ("swapped_tool",),
@@ -43,6 +45,8 @@ _SET = 0.1
 _PEAKS = 4
 _LOST, _CLOCKS_LOST = ("unexplained", "partly_explained"), 4
 """Where the run's own timing replaced the plan's, an instrument's clock is known so many times worse."""
+_LENGTH_MM = 0.1
+"""Coefficients of force known to 3 % tell a depth of cut of some mm no better."""
 _CLOCKS_OF_TWO = 2
 """Two clocks are the same where they differ by no more than normal mismatch of both."""
 _TIMING = ("velocity_rule", "corner", "advance_stop", "override")
@@ -282,12 +286,9 @@ def _learn(state: _State, judgement: Judgement) -> None:
     """Take what a link says into the model of the later ones."""
     named = list(judgement.applied)
     if judgement.link == "force":
-        state.found += [one for one in named if one.effect.family != "sensor"]
+        state.found += [_sure_length(one) for one in named if one.effect.family != "sensor"]
         if judgement.verdict in _LOST:
             state.sides = [side.with_measured_load() for side in state.sides]
-    for one in named:
-        if one.effect.name == "absolute_accuracy":
-            _planned_once(state, one)
     if judgement.link == "servo":
         _free_controller(state, judgement)
     if judgement.link in ("servo", "gear") and judgement.verdict in ("no_gap", "explained"):
@@ -297,9 +298,26 @@ def _learn(state: _State, judgement: Judgement) -> None:
     planned = [one for one in named if one.effect.name in _TIMING]
     for one in planned:
         state.sides = [replace(side, inputs=one.effect.replan(side.inputs, one)) for side in state.sides]
+    if any(one.effect.name == "absolute_accuracy" for one in named):
+        state.sides = [_without_own_model(side) for side in state.sides]
+        return
     if judgement.verdict in _LOST:
         state.sides = [retimed(side) for side in state.sides]
     state.sides = [refined(_with_controller_clock(side)) for side in state.sides]
+
+
+def _without_own_model(side: Side) -> Side:
+    """Return the side on the run's own time, the controller's joints less what its own model adds."""
+    on_time = refined(side.with_own_model())
+    inputs = replace(on_time.inputs, q_cmd_rad=side.inputs.q_cmd_rad)
+    return replace(on_time, inputs=inputs).with_nominal_joints()
+
+
+def _sure_length(one: Applied) -> Applied:
+    """Return another tool without a length that forces cannot tell from none."""
+    if one.effect.name != "swapped_tool" or abs(one.values["length_mm"]) > _LENGTH_MM:
+        return one
+    return replace(one, values={**one.values, "length_mm": 0.0})
 
 
 def _free_controller(state: _State, servo: Judgement) -> None:

@@ -36,10 +36,13 @@ _HOPELESS = 3.0
 _CLOSE_SHARE, _CLOSE_GAIN = 0.15, 12.0
 """Rivals within this of the best linear gain are refitted too: signatures hold for small effects only."""
 PRUNE = 0.05
+_ACTS = 1e-6
 _MARGIN = 1.0
 _SLACK = 1.15
 """Bounds of normal mismatch are round numbers."""
 _STARTS = (1.0, -0.7, 3.0)
+_FIRST_STEPS, _BEHIND = 3, 0.2
+"""After so many steps of a refit one that is behind the best by this share of its gain is given up."""
 _QUIETER = 0.7
 """Noise that has less than this of its power beside the causes is taken anew."""
 _BENT_SHARE = 0.4
@@ -76,7 +79,6 @@ class Examination:
     target: Target
     fitted: Fitted
     level: float
-    chi2_before: float
     question: Question
     surprises: list[float] = field(default_factory=list)
     seen: list[tuple[float, float]] = field(default_factory=list)
@@ -139,7 +141,6 @@ def examine(
         target,
         start,
         0.0,
-        start.chi2,
         question,
     )
     _select(found)
@@ -224,7 +225,12 @@ def _accept(
                 best = min(best, fitted.chi2)
             else:
                 alone = len(start.effect.parameters) == 1
-                fitted = refit(found.target, (*found.applied, _best_of(found, start)), scan=alone)
+                start = _best_of(found, start)
+                fitted = refit(found.target, (*found.applied, start), steps=_FIRST_STEPS, scan=alone)
+                best = min(best, fitted.chi2)
+                if fitted.chi2 <= best + _BEHIND * (found.fitted.chi2 - best):
+                    fitted = refit(found.target, fitted.applied)
+                    best = min(best, fitted.chi2)
             tried.append((fitted.chi2 + fitted.occam, score, fitted))
         tried.sort(key=lambda each: each[0])
         for _, score, fitted in tried:
@@ -383,19 +389,30 @@ def tangents_of(part: Part, fitted: Fitted, without: int = -1) -> Floats:
 
 
 def _prune(found: Examination) -> None:
-    """Drop what brings less than 5 % of the whole gain."""
+    """Drop what brings less than 5 % of the whole gain where it acts: a joint's effect in that joint."""
+    before = found.target.residual(())
     while len(found.applied) > 1:
-        whole = found.chi2_before - found.fitted.chi2
+        after = found.target.residual(found.applied)
         costs = []
         for number in range(len(found.applied)):
             rest = tuple(each for i, each in enumerate(found.applied) if i != number)
             without = refit(found.target, rest, steps=4)
-            costs.append((without.chi2 - found.fitted.chi2, number, without))
-        cost, number, without = min(costs, key=lambda each: each[0])
-        if cost >= PRUNE * whole:
+            here = acts(found, number)
+            whole = float(np.sum(before[: len(here)][here] ** 2) - np.sum(after[: len(here)][here] ** 2))
+            costs.append(((without.chi2 - found.fitted.chi2) / max(whole, 1e-30), number, without))
+        share, number, without = min(costs, key=lambda each: each[0])
+        if share >= PRUNE:
             return
         found.fitted = without
         del found.surprises[number], found.usual[number]
+
+
+def acts(found: Examination, number: int) -> NDArray[np.bool_]:
+    """Return which of the whitened data an accepted effect changes at all."""
+    rest = [each for i, each in enumerate(found.applied) if i != number]
+    change = found.target.whiten([part.sample(found.applied) - part.sample(rest) for part in found.parts])
+    changes: NDArray[np.bool_] = np.abs(change) > _ACTS * np.abs(change).max(initial=0.0)
+    return changes
 
 
 def columns_of(

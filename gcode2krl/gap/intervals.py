@@ -5,15 +5,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.gap.evidence import stretches_of
-from gcode2krl.gap.examine import Examination
-from gcode2krl.gap.refit import unbounded_jacobian
+from gcode2krl.gap.evidence import PRIOR, stretches_of
+from gcode2krl.gap.examine import Examination, replans
+from gcode2krl.gap.refit import FIXED, unbounded_jacobian
 from gcode2krl.gap.signatures import PHASE
 
 Floats = NDArray[np.float64]
 _DRAWS = 400
-_LAW = 0.03
-"""A path is met to the accuracy of the time law, not to that of noise: so much of a number is not known."""
+_MODEL, _LAW = 0.03, 0.1
+"""Shares of a number that models are off by, whatever the noise: of all effects, of those that plan anew.
+
+As half-widths of 90 % intervals; from calibration runs of `tests/plant`, not from those that are scored.
+"""
 _LEAST_STRETCHES = 8
 
 
@@ -29,7 +32,8 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
     """Return the interval of every parameter of every accepted effect.
 
     The covariance of the fit's numbers is H⁻¹·B·H⁻¹ with H the curvature and B the sum over stretches of time
-    of the outer products of their scores (White 1980, by clusters); never less than H⁻¹ alone.
+    of the outer products of their scores (White 1980, by clusters); never less than H⁻¹ alone. H holds what
+    was known before: a size is expected within `PRIOR` typical ones.
     """
     if not found.applied:
         return []
@@ -38,7 +42,6 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = found.fitted.x + generator.standard_normal((_DRAWS, len(found.fitted.x))) @ root.T
-    least = _LAW if found.link == "path" else 0.0
     result, at = [], 0
     for number, free in enumerate(found.fitted.free):
         width = len(free.names)
@@ -46,27 +49,30 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
         at += width
         drawn = [free.applied(x).values for x in mine]
         own = found.applied[number].values
+        share = _LAW if replans(free.effect) else _MODEL
         result.append({
-            name: _interval(name, own[name], np.array([d[name] for d in drawn]), least * abs(own[name]))
+            name: _interval(name, own[name], np.array([d[name] for d in drawn]), share * abs(own[name]))
             for name in own
         })  # fmt: skip
     return result
 
 
-def _interval(name: str, value: float, drawn: Floats, least: float) -> Interval:
-    """Return the 90 % interval of draws (d,), an angle's about its value, at least ± ``least``."""
+def _interval(name: str, value: float, drawn: Floats, model: float) -> Interval:
+    """Return the 90 % interval of draws (d,), an angle's about its value, and of what the model is off by."""
     away = drawn - value
+    model = 0.0 if name in FIXED else model
     if name == PHASE:
         away = (away + np.pi) % (2.0 * np.pi) - np.pi
     low, high = np.quantile(away, [0.05, 0.95]).tolist()
-    return Interval(value, value + min(low, -least), value + max(high, least))
+    return Interval(value, value - float(np.hypot(low, model)), value + float(np.hypot(high, model)))
 
 
 def _covariance(found: Examination) -> Floats:
     residual = found.target.residual(found.applied)
     scale = np.concatenate([free.scale for free in found.fitted.free])
     scaled = unbounded_jacobian(found.target, found.fitted) * scale
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True)
+    # what the data do not see at all is as uncertain as it was before them
+    inverse = np.linalg.inv(scaled.T @ scaled + PRIOR**-2 * np.eye(len(scale)))
     clusters = np.concatenate([
         np.tile(1000 * number + stretches_of(part), part.shape[1]) for number, part in enumerate(found.parts)
     ])  # fmt: skip

@@ -15,7 +15,7 @@ from gcode2krl.gap.attribute import (
     rivals_of,
     unknown_probability,
 )
-from gcode2krl.gap.examine import PRUNE, Examination, Question, examine, nuisance_for
+from gcode2krl.gap.examine import PRUNE, Examination, Question, acts, examine, nuisance_for
 from gcode2krl.gap.fold import folds_of
 from gcode2krl.gap.intervals import Interval, intervals_of
 from gcode2krl.gap.measure import Size, size_of_gap
@@ -29,6 +29,7 @@ MOST_TOGETHER = 2
 """More effects in one link than this at once imitate something that the library does not have."""
 LEAST_BROUGHT = 0.4
 """A cause that takes less than this of what those above it leave on held-out data is not named."""
+_TOGETHER = 0.5
 CROWDED = 0.4
 """Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
 
@@ -158,6 +159,18 @@ def _pooled(sizes: Sequence[Size]) -> Size:
     )
 
 
+def _beside_others(found: Examination, positions: Sequence[int]) -> bool:
+    """Tell whether the last of some accepted effects acts where those before it do: in the same joints, say.
+
+    Only there can it be what is left of their form.
+    """
+    if len(positions) == 1:
+        return True
+    mine = acts(found, positions[-1])
+    others = np.any([acts(found, position) for position in positions[:-1]], axis=0)
+    return float(np.mean(others[mine])) > _TOGETHER if mine.any() else True
+
+
 def _judgement(
     link: str, parts: Sequence[Part], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
     whole: Size, held_out: bool,
@@ -175,7 +188,8 @@ def _judgement(
         rivals = rivals_of(found, number)
         own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
         brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        if held_out and brings < max(PRUNE, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
+        least = PRUNE if _beside_others(found, positions[: order + 1]) else 0.0
+        if held_out and brings < max(least, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
             own *= CROWDED
         causes.append(
             Cause(

@@ -112,7 +112,7 @@ class Part:
         if self.link != "path":
             return simulate(self.inputs, applied)
         values = tuple((one.effect.name, one.target, *one.values.items()) for one in applied)
-        key = (id(self.inputs.plan), id(self.inputs.time_s), values)
+        key = (id(self.inputs.plan), id(self.inputs.time_s), id(self.inputs.q_cmd_rad), values)
         if key not in _PATHS_KNOWN:
             _PATHS_KNOWN[key] = (self.inputs, commanded(self.inputs, applied))
             if len(_PATHS_KNOWN) > _MOST_KNOWN:

@@ -18,14 +18,14 @@ from gcode2krl.gap.signatures import PHASE
 from gcode2krl.units import RAD_PER_REV
 
 Floats = NDArray[np.float64]
-_FIXED = ("harmonic",)
+FIXED = ("harmonic",)
 """Shapes that are counts: a fit keeps the value of the grid."""
 _MOST_STEPS = 12
 _AT_BOUND = 1e-3
 _NUMBER = 0.5
 """Of two effects that are one to the data the one with fewer numbers is named."""
-_SLIGHT_SLIP = 9.2
-"""Twice log 100: slips are gross, the load of another tool, say; what is slight is another effect."""
+_SLIP = 9.2
+"""Twice log 100, prior odds: slips are gross, another tool's load, say; what is slight is another effect."""
 _SEARCH_ROUNDS, _FINEST = 30, 0.005
 _MOST_STRETCHES = 100_000
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
@@ -105,7 +105,7 @@ def free_of(applied: Applied, part: Part) -> Free:
     if direction or PHASE in effect.names:
         most = effect.parameter(size_of(effect)).high
     for p in effect.parameters:
-        if p.name in _FIXED or (direction and p.name == size_of(effect)):
+        if p.name in FIXED or (direction and p.name == size_of(effect)):
             continue
         vector = p.name in direction or (PHASE in effect.names and (p.name == PHASE or not p.is_shape))
         names.append(p.name)
@@ -143,8 +143,8 @@ class Fitted:
         number that the data do not see costs next to nothing.
         """
         grown = np.eye(len(self.information)) + PRIOR**2 * self.information
-        slight = sum(_is_slight_slip(each, one) for each, one in zip(self.free, self.applied, strict=True))
-        return float(np.linalg.slogdet(grown)[1]) + _NUMBER * len(grown) + _SLIGHT_SLIP * slight
+        slips = sum(_slip_cost(each, one) for each, one in zip(self.free, self.applied, strict=True))
+        return float(np.linalg.slogdet(grown)[1]) + _NUMBER * len(grown) + slips
 
     def deviations(self, number: int) -> dict[str, float]:
         """Return the standard deviation of each number of an effect, by the curvature of chi2."""
@@ -154,14 +154,16 @@ class Fitted:
         return dict(zip(names, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
 
-def _is_slight_slip(free: Free, applied: Applied) -> bool:
-    """Tell whether a set-up slip is less than half of what slips are."""
-    sizes = zip(free.names, free.start(applied), free.scale, strict=True)
-    usual = [p.nominal for p in free.effect.parameters if p.name in free.names]
-    return free.effect.kind == "slip" and all(
-        abs(value - (nominal or 0.0)) < scale / 2.0
-        for (_, value, scale), nominal in zip(sizes, usual, strict=True)
+def _slip_cost(free: Free, applied: Applied) -> float:
+    """Return what a set-up slip costs as chi2: slight ones are hardly any, gross ones are most gaps."""
+    if free.effect.kind != "slip":
+        return 0.0
+    x = free.start(applied)
+    gross = any(
+        not (p := free.effect.parameter(name)).is_shape and abs(value - (p.nominal or 0.0)) >= scale / 2.0
+        for name, value, scale in zip(free.names, x.tolist(), free.scale, strict=True)
     )
+    return -_SLIP if gross else _SLIP
 
 
 class Target:
@@ -291,7 +293,7 @@ def refit(target: Target, start: Sequence[Applied], steps: int = _MOST_STEPS, sc
         if not improved:
             break
         gain, x, r, best = best - chi2, trial, r_new, chi2
-        if gain < 0.02 + 1e-5 * best:
+        if gain < 0.02 + 1e-6 * best:
             break
     normal = jacobian.T @ jacobian * np.outer(scale, scale) if len(x) else np.zeros((0, 0))
     inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-10, hermitian=True), dtype=np.float64)

@@ -13,6 +13,7 @@ from gcode2krl.runs import Controller, Measured, Run
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _SMOOTH_S = 0.05
+_OWN_MODEL_STEPS, _STEP_S = 4, 1e-3
 SAME_PATH_RAD = 2e-5
 """A log this close to the prediction, 0.03 mm at an arm's length, is that path and its last decimal."""
 
@@ -89,6 +90,65 @@ class Side:
         apart = self.fitted.get("gear", q_load - reference)
         load = before + linear(here, own_s, np.nan_to_num(apart))
         return replace(self, inputs=replace(inputs, q_act_rad=actual, q_load_rad=load))
+
+    def with_own_model(self) -> "Side":
+        """Return the side with what a controller's own model of the robot adds to the planned joints.
+
+        It is a function of the pose, here a polynomial of second degree in the six angles, by least squares.
+        The offset of the table's clock is fitted along, as it would bend the one into the other.
+        """
+        table, inputs = self.run.controller, self.inputs
+        if table is None or table.q_cmd_rad is None or self.from_log:
+            return self
+        offset_s, values = 0.0, np.zeros((1, 6))
+        for _ in range(_OWN_MODEL_STEPS):
+            stamps = self.stamps(table) - offset_s
+            wanted, before, after = (
+                cubic(stamps + s, inputs.time_s, inputs.q_cmd_rad) for s in (0.0, -_STEP_S, _STEP_S)
+            )
+            rate = (after - before) / (2.0 * _STEP_S)
+            terms, apart = (
+                _of_second_degree(wanted, inputs.q_cmd_rad),
+                np.nan_to_num(table.q_cmd_rad - wanted),
+            )
+            fitted = np.linalg.lstsq(terms, np.concatenate([apart, rate], axis=1), rcond=1e-8)[0]
+            late = apart - terms @ fitted[:, :6]
+            moves = rate - terms @ fitted[:, 6:]
+            step_s = -float(np.sum(late * moves)) / max(float(np.sum(moves**2)), 1e-30)
+            offset_s, values = offset_s + step_s, fitted[:, :6] + step_s * fitted[:, 6:]
+        added = _of_second_degree(inputs.q_cmd_rad, inputs.q_cmd_rad) @ values
+        clock_s = {**self.clock_s, "controller": self.clock_s.get("controller", 0.0) + offset_s}
+        # times of its own: a path is remembered by them (`Part`)
+        inputs = replace(inputs, q_cmd_rad=inputs.q_cmd_rad + added, time_s=inputs.time_s.copy())
+        return replace(self, clock_s=clock_s, inputs=inputs)
+
+    def with_nominal_joints(self) -> "Side":
+        """Return the side with the controller's table less what its commanded joints differ from the plan by.
+
+        Row by row, for a controller whose own model of the robot makes them differ: its tip is where it was
+        commanded, and what its drives do beyond its commands stays. Clocks must have been set before.
+        """
+        table = self.run.controller
+        if table is None or table.q_cmd_rad is None or self.from_log:
+            return self
+        wanted = cubic(self.stamps(table), self.inputs.time_s, self.inputs.q_cmd_rad)
+        apart = np.nan_to_num(table.q_cmd_rad - wanted)
+        nominal = replace(
+            table,
+            q_cmd_rad=table.q_cmd_rad - apart,
+            q_act_rad=None if table.q_act_rad is None else table.q_act_rad - apart,
+            q_load_rad=None if table.q_load_rad is None else table.q_load_rad - apart,
+        )
+        return replace(self, run=replace(self.run, controller=nominal))
+
+
+def _of_second_degree(q_rad: Floats, among_rad: Floats) -> Floats:
+    """Return 1, angles and their products (n, 28) of poses (n, 6), in units of the spread among others."""
+    spread = np.maximum(among_rad.std(axis=0), 1e-9)
+    q = (q_rad - among_rad.mean(axis=0)) / spread
+    first, second = np.triu_indices(q.shape[1])
+    found: Floats = np.concatenate([np.ones((len(q), 1)), q, q[:, first] * q[:, second]], axis=1)
+    return found
 
 
 def _smooth(values: Floats, rows: int) -> Floats:

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
 from gcode2krl.effects import Applied, Effect
+from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.clocks import fitted_offset
 from gcode2krl.gap.links import MODEL_RAD, parts_of
 from gcode2krl.gap.noise import white
 from gcode2krl.gap.nuisance import Nuisance
+from gcode2krl.gap.other_program import on_the_curve, other_program
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.refit import Target, refit
 from gcode2krl.gap.side import Side
@@ -37,6 +39,8 @@ _FORCE_UNITS = {
 }  # fmt: skip
 _NEAR_UNIT = 0.15
 _CLOCK_S = 2e-3
+_TURN_RAD = 1e-4
+"""0.01 mm over 100 mm: a frame turned by less is a shift."""
 _FATAL = ("run-unit", "run-axes", "run-program")
 
 
@@ -52,13 +56,15 @@ class Slip:
     words: str
     final: bool
     """The run cannot be compared further."""
+    alike: tuple[tuple[str, str | None], ...] = ()
+    """Names and targets of the slips that it cannot be told from; None for a target that is not known."""
 
 
 def slips_of(sides: Sequence[Side], library: Mapping[str, Effect]) -> tuple[list[Slip], list[Issue]]:
     """Return the slips that all runs share, and what the checks of the runs say besides."""
     issues = [issue for side in sides for issue in _checked(side)]
     codes = {issue.code for issue in issues if issue.severity == "error"}
-    found = [*_override(sides, library), *_other_frame(sides, library)]
+    found = _other_program(sides, library) or [*_override(sides, library), *_other_frame(sides, library)]
     if found:
         return found[:1], issues
     found = _tracker_frame(sides, library) or _force_unit(sides, library)
@@ -101,14 +107,24 @@ def _checked(side: Side) -> list[Issue]:
 
 
 def _fatal(library: Mapping[str, Effect], name: str, issue: Issue, sides: Sequence[Side]) -> Slip:
-    effect = library[name]
     file = issue.message.split(".")[0].split(":")[0]
-    target = file if file in effect.targets(sides[0].inputs.cell) else None
+    target = file if file in library[name].targets(sides[0].inputs.cell) else None
+    return _final(library[name], target, issue.message, sides)
+
+
+def _final(effect: Effect, target: str | None, words: str, sides: Sequence[Side]) -> Slip:
+    """Return a slip beyond which nothing is compared."""
     parts = parts_of("path", sides) or parts_of("mechanics", sides)
     rms = _rms([part.residual for part in parts]) if parts else 0.0
     factor, unit = (parts[0].factor, parts[0].unit) if parts else (1.0, "mm")
     values = {p.name: p.start if p.nominal is None else p.nominal for p in effect.parameters}
-    return Slip(Applied(effect, target, values), "path", rms * factor, None, unit, issue.message, True)
+    return Slip(Applied(effect, target, values), "path", rms * factor, None, unit, words, True)
+
+
+def _other_program(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the run of another program, if its commanded path shows one; no override explains that."""
+    words = other_program(sides) if "other_program" in library else None
+    return [] if words is None else [_final(library["other_program"], None, words, sides)]
 
 
 def _override(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[Slip]:
@@ -183,9 +199,33 @@ def _other_frame(sides: Sequence[Side], library: Mapping[str, Effect]) -> list[S
     if best.effect.name == "base_number":
         best = _refined(parts, best)
         rms = _rms([part.measured - part.sample([best]) for part in parts])
+    if not all(_brings_back(side, best) for side in sides):
+        return []
     name = best.target if best.effect.name == "tool_number" else "another one"
     what = "tool" if best.effect.name == "tool_number" else "base"
-    return _slip_if_explained(parts, best, rms, f"the commanded joints are those of {what} {name}")
+    found = _slip_if_explained(parts, best, rms, f"the commanded joints are those of {what} {name}")
+    return [replace(slip, alike=_alike(best, sides)) for slip in found]
+
+
+def _brings_back(side: Side, one: Applied) -> bool:
+    """Tell whether the frame of another tool or base puts the commanded path where it was programmed."""
+    if one.effect.name == "tool_number":
+        return on_the_curve(side, tool=int(one.target or 0))
+    return on_the_curve(side, frame_of(one))
+
+
+def _alike(one: Applied, sides: Sequence[Side]) -> tuple[tuple[str, str | None], ...]:
+    """Return what shifts the path like another tool or base: one of the other, while the tool never turns."""
+    rotations = np.concatenate([side.inputs.tool_rotation for side in sides])
+    turns = float(np.abs(rotations - rotations[0]).max())
+    if one.effect.name == "base_number":
+        turns = max(turns, float(np.abs(frame_of(one)[:3, :3] - np.eye(3)).max()))
+        return (("tool_number", None),) if turns < _TURN_RAD else ()
+    cell = sides[0].inputs.cell
+    wrong = cell.tool_matrix(int(one.target or 0))[:3, :3]
+    for number in np.unique(np.concatenate([side.inputs.tool for side in sides])):
+        turns = max(turns, float(np.abs(cell.tool_matrix(int(number))[:3, :3] - wrong).max()))
+    return (("base_number", None),) if turns < _TURN_RAD else ()
 
 
 def _refined(parts: Sequence[Part], best: Applied) -> Applied:

@@ -54,6 +54,9 @@ SLIPS = (
 )  # fmt: skip
 
 
+SLIP_PARAMETERS = {"load": ("mass_kg", "dx_mm", "dy_mm", "dz_mm", "further_mm")}
+
+
 def test_the_library_has_every_effect_with_its_parameters(known):
     for name, parameters in TABLE.items():
         effect = known[name]
@@ -61,6 +64,7 @@ def test_the_library_has_every_effect_with_its_parameters(known):
         assert set(parameters) <= {*effect.names, *effect.vectors}, name
     for name in SLIPS:
         assert known[name].kind == "slip"
+        assert set(SLIP_PARAMETERS.get(name, ())) <= {*known[name].names, *known[name].vectors}, name
     assert set(known) == {*TABLE, *SLIPS}
 
 

@@ -66,7 +66,7 @@ def test_override(milling, known):
 
 
 def test_rsi_takes_the_deflection_back(milling, known):
-    before, after = simulate(milling), run(milling, known, "rsi_on:gain=1")
+    before, after = simulate(milling), run(milling, known, "rsi_on:gain=1,delay_s=0")
     cuts = milling.force_base_N.any(axis=1)
     feed = milling.velocity_mm_s
     left = project_normal(after.tcp_base_mm - milling.position_mm, feed)[cuts]
@@ -75,6 +75,17 @@ def test_rsi_takes_the_deflection_back(milling, known):
     assert np.abs(left).max() < 0.01 * np.abs(was).max()
     np.testing.assert_array_equal(after.q_cmd_rad, milling.q_cmd_rad)
     assert np.abs(after.q_act_rad - milling.q_cmd_rad).max() > 1e-5
+
+
+def test_rsi_corrects_what_it_saw_some_time_ago(milling, known):
+    without = simulate(milling).tcp_base_mm
+    now, later = (
+        run(milling, known, f"rsi_on:gain=1,delay_s={delay}").tcp_base_mm - without for delay in (0, 0.12)
+    )
+    rows = milling.time_s > milling.time_s[0] + 0.12
+    for axis in range(3):
+        wanted = np.interp(milling.time_s - 0.12, milling.time_s, now[:, axis])
+        np.testing.assert_allclose(later[rows, axis], wanted[rows], atol=2e-3)
 
 
 def test_load(swinging, known):

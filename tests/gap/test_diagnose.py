@@ -91,8 +91,7 @@ def test_an_effect_that_the_library_lacks_is_not_blamed_on_another():
 
 
 def test_two_effects_are_both_named():
-    # of like size: what brings less than 5 % of the whole is pruned
-    gap = _gap("friction:target=A1,spike_deg=0.02,decay_s=0.15", "servo_lag:target=A4,tau_s=0.003", **SERVO)
+    gap = _gap("friction:target=A1,spike_deg=0.008,decay_s=0.15", "servo_lag:target=A4,tau_s=0.01", **SERVO)
     found = {(each["effect"], each["target"]) for each in gap.named_causes}
     assert found == {("friction", "A1"), ("servo_lag", "A4")}
 

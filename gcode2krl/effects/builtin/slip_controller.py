@@ -16,8 +16,8 @@ from gcode2krl.units import RAD_PER_DEG
 class RsiOn(Effect):
     """An RSI correction was on: the drives take back ``gain``·the nominal deflection normal to the feed.
 
-    The commanded columns stay those of the program, the actual ones move (Haehn & Weigold 2020, eq. 10).
-    Without latency; the tool is not turned.
+    The commanded columns stay those of the program, the actual ones move (Haehn & Weigold 2020, eq. 10), as
+    the force of ``delay_s`` ago says. The tool is not turned.
     """
 
     name = "rsi_on"
@@ -29,31 +29,48 @@ class RsiOn(Effect):
             "gain", "", 0.0, 1.5, nominal=0.0, start=1.0, linear=True, minimum=0.0,
             source="1 takes all of the modelled deflection back",
         ),
+        Parameter(
+            "delay_s", "s", 0.0, 0.5, nominal=None, start=0.1, grid=(0.0, 0.05, 0.1, 0.15),
+            source="force chain and robot's reaction 100-150 ms; pilot forces take it off",
+        ),
     )  # fmt: skip
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""
         if applied["gain"] == 0.0 or not inputs.deflection_mm.any():
             return q_act_rad
+        wanted_mm = -applied["gain"] * project_normal(inputs.deflection_mm, inputs.velocity_mm_s)
+        seen_s = inputs.time_s - applied["delay_s"]
         shift = np.zeros((len(inputs), 6, 1))
-        shift[:, :3, 0] = -applied["gain"] * project_normal(inputs.deflection_mm, inputs.velocity_mm_s)
+        for axis in range(3):
+            shift[:, axis, 0] = np.interp(seen_s, inputs.time_s, wanted_mm[:, axis])
         return q_act_rad + np.linalg.solve(inputs.jacobian, shift)[:, :, 0]
+
+
+_FURTHER = ("dx_mm", "dy_mm", "dz_mm")
 
 
 class WrongLoad(Effect):
     """The controller's load data are off by ``mass_kg`` (true less stated): the arm sags by that weight.
 
-    The centre of the load is the stated one; by the model's own compliance, static.
+    Its centre lies at the stated one and ``dx_mm dy_mm dz_mm`` further, along the axes of the flange: load
+    data of another tool differ in both. By the model's own compliance, static.
     """
 
     name = "load"
     family = "set-up slips"
     links = frozenset({"mechanics"})
     kind = "slip"
+    vectors = MappingProxyType({"further_mm": _FURTHER})
     parameters = (
         Parameter(
             "mass_kg", "kg", -300.0, 300.0, nominal=0.0, start=30.0, linear=True,
             source="load data of another tool, or none: up to the rated payload",
+        ),
+        *(
+            Parameter(name, "mm", -500.0, 500.0, nominal=None, start=0.0,
+                      source="centres of the tools of one cell: some hundred millimetres apart")
+            for name in _FURTHER
         ),
     )  # fmt: skip
 
@@ -62,7 +79,7 @@ class WrongLoad(Effect):
         if applied["mass_kg"] == 0.0:
             return load
         stated = inputs.cell.load
-        centre_mm = np.array([stated.x_mm, stated.y_mm, stated.z_mm])
+        centre_mm = np.array([stated.x_mm, stated.y_mm, stated.z_mm]) + applied.vector(_FURTHER)
         lever_mm = np.empty((len(inputs), 3))
         for number, rows in arm.tool_rows(inputs.tool):
             from_tip_mm = centre_mm - inputs.cell.tool_matrix(number)[:3, 3]

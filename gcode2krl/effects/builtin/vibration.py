@@ -14,7 +14,7 @@ from gcode2krl.effects.effect import (
     Values,
     direction_parameters,
 )
-from gcode2krl.effects.inputs import Inputs, gradient
+from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import second_order
 from gcode2krl.units import RAD_PER_REV
 
@@ -84,10 +84,12 @@ class Vibration(Effect):
             return tcp_mm
         along, w_rad_s = applied.unit_vector(), RAD_PER_REV * applied["hz"]
         static = deflection_mm @ along
-        acceleration = gradient(inputs.velocity_mm_s, inputs.time_s) @ along
         damping = min(applied["damping"], 0.999)
-        drive = static - acceleration / w_rad_s**2
-        ringing = second_order(drive, inputs.time_s, applied["hz"], damping) - static
+        # H·(-a/w²) = H·(p + 2·zeta/w·p') - p: places between samples are nearer to a line than accelerations
+        place = (inputs.position_mm - inputs.position_mm[:1]) @ along
+        driven = static + place
+        drive = driven + 2.0 * damping / w_rad_s * (inputs.velocity_mm_s @ along)
+        ringing = second_order(drive, inputs.time_s, applied["hz"], damping) - driven
         return tcp_mm + applied["participation"] * ringing[:, None] * along
 
 
