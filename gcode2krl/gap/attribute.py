@@ -7,8 +7,10 @@ import numpy as np
 from gcode2krl.effects import Applied
 from gcode2krl.gap.evidence import Ledger
 from gcode2krl.gap.examine import Examination, tangents_of
-from gcode2krl.gap.refit import Target, refit, slope_of
+from gcode2krl.gap.refit import refit
 from gcode2krl.gap.select import scores
+from gcode2krl.gap.slope import slope_of
+from gcode2krl.gap.target import Target
 
 TEMPERATURE = 3.0
 """Differences of chi2 are divided by it: noise and effects are not exactly what they are modelled as."""

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.gap.bounds import Mismatch
 from gcode2krl.gap.evidence import Ledger, rows_of
+from gcode2krl.gap.free import Fitted, free_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.noise_source import noise_of
 from gcode2krl.gap.nuisance import Nuisance, nuisance_of
 from gcode2krl.gap.part import Part
 from gcode2krl.gap.place_time import PlaceTimes
-from gcode2krl.gap.refit import Fitted, Target, free_of, refit, searched, slope_of
+from gcode2krl.gap.refit import refit, searched
 from gcode2krl.gap.select import (
     LEAST_RATIO,
     Column,
@@ -25,6 +26,8 @@ from gcode2krl.gap.select import (
     threshold,
 )  # fmt: skip
 from gcode2krl.gap.signatures import Block, Signatures
+from gcode2krl.gap.slope import slope_of
+from gcode2krl.gap.target import Target
 
 Floats = NDArray[np.float64]
 MOST_EFFECTS = 4

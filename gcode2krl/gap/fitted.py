@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from gcode2krl.gap.examine import Question, nuisance_for
 from gcode2krl.gap.judge import Judgement
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Target
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.signatures import Signatures
+from gcode2krl.gap.target import Target
 
 Floats = NDArray[np.float64]
 _ENCODER = ("clock", "encoder zero")

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from gcode2krl.gap.evidence import PRIOR, stretches_of
 from gcode2krl.gap.examine import Examination, replans
-from gcode2krl.gap.refit import FIXED, unbounded_jacobian
+from gcode2krl.gap.free import FIXED
 from gcode2krl.gap.signatures import PHASE
+from gcode2krl.gap.slope import unbounded_jacobian
 
 Floats = NDArray[np.float64]
 _DRAWS = 400

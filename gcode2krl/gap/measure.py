@@ -16,7 +16,7 @@ from gcode2krl.gap.evidence import stretches_of
 from gcode2krl.gap.noise import Noise
 from gcode2krl.gap.nuisance import Nuisance
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Target
+from gcode2krl.gap.target import Target
 
 Floats = NDArray[np.float64]
 SIGNIFICANT_SIGMA = 4.0

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.free import Free
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Free
 
 Floats = NDArray[np.float64]
 _PLACES = 400

@@ -15,13 +15,15 @@ from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.clocks import fitted_offset
+from gcode2krl.gap.commanded_path import on_the_curve
 from gcode2krl.gap.links import MODEL_RAD, parts_of
 from gcode2krl.gap.noise import white
 from gcode2krl.gap.nuisance import Nuisance
-from gcode2krl.gap.other_program import on_the_curve, other_program
+from gcode2krl.gap.other_program import other_program
 from gcode2krl.gap.part import Part
-from gcode2krl.gap.refit import Target, refit
+from gcode2krl.gap.refit import refit
 from gcode2krl.gap.side import Side
+from gcode2krl.gap.target import Target
 from gcode2krl.runs import check_against
 from gcode2krl.runs.matching import rotation_between
 from gcode2krl.units import DEG_PER_RAD

@@ -7,7 +7,8 @@ import pytest
 
 from gcode2krl.effects import inputs_of, simulate
 from gcode2krl.effects.frame_effect import frame_of
-from gcode2krl.gap.other_program import commanded_path, on_the_curve, other_program
+from gcode2krl.gap.commanded_path import commanded_path, on_the_curve
+from gcode2krl.gap.other_program import other_program
 from gcode2krl.gap.part import cubic
 from gcode2krl.gap.side import Side
 from gcode2krl.gap.slips import slips_of
