@@ -157,10 +157,27 @@ def _judge_one(judged: Judged, entry: dict, record: dict, result: dict[str, Any]
         gone = result["gap"]["rms_before"] ** 2 - result["gap"]["rms_after"] ** 2
         judged.relative_shrink = float(np.clip(gone / known["removed"], 0.0, 1.0))
     right = [
-        cause for cause in result["causes"] if _is(cause, judged.truths[0]) and cause["probability"] >= NAMED
+        _one_way(cause, entry)
+        for cause in result["causes"]
+        if _is(cause, judged.truths[0]) and cause["probability"] >= NAMED
     ]
     if right and judged.form == "same" and judged.kind == "single":
         judged.errors, judged.covered = _numbers(flat(entry["parameters"]), right[0]["parameters"])
+
+
+def _one_way(cause: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
+    """Return a cause with its direction the truth's way round where the effect has a line, not an arrow."""
+    names = ("direction_x", "direction_y", "direction_z")
+    said, true = cause["parameters"], flat(entry["parameters"])
+    if entry["effect"] != "vibration" or not set(names) <= set(said) & set(true):
+        return cause
+    if sum(said[name]["value"] * true[name] for name in names) >= 0.0:
+        return cause
+    turned = {
+        name: {"value": -said[name]["value"], "low": -said[name]["high"], "high": -said[name]["low"]}
+        for name in names
+    }
+    return {**cause, "parameters": {**said, **turned}}
 
 
 def overlap(entry: dict[str, Any], intervals: Sequence[dict[str, Any]]) -> float:

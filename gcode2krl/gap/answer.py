@@ -17,6 +17,8 @@ from gcode2krl.gap.timing import timing_share, timing_sizes
 from gcode2krl.gap.where import place
 
 _MOST_ALIKE = 5
+_CLOCK_S = 2e-3
+"""Times of a prediction are right to this (design/gap.md)."""
 _SURE = 0.95
 """A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
 
@@ -195,10 +197,10 @@ def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
 def _slip_cause(slip: Slip) -> dict[str, Any]:
     # what it leaves of the gap says how well its numbers are met
     share = (slip.rms_after or 0.0) / slip.rms_before if slip.rms_before > 0.0 else 0.0
-    values = {
-        name: {"value": v, "low": v - share * abs(v), "high": v + share * abs(v)}
-        for name, v in slip.applied.values.items()
-    }
+    values = {}
+    for name, v in slip.applied.values.items():
+        wide = share * abs(v) + (_CLOCK_S if name.endswith("_s") else 0.0)
+        values[name] = {"value": v, "low": v - wide, "high": v + wide}
     return {
         "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,
         "probability": _SURE, "parameters": {} if slip.final else values, "shrink": None,
