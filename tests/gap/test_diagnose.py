@@ -96,6 +96,34 @@ def test_two_effects_are_both_named():
     assert found == {("friction", "A1"), ("servo_lag", "A4")}
 
 
+def test_commands_with_a_clock_of_their_own_are_named_once():
+    """They differ from the plan and from the drives; the table's own clock and the tracker's are right."""
+    gap = _gap("clock:target=q_cmd,offset_s=0.012", force=False)
+    assert [(each["effect"], each["target"]) for each in gap.named_causes] == [("clock", "q_cmd")]
+    assert gap.verdict == "explained"
+
+
+def test_what_the_data_do_not_see_is_not_said_to_be_known():
+    gap = _gap("tool_frame:x_mm=0.3,y_mm=-0.2,c_deg=0.02", **TIP)
+    alike = {each["effect"] for cause in gap.causes for each in cause["indistinguishable_from"]}
+    assert {"tool_frame", "base_frame"} & ({gap.causes[0]["effect"]} | alike)
+    angle = gap.causes[0]["parameters"].get("c_deg")
+    if gap.causes[0]["effect"] == "tool_frame":  # the tracker sees the tip, which a turn about it leaves
+        assert angle["low"] < -0.1
+        assert angle["high"] > 0.1
+
+
+def test_what_rings_is_told_from_noise():
+    gap = _gap("vibration:hz=13,damping=0.02,participation=0.6,direction=0.6/0.5/-0.62", **TIP)
+    cause = gap.causes[0]
+    assert (cause["effect"], gap.verdict) == ("vibration", "explained")
+    assert cause["parameters"]["hz"]["value"] == pytest.approx(13.0, rel=0.005)
+    found = np.array([cause["parameters"][f"direction_{axis}"]["value"] for axis in "xyz"])
+    wanted = np.array([0.6, 0.5, -0.62]) / np.linalg.norm([0.6, 0.5, -0.62])
+    assert abs(found @ wanted) > 0.995  # a line, not an arrow
+    assert gap.gap["noise_floor"] < 1.3 * 0.02 * np.sqrt(3.0)
+
+
 def test_the_place_of_a_spike_is_after_the_reversals_of_its_joint():
     gap = _gap("friction:target=A2,spike_deg=0.01,decay_s=0.15", **SERVO)
     assert gap.where["phases"][0]["phase"] in ("reversal", "corner")
