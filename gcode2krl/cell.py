@@ -31,10 +31,12 @@ from gcode2krl.sections import (
     Material,
     Pilot,
     Program,
+    ResultLimits,
     Robot,
     Section,
     Spindle,
     Stock,
+    Table,
     Tool,
     Verified,
 )
@@ -47,6 +49,8 @@ class Cell(Section):
     """A resolved cell."""
 
     name: str = ""
+    based_on: str = ""
+    """The cell that this one takes over from: ``demonstration`` or another cell file."""
     verified: Verified | None = None
     robot: Robot
     controller: Controller
@@ -61,6 +65,8 @@ class Cell(Section):
     clearance: Clearance
     material: Material | None = None
     stock: Stock | None = None
+    table: Table | None = None
+    limits: ResultLimits = ResultLimits()
     load: Load
     compliance: Compliance = Compliance()
     pilot: Pilot = Pilot()

@@ -307,6 +307,8 @@ class Stock(Section):
     """STL, PLY or 3MF in mm, relative to the cell file."""
     resolution_mm: Positive | None = None
     """Cell size of the material removal; default: from the smallest tool."""
+    through_mm: NotNegative = 0.0
+    """How far a cutter may go below the underside on purpose: there is a sacrificial board below."""
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -317,6 +319,26 @@ class Stock(Section):
                 if low >= high:
                     raise ValueError(f"box_mm: {axis} from {low:g} is not below {high:g}")
         return self
+
+
+class Table(Section):
+    """What carries the work, in ``$BASE``: nothing of the tool may go below it."""
+
+    z_mm: Finite
+
+
+class ResultLimits(Section):
+    """How large a predicted figure may become before a warning says that it is doubtful."""
+
+    force_N: Positive = 2000.0
+    """Mean cutting force on the tool."""
+    torque_Nm: Positive = 50.0
+    """Mean torque on the spindle."""
+    deflection_mm: Positive = 5.0
+    acceleration_mm_s2: Positive = 20000.0
+    """Along the path, corners included."""
+    lost_time_share: Annotated[float, Field(gt=0, le=1)] = 0.25
+    """Share of the time that short moves, stops and joint speeds cost."""
 
 
 class VirtualJoint(Section):
@@ -368,6 +390,9 @@ class Program(Section):
     max_lines: Annotated[int, Field(ge=100)] = 5000
     comment_every: Annotated[int, Field(ge=0)] = 50
     """A comment with the G-code line every so many motions; 0 = only at events."""
+    tool_length: Literal["g43", "from_table"] = "g43"
+    """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
+    the spindle, for posts that set lengths by touching off and never write G43."""
     warn_size_mb: Positive = 4.0
     externals: tuple[str, ...] = ()
     """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""

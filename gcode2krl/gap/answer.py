@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gcode2krl.errors import Issue
+from gcode2krl.gap.bounds import Mismatch
 from gcode2krl.gap.judge import Cause, Judgement
 from gcode2krl.gap.links import JOINTS, LINKS, SIGNAL, UNIT, needs
 from gcode2krl.gap.observable import observable
@@ -17,8 +18,6 @@ from gcode2krl.gap.timing import timing_share, timing_sizes
 from gcode2krl.gap.where import place
 
 _MOST_ALIKE = 5
-_CLOCK_S = 2e-3
-"""Times of a prediction are right to this (design/gap.md)."""
 _SURE = 0.95
 """A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
 
@@ -199,7 +198,7 @@ def _slip_cause(slip: Slip) -> dict[str, Any]:
     share = (slip.rms_after or 0.0) / slip.rms_before if slip.rms_before > 0.0 else 0.0
     values = {}
     for name, v in slip.applied.values.items():
-        wide = share * abs(v) + (_CLOCK_S if name.endswith("_s") else 0.0)
+        wide = share * abs(v) + (Mismatch.clock_s if name.endswith("_s") else 0.0)
         values[name] = {"value": v, "low": v - wide, "high": v + wide}
     return {
         "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,

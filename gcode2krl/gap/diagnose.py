@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Applied, Effect, inputs_of, library
@@ -33,7 +32,6 @@ from gcode2krl.gap.stops import unplanned_stops
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run, check_program
 
-Floats = NDArray[np.float64]
 _S_PER_H = 3600.0
 _SLIPS_THAT_ARE_CAUSES = {
     "path": ("absolute_accuracy",), "servo": ("rsi_on",), "force": ("swapped_tool",),

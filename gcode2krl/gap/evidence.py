@@ -81,19 +81,6 @@ class Evidence:
         """Return the squared length of the whitened data after nuisance."""
         return float(self.gram[0, 0])
 
-    def gain(self, columns: Sequence[int] | Ints, given: Sequence[int] | Ints = ()) -> tuple[float, Floats]:
-        """Return by how much chi2 falls with some signatures besides given ones, and their coefficients."""
-        given_, new = np.asarray(given, dtype=int) + 1, np.asarray(columns, dtype=int) + 1
-        g = self.gram
-        a, b = g[np.ix_(new, new)], g[new, 0]
-        if len(given_):
-            half = solve(g[np.ix_(given_, given_)], g[np.ix_(given_, np.r_[0, new])])
-            cross = g[np.ix_(new, given_)]
-            b = b - cross @ half[:, 0]
-            a = a - cross @ half[:, 1:]
-        coefficients = solve(a, b[:, None])[:, 0]
-        return float(max(b @ coefficients, 0.0)), coefficients
-
 
 def solve(a: Floats, b: Floats) -> Floats:
     """Return a⁻¹·b for a positive semidefinite a; directions that hold nothing stay zero."""
@@ -173,21 +160,19 @@ class Ledger:
                 )  # fmt: skip
             self._grams.append(found)
 
-    def evidence(self, chosen: Sequence[tuple[int, int]] | None = None) -> Evidence:
-        """Return the evidence of some (part, stretch) pairs, None = all; tangents come first.
+    def evidence(self) -> Evidence:
+        """Return what all data together say; tangents come first.
 
         Nuisance that the data drive to its bounds, with the tangents alone, is held there and taken off.
         """
-        wanted = None if chosen is None else set(chosen)
         kept = 1 + self.given + self.rows[0].signatures
         places = self._places(np.arange(kept))
         size = 1 + max(int(into.max(initial=-1)) for _, into in places)
         total, count = np.zeros((size, size)), 0
-        for number, (grams, (at, into)) in enumerate(zip(self._grams, places, strict=True)):
-            mine = [value for key, value in grams.items() if wanted is None or (number, key) in wanted]
-            if mine:
-                total[np.ix_(into, into)] += np.sum([gram for gram, _ in mine], axis=0)[np.ix_(at, at)]
-                count += sum(rows for _, rows in mine)
+        for grams, (at, into) in zip(self._grams, places, strict=True):
+            whole = np.sum([gram for gram, _ in grams.values()], axis=0)
+            total[np.ix_(into, into)] += whole[np.ix_(at, at)]
+            count += sum(rows for _, rows in grams.values())
         free = np.arange(1, 1 + self.given)
         _, b, self._chi2 = _bounded(total, kept, free, np.zeros(len(free)))
         self._held = np.zeros(len(total))
@@ -264,16 +249,3 @@ class Ledger:
             found.append((np.r_[given, np.arange(first, first + width)], into))
             own += width - rows.shared
         return found
-
-    def power(self, stretch: tuple[int, int], columns: Ints) -> float:
-        """Return the summed squares of some whitened signatures in a (part, stretch) pair."""
-        gram, _ = self._grams[stretch[0]][stretch[1]]
-        at = np.asarray(columns, dtype=int) + 1
-        scale = sum(
-            np.diag(value)[at] for grams in self._grams for value, _ in grams.values()
-        )  # fmt: skip
-        return float(np.sum(np.diag(gram)[at] / np.maximum(scale, 1e-300)))
-
-    def stretches(self) -> list[tuple[int, int]]:
-        """Return all (part, stretch) pairs."""
-        return [(number, key) for number, members in enumerate(self._members) for key in members]

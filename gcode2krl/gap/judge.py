@@ -30,6 +30,7 @@ MOST_TOGETHER = 2
 LEAST_BROUGHT = 0.4
 """A cause that takes less than this of what those above it leave on held-out data is not named."""
 _TOGETHER = 0.5
+"""Share of an effect's data from which on it acts where others do."""
 CROWDED = 0.4
 """Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
 

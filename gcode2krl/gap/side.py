@@ -118,8 +118,7 @@ class Side:
             offset_s, values = offset_s + step_s, fitted[:, :6] + step_s * fitted[:, 6:]
         added = _of_second_degree(inputs.q_cmd_rad, inputs.q_cmd_rad) @ values
         clock_s = {**self.clock_s, "controller": self.clock_s.get("controller", 0.0) + offset_s}
-        # times of its own: a path is remembered by them (`Part`)
-        inputs = replace(inputs, q_cmd_rad=inputs.q_cmd_rad + added, time_s=inputs.time_s.copy())
+        inputs = replace(inputs, q_cmd_rad=inputs.q_cmd_rad + added)
         return replace(self, clock_s=clock_s, inputs=inputs)
 
     def with_nominal_joints(self) -> "Side":

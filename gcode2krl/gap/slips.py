@@ -14,6 +14,7 @@ from gcode2krl import frames as fr
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.errors import Gcode2KrlError, Issue
+from gcode2krl.gap.bounds import Mismatch
 from gcode2krl.gap.clocks import fitted_offset
 from gcode2krl.gap.commanded_path import on_the_curve
 from gcode2krl.gap.links import MODEL_RAD, parts_of
@@ -40,7 +41,6 @@ _FORCE_UNITS = {
     10.0: "decinewtons",
 }  # fmt: skip
 _NEAR_UNIT = 0.15
-_CLOCK_S = 2e-3
 _TURN_RAD = 1e-4
 """0.01 mm over 100 mm: a frame turned by less is a shift."""
 _FATAL = ("run-unit", "run-axes", "run-program")
@@ -233,7 +233,7 @@ def _alike(one: Applied, sides: Sequence[Side]) -> tuple[tuple[str, str | None],
 def _refined(parts: Sequence[Part], best: Applied) -> Applied:
     """Return the frame that fits the commanded joints of all runs, whose clocks may be off."""
     nuisance = [
-        [Nuisance("clock", False, -np.ascontiguousarray(part.rate.T)[:, :, None] * _CLOCK_S)]
+        [Nuisance("clock", False, -np.ascontiguousarray(part.rate.T)[:, :, None] * Mismatch.clock_s)]
         for part in parts
     ]
     target = Target(parts, nuisance, [white(MODEL_RAD)] * parts[0].shape[1])
