@@ -78,7 +78,7 @@ M30
 """
 PROGRAMS = {"base": BASE, "inch": INCH, "no tool": NO_TOOL}
 HOME_END = "G28 G91 Z0.\nG28 X0. Y0.\nG90"
-CELL_HEAD = 'verified = { by = "benchmark", date = "2026-01-15" }\n'
+CELL_HEAD = 'based_on = "demonstration"\nverified = { by = "benchmark", date = "2026-01-15" }\n'
 CELL_TOOLS = "[tool.7]\nlength_mm = 120.0\n[tool.14]\nlength_mm = 90.0\n"
 """The clean cell: the demonstration cell with two tools of different length. A case's text goes between."""
 NO_PLANE = '[clearance]\nz_mm = "none"\n'
@@ -111,6 +111,14 @@ class Mistake:
     cut_after: str = ""
     """The file ends right after this text."""
     name: str = "part.nc"
+    severity: str = "error"
+    """The least severity that is right: ``warning`` where a person may mean it."""
+    head: str = CELL_HEAD
+    tools: str = CELL_TOOLS
+    options: tuple[str, ...] = ()
+    output: str = "out.src"
+    expected: tuple[int, ...] = ()
+    """The lines that are right, where ``data`` has no marks."""
 
 
 @dataclass(frozen=True)

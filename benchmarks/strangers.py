@@ -1,0 +1,247 @@
+"""Programs that others wrote: which are translated at once, which after one round of remedies, which not.
+
+``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--json]`` runs the command line on every G-code
+file below the folders, each in a process of its own with a time limit, as a user would type it: the built-in
+cell, no options. Where the program is refused, each printed remedy that `remedies` knows is followed once (a
+key in a cell based on the demonstration, an option, the part moved into reach), and it is run again.
+Programs in a language that is not read yet (expressions, subprograms, cutter compensation, canned cycles,
+probing, turning) are counted apart. The exit code is always 0: figures are printed, not judged.
+"""
+
+import argparse
+import json
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ENDINGS = (".nc", ".ngc", ".gcode", ".tap", ".cnc", ".mpf")
+LANGUAGE = frozenset(
+    {
+        "o-word",
+        "unsupported-g",
+        "unsupported-m",
+        "unknown-g",
+        "expression",
+        "rotary-axis",
+        "binary-file",
+        "no-motion",
+    }
+)
+"""Codes of findings that say a language is not read yet, or that a file is no program (a subprogram file)."""
+_FINDING = re.compile(
+    r"^(?:(?P<place>.+?): )?(?P<severity>error|warning|note): (?P<message>.*?)"
+    r"(?: \[(?P<code>[a-z0-9-]+)\])?(?: -> (?P<remedy>.*))?$"
+)
+MOST_LINES_OF_ONE_CAUSE = 10
+NOT_TURNED = "a_deg = 0.0, b_deg = 0.0, c_deg = 0.0"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One run of the command line."""
+
+    exit_code: int | None
+    """None: over the time limit."""
+    seconds: float
+    errors: tuple[tuple[str, str], ...]
+    """Code and message of each printed error."""
+    warnings: tuple[str, ...]
+    longest_list: int
+    """Lines printed for the commonest code."""
+    printed: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of one program."""
+
+    name: str
+    verdict: str
+    """at once, after remedies, refused, language, time."""
+    codes: tuple[str, ...]
+    remedies: tuple[str, ...]
+    seconds: float
+    longest_list: int
+    last_words: tuple[str, ...]
+
+
+def attempt(part: Path, folder: Path, arguments: tuple[str, ...], limit_s: float) -> Attempt:
+    """Run ``translate`` on a program in a process of its own."""
+    started = time.perf_counter()
+    command = [sys.executable, "-m", "gcode2krl", "translate", str(part), "-o", str(folder / "PART.src")]
+    try:
+        done = subprocess.run(
+            [*command, *arguments],
+            capture_output=True,
+            timeout=limit_s,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+    except subprocess.TimeoutExpired:
+        return Attempt(None, time.perf_counter() - started, (), (), 0, "")
+    printed = done.stderr.decode("utf-8", "replace")
+    found = [match for line in printed.splitlines() if (match := _FINDING.match(line))]
+    errors = tuple((m["code"] or "-", m["message"]) for m in found if m["severity"] == "error")
+    warnings = tuple(m["code"] or "-" for m in found if m["severity"] == "warning")
+    longest = max(Counter(m["code"] for m in found).values(), default=0)
+    return Attempt(done.returncode, time.perf_counter() - started, errors, warnings, longest, printed)
+
+
+def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield code, text for the cell and options, for each error whose printed remedy can be followed."""
+    codes = {code for code, _ in first.errors}
+    messages = {code: [m for c, m in first.errors if c == code] for code in codes}
+    if "g43-missing" in codes:
+        yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
+    if "spindle-off" in codes:
+        yield "spindle-off", "", ("--allow", "spindle-off")
+    if codes & {"out-of-reach", "joint-limit", "singularity", "home-limit"} and extent_mm:
+        yield "out-of-reach", extent_mm, ()
+    unmapped = {m for text in messages.get("m-code-unmapped", ()) for m in re.findall(r"\bM(\d+)\b", text)}
+    if unmapped:
+        lines = "".join(
+            f'M{number} = "; M{number} does nothing here"\n' for number in sorted(unmapped, key=int)
+        )
+        yield "m-code-unmapped", f"[m_code]\n{lines}", ()
+    unknown = {t for code in ("tool-unknown", "tool-undeclared") for text in messages.get(code, ())
+               for t in re.findall(r"\bT(\d+)\b|tool (\d+)", text)}  # fmt: skip
+    for number in sorted({int(a or b) for a, b in unknown}):
+        yield "tool-unknown", f"[tool.{number}]\ndiameter_mm = 6.0\nteeth = 2\nlength_mm = 100.0\n", ()
+    for code in ("unit-doubtful", "cut-off", "h-differs"):
+        if code in codes:
+            yield code, "", ("--allow", code)
+
+
+def try_program(part: Path, limit_s: float) -> Result:
+    """Run a program at once and, where it is refused, once more with its remedies followed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        first = attempt(part, folder, (), limit_s)
+        codes = tuple(sorted({code for code, _ in first.errors}))
+        last_words = tuple(message[:110] for _, message in first.errors[:3])
+        if first.exit_code is None:
+            return Result(part.name, "time", codes, (), first.seconds, 0, ())
+        if first.exit_code == 0:
+            return Result(part.name, "at once", first.warnings, (), first.seconds, first.longest_list, ())
+        followed = list(remedies(first, _into_reach(part)))
+        if followed:
+            cell = folder / "cell.toml"
+            cell.write_text(
+                'based_on = "demonstration"\n' + _joined(text for _, text, _ in followed), "utf-8"
+            )
+            options = tuple(word for _, _, words in followed for word in words)
+            second = attempt(part, folder, ("--cell", str(cell), *options), limit_s)
+            names = tuple(code for code, _, _ in followed)
+            if second.exit_code == 0:
+                return Result(
+                    part.name, "after remedies", codes, names, first.seconds, first.longest_list, ()
+                )
+            last_words = tuple(message[:110] for _, message in second.errors[:3]) or last_words
+            codes = tuple(sorted({code for code, _ in second.errors})) or codes
+        verdict = "language" if set(codes) & LANGUAGE else "refused"
+        return Result(part.name, verdict, codes, (), first.seconds, first.longest_list, last_words)
+
+
+def _joined(texts: Iterator[str]) -> str:
+    """Return the text of a cell, plain keys before tables, and each table once."""
+    plain, tables = [], dict[str, list[str]]()
+    for text in texts:
+        head = ""
+        for line in text.splitlines():
+            if line.startswith("["):
+                head = line
+                tables.setdefault(head, [])
+            elif head:
+                tables[head].append(line)
+            else:
+                plain.append(line)
+    return "\n".join([*plain, *(f"{head}\n" + "\n".join(lines) for head, lines in tables.items())]) + "\n"
+
+
+def _into_reach(part: Path) -> str:
+    """Return a ``$BASE`` that puts the middle of the program where the demonstration cell reaches well."""
+    from gcode2krl import Gcode2KrlError, load_cell, read_gcode
+
+    try:
+        path = read_gcode(part, load_cell())
+    except Gcode2KrlError:
+        return ""
+    place = path.position_mm[1:][~path.machine[1:]]
+    if len(place) == 0:
+        return ""
+    low, high = place.min(axis=0), place.max(axis=0)
+    x_mm, y_mm, z_mm = (*(-(low + high)[:2] / 2.0), -low[2])
+    base = f"x_mm = {1600.0 + x_mm:.1f}, y_mm = {y_mm:.1f}, z_mm = {760.0 + z_mm:.1f}, {NOT_TURNED}"
+    plane = f"[clearance]\nz_mm = {max(100.0, high[2] + 5.0):.1f}\n"
+    return f'[frames]\nspin = "auto"\nbase = {{ {base} }}\n{plane}'
+
+
+def programs(folders: list[Path], most: int | None, seed: int) -> list[Path]:
+    """Return the G-code files below the folders, at most ``most`` of each, drawn by the seed."""
+    chosen: list[Path] = []
+    for folder in folders:
+        found = (
+            [folder]
+            if folder.is_file()
+            else sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS)
+        )
+        if most is not None and len(found) > most:
+            found = sorted(random.Random(seed).sample(found, most))
+        chosen += found
+    return chosen
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run the programs and print what became of each, then the counts."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--most", type=int, help="At most so many programs of each folder, drawn by --seed.")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=300.0, help="Time limit for each run.")
+    parser.add_argument("--json", action="store_true", help="One JSON object on standard output.")
+    options = parser.parse_args(argv)
+    results = []
+    for part in programs(options.folders, options.most, options.seed):
+        result = try_program(part, options.seconds)
+        results.append(result)
+        if not options.json:
+            tail = ", ".join(result.remedies or result.codes)
+            print(
+                f"{result.verdict:<15} {result.seconds:6.1f} s  {result.longest_list:>3}  "
+                f"{result.name:<44} {tail}"
+            )
+            for words in result.last_words:
+                print(f"{'':28} | {words}")
+            sys.stdout.flush()
+    counts = Counter(result.verdict for result in results)
+    read = [r for r in results if r.verdict != "language"]
+    figures = {
+        "programs": len(results),
+        **{name: counts[name] for name in ("at once", "after remedies", "refused", "time", "language")},
+        "refused by the pilot": sum(
+            any(c.startswith("pilot") for c in r.codes) for r in read if r.verdict == "refused"
+        ),
+        "refused by corner-tolerance": sum(
+            "corner-tolerance" in r.codes for r in read if r.verdict == "refused"
+        ),
+        "more than ten lines for one cause": sum(r.longest_list > MOST_LINES_OF_ONE_CAUSE for r in results),
+    }
+    if options.json:
+        json.dump(
+            {"programs": [asdict(result) for result in results], "totals": figures}, sys.stdout, indent=2
+        )
+        return
+    print()
+    for name, count in figures.items():
+        print(f"{name:<36} {count}")
+
+
+if __name__ == "__main__":
+    main()
