@@ -311,7 +311,7 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
     texts = switching.rendered(templates, view)
-    yield from switching.pair_issues(templates, texts)
+    yield from (issue for issue in switching.pair_issues(templates, texts) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
 
 

@@ -117,7 +117,7 @@ def _radians(cell: BaseModel) -> Iterator[Issue]:
     for key, found in angles.items():
         eighths = [abs(angle) / _EIGHTH_TURN_RAD for angle in found]
         whole = all(abs(turn - round(turn)) * _EIGHTH_TURN_RAD < _NEAR_RAD for turn in eighths)
-        if any(found) and whole and max(eighths) <= _FULL_TURN:
+        if whole and 0.99 < max(eighths) <= _FULL_TURN:
             shown = ", ".join(f"{angle:g}" for angle in found)
             name = key.rstrip(".")
             yield Issue(

@@ -1,6 +1,6 @@
 """The sections of a cell file: what each table holds, in which unit, and what is allowed."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,15 @@ class Frame(Section):
     a_deg: Finite
     b_deg: Finite
     c_deg: Finite
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_six(cls, given: Any) -> Any:
+        if isinstance(given, dict):
+            lacking = [name for name in cls.model_fields if name not in given]
+            if lacking:
+                raise ValueError(f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg")
+        return given
 
     def matrix(self) -> NDArray[np.float64]:
         """Return the homogeneous transform (4, 4)."""

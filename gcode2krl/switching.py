@@ -5,7 +5,7 @@ from typing import Any
 
 from gcode2krl import template_rules as rules
 from gcode2krl.cell_templates import MissingValueError, TemplateError, render
-from gcode2krl.errors import Issue
+from gcode2krl.errors import Issue, Severity
 
 SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
@@ -45,7 +45,10 @@ def template_issues(
 
 
 def pair_issues(templates: Mapping[str, str], texts: Mapping[str, str]) -> Iterator[Issue]:
-    """Yield the halves of pairs: what switches on without its partner that switches off."""
+    """Yield the halves of pairs: what switches on without its partner that switches off.
+
+    A warning where the partner calls a subprogram, whose effect is not read.
+    """
     for on, off in _OFF.items():
         on_key, off_key = f"m_code.{on}", f"m_code.{off}"
         if on_key not in templates:
@@ -57,17 +60,31 @@ def pair_issues(templates: Mapping[str, str], texts: Mapping[str, str]) -> Itera
         elif on_key in texts and off_key in texts:
             left = rules.may_be_on(texts[on_key]) - rules.surely_off(texts[off_key])
             if left:
-                names = ", ".join(sorted(left))
-                yield _pair(off_key, f"{on_key} switches on {names}, which {off_key} does not switch off")
+                names, called = ", ".join(sorted(left)), rules.calls(texts[off_key])
+                text = f"{on_key} switches on {names}, which {off_key} does not switch off"
+                if called:
+                    text += f", unless {called[0]} does"
+                yield _pair(off_key, text, "warning" if called else "error")
 
 
 def meaning_issues(
     texts: Mapping[str, str], named: Mapping[str, int | None], inputs: Mapping[str, int | None]
 ) -> Iterator[Issue]:
-    """Yield outputs and inputs with two meanings.
+    """Yield outputs and inputs with two meanings, one finding for each of them.
 
     ``named`` holds the outputs that keys of the cell name, ``inputs`` the inputs.
     """
+    seen: set[str] = set()
+    for issue in _meanings(texts, named, inputs):
+        signal = issue.message.split()[0]
+        if signal not in seen:
+            seen.add(signal)
+            yield issue
+
+
+def _meanings(
+    texts: Mapping[str, str], named: Mapping[str, int | None], inputs: Mapping[str, int | None]
+) -> Iterator[Issue]:
     yield from _same_number(named, "$OUT", _may_share)
     yield from _same_number(inputs, "$IN", lambda a, b: False)
     on = {key: rules.may_be_on(text) for key, text in texts.items()}
@@ -128,9 +145,9 @@ def _same_number(named: Mapping[str, int | None], what: str, may_share: Any) -> 
             yield _two_meanings(f"{what}[{number}]", first, key)
 
 
-def _pair(key: str, text: str) -> Issue:
+def _pair(key: str, text: str, severity: Severity = "error") -> Issue:
     return Issue(
-        "error", "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of that off"
+        severity, "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of that off"
     )
 
 

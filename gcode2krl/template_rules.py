@@ -79,6 +79,11 @@ def switched(text: str) -> list[Switched]:
     return found
 
 
+def calls(text: str) -> list[str]:
+    """Return the subprograms that KRL text calls: what they switch cannot be read."""
+    return [name for statement in statements(text) for name in _called(statement) if name not in _FUNCTIONS]
+
+
 def may_be_on(text: str) -> frozenset[str]:
     """Return the signals that are on, or may be, after the text."""
     on: set[str] = set()

@@ -6,7 +6,6 @@ import click
 
 from gcode2krl import library
 from gcode2krl.cell import Cell, cell_schema, load_cell
-from gcode2krl.cli.cell_list import findings, missing_keys, to_confirm
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -55,6 +54,7 @@ def schema() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def check(cell_path: str | None, as_json: bool) -> int:
     """Check a cell file and list what a person must confirm at the real cell."""
+    from gcode2krl.cli.cell_list import findings, missing_keys, to_confirm
     from gcode2krl.krl.provenance import default_values
 
     console = Console(as_json=as_json)

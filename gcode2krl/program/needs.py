@@ -4,11 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gcode2krl import cell_templates, ranges
+from gcode2krl import ranges
 from gcode2krl.cell import Cell, plain_view
 from gcode2krl.errors import Issue
 from gcode2krl.sections import missing_key
-from gcode2krl.switching import SAMPLE
 from gcode2krl.tables import Event, Toolpath
 
 
@@ -27,6 +26,7 @@ def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield warnings on stated values: beyond their usual range, or left at a default that matters."""
     used = set(_used_tools(toolpath))
     yield from ranges.range_issues(cell, used)
+    yield from _unread_pairs(toolpath, cell)
     centre = [f"load.{axis}_mm" for axis in "xyz"]
     if cell.load.mass_kg is not None and all(key in cell.defaults for key in centre):
         text = "the centre of the load is not stated: X 0, Y 0, Z 0 of the flange is written"
@@ -65,6 +65,9 @@ def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
         yield "load.mass_kg", "$LOAD is written with $TOOL"
     if any(event.kind == "spindle" for event in toolpath.events) and cell.spindle.max_rpm is None:
         yield "spindle.max_rpm", "whether the spindle can turn at S is not known"
+    from gcode2krl import cell_templates
+    from gcode2krl.switching import SAMPLE
+
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
     templates = cell.templates()
     for key in _used_templates(toolpath, templates):
@@ -75,6 +78,18 @@ def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
                 yield error.key.removeprefix("cell."), f"{key} switches it"
         except cell_templates.TemplateError:
             continue  # said where it is rendered with its own values
+
+
+def _unread_pairs(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the pairs that the program uses and whose second half calls a subprogram."""
+    from gcode2krl import switching
+
+    templates = cell.templates()
+    view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
+    used = _used_templates(toolpath, templates)
+    for issue in switching.pair_issues(templates, switching.rendered(templates, view)):
+        if issue.message.split()[0] in used:
+            yield issue
 
 
 def _used_templates(toolpath: Toolpath, templates: dict[str, str]) -> list[str]:
