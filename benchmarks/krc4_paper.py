@@ -39,7 +39,7 @@ def simulate(folder, speed_m_s, a_m_s2, cdis_mm):
     """Return Motion at 12 ms and at 1 ms."""
     path = Path(folder) / "cell.toml"
     keys = f"k_s = {K_S}\nacc_cp_m_s2 = {a_m_s2}\ncdis_mm = {float(cdis_mm)}\n"
-    path.write_text(f'[controller]\n{keys}advance = "unlimited"\n')
+    path.write_text(f'based_on = "demonstration"\n[controller]\n{keys}advance = "unlimited"\n')
     cell = load_cell(path)
     toolpath = read_stream(io.BytesIO(program(speed_m_s).encode()), "paper.nc", cell)
     return plan_motion(toolpath, cell, dt_s=CYCLE_S), plan_motion(toolpath, cell, dt_s=FINE_S)

@@ -81,6 +81,7 @@ HOME_END = "G28 G91 Z0.\nG28 X0. Y0.\nG90"
 CELL_HEAD = 'based_on = "demonstration"\nverified = { by = "benchmark", date = "2026-01-15" }\n'
 CELL_TOOLS = "[tool.7]\nlength_mm = 120.0\n[tool.14]\nlength_mm = 90.0\n"
 """The clean cell: the demonstration cell with two tools of different length. A case's text goes between."""
+NO_TURN = "a_deg = 0.0\nb_deg = 0.0\nc_deg = 0.0\n"
 NO_PLANE = '[clearance]\nz_mm = "none"\n'
 LIMITS = """\
 [robot.limits]
@@ -88,7 +89,8 @@ q_deg = [[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-122.5, 122.5], [-3
 """
 A5_ZERO = (
     LIMITS.replace("-122.5, 122.5", "-110, 110")
-    + "[home]\nq_deg = [0, -110, 90, 0, 20, 0]\n[frames.base]\ny_mm = -30.0\nz_mm = 1496.8\n"
+    + "[home]\nq_deg = [0, -110, 90, 0, 20, 0]\n[frames.base]\nx_mm = 1500.0\ny_mm = -30.0\nz_mm = 1496.8\n"
+    + NO_TURN
 )
 """Forearm level and A1 zero in the middle of line 17; A5 limited by cables, so the elbow stays up."""
 
@@ -355,7 +357,7 @@ ROBOT_MISTAKES = (
     ),
     Mistake(
         "base low and Z-400 for Z-4.00: A2 beyond its limit", r"A2",
-        {12: "@N90 G1 Z-400 F600."}, cell="[frames.base]\nz_mm = 0.0\n",
+        {12: "@N90 G1 Z-400 F600."}, cell="[frames.base]\nx_mm = 1500.0\ny_mm = 0.0\nz_mm = 0.0\n" + NO_TURN,
     ),
     Mistake(
         "spindle turned to the robot: A5 beyond its limit", r"A5",
@@ -367,17 +369,19 @@ ROBOT_MISTAKES = (
     ),
     Mistake(
         "base in metres", r"reach|A\d",
-        {9: "@", 10: "@", 12: "@"}, cell="[frames.base]\nx_mm = 1.5\nz_mm = 0.8\n", or_whole=True,
+        {9: "@", 10: "@", 12: "@"}, cell="[frames.base]\nx_mm = 1.5\ny_mm = 0.0\nz_mm = 0.8\n" + NO_TURN,
+        or_whole=True,
     ),
     Mistake(
         "work offset in thousandths of a millimetre", r"reach",
-        {9: "@", 10: "@"}, cell="[work_offsets.G54]\nz_mm = 150000.0\n", or_whole=True,
+        {9: "@", 10: "@"}, cell="[work_offsets.G54]\nx_mm = 0.0\ny_mm = 0.0\nz_mm = 15000.0\n" + NO_TURN,
+        or_whole=True,
     ),
     Mistake("HOME beyond a joint limit", r"HOME", cell="[home]\nq_deg = [0, -150, 90, 0, 0, 0]\n"),
     Mistake("HOME in radians", r"HOME", cell="[home]\nq_deg = [0, -1.571, 1.571, 0, 0, 0]\n"),
     Mistake(
         "HOME with the tip below the clearance plane", r"HOME|clearance",
-        cell="[frames.base]\nz_mm = 1480.0\n",
+        cell="[frames.base]\nx_mm = 1500.0\ny_mm = 0.0\nz_mm = 1480.0\n" + NO_TURN,
     ),
     Mistake(
         "clearance plane out of reach", r"reach|clearance",
@@ -462,7 +466,11 @@ CLEAN = (
     Clean("inch program with G20", "inch"),
     Clean("G28 in header and footer", change={5: "G28 G91 Z0.\nG90\nG54", 30: f"M5\n{HOME_END}"}),
     Clean("G53 G0 Z0 before the tool change", change={20: "M5\nG53 G0 Z0."}),
-    Clean("work offset G55 of the cell", change={5: "G55"}, cell="[work_offsets.G55]\nz_mm = 30.0\n"),
+    Clean(
+        "work offset G55 of the cell",
+        change={5: "G55"},
+        cell="[work_offsets.G55]\nx_mm = 0.0\ny_mm = 0.0\nz_mm = 30.0\n" + NO_TURN,
+    ),
     Clean("comments with ; and remarks after the end", change={8: "M8 ; coolant", 32: "%\nend of file"}),
     Clean("next tool preselected with T alone", change={7: "S8000 M3\nT14", 21: "M6"}),
     Clean("typed by hand, neither M30 nor %", "no tool", change={10: None}),

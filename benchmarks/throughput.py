@@ -152,10 +152,14 @@ def write_inputs(folder: Path) -> None:
     """Write the tool table and parameters of rs274, and the two cells."""
     (folder / "tool.tbl").write_text("T13 P13 Z0 D8\n", encoding="ascii")
     (folder / "vars.var").write_text("", encoding="ascii")
-    (folder / "unlimited.toml").write_text('[controller]\nadvance = "unlimited"\n', encoding="ascii")
-    material = '[controller]\nadvance = "unlimited"\n[stock]\nresolution_mm = 0.25\n'
+    (folder / "unlimited.toml").write_text(
+        'based_on = "demonstration"\n[controller]\nadvance = "unlimited"\n', encoding="ascii"
+    )
+    material = (
+        'based_on = "demonstration"\n[controller]\nadvance = "unlimited"\n[stock]\nresolution_mm = 0.25\n'
+    )
     (folder / "material.toml").write_text(material, encoding="ascii")
-    (folder / "look_ahead.toml").write_text("", encoding="ascii")
+    (folder / "look_ahead.toml").write_text('based_on = "demonstration"\n', encoding="ascii")
 
 
 # --- the work: peers -------------------------------------------------------------------------------

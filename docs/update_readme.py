@@ -13,7 +13,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-STOCK = "[stock]\nbox_mm = [[0, -100, -30], [300, 100, 0]]\n"
+STOCK = 'based_on = "demonstration"\n' + "[stock]\nbox_mm = [[0, -100, -30], [300, 100, 0]]\n"
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(
     r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```",

@@ -1,12 +1,19 @@
 """The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
 
 import difflib
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from gcode2krl.errors import input_error
 
+MOST_BYTES = 4_000_000
+"""A cell with 1,000 tools has 0.2 MB."""
+MOST_LEVELS = 32
+"""The deepest table of a cell has 5 levels; the time of `tomllib` grows with the square of a key's parts."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"]*+"|'[^']*+')"""
+_MANY_DOTS = re.compile(rf"(?<![A-Za-z0-9_\-\"'])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
 KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
@@ -26,17 +33,49 @@ def names(kind: str) -> dict[str, Path]:
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; raises `NotUnderstoodError` naming the file and line where it cannot."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(path)) from None
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise input_error("file-unreadable", f"cannot read: {why}", source=str(path)) from None
+    if len(data) > MOST_BYTES:
+        raise input_error(
+            "file-too-large", f"more than {MOST_BYTES // 1_000_000} MB is no model or cell file",
+            "name the right file", source=str(path),
+        )  # fmt: skip
+    try:
+        return parse_toml(data.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
         raise input_error("not-utf8", f"byte {error.start} is not UTF-8", source=str(path)) from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """Parse TOML in bounded time; raises `NotUnderstoodError` where it is none, or is nested too deeply."""
+    remedy = "see docs/cell.md for the format"
+    for number, line in enumerate(text.split("\n"), start=1):
+        if _MANY_DOTS.search(line):
+            sentence = f"line {number}: a key of more than {MOST_LEVELS} parts"
+            raise input_error("not-toml", sentence, remedy, source=source)
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise input_error(
-            "not-toml", str(error), "see docs/cell.md for the format", source=str(path)
-        ) from None
+        found = tomllib.loads(text)
+    except RecursionError:
+        raise input_error("not-toml", "nested too deeply", remedy, source=source) from None
+    except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
+        raise input_error("not-toml", str(error)[:200], remedy, source=source) from None
+    if _levels(found) > MOST_LEVELS:
+        raise input_error("not-toml", f"more than {MOST_LEVELS} levels", remedy, source=source)
+    return found
+
+
+def _levels(found: dict[str, Any]) -> int:
+    """Return how deeply tables and lists are nested, counted no further than just beyond the limit."""
+    level = 0
+    here: list[dict[str, Any] | list[Any]] = [found]
+    while here and level <= MOST_LEVELS:
+        level += 1
+        inside = (part for one in here for part in (one.values() if isinstance(one, dict) else one))
+        here = [part for part in inside if isinstance(part, dict | list)]
+    return level
 
 
 def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, Any]:

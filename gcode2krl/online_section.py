@@ -8,7 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from gcode2krl.sections import Finite, NotNegative, Positive, Section, SignalNumber, SixFloats
 
-PortNumber = Annotated[int, Field(ge=1, le=65535)]
+PortNumber = Annotated[int, Field(strict=True, ge=1, le=65535)]
 CYCLES_S = (0.004, 0.012)
 LEAD_SHARE_OF_BLEND = 0.2
 """The share of the blend time that belongs to the best lead; see `Online.pilot_lead_s`."""
@@ -30,14 +30,14 @@ class RobotLink(Section):
     port: PortNumber = 49152
     sensor_type: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,32}$")] = "ImFree"
     """``SENTYPE`` of the controller's file, sent in every answer."""
-    timeout_cycles: Annotated[int, Field(ge=1, le=5)] = 5
+    timeout_cycles: Annotated[int, Field(strict=True, ge=1, le=5)] = 5
     """``Timeout`` of the controller's ETHERNET object: cycles without answer until RSI stops."""
-    lost_cycles: Annotated[int, Field(ge=1, le=100)] = 5
+    lost_cycles: Annotated[int, Field(strict=True, ge=1, le=100)] = 5
     """Telegrams missing in a row after which the correction is held for the rest of the session; the
     controller gives up after as many."""
     silence_s: Positive = 1.0
     """Without a telegram for so long the session is over and nothing is answered any more."""
-    decimals: Annotated[int, Field(ge=3, le=9)] = 4
+    decimals: Annotated[int, Field(strict=True, ge=3, le=9)] = 4
     """``Precision`` of the ETHERNET object: decimals of what the robot sends; KUKA's default is 1."""
     t1_output: SignalNumber = 993
     """``$OUT`` that is on in T1 (``SIGNAL $T1``); 993 as remembered of KUKA's Automatic External interface:
@@ -66,15 +66,15 @@ class RobotLink(Section):
 class Probe(Section):
     """How the server finds out whether the robot takes corrections as absolute."""
 
-    amplitude_mm: Annotated[float, Field(gt=0, le=0.2)] = 0.1
+    amplitude_mm: Annotated[float, Field(strict=True, gt=0, le=0.2)] = 0.1
     """A correction along the tool axis, away from the part, while the robot stands in air."""
-    rest_cycles: Annotated[int, Field(ge=5)] = 25
+    rest_cycles: Annotated[int, Field(strict=True, ge=5)] = 25
     """The robot must have stood for so long."""
     rest_mm: Positive = 0.02
     """What counts as standing: RIst moves by no more, the resolution of two decimals and its rounding."""
-    most_cycles: Annotated[int, Field(ge=2, le=50)] = 25
+    most_cycles: Annotated[int, Field(strict=True, ge=2, le=50)] = 25
     """The longest time the probe is on; it ends as soon as the robot is seen to move."""
-    settle_cycles: Annotated[int, Field(ge=5)] = 25
+    settle_cycles: Annotated[int, Field(strict=True, ge=5)] = 25
     """After that the robot must be back where it was."""
 
 
@@ -97,7 +97,7 @@ class Online(Section):
     """From a correction sent to the robot's movement, as measured on this robot."""
     gains: Gains = Gains()
     axis_gains: Annotated[tuple[Gains, ...], Field(min_length=6, max_length=6)] = (Gains(),) * 6
-    most_mm: Annotated[float, Field(gt=0, le=10)] = 2.5
+    most_mm: Annotated[float, Field(strict=True, gt=0, le=10)] = 2.5
     """Largest correction, of the sum; also ``POSCORR`` and ``POSCORRMON``. 1.4 mm is the paper's largest
     deviation."""
     rate_mm_s: Positive = 50.0

@@ -148,6 +148,8 @@ def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = Non
     ------
     NotUnderstoodError
         Where the program has no motion, or the tolerance is not positive.
+    RefusedError
+        Where the cell does not state robot, ``$BASE``, HOME or a tool's tip.
     """
     return targets_and_joints(toolpath, cell, tolerance_mm)[0]
 
@@ -158,6 +160,7 @@ def targets_and_joints(
     """Return what `set_targets` returns, and the joints it was checked with (``sigma_min`` left NaN)."""
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
+    program.require_geometry(toolpath, cell)
     return checked(program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm), cell)
 
 

@@ -1,22 +1,38 @@
 """The sections of a cell file: what each table holds, in which unit, and what is allowed."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from gcode2krl import frames as fr
+from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.units import RAD_PER_DEG
 
 Sure = Literal["verified", "checked", "memory", "assumption", "unknown"]
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+YesNo = Annotated[bool, Field(strict=True)]
+OneLine = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x85\u2028\u2029]*$")]
+"""Text that goes into a line of the program: it cannot begin another line."""
 SixFloats = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
-DataNumber = Annotated[int, Field(ge=1, le=32)]
-SignalNumber = Annotated[int, Field(ge=1, le=8192)]
+DataNumber = Annotated[int, Field(strict=True, ge=1, le=32)]
+SignalNumber = Annotated[int, Field(strict=True, ge=1, le=8192)]
+
+
+def missing(*keys: str) -> RefusedError:
+    """Return the error of a stage that needs keys which the cell does not name."""
+    return RefusedError([missing_key(key) for key in keys])
+
+
+def missing_key(key: str, reason: str = "") -> Issue:
+    """Return the finding that a key is needed and not stated."""
+    text = f"the cell does not name {key}" + (f": {reason}" if reason else "")
+    remedy = f'give {key} in the cell file, or say whose it is with based_on = "…"'
+    return Issue("error", "cell-missing", 0, text, remedy)
 
 
 class Section(BaseModel):
@@ -33,14 +49,23 @@ class Provenance(Section):
 
 
 class Frame(Section):
-    """A KUKA frame: position in mm and A, B, C in degrees (Rz·Ry·Rx)."""
+    """A KUKA frame, whole: position in mm and A, B, C in degrees (Rz·Ry·Rx)."""
 
-    x_mm: Finite = 0.0
-    y_mm: Finite = 0.0
-    z_mm: Finite = 0.0
-    a_deg: Finite = 0.0
-    b_deg: Finite = 0.0
-    c_deg: Finite = 0.0
+    x_mm: Finite
+    y_mm: Finite
+    z_mm: Finite
+    a_deg: Finite
+    b_deg: Finite
+    c_deg: Finite
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_six(cls, given: Any) -> Any:
+        if isinstance(given, dict):
+            lacking = [name for name in cls.model_fields if name not in given]
+            if lacking:
+                raise ValueError(f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg")
+        return given
 
     def matrix(self) -> NDArray[np.float64]:
         """Return the homogeneous transform (4, 4)."""
@@ -48,19 +73,36 @@ class Frame(Section):
         return fr.transform([self.x_mm, self.y_mm, self.z_mm], fr.rotation_from_abc(abc))
 
 
-class Geometry(Provenance):
-    """Lengths of an ortho-parallel arm with spherical wrist (b = 0), in mm."""
+_LENGTHS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
 
-    a1_mm: Finite
-    a2_mm: Finite
-    c1_mm: Finite
-    c2_mm: Positive
-    c3_mm: Positive
-    c4_mm: Positive
+
+class Geometry(Provenance):
+    """Lengths of an ortho-parallel arm with spherical wrist (b = 0), in mm: all six, or none is known."""
+
+    a1_mm: Finite | None = None
+    a2_mm: Finite | None = None
+    c1_mm: Finite | None = None
+    c2_mm: Positive | None = None
+    c3_mm: Positive | None = None
+    c4_mm: Positive | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        missing = [name for name in _LENGTHS if getattr(self, name) is None]
+        if 0 < len(missing) < len(_LENGTHS):
+            raise ValueError(f"{', '.join(missing)} missing: give all six lengths")
+        return self
+
+    @property
+    def known(self) -> bool:
+        """True where the lengths are stated."""
+        return self.a1_mm is not None
 
     def array(self) -> NDArray[np.float64]:
-        """Return a1, a2, c1, c2, c3, c4 (6,) in mm."""
-        return np.array([self.a1_mm, self.a2_mm, self.c1_mm, self.c2_mm, self.c3_mm, self.c4_mm])
+        """Return a1, a2, c1, c2, c3, c4 (6,) in mm; raises `RefusedError` where they are not stated."""
+        if not self.known:
+            raise missing("robot.model")
+        return np.array([getattr(self, name) for name in _LENGTHS], dtype=float)
 
 
 class Limits(Provenance):
@@ -104,12 +146,12 @@ class Drives(Provenance):
 
 
 class Robot(Section):
-    """One robot model."""
+    """One robot model; without geometry nothing is known of where its joints stand."""
 
-    model: str
-    trafo_name: str = ""
+    model: OneLine = ""
+    trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$")] = ""
     """What ``$TRAFONAME[]`` of the controller must contain; empty: the guard does not look."""
-    geometry: Geometry
+    geometry: Geometry = Geometry()
     limits: Limits = Limits()
     speeds: Speeds = Speeds()
     payload: Payload = Payload()
@@ -118,12 +160,12 @@ class Robot(Section):
 
 
 class Controller(Provenance):
-    """What the controller's planner is set to."""
+    """What the controller's planner is set to; the defaults are those of the KRC4."""
 
-    model: str
+    model: OneLine = "KRC4"
     k_s: NotNegative = 0.168
     cycle_s: Positive = 0.012
-    advance: Annotated[int, Field(ge=0, le=5)] | Literal["unlimited"] = 3
+    advance: Annotated[int, Field(strict=True, ge=0, le=5)] | Literal["unlimited"] = 3
     cdis_mm: NotNegative = 0.1
     tolerance_mm: Positive | None = None
     vel_cp_m_s: Positive = 2.0
@@ -132,7 +174,7 @@ class Controller(Provenance):
     rapid_m_s: Positive = 0.2
     vel_ori_deg_s: Positive = 200.0
     acc_ori_deg_s2: Positive = 100.0
-    ptp_percent: Annotated[int, Field(ge=1, le=100)] = 20
+    ptp_percent: Annotated[int, Field(strict=True, ge=1, le=100)] = 20
     law: Literal["averages", "trapezoid"] = "averages"
 
 
@@ -143,23 +185,23 @@ class Tool(Provenance):
     kind: Literal["flat", "bull-nose", "ball", "tapered", "drill"] = "flat"
     diameter_mm: Positive
     """Largest diameter of the cutting part; of a tapered mill the one at the tip."""
-    teeth: Annotated[int, Field(ge=1, le=50)]
+    teeth: Annotated[int, Field(strict=True, ge=1, le=50)]
     corner_radius_mm: NotNegative = 0.0
-    helix_deg: Annotated[float, Field(ge=0, lt=90)] = 30.0
+    helix_deg: Annotated[float, Field(strict=True, ge=0, lt=90)] = 30.0
     length_mm: Positive | None = None
     """From the gauge line of the spindle to the tip."""
     flute_length_mm: Positive | None = None
     """Length of the cutting edges along the axis; above it is the shank."""
-    taper_deg: Annotated[float, Field(ge=0, lt=80)] = 0.0
+    taper_deg: Annotated[float, Field(strict=True, ge=0, lt=80)] = 0.0
     """Half angle of a tapered mill."""
-    point_deg: Annotated[float, Field(gt=10, lt=180)] | None = None
+    point_deg: Annotated[float, Field(strict=True, gt=10, lt=180)] | None = None
     """Full angle of a drill's point."""
     shank_diameter_mm: Positive | None = None
     """Default: the cutter's diameter, which then cannot touch more than the edges have cut."""
     stick_out_mm: Positive | None = None
     """From the tip to the face of the holder; None: the holder is not checked."""
     holder_diameter_mm: Positive | None = None
-    centre_cutting: bool = True
+    centre_cutting: YesNo = True
     max_depth_mm: Positive | None = None
     """Largest axial depth of cut; default: the flute length."""
     max_force_N: Positive | None = None
@@ -186,6 +228,10 @@ class Tool(Provenance):
             )
         if self.tool_data is not None and self.axis is None:
             raise ValueError('axis is required with tool_data: "+x", "-x", "+y", "-y", "+z" or "-z"')
+        if self.tool_data is not None and self.frame is None:
+            raise ValueError(
+                "tool_data without frame: give frame too, the TCP as the controller has it, to be compared"
+            )
         if self.axis not in (None, "+z") and self.frame is None:
             raise ValueError("axis other than +z needs frame, the TCP as the controller has it")
         return self
@@ -194,34 +240,42 @@ class Tool(Provenance):
 class Frames(Provenance):
     """Where the work and the tool are."""
 
-    base: Frame = Frame()
+    base: Frame | None = None
     """``$BASE`` in ``$ROBROOT``."""
     base_data: DataNumber | None = None
     """Number of ``BASE_DATA`` on the controller; without it ``$BASE`` is written as a frame."""
-    tool: Frame = Frame()
+    tool: Frame | None = None
     """TCP in the flange of a tool of ``tool_length_mm``; z points from tip to holder."""
-    tool_length_mm: NotNegative = 0.0
-    spin: Annotated[float, Field(ge=-360, le=360)] | Literal["auto", "stiffest"] = 0.0
+    tool_length_mm: NotNegative | None = None
+    spin: Annotated[float, Field(strict=True, ge=-360, le=360)] | Literal["auto", "stiffest"] = 0.0
     """Angle in degrees about the tool axis; ``auto`` keeps away from limits and singularities, ``stiffest``
     bends least under a load across the tool."""
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Self:
+        if self.base_data is not None and self.base is None:
+            raise ValueError(
+                "base_data without base: give base too, $BASE as the controller has it, to be compared"
+            )
+        return self
 
 
 class Home(Section):
     """Where the program starts and ends."""
 
-    q_deg: SixFloats
+    q_deg: SixFloats | None = None
 
 
 class Clearance(Section):
     """The plane above everything, in ``$BASE``; ``none`` where the cell has none."""
 
-    z_mm: Finite | Literal["none"]
+    z_mm: Finite | Literal["none"] | None = None
 
 
 class Load(Provenance):
     """Payload on the flange: mass, centre and inertia in the flange frame."""
 
-    mass_kg: NotNegative
+    mass_kg: NotNegative | None = None
     x_mm: Finite = 0.0
     y_mm: Finite = 0.0
     z_mm: Finite = 0.0
@@ -233,26 +287,26 @@ class Load(Provenance):
 class Spindle(Provenance):
     """The spindle and its signals; numbers are ``$OUT``, ``$IN`` and ``$ANOUT`` of the controller."""
 
-    max_rpm: Positive
-    run_cw_output: SignalNumber
-    run_ccw_output: SignalNumber
-    speed_analog_output: Annotated[int, Field(ge=1, le=32)]
+    max_rpm: Positive | None = None
+    run_cw_output: SignalNumber | None = None
+    run_ccw_output: SignalNumber | None = None
+    speed_analog_output: Annotated[int, Field(strict=True, ge=1, le=32)] | None = None
     at_speed_input: SignalNumber | None = None
     max_power_W: Positive | None = None
     max_torque_Nm: Positive | None = None
     start_s: NotNegative = 5.0
     """Waited after M3 where there is no at-speed input."""
     stop_s: NotNegative = 5.0
-    flood_output: SignalNumber
-    mist_output: SignalNumber
+    flood_output: SignalNumber | None = None
+    mist_output: SignalNumber | None = None
 
 
 class GuardInput(Section):
     """A controller input that must have a value before the first motion."""
 
     number: SignalNumber
-    value: bool = True
-    meaning: str
+    value: YesNo = True
+    meaning: OneLine
 
 
 class LinearEdge(Section):
@@ -276,7 +330,7 @@ class Kienzle(Section):
 
     kc11: Positive
     """Specific cutting force at h = b = 1 mm in N/mm²."""
-    mc: Annotated[float, Field(ge=0, lt=1)]
+    mc: Annotated[float, Field(strict=True, ge=0, lt=1)]
     radial_ratio: NotNegative = 0.4
     axial_ratio: Finite = 0.2
 
@@ -288,7 +342,7 @@ class Material(Provenance):
     name: str = ""
     linear_edge: LinearEdge | None = None
     kienzle: Kienzle | None = None
-    relative_band: Annotated[float, Field(ge=0, lt=1)] = 0.4
+    relative_band: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.4
     """Half-width of the 90 % band of forces, relative."""
     note: str = ""
 
@@ -337,7 +391,7 @@ class ResultLimits(Section):
     deflection_mm: Positive = 5.0
     acceleration_mm_s2: Positive = 20000.0
     """Along the path, corners included."""
-    lost_time_share: Annotated[float, Field(gt=0, le=1)] = 0.25
+    lost_time_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.25
     """Share of the time that short moves, stops and joint speeds cost."""
 
 
@@ -357,14 +411,26 @@ class Compliance(Provenance):
     """The virtual joints of robot and end effector; without all of them no deflection is predicted."""
 
     virtual_joints: dict[VirtualJointName, VirtualJoint] = Field(default_factory=dict)
-    sensor_height_mm: NotNegative = 56.0
+    sensor_height_mm: NotNegative | None = None
     """From the flange face to the mounting face of spindle and holder; the sensor's joint is half-way."""
-    relative_band: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    relative_band: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.1
     """Half-width of the 90 % band of the stiffness, relative."""
     modes_hz: tuple[Positive, ...] = ()
     """Structural modes that a spindle speed or tooth passing should keep away from."""
     robot_source: str = ""
     robot_sure: Sure = "unknown"
+
+    def known_height_mm(self) -> float:
+        """Return `sensor_height_mm`; raises `RefusedError` where it is not stated."""
+        if self.sensor_height_mm is None:
+            raise missing("compliance.sensor_height_mm")
+        return self.sensor_height_mm
+
+
+# Only variables of sensors, or the integrator's own: never one that the planner, a frame or an output has.
+_OWN = r"[A-FH-Za-fh-z][A-Za-z0-9_]{0,23}"
+_PILOT_VARIABLE = rf"^(\$SEN_PINT\[[0-9]{{1,2}}\]|{_OWN}(\[[0-9]{{1,3}}\])?)$"
+_PILOT_ARRAY = rf"^(\$SEN_PREA|{_OWN})$"
 
 
 class Pilot(Section):
@@ -377,38 +443,56 @@ class Pilot(Section):
     """Least time between the announcement of a knot and the knot."""
     tolerance_N: Positive | None = None
     """Largest error of the knots' polyline; default: the larger of 10 N and 3 % of the peak."""
-    index_variable: str = "$SEN_PINT[1]"
-    hash_variable: str = "$SEN_PINT[2]"
-    value_variable: str = "$SEN_PREA"
-    max_active: Annotated[int, Field(ge=1, le=8)] = 8
+    index_variable: Annotated[str, Field(pattern=_PILOT_VARIABLE)] = "$SEN_PINT[1]"
+    hash_variable: Annotated[str, Field(pattern=_PILOT_VARIABLE)] = "$SEN_PINT[2]"
+    value_variable: Annotated[str, Field(pattern=_PILOT_ARRAY)] = "$SEN_PREA"
+    max_active: Annotated[int, Field(strict=True, ge=1, le=8)] = 8
     """Triggers that may wait at the same time."""
+
+
+_EXTERNAL = r"^[A-Za-z][A-Za-z0-9_]{0,23} ?\([A-Za-z0-9_ :,\[\]]*\)$"
 
 
 class Program(Section):
     """How the KRL text is laid out."""
 
-    max_lines: Annotated[int, Field(ge=100)] = 5000
-    comment_every: Annotated[int, Field(ge=0)] = 50
+    max_lines: Annotated[int, Field(strict=True, ge=100)] = 5000
+    comment_every: Annotated[int, Field(strict=True, ge=0)] = 50
     """A comment with the G-code line every so many motions; 0 = only at events."""
     tool_length: Literal["g43", "from_table"] = "g43"
     """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
     the spindle, for posts that set lengths by touching off and never write G43."""
     warn_size_mb: Positive = 4.0
-    externals: tuple[str, ...] = ()
+    externals: tuple[Annotated[str, Field(pattern=_EXTERNAL)], ...] = ()
     """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""
     prologue: str = ""
     """KRL (Jinja2) between the guard and the first motion."""
     epilogue: str = ""
     """KRL (Jinja2) after the last motion."""
-    memory_moves: Annotated[int, Field(ge=1)] = 30000
+    memory_moves: Annotated[int, Field(strict=True, ge=1)] = 30000
     """LIN lines a controller surely holds."""
 
 
 class Verified(Section):
     """Who confirmed that the cell file matches the real cell."""
 
-    by: Annotated[str, Field(min_length=1)]
+    by: Annotated[OneLine, Field(min_length=1, max_length=100)]
     date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+
+
+ToolNumber = Annotated[int, Field(ge=1, le=99999)]
+
+
+class TakenOver(Section):
+    """A value that a cell took over from the one it is based on."""
+
+    key: str
+    """Dotted, as in the file: ``frames.base``."""
+    value: str
+    source: str
+    """The file, or ``demonstration``."""
+    verified: bool
+    """True where that file is verified."""
 
 
 class EffectEntry(Section):

@@ -126,7 +126,10 @@ def test_joint_speeds_agree_with_the_jacobian(prediction):
 
 def test_a_joint_too_slow_for_the_feed_slows_the_robot_down(tmp_path):
     path = tmp_path / "cell.toml"
-    path.write_text("[robot.speeds]\nqd_deg_s = [1.5, 101, 107, 122, 113, 175]\n", encoding="ascii")
+    path.write_text(
+        "based_on = 'demonstration'\n[robot.speeds]\nqd_deg_s = [1.5, 101, 107, 122, 113, 175]\n",
+        encoding="ascii",
+    )
     cell = load_cell(path)
     toolpath = _toolpath("G21 T1 M6\nS9000 M3\nG0 G43 H1 Z50\nX0 Y-200\nG1 Y200 F6000\nM30\n", cell)
     targets = set_targets(toolpath, cell)

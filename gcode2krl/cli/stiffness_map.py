@@ -193,9 +193,9 @@ class SpinMap:
 
 def plane_map(case: Case, z_mm: float, step_mm: float | None = None) -> PlaneMap:
     """Return the deflection over the plane at a height in ``$BASE``, as far as the arm reaches."""
-    g = case.cell.robot.geometry
+    a1_mm, a2_mm, _, c2_mm, c3_mm, c4_mm = case.cell.robot.geometry.array()
     tip_mm = float(np.linalg.norm(case.cell.tool_matrix(case.tool)[:3, 3]))
-    reach_mm = abs(g.a1_mm) + g.c2_mm + float(np.hypot(g.a2_mm, g.c3_mm)) + g.c4_mm + tip_mm
+    reach_mm = float(abs(a1_mm) + c2_mm + np.hypot(a2_mm, c3_mm) + c4_mm + tip_mm)
     step_mm = reach_mm / _STEPS_TO_REACH if step_mm is None else step_mm
     if not (np.isfinite(step_mm) and step_mm > 0.0 and (2.0 * reach_mm / step_mm + 1.0) ** 2 <= _MOST_POSES):
         raise input_error(

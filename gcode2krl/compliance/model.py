@@ -12,7 +12,7 @@ import numpy.typing as npt
 from gcode2krl.cell import Cell
 from gcode2krl.compliance.rows import Floats
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.sections import VIRTUAL_JOINTS
+from gcode2krl.sections import VIRTUAL_JOINTS, missing_key
 
 Ints = npt.NDArray[np.int32]
 
@@ -26,18 +26,18 @@ class Tips(NamedTuple):
 
 def frames(cell: Cell) -> Floats:
     """Return cos alpha, sin alpha, a and d (10, 4) of eq. 1 for frames 1 to 10, in mm."""
-    g = cell.robot.geometry
-    half_mm = cell.compliance.sensor_height_mm / 2
+    a1_mm, a2_mm, c1_mm, c2_mm, c3_mm, c4_mm = cell.robot.geometry.array()
+    half_mm = cell.compliance.known_height_mm() / 2
     quarter_turns_a_d = np.array(
         [
-            (0, 0.0, g.c1_mm),  # A1: foot of axis 1, lifted to axis 2
-            (-1, g.a1_mm, 0.0),  # A2: axis 2
-            (0, g.c2_mm / 2, 0.0),  # linked arm: its middle
-            (0, g.c2_mm / 2, 0.0),  # A3: axis 3
-            (-1, -g.a2_mm, g.c3_mm / 2),  # arm: on axis 4, half-way to the wrist
-            (0, 0.0, g.c3_mm / 2),  # A4: wrist centre
+            (0, 0.0, c1_mm),  # A1: foot of axis 1, lifted to axis 2
+            (-1, a1_mm, 0.0),  # A2: axis 2
+            (0, c2_mm / 2, 0.0),  # linked arm: its middle
+            (0, c2_mm / 2, 0.0),  # A3: axis 3
+            (-1, -a2_mm, c3_mm / 2),  # arm: on axis 4, half-way to the wrist
+            (0, 0.0, c3_mm / 2),  # A4: wrist centre
             (1, 0.0, 0.0),  # A5: wrist centre
-            (-1, 0.0, g.c4_mm),  # A6: flange
+            (-1, 0.0, c4_mm),  # A6: flange
             (0, 0.0, half_mm),  # sensor: half its height
             (0, 0.0, half_mm),  # spindle and holder: mounting face on the sensor
         ]
@@ -49,6 +49,8 @@ def frames(cell: Cell) -> Floats:
 def missing_stiffness(cell: Cell) -> Issue | None:
     """Return the finding that names the virtual joints without stiffness; None where all are stated."""
     missing = [name for name in VIRTUAL_JOINTS if name not in cell.compliance.virtual_joints]
+    if not missing and cell.compliance.sensor_height_mm is None:
+        return missing_key("compliance.sensor_height_mm", "no deflection without the sensor's place")
     if not missing:
         return None
     return Issue(
@@ -91,7 +93,7 @@ def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
             )
     if np.shape(tool) not in ((), (count,)):
         raise ValueError(f"tool has shape {np.shape(tool)}, not () or ({count},)")
-    holder_mm = np.array([0.0, 0.0, cell.compliance.sensor_height_mm])
+    holder_mm = np.array([0.0, 0.0, cell.compliance.known_height_mm()])
     position = np.array([cell.tool_matrix(int(number))[:3, 3] - holder_mm for number in numbers])
     rows = np.broadcast_to(index.reshape(np.shape(tool)), count)
     return Tips(position.reshape(-1, 3), np.ascontiguousarray(rows, dtype=np.int32))

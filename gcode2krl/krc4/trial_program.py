@@ -15,6 +15,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.sections import missing
 from gcode2krl.tables import Targets
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, S_PER_MIN
 
@@ -223,8 +224,10 @@ def _tool(cell: Cell) -> int:
 
 
 def _most_rpm(cell: Cell, tool: int) -> float:
-    own = cell.tool[tool].max_rpm
-    return cell.spindle.max_rpm if own is None else min(own, cell.spindle.max_rpm)
+    own, most = cell.tool[tool].max_rpm, cell.spindle.max_rpm
+    if most is None:
+        raise missing("spindle.max_rpm")
+    return most if own is None else min(own, most)
 
 
 def _speeds(cell: Cell) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
 from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.provenance import provenance_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
 from gcode2krl.tables import Joints, Targets
@@ -246,6 +247,7 @@ class _Composer:
             allowed=self.layout.allowed,
             guard=self.layout.guard,
             forces=self.layout.forces,
+            provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
             pilot=self.pilot,
             rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
@@ -255,10 +257,10 @@ class _Composer:
             base=st.base_statement(self.cell),
             tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
-        return _text(text) + _text(st.render(self.cell.program.prologue, self.cell))
+        return _text(text) + _text(st.render(self.cell, "program.prologue"))
 
     def _foot(self) -> bytes:
-        return _text(st.render(self.cell.program.epilogue, self.cell)) + _text("END")
+        return _text(st.render(self.cell, "program.epilogue")) + _text("END")
 
     def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
         parts: dict[str, bytes] = {}

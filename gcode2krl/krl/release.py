@@ -16,6 +16,7 @@ NEVER_RELEASED = frozenset(
         "no-clearance",
         "no-feed",
         "template",
+        "cell-missing",
         "online-nothing",
         "online-tool",
         "online-home",

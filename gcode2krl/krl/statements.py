@@ -6,13 +6,15 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from jinja2.sandbox import SandboxedEnvironment
 from numpy.typing import NDArray
 
+from gcode2krl import cell_templates, template_rules
 from gcode2krl import frames as fr
-from gcode2krl.cell import Cell, controller_axes
-from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.cell import Cell, controller_axes, plain_view
+from gcode2krl.errors import RefusedError
 from gcode2krl.krl.number_text import fixed
+from gcode2krl.sections import missing, missing_key
+from gcode2krl.switching import template_issue
 from gcode2krl.tables import Event
 from gcode2krl.units import DEG_PER_RAD
 
@@ -49,6 +51,8 @@ def tool_statements(cell: Cell, number: int) -> str:
     if tool.tool_data is not None:
         return f"BAS (#TOOL,{tool.tool_data} )"
     load = cell.load
+    if load.mass_kg is None:
+        raise missing("load.mass_kg")
     centre = (
         f"CM {{X {fixed(load.x_mm, 3)},Y {fixed(load.y_mm, 3)},Z {fixed(load.z_mm, 3)},A 0.0,B 0.0,C 0.0}}"
     )
@@ -89,7 +93,7 @@ def event_statements(event: Event, cell: Cell) -> str:
     line = event.values["line"]
     if event.kind == "tool":
         number = event.values["tool"]
-        text = render(cell.tool_change, cell, tool=number, line=line)
+        text = render(cell, "tool_change", tool=number, line=line)
         frame = tool_statements(cell, number) if number in cell.tool else ""
         return f"; line {line}: M6 T{number}\n{text}\n{frame}"
     code = event.values["m"]
@@ -99,43 +103,44 @@ def event_statements(event: Event, cell: Cell) -> str:
             f'; line {line}: message\nGK_MSG={{MODUL[] "GCODE2KRL",NR 9,MSG_TXT[] "{message}"}}\n'
             "GK_HANDLE=SET_KRLMSG(#NOTIFY,GK_MSG,GK_PAR[],GK_OPT)"
         )
-    template = cell.m_code.get(f"M{code}")
-    if template is None:
+    if f"M{code}" not in cell.m_code:
         return f"; line {line}: M{code} HAS NO KRL IN THE CELL AND WAS RELEASED BY HAND"
     rpm = abs(event.values.get("rpm", 0.0))
     text = render(
-        template, cell, rpm=rpm, m=code, p=event.values.get("p"), text=event.values.get("text", ""), line=line
-    )
+        cell, f"m_code.M{code}", rpm=rpm, m=code, p=event.values.get("p"),
+        text=ascii_text(event.values.get("text", "")), line=line,
+    )  # fmt: skip
     return f"; line {line}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
 
 
-def render(template: str, cell: Cell, **values: Any) -> str:
-    """Render a template of the cell; raises `RefusedError` where it cannot be."""
+def render(cell: Cell, key: str, **values: Any) -> str:
+    """Return the KRL of a template of the cell (``m_code.M8``, ``program.prologue``), empty without one.
+
+    Raises `RefusedError` that names the key where it cannot be rendered, or says what it must not.
+    """
+    template = cell.templates().get(key, "")
+    view = {"spindle": cell.spindle.model_dump()}
+    if cell_templates.uses_cell(template):
+        view["cell"] = plain_view(cell)
     try:
-        text = str(_template(template).render(cell=cell, spindle=cell.spindle, **values)).strip("\n")
-    except Exception as error:  # a template is a user's program: whatever it raises is a finding
-        raise _template_error(template, str(error) or type(error).__name__) from None
-    if not text.isascii():
-        raise _template_error(template, "a character that is not ASCII")
+        text = cell_templates.render(template, {**view, **values})
+    except cell_templates.MissingValueError as error:
+        if "." in error.key:
+            raise RefusedError(missing_key(error.key.removeprefix("cell."), f"{key} switches it")) from None
+        raise RefusedError(template_issue(key, str(error))) from None
+    except cell_templates.TemplateError as error:
+        raise RefusedError(template_issue(key, str(error))) from None
+    problem = template_rules.problem(text, cell.program.externals)
+    if problem:
+        raise RefusedError(template_issue(key, problem))
     return text
-
-
-def _template_error(template: str, what: str) -> RefusedError:
-    brief = " ".join(template.split())[:40]
-    message = f"template {brief!r} of the cell: {what}"
-    return RefusedError(Issue("error", "template", 0, message, "correct it in the cell file"))
-
-
-@lru_cache(maxsize=64)
-def _template(text: str) -> jinja2.Template:
-    return environment().from_string(text)
 
 
 @lru_cache(maxsize=1)
 def environment() -> jinja2.Environment:
-    """Return the Jinja2 environment of all KRL templates; an unknown name is an error."""
+    """Return the Jinja2 environment of the package's own templates; an unknown name is an error."""
     loader = jinja2.PackageLoader("gcode2krl.krl", "templates")
-    made = SandboxedEnvironment(  # a cell file may come from elsewhere
+    made = jinja2.Environment(  # templates of this package alone; those of cells: cell_templates
         loader=loader,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

@@ -206,7 +206,7 @@ def sensor_in_flange(cell: Cell) -> Floats:
 
     An assumption: makers state the origin at the tool side.
     """
-    return fr.transform([0.0, 0.0, cell.compliance.sensor_height_mm], np.eye(3))
+    return fr.transform([0.0, 0.0, cell.compliance.known_height_mm()], np.eye(3))
 
 
 def _tool_rotation(q_rad: Floats, cell: Cell, tool: int) -> Floats:

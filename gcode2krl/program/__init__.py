@@ -1,8 +1,15 @@
 """Toolpath to Targets: what the KRL program will say."""
 
-from gcode2krl.program.checks import check_toolpath
+from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.targets import plan_targets
 
-__all__ = ["check_toolpath", "plan_targets", "smooth_spin", "stiffest_spin", "tool_rotation"]
+__all__ = [
+    "check_toolpath",
+    "plan_targets",
+    "require_geometry",
+    "smooth_spin",
+    "stiffest_spin",
+    "tool_rotation",
+]

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.program.needs import doubtful_issues, lacks_geometry, missing_issues
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
@@ -22,8 +23,16 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     for check in (_undefined_positions, _machine_moves, _spindle, _speeds, _length_offsets, _clearance):
         findings += list(check(toolpath, cell, feed))
     findings += list(_tools(toolpath, cell, feed))
+    findings += missing_issues(toolpath, cell)
+    findings += doubtful_issues(toolpath, cell)
     findings += list(_events(toolpath, cell))
     return tuple(findings)
+
+
+def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
+    """Raise `RefusedError` with all findings where the cell does not say where anything is."""
+    if lacks_geometry(toolpath, cell):
+        raise RefusedError((*toolpath.issues, *check_toolpath(toolpath, cell)), toolpath.source)
 
 
 def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
@@ -90,9 +99,8 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
 
 def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     tool = cell.tool.get(int(toolpath.tool[min(event.row + 1, len(toolpath) - 1)]))
-    most = cell.spindle.max_rpm
-    if tool is not None and tool.max_rpm is not None:
-        most = min(most, tool.max_rpm)
+    stated = (cell.spindle.max_rpm, tool.max_rpm if tool is not None else None)
+    most = min((rpm for rpm in stated if rpm is not None), default=np.inf)
     rpm = abs(event.values["rpm"])
     if rpm > most * (1 + 1e-9):
         sentence = f"S{rpm:.0f} is above the {most:.0f} rpm that spindle and tool allow"

@@ -346,7 +346,7 @@ class _Plan:
         return exact
 
     def _notes(self) -> list[Issue]:
-        if self.cell.verified is not None:
+        if self.cell.is_confirmed:
             return []
         return [
             Issue(

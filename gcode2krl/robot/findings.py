@@ -162,7 +162,7 @@ def _cell_findings(cell: Cell) -> Iterator[Issue]:
 
 def _load_findings(cell: Cell) -> Iterator[Issue]:
     mass, rated = cell.load.mass_kg, cell.robot.payload.mass_kg
-    if rated is not None and mass > rated:
+    if rated is not None and mass is not None and mass > rated:
         yield Issue(
             "error",
             "overload",

@@ -7,7 +7,8 @@ import pytest
 
 from tests.cli.test_translate import CLEAN
 
-CELL = '[online]\nmost_mm = 1.5\n[online.link]\naddress = "192.168.7.3"\nport = 50001\n'
+CELL = 'based_on = "demonstration"\n[online]\nmost_mm = 1.5\n[online.link]\n'
+CELL += 'address = "192.168.7.3"\nport = 50001\n'
 FILES = ["ImFree.rsi.xml", "ImFree_ETH.xml", "out.dat", "out.pilot.csv", "out.src"]
 
 

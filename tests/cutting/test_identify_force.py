@@ -92,7 +92,10 @@ M30
 
 def test_the_command_reads_a_run_and_writes_the_cell(run, tmp_path):
     (tmp_path / "slots.nc").write_text(SLOTS, encoding="ascii")
-    stock = "[stock]\nbox_mm = [[0, -60, -20], [50, 60, 0]]\nresolution_mm = 0.4\n"
+    stock = (
+        'based_on = "demonstration"\n'
+        + "[stock]\nbox_mm = [[0, -60, -20], [50, 60, 0]]\nresolution_mm = 0.4\n"
+    )
     (tmp_path / "cell.toml").write_text(stock, encoding="utf-8")
     assert run("predict", "slots.nc", "-o", "prediction", "--cell", "cell.toml", "-q").code == 0
     from gcode2krl import Prediction

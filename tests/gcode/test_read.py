@@ -123,7 +123,10 @@ def test_work_offsets_of_the_cell(tmp_path):
     from gcode2krl import load_cell
 
     path = tmp_path / "cell.toml"
-    path.write_text("[work_offsets]\nG55 = { x_mm = 100.0, z_mm = -5.0 }\n", encoding="ascii")
+    path.write_text(
+        "[work_offsets.G55]\nx_mm = 100\ny_mm = 0\nz_mm = -5\na_deg = 0\nb_deg = 0\nc_deg = 0\n",
+        encoding="ascii",
+    )
     toolpath = read("G21 G55 G0 X1 Y1 Z1\nG56 X1\nM2\n", load_cell(path))
     np.testing.assert_allclose(toolpath.position_mm[1:], [[101, 1, -4], [1, 1, -4]])
     assert [(issue.code, issue.line) for issue in toolpath.issues] == [("work-offset-unknown", 2)]

@@ -47,7 +47,7 @@ def make_cell(tmp_path_factory):
         if key not in known:
             path = tmp_path_factory.mktemp("cell") / "cell.toml"
             rows = [f"{name} = {toml_value(value)}" for name, value in controller.items()]
-            path.write_text("[controller]\n" + "\n".join(rows) + "\n")
+            path.write_text("based_on = 'demonstration'\n[controller]\n" + "\n".join(rows) + "\n")
             known[key] = load_cell(path)
         return known[key]
 

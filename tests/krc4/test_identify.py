@@ -141,7 +141,9 @@ def test_tolerance_gives_the_cdis(angle):
 
 
 def test_program_elsewhere_and_slower(run, tmp_path):
-    (tmp_path / "cell.toml").write_text("[controller]\nvel_cp_m_s = 0.1\n", encoding="utf-8")
+    (tmp_path / "cell.toml").write_text(
+        "based_on = 'demonstration'\n[controller]\nvel_cp_m_s = 0.1\n", encoding="utf-8"
+    )
     outcome = run("make-test", "controller", "-o", "-", "--cell", "cell.toml", "--at", "10", "20", "30")
     assert outcome.code == 0
     assert "G0 X10.000 Y20.000" in outcome.out
@@ -265,7 +267,9 @@ def test_wrong_traces_are_told(targets, text, cell):
 
 def test_command(run, tmp_path, text):
     write_csv(trace_of(text, Controller(0.156, 4.2)), tmp_path / "trace.csv")
-    (tmp_path / "cell.toml").write_text('name = "mine"\n[controller]\nadvance = 4\n', encoding="utf-8")
+    (tmp_path / "cell.toml").write_text(
+        'name = "mine"\nbased_on = "demonstration"\n[controller]\nadvance = 4\n', encoding="utf-8"
+    )
     outcome = run(
         "identify", "controller", "trace.csv", "--json", "--plot", "figure.png", "--apply", "cell.toml"
     )
@@ -291,7 +295,9 @@ def test_command_with_a_program_of_the_cells_cdis(run, tmp_path, text):
     lines = [line for line in text.splitlines() if not line.startswith("(")]
     own = "\n".join("G64" if line.startswith("G64") else line for line in lines)
     (tmp_path / "own.nc").write_text(own, encoding="utf-8")
-    (tmp_path / "cell.toml").write_text("[controller]\ncdis_mm = 6.0\n", encoding="utf-8")
+    (tmp_path / "cell.toml").write_text(
+        "based_on = 'demonstration'\n[controller]\ncdis_mm = 6.0\n", encoding="utf-8"
+    )
     write_csv(trace_of(own, Controller(0.168, 5.0)), tmp_path / "trace.csv")
     arguments = ("--part", "own.nc", "--cell", "cell.toml", "--apply", "new.toml")
     outcome = run("identify", "controller", "trace.csv", *arguments)

@@ -202,6 +202,7 @@ def test_any_base_tool_and_spin(tmp_path, axis, spin_deg):
     tool = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "c_deg": c}
     cell = resolve_cell(
         {
+            "based_on": "demonstration",
             "frames": {"base": BASE, "base_data": 3, "spin": spin_deg},
             "tool": {"1": {"tool_data": 7, "axis": axis, "frame": tool}},
         }

@@ -9,6 +9,7 @@ import pytest
 from gcode2krl import verify_krl
 from gcode2krl.cli.main import main
 from gcode2krl.errors import NotUnderstoodError
+from tests.cells import OWN_CELL
 from tests.krl.replay import read_program
 
 
@@ -216,7 +217,7 @@ def test_program_of_another_part_is_noticed(make, tmp_path):
 
 
 def test_program_of_another_cell_is_noticed(make):
-    made = make(data={"frames": {"base": {"z_mm": 801.0}}})
+    made = make(data={"frames": {"base": {**OWN_CELL["frames"]["base"], "z_mm": 801.0}}})
     default = make(stem="default")
     assert not verify_krl(made.src, made.toolpath, default.cell).ok
 

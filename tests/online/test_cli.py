@@ -11,7 +11,9 @@ from tests.online.test_replay import write_run
 from tests.online.test_server import Wire, exchange, free_port
 from tests.online.test_twin import SLOT
 
-STOCK = "[stock]\nbox_mm = [[0, -20, -30], [40, 20, 0]]\nresolution_mm = 0.2\n"
+STOCK = (
+    'based_on = "demonstration"\n' + "[stock]\nbox_mm = [[0, -20, -30], [40, 20, 0]]\nresolution_mm = 0.2\n"
+)
 
 
 @pytest.fixture

@@ -113,6 +113,7 @@ RAPID_mm_s = 200.0
 
 CELL_TOML = """\
 name = "plant, demonstration cell"
+based_on = "demonstration"
 
 [robot]
 model = "KR 300 R2500 ultra"

@@ -222,7 +222,8 @@ def test_tool_named_but_unknown_is_an_error(plan):
 def test_no_tool_named(plan):
     text = "G21 G90 G54\nS8000 M3\nG0 X0 Y0\nG0 Z5\nG1 Z-1 F600\nM30\n"
     assert "tool-assumed" in {issue.code for issue in plan(text).targets.issues}
-    assert "tool-missing" in plan(text, {"mounted_tool": 99}).codes()
+    with pytest.raises(NotUnderstoodError, match="mounted_tool"):
+        plan(text, {"mounted_tool": 99})
 
 
 # --- dwell, events, stops -------------------------------------------------------------------------------

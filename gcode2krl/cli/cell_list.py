@@ -1,0 +1,124 @@
+"""What a person must confirm of a cell, where its values come from, and what it does not state."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from gcode2krl import switching
+from gcode2krl.cell import Cell, plain_view
+from gcode2krl.errors import Issue
+from gcode2krl.ranges import range_issues
+from gcode2krl.sections import Frame
+
+MISSING = "MISSING"
+Row = tuple[str, str, str]
+
+
+def to_confirm(cell: Cell) -> Iterator[Row]:
+    """Yield (what, value, how sure) of everything a person must confirm."""
+    robot, load = cell.robot, cell.load
+    yield "robot", robot.model or ("geometry given" if robot.geometry.known else MISSING), robot.geometry.sure
+    yield "$TRAFONAME[] contains", robot.trafo_name or "not compared", "memory"
+    yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
+    yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s", "unknown"), robot.speeds.sure
+    yield "$BASE", _frame(cell.frames.base) + _number("BASE_DATA", cell.frames.base_data), cell.frames.sure
+    length_mm = cell.frames.tool_length_mm
+    length = f"length {length_mm:g} mm" if length_mm is not None else f"length {MISSING}"
+    yield "$TOOL (reference tool)", f"{_frame(cell.frames.tool)}, {length}", cell.frames.sure
+    yield from _tools(cell)
+    centre = f"at X {load.x_mm:g} Y {load.y_mm:g} Z {load.z_mm:g}"
+    inertia = f"J {load.jx_kgm2:g} {load.jy_kgm2:g} {load.jz_kgm2:g} kgm2"
+    weight = f"{load.mass_kg:g} kg {centre}, {inertia}" if load.mass_kg is not None else MISSING
+    yield "$LOAD", weight, load.sure
+    yield "HOME", _list(cell.home.q_deg, "deg", MISSING), "assumption"
+    plane = cell.clearance.z_mm
+    place = MISSING if plane is None else f"Z {plane} mm in $BASE, free of obstacles all the way"
+    yield "clearance plane", place, "assumption"
+    yield from _signals(cell)
+    for item in cell.guard_inputs:
+        yield f"$IN[{item.number}]", f"{item.meaning} = {item.value}", "assumption"
+    link = cell.online.link
+    yield (
+        "RSI",
+        f"$OUT[{link.t1_output}] on in T1, $OUT[{link.ready_output}] free, PC {link.address}:{link.port}",
+        "memory",
+    )
+
+
+def missing_keys(cell: Cell) -> list[str]:
+    """Return the keys that any program needs and the cell does not state."""
+    stated = {
+        "robot.model": cell.robot.geometry.known or None,
+        "robot.limits.q_deg": cell.robot.limits.q_deg,
+        "frames.base": cell.frames.base,
+        "home.q_deg": cell.home.q_deg,
+        "clearance.z_mm": cell.clearance_z_mm,
+        "tool": cell.tool or None,
+    }
+    keys = [key for key, value in stated.items() if value is None]
+    for number in sorted(cell.tool):
+        keys += cell.missing_of_tool(number)
+    if cell.load.mass_kg is None and any(tool.tool_data is None for tool in cell.tool.values()):
+        keys.append("load.mass_kg")
+    if cell.spindle.max_rpm is None:
+        keys.append("spindle.max_rpm")
+    keys += [f"m_code.{code}" for code in ("M3", "M5") if code not in cell.m_code]
+    return list(dict.fromkeys(keys))
+
+
+def findings(cell: Cell) -> list[Issue]:
+    """Return what is doubtful in the cell, and what its templates must not say."""
+    templates = cell.templates()
+    wrong = switching.template_issues(templates, _view(cell), cell.program.externals)
+    pairs = switching.pair_issues(templates, switching.rendered(templates, _view(cell)))
+    return [*wrong, *pairs, *range_issues(cell)]
+
+
+def _tools(cell: Cell) -> Iterator[Row]:
+    for number, tool in sorted(cell.tool.items()):
+        length = f"{tool.length_mm:g} mm" if tool.length_mm is not None else "no length"
+        whose = " (library)" if f"tool.{number}.length_mm" in cell.defaults else ""
+        data = _number("TOOL_DATA", tool.tool_data)
+        frame = f", $TOOL {_frame(tool.frame)}, {tool.axis or '+z'} to the holder" if tool.frame else ""
+        shape = f"{tool.model or tool.kind} D{tool.diameter_mm:g} z{tool.teeth}"
+        yield f"tool T{number}", f"{shape} {length}{whose}{data}{frame}", tool.sure
+
+
+def _signals(cell: Cell) -> Iterator[Row]:
+    """Yield what each M-code really switches, read back from its rendered template."""
+    spindle = cell.spindle
+    most = f"{spindle.max_rpm:g} rpm at most" if spindle.max_rpm is not None else MISSING
+    yield "spindle", most, spindle.sure
+    texts = switching.rendered(cell.templates(), _view(cell))
+    for key, template in cell.templates().items():
+        name = key.removeprefix("m_code.")
+        if key not in texts:
+            yield name, f"cannot be rendered: {' '.join(template.split())[:60]}", "assumption"
+            continue
+        switched = switching.signals_text(texts, key)
+        said = "; ".join(line.strip() for line in texts[key].split("\n") if line.strip())
+        yield name, f"switches {switched}" if switched else said[:100], "assumption"
+
+
+def _view(cell: Cell) -> dict[str, Any]:
+    return {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
+
+
+def _frame(frame: Frame | None) -> str:
+    if frame is None:
+        return MISSING
+    place = f"X {frame.x_mm:g} Y {frame.y_mm:g} Z {frame.z_mm:g}"
+    return f"{place} A {frame.a_deg:g} B {frame.b_deg:g} C {frame.c_deg:g}"
+
+
+def _number(name: str, number: int | None) -> str:
+    return f" = {name}[{number}]" if number is not None else ""
+
+
+def _pairs(pairs: tuple[tuple[float, float], ...] | None) -> str:
+    if pairs is None:
+        return "unknown: translation refuses"
+    return ", ".join(f"{low:g}..{high:g}" for low, high in pairs) + " deg"
+
+
+def _list(values: tuple[float, ...] | None, unit: str, unknown: str) -> str:
+    return unknown if values is None else f"{', '.join(f'{v:g}' for v in values)} {unit}"

@@ -1,0 +1,106 @@
+"""What a program needs of its cell and the cell does not state, and what it states that is doubtful."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gcode2krl import ranges
+from gcode2krl.cell import Cell, plain_view
+from gcode2krl.errors import Issue
+from gcode2krl.sections import missing_key
+from gcode2krl.tables import Event, Toolpath
+
+
+def lacks_geometry(toolpath: Toolpath, cell: Cell) -> bool:
+    """Tell whether the cell does not say where the arm, the work or a tool is: nothing can be planned."""
+    return any(_geometry_keys(toolpath, cell))
+
+
+def missing_issues(toolpath: Toolpath, cell: Cell) -> list[Issue]:
+    """Return an error for each key that the program needs and the cell does not state."""
+    keys = [*_geometry_keys(toolpath, cell), *_other_keys(toolpath, cell)]
+    return [missing_key(key, reason) for key, reason in dict(keys).items()]
+
+
+def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield warnings on stated values: beyond their usual range, or left at a default that matters."""
+    used = set(_used_tools(toolpath))
+    yield from ranges.range_issues(cell, used)
+    yield from _unread_pairs(toolpath, cell)
+    centre = [f"load.{axis}_mm" for axis in "xyz"]
+    if cell.load.mass_kg is not None and all(key in cell.defaults for key in centre):
+        text = "the centre of the load is not stated: X 0, Y 0, Z 0 of the flange is written"
+        yield Issue("warning", "load-centre", 0, text, "give load.x_mm, y_mm and z_mm in the cell file")
+    for number in sorted(used):
+        tool = cell.tool.get(number)
+        if tool is None or not cell.is_confirmed or f"tool.{number}.length_mm" not in cell.defaults:
+            continue
+        text = f"the length of T{number}, {tool.length_mm:g} mm, is that of the library's {tool.model!r}"
+        yield Issue(
+            "warning", "tool-length-library", 0, text, f"measure it, and give tool.{number}.length_mm"
+        )
+
+
+def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
+    """Yield (key, why) of what places the program: without these nothing can be planned."""
+    if not cell.robot.geometry.known:
+        yield "robot.model", "which arm moves is not known"
+    if cell.frames.base is None:
+        yield "frames.base", "where $BASE stands is not known"
+    if cell.home.q_deg is None:
+        yield "home.q_deg", "where the program starts and ends is not known"
+    used = [number for number in _used_tools(toolpath) if number in cell.tool]
+    if not cell.tool:
+        numbers = [number for number in _used_tools(toolpath) if number > 0]
+        yield f"tool.{numbers[0] if numbers else 1}", "the cell has no tool"
+    for number in used or sorted(cell.tool)[:1]:
+        for key in cell.missing_of_tool(number):
+            yield key, f"where the tip of T{number} is is not known"
+
+
+def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
+    """Yield (key, why) of what else the text of the program says."""
+    tools = [cell.tool[number] for number in _used_tools(toolpath) if number in cell.tool]
+    if cell.load.mass_kg is None and any(tool.tool_data is None for tool in tools):
+        yield "load.mass_kg", "$LOAD is written with $TOOL"
+    if any(event.kind == "spindle" for event in toolpath.events) and cell.spindle.max_rpm is None:
+        yield "spindle.max_rpm", "whether the spindle can turn at S is not known"
+    from gcode2krl import cell_templates
+    from gcode2krl.switching import SAMPLE
+
+    view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
+    templates = cell.templates()
+    for key in _used_templates(toolpath, templates):
+        try:
+            cell_templates.render(templates[key], {**SAMPLE, **view})
+        except cell_templates.MissingValueError as error:
+            if "." in error.key:
+                yield error.key.removeprefix("cell."), f"{key} switches it"
+        except cell_templates.TemplateError:
+            continue  # said where it is rendered with its own values
+
+
+def _unread_pairs(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the pairs that the program uses and whose second half calls a subprogram."""
+    from gcode2krl import switching
+
+    templates = cell.templates()
+    view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
+    used = _used_templates(toolpath, templates)
+    for issue in switching.pair_issues(templates, switching.rendered(templates, view)):
+        if issue.message.split()[0] in used:
+            yield issue
+
+
+def _used_templates(toolpath: Toolpath, templates: dict[str, str]) -> list[str]:
+    used = {_template_of(event) for event in toolpath.events} | {"program.prologue", "program.epilogue"}
+    return [key for key in templates if key in used]
+
+
+def _template_of(event: Event) -> str:
+    return "tool_change" if event.kind == "tool" else f"m_code.M{event.values['m']}"
+
+
+def _used_tools(toolpath: Toolpath) -> list[int]:
+    moves = toolpath.is_position() & ~toolpath.machine
+    return [int(number) for number in np.unique(toolpath.tool[moves])]

@@ -1,0 +1,209 @@
+"""What a template of the cell may say in KRL: switch, wait, halt and call what ``externals`` declares.
+
+It may not move, jump, or change what the motions rest on (frames, load, speeds, approximation, advance). The
+list is of what is allowed: a statement that is not known here is refused.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+RSI_INTERRUPT = 21
+STOP_INTERRUPT = 3
+_SWITCHED = frozenset(["OUT", "ANOUT", "FLAG", "CYCFLAG", "TIMER", "TIMER_STOP", "TIMER_FLAG"])
+"""System variables that a template may set; all others belong to the planner or to safety."""
+_PLANNER_DATA = re.compile(
+    r"(BASE_|TOOL_|LOAD_|MACHINE_|IPO_|BAS_|DEF_|PDAT|FDAT|LDAT|XHOME|HOME|XP|GK_|POS_ACT|AXIS_ACT|P\d)"
+)
+"""Names of ``$CONFIG.DAT``, of inline forms and of this program's own variables."""
+_OPEN = {"IF": "ENDIF", "WHILE": "ENDWHILE", "FOR": "ENDFOR", "LOOP": "ENDLOOP", "REPEAT": "UNTIL",
+         "SWITCH": "ENDSWITCH"}  # fmt: skip
+_CLOSE = {close: begin for begin, close in _OPEN.items()}
+_MOTIONS = frozenset(["PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL", "SPLINE", "ENDSPLINE", "PTP_REL",
+                      "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "ASYPTP", "ASYCONT",
+                      "ASYCANCEL", "ASYSTOP", "TIME_BLOCK", "CONST_VEL", "STOP"])  # fmt: skip
+_JUMPS = frozenset(["GOTO", "RETURN", "RESUME", "BRAKE"])
+_ASSIGNED = re.compile(r"(\$?)([A-Z_][A-Z0-9_]*)((?:\.[A-Z0-9_]+|\[[^\]=]*\])*) ?=(?!=)")
+_CALL = re.compile(r"([A-Z_][A-Z0-9_]*) ?\(")
+_PULSE = re.compile(r"PULSE ?\( ?\$?([A-Z_][A-Z0-9_]*)(\[[^\]=]*\])? ?,[^()]*\)$")
+_OUTPUT = re.compile(r"(\$OUT\[ ?\d+ ?\]|[A-Z_][A-Z0-9_]*(?:\[\d+\])?) ?= ?(.+)$")
+_INTERRUPT = re.compile(r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
+                        r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$")  # fmt: skip
+_CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
+
+
+@dataclass(frozen=True)
+class Switched:
+    """A signal that a template sets: ``$OUT[3]``, or the integrator's name of one.
+
+    ``sure`` is False inside a condition or a loop, and where the value is not read as TRUE or FALSE.
+    """
+
+    name: str
+    value: bool
+    sure: bool
+
+
+def statements(text: str) -> list[str]:
+    """Return the statements of KRL text: upper case, single spaces, without comments and blank lines."""
+    found = (_statement(line) for line in text.split("\n"))
+    return [line for line in found if line]
+
+
+def problem(text: str, externals: Iterable[str] = ()) -> str:
+    """Return what rendered KRL says that it must not, empty where it is good."""
+    if not text.isascii():
+        return "a character that is not ASCII"
+    if _CONTROL.search(text.replace("\t", " ")):
+        return "a control character"
+    callable_names = {name.split("(")[0].strip().upper() for name in externals}
+    for statement in statements(text):
+        wrong = _wrong(statement, callable_names)
+        if wrong:
+            return f"{statement[:50]!r} {wrong}"
+    return _unbalanced(text)
+
+
+def switched(text: str) -> list[Switched]:
+    """Return the digital outputs that KRL text sets, in order."""
+    depth, found = 0, []
+    for statement in statements(text):
+        word = _first(statement)
+        depth += (word in _OPEN) - (word in _CLOSE)
+        match = _OUTPUT.match(statement)
+        if match:
+            known = match[2] in ("TRUE", "FALSE")
+            if known or match[1].startswith("$"):
+                name = match[1].replace(" ", "")
+                found.append(Switched(name, match[2] != "FALSE", known and depth == 0))
+    return found
+
+
+def calls(text: str) -> list[str]:
+    """Return the subprograms that KRL text calls: what they switch cannot be read."""
+    return [name for statement in statements(text) for name in _called(statement) if name not in _FUNCTIONS]
+
+
+def may_be_on(text: str) -> frozenset[str]:
+    """Return the signals that are on, or may be, after the text."""
+    on: set[str] = set()
+    for one in switched(text):
+        if one.value:
+            on.add(one.name)
+        elif one.sure:
+            on.discard(one.name)
+    return frozenset(on)
+
+
+def surely_off(text: str) -> frozenset[str]:
+    """Return the signals that are off after the text, whatever its conditions."""
+    off: set[str] = set()
+    for one in switched(text):
+        if one.value:
+            off.discard(one.name)
+        elif one.sure:
+            off.add(one.name)
+    return frozenset(off)
+
+
+def _statement(line: str) -> str:
+    bare = re.sub(r'^((?:[^";]|"[^"]*")*);.*$', r"\1", line)
+    return re.sub(r"\s+", " ", bare).strip().upper()
+
+
+def _first(statement: str) -> str:
+    match = re.match(r"\$?[A-Z_][A-Z0-9_]*", statement)
+    return match[0] if match else ""
+
+
+def _wrong(statement: str, callable_names: set[str]) -> str:
+    """Return why a statement is not allowed, empty where it is."""
+    word = _first(statement)
+    if word in _MOTIONS:
+        return "moves the robot"
+    if word in _JUMPS or re.match(r"[A-Z_][A-Z0-9_]* ?:", statement):
+        return "leaves the order of the program"
+    if word in ("INTERRUPT", "GLOBAL"):
+        return _wrong_interrupt(statement, callable_names)
+    for name in _called(statement):
+        if name not in callable_names and name not in _FUNCTIONS:
+            return f"calls {name}, which program.externals does not declare"
+    if word == "PULSE":
+        return "" if _is_switchable_pulse(statement) else "pulses something other than an output"
+    if word in _CONDITIONS:
+        return "" if not _assigns(statement) or word == "FOR" else "assigns in a condition"
+    if word in ("HALT", "CONTINUE", "EXIT") and statement == word:
+        return ""
+    if word == "WAIT":
+        return "" if re.match(r"WAIT (SEC|FOR)\b", statement) else "is no WAIT SEC or WAIT FOR"
+    assigned = _ASSIGNED.match(statement)
+    if assigned:
+        return _wrong_assignment(assigned)
+    if _CALL.match(statement) and statement.endswith(")") and _first(statement) in callable_names:
+        return ""
+    return "is not a statement that templates may use"
+
+
+_CONDITIONS = frozenset([*_OPEN, *_CLOSE, "ELSE", "CASE", "DEFAULT"])
+_FUNCTIONS = frozenset(["ABS", "SIN", "COS", "SQRT", "ROUND", "STRFIND", "STRLEN", "PULSE", "AND",
+                        "OR", "NOT", "EXOR", "IF", "WHILE", "UNTIL", "FOR", "CASE", "SWITCH", "SEC", "B_AND",
+                        "B_OR", "B_NOT", "TO"])  # fmt: skip
+"""Names that may stand before a bracket without being a subprogram."""
+
+
+def _called(statement: str) -> Iterator[str]:
+    bare = re.sub(r'"[^"]*"', '""', statement)
+    return (match[1] for match in re.finditer(r"(?<![$\w.])([A-Z_][A-Z0-9_]*) ?\(", bare))
+
+
+def _assigns(statement: str) -> bool:
+    return re.search(r"(?<![<>=])=(?!=)", re.sub(r'"[^"]*"', "", statement)) is not None
+
+
+def _wrong_assignment(assigned: re.Match[str]) -> str:
+    system, name = assigned[1] == "$", assigned[2]
+    if system and name not in _SWITCHED:
+        return f"changes ${name}, on which the motions may rest"
+    if system and name == "OUT" and not re.fullmatch(r"\[ ?\d+ ?\]", assigned[3]):
+        return "switches an output whose number is not written: it cannot be read back"
+    if not system and _PLANNER_DATA.match(name):
+        return f"changes {name}, which the controller or the program uses"
+    return ""
+
+
+def _is_switchable_pulse(statement: str) -> bool:
+    match = _PULSE.match(statement)
+    return match is not None and match[1] == "OUT"
+
+
+def _wrong_interrupt(statement: str, callable_names: set[str]) -> str:
+    match = _INTERRUPT.match(statement)
+    number = int(match[1] or match[3]) if match else 0
+    if match is None or number in (RSI_INTERRUPT, STOP_INTERRUPT):
+        return f"touches an interrupt of the program ({STOP_INTERRUPT}, {RSI_INTERRUPT}, or all of them)"
+    if match[1] and match[2] not in callable_names:
+        return f"calls {match[2]}, which program.externals does not declare"
+    return ""
+
+
+def _unbalanced(text: str) -> str:
+    """Return which block the text opens and does not close, or the other way round."""
+    open_blocks: list[str] = []
+    for statement in statements(text):
+        word = _first(statement)
+        if word in _OPEN:
+            open_blocks.append(word)
+        elif word in _CLOSE:
+            if not open_blocks or open_blocks.pop() != _CLOSE[word]:
+                return f"{word} without {_CLOSE[word]}"
+        elif word in ("ELSE", "CASE", "DEFAULT") and not open_blocks:
+            return f"{word} outside of a block"
+        elif word == "EXIT" and "LOOP" not in open_blocks:
+            return "EXIT outside of a LOOP leaves the program"
+    if open_blocks:
+        return f"{open_blocks[-1]} without {_OPEN[open_blocks[-1]]}"
+    folds = [line.strip().upper() for line in text.split("\n")]
+    opened = sum(line.startswith(";FOLD") for line in folds)
+    if opened != sum(line.startswith(";ENDFOLD") for line in folds):
+        return ";FOLD and ;ENDFOLD do not match"
+    return ""
