@@ -69,7 +69,8 @@ class Finding:
             return f"{count:,} times" if count > 1 else ""
         places = ", ".join(str(line) for line in lines[:_LINES_NAMED])
         if len(lines) > _LINES_NAMED:
-            places += f" and {len(lines) - _LINES_NAMED:,} more"
+            at_least = " or more" if count >= MOST_PLACES else ""
+            places += f" and {len(lines) - _LINES_NAMED:,}{at_least} more"
         same = all(issue.message == self.first.message for issue in self.issues)
         figures = "" if same else "with other figures "
         return f"also {figures}in {'line' if len(lines) == 1 else 'lines'} {places}"
@@ -88,8 +89,8 @@ class Told:
     def counts(self) -> tuple[str, ...]:
         """Return the lines that count what is not printed."""
         return (
-            *_counted(self.left_out, "… and {count} more {findings}"),
-            *_counted(self.consequences, "… and {count} {findings} that follow from these"),
+            *_counted(self.left_out, "more finding", "more findings"),
+            *_counted(self.consequences, "finding that follows from these", "findings that follow from these"),
         )
 
     def lines(self, source: str = "") -> list[str]:
@@ -153,12 +154,12 @@ def _grouped(issues: Iterable[Issue], key: Callable[[Issue], Hashable]) -> list[
     return [tuple(group) for group in groups.values()]
 
 
-def _counted(issues: Sequence[Issue], words: str) -> Iterator[str]:
+def _counted(issues: Sequence[Issue], one: str, several: str) -> Iterator[str]:
     """Yield the line that counts findings with their codes, nothing where there are none."""
     if issues:
-        codes = Counter(issue.code for issue in issues)
-        found = words.format(count=f"{len(issues):,}", findings="finding" if len(issues) == 1 else "findings")
-        yield f"{found}: {', '.join(f'{code} {count:,}' for code, count in codes.most_common())}"
+        counts = Counter(issue.code for issue in issues)
+        codes = ", ".join(f"{code} {count:,}" for code, count in counts.most_common())
+        yield f"… and {len(issues):,} {one if len(issues) == 1 else several}: {codes}"
 
 
 class Gcode2KrlError(Exception):
