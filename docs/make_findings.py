@@ -1,6 +1,6 @@
 """Write docs/findings.md, the table of all findings, from ``gcode2krl/codes.toml``.
 
-    python docs/make_findings.py
+python docs/make_findings.py
 """
 
 from pathlib import Path

@@ -69,8 +69,8 @@ class Finding:
             return f"{count:,} times" if count > 1 else ""
         places = ", ".join(str(line) for line in lines[:_LINES_NAMED])
         if len(lines) > _LINES_NAMED:
-            at_least = " or more" if count >= MOST_PLACES else ""
-            places += f" and {len(lines) - _LINES_NAMED:,}{at_least} more"
+            at_least = "at least " if count >= MOST_PLACES else ""
+            places += f" and {at_least}{len(lines) - _LINES_NAMED:,} more"
         same = all(issue.message == self.first.message for issue in self.issues)
         figures = "" if same else "with other figures "
         return f"also {figures}in {'line' if len(lines) == 1 else 'lines'} {places}"
@@ -90,7 +90,9 @@ class Told:
         """Return the lines that count what is not printed."""
         return (
             *_counted(self.left_out, "more finding", "more findings"),
-            *_counted(self.consequences, "finding that follows from these", "findings that follow from these"),
+            *_counted(
+                self.consequences, "finding that follows from these", "findings that follow from these"
+            ),
         )
 
     def lines(self, source: str = "") -> list[str]:

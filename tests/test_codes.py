@@ -5,6 +5,7 @@ import importlib.util
 import re
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -90,7 +91,7 @@ def _stated_severities() -> Iterator[tuple[str, str, str]]:
     for file, tree in _modules().items():
         for name, call in _calls(tree):
             words = [list(_words(argument)) for argument in call.args]
-            for severities, found in zip(words, words[1:], strict=False):
+            for severities, found in pairwise(words):
                 if severities and set(severities) <= set(SEVERITIES) and len(found) == 1:
                     yield from ((found[0], severity, f"{file.name}:{call.lineno}") for severity in severities)
             if name == "input_error" and words and words[0]:
