@@ -1,7 +1,5 @@
 """The one table of finding codes, read from ``codes.toml``: what each means and what to do about it."""
 
-import difflib
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -28,6 +26,8 @@ class Code:
 @cache
 def codes() -> Mapping[str, Code]:
     """Return code name → entry, in alphabetical order."""
+    import tomllib
+
     with _FILE.open("rb") as stream:
         table = tomllib.load(stream)
     entries = (
@@ -51,5 +51,7 @@ def follows(name: str) -> frozenset[str]:
 
 def closest(name: str, known: Iterable[str]) -> str:
     """Return the known name that a mistyped one most likely means, empty where none is near."""
+    import difflib
+
     near = difflib.get_close_matches(name, list(known), n=1)
     return near[0] if near else ""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gcode2krl.codes import follows
+from gcode2krl.codes import codes, follows
 
 Severity = Literal["error", "warning", "note"]
 MOST_LINES = 20
@@ -34,6 +34,14 @@ class Issue:
     message: str
     remedy: str = ""
 
+    def advice(self) -> str:
+        """Return the remedy; where the finding has none of its own, that of its code in the table."""
+        entry = None if self.remedy else codes().get(self.code)
+        if entry is None:
+            return self.remedy
+        first, _, rest = entry.remedy.rstrip(".").partition(" ")
+        return f"{first.lower() if first[1:].islower() else first} {rest}"
+
     def text(self, source: str = "", also: str = "") -> str:
         """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.
 
@@ -43,7 +51,8 @@ class Issue:
         if not source and self.line > 0:
             place = f"line {self.line}"
         head = f"{place}: {self.severity}: " if place else f"{self.severity}: "
-        tail = f" -> {self.remedy}" if self.remedy else ""
+        advice = self.advice()
+        tail = f" -> {advice}" if advice else ""
         return f"{head}{self.message}{f' ({also})' if also else ''} [{self.code}]{tail}"
 
 
@@ -160,8 +169,8 @@ def _counted(issues: Sequence[Issue], one: str, several: str) -> Iterator[str]:
     """Yield the line that counts findings with their codes, nothing where there are none."""
     if issues:
         counts = Counter(issue.code for issue in issues)
-        codes = ", ".join(f"{code} {count:,}" for code, count in counts.most_common())
-        yield f"… and {len(issues):,} {one if len(issues) == 1 else several}: {codes}"
+        named = ", ".join(f"{code} {count:,}" for code, count in counts.most_common())
+        yield f"… and {len(issues):,} {one if len(issues) == 1 else several}: {named}"
 
 
 class Gcode2KrlError(Exception):

@@ -104,3 +104,17 @@ def test_an_exception_says_it_in_few_lines_and_carries_everything() -> None:
     assert str(error).count("\n") == 0
     assert "2,090 more" in str(error)
     assert len(error.issues) == 2094
+
+
+@pytest.mark.parametrize("code", codes())
+def test_a_finding_without_a_remedy_of_its_own_takes_that_of_the_table(code: str) -> None:
+    text = Issue("error", code, 3, "wrong").text("part.nc")
+    _, arrow, remedy = text.partition(f"[{code}] -> ")
+    assert arrow
+    assert len(remedy) > 5
+    assert not remedy.endswith((".", " "))
+    assert Issue("error", code, 3, "wrong", "do this").text().endswith("-> do this")
+
+
+def test_an_unknown_code_has_no_remedy() -> None:
+    assert Issue("error", "no-such-code", 0, "wrong").text() == "error: wrong [no-such-code]"

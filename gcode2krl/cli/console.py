@@ -72,6 +72,6 @@ class Console:
 def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
     """Return findings as the objects of the JSON contract."""
     return [
-        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.remedy}
+        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.advice()}
         for i in issues
     ]
