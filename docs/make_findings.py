@@ -17,7 +17,7 @@ program (nothing is written), a *warning* does so with `--strict` only, a *note*
 "error, warning", the reason says when it is which.
 
 - Errors stand first. Equal findings are one line that names the first lines and counts the rest; at most 20
-  lines are printed, at most five of one code, then the count. `--json` lists every finding.
+  lines are printed, at most eight of one code, then the count. `--json` lists every finding.
 - What only follows from another finding (a feed that is missing because the line that sets it could not be
   read) is counted behind its cause and not printed. Mend the cause, and it goes or is shown.
 - `--allow CODE:LINE` releases one error by hand, for the reason that the last column names; the program's

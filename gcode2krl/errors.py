@@ -13,8 +13,10 @@ MOST_LINES = 20
 """Findings that are printed, a line each; the rest is counted."""
 MOST_PLACES = 1000
 """Places of one kind that a check lists."""
-_MOST_OF_A_CODE = 5
-"""Sentences of one code that are printed, so that one cause never fills the screen."""
+_MOST_OF_A_CODE = 8
+"""Lines of one code that are printed, so that one cause never fills the screen."""
+_MOST_ALIKE = 5
+"""Where a code has more sentences, those that differ in their figures only are one line."""
 _LINES_NAMED = 3
 _RANK: dict[Severity, int] = {"error": 0, "warning": 1, "note": 2}
 _FIGURE = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -148,7 +150,7 @@ def _joined(issues: Sequence[Issue]) -> list[Finding]:
     """Join equal findings; where a code has many sentences, those that differ in their figures only."""
     equal = _grouped(issues, lambda issue: (issue.severity, issue.code, issue.message, issue.remedy))
     sentences = Counter(group[0].code for group in equal)
-    many = {code for code, count in sentences.items() if count > _MOST_OF_A_CODE}
+    many = {code for code, count in sentences.items() if count > _MOST_ALIKE}
 
     def without_figures(issue: Issue) -> Hashable:
         if issue.code not in many:

@@ -44,11 +44,11 @@ def test_a_few_figures_are_printed_apart_and_many_are_one_line() -> None:
     ]
 
 
-def test_no_code_prints_more_than_five_lines_and_the_rest_is_counted() -> None:
+def test_no_code_prints_more_than_eight_lines_and_the_rest_is_counted() -> None:
     words = "abcdefghijklmnop"
     shown = told([_error("cell-key", 0, f"key {word} is wrong") for word in words])
-    assert len(shown.findings) == 5
-    assert shown.counts() == (f"… and {len(words) - 5} more findings: cell-key {len(words) - 5}",)
+    assert len(shown.findings) == 8
+    assert shown.counts() == (f"… and {len(words) - 8} more findings: cell-key {len(words) - 8}",)
 
 
 def test_at_most_twenty_lines_and_errors_first() -> None:

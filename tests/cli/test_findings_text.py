@@ -98,7 +98,7 @@ def test_a_terminal_is_told_how_to_learn_more(
 
 
 def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Every kind of bad line 300 times over: at most five lines of a kind, twenty in all, then counts."""
+    """Every kind of bad line 300 times over: at most eight lines of a kind, twenty in all, then counts."""
     kinds = ["G1 X[1+2]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "o100 sub", "G1 E5", "M98 P1"]
     part = _part(tmp_path, [f"{kind}" for k in range(30) for kind in kinds for _ in range(k % 3 + 1)])
     assert _run(part, "-o", str(tmp_path / "part.src")) == 2
@@ -106,4 +106,4 @@ def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture
     codes = [line.partition(" [")[2].partition("]")[0] for line in lines if ": error:" in line]
     assert len(lines) <= 22
     assert len(codes) > 5
-    assert max(map(codes.count, codes)) <= 5
+    assert max(map(codes.count, codes)) <= 8
