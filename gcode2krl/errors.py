@@ -1,10 +1,25 @@
 """What a user is told: findings with a line and a remedy, and the exceptions that carry them."""
 
-from collections.abc import Iterable
+import re
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from gcode2krl.codes import codes, follows
+
 Severity = Literal["error", "warning", "note"]
+MOST_LINES = 20
+"""Findings that are printed, a line each; the rest is counted."""
+MOST_PLACES = 1000
+"""Places of one kind that a check lists."""
+_MOST_OF_A_CODE = 8
+"""Lines of one code that are printed, so that one cause never fills the screen."""
+_MOST_ALIKE = 5
+"""Where a code has more sentences, those that differ in their figures only are one line."""
+_LINES_NAMED = 3
+_RANK: dict[Severity, int] = {"error": 0, "warning": 1, "note": 2}
+_FIGURE = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,7 +27,7 @@ class Issue:
     """One finding.
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
-    kebab-case word, used by ``--allow CODE:LINE``.
+    kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``.
     """
 
     severity: Severity
@@ -21,25 +36,157 @@ class Issue:
     message: str
     remedy: str = ""
 
-    def text(self, source: str = "") -> str:
-        """Return the finding on one line, ``part.nc:120: error: … [code] — remedy``."""
+    def advice(self) -> str:
+        """Return the remedy; where the finding has none of its own, that of its code in the table."""
+        entry = None if self.remedy else codes().get(self.code)
+        if entry is None:
+            return self.remedy
+        first, _, rest = entry.remedy.rstrip(".").partition(" ")
+        return f"{first.lower() if first[1:].islower() else first} {rest}"
+
+    def text(self, source: str = "", also: str = "") -> str:
+        """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.
+
+        ``also`` says behind the message where else the same was found.
+        """
         place = f"{source}:{self.line}" if self.line > 0 and source else source
         if not source and self.line > 0:
             place = f"line {self.line}"
         head = f"{place}: {self.severity}: " if place else f"{self.severity}: "
-        tail = f" -> {self.remedy}" if self.remedy else ""
-        return f"{head}{self.message} [{self.code}]{tail}"
+        advice = self.advice()
+        tail = f" -> {advice}" if advice else ""
+        return f"{head}{self.message}{f' ({also})' if also else ''} [{self.code}]{tail}"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Equal findings, or findings that differ in their figures only, told on one line."""
+
+    issues: tuple[Issue, ...]
+
+    @property
+    def first(self) -> Issue:
+        """The one that stands for all."""
+        return self.issues[0]
+
+    def text(self, source: str = "") -> str:
+        """Return the first as `Issue.text` does, with the lines of the others."""
+        return self.first.text(source, self._others())
+
+    def _others(self) -> str:
+        count = len(self.issues)
+        lines = sorted({issue.line for issue in self.issues} - {self.first.line})
+        if not lines:
+            return f"{count:,} times" if count > 1 else ""
+        places = ", ".join(str(line) for line in lines[:_LINES_NAMED])
+        if len(lines) > _LINES_NAMED:
+            at_least = "at least " if count >= MOST_PLACES else ""
+            places += f" and {at_least}{len(lines) - _LINES_NAMED:,} more"
+        same = all(issue.message == self.first.message for issue in self.issues)
+        figures = "" if same else "with other figures "
+        return f"also {figures}in {'line' if len(lines) == 1 else 'lines'} {places}"
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a person is told of many findings: errors first, one cause once, at most `MOST_LINES`."""
+
+    findings: tuple[Finding, ...]
+    left_out: tuple[Issue, ...]
+    """What did not fit."""
+    consequences: tuple[Issue, ...]
+    """What follows from a finding that is there (`follows` in ``codes.toml``)."""
+
+    def counts(self) -> tuple[str, ...]:
+        """Return the lines that count what is not printed."""
+        return (
+            *_counted(self.left_out, "more finding", "more findings"),
+            *_counted(
+                self.consequences, "finding that follows from these", "findings that follow from these"
+            ),
+        )
+
+    def lines(self, source: str = "") -> list[str]:
+        """Return all lines."""
+        return [*(finding.text(source) for finding in self.findings), *self.counts()]
+
+
+def told(issues: Iterable[Issue]) -> Told:
+    """Return what to print of findings: equal ones as one, consequences counted only."""
+    ordered = sorted(issues, key=lambda issue: _RANK[issue.severity])
+    causes, consequences = _parted(ordered)
+    findings: list[Finding] = []
+    left_out: list[Issue] = []
+    of_code: Counter[str] = Counter()
+    for finding in _joined(causes):
+        of_code[finding.first.code] += 1
+        if of_code[finding.first.code] > _MOST_OF_A_CODE or len(findings) == MOST_LINES:
+            left_out += finding.issues
+        else:
+            findings.append(finding)
+    return Told(tuple(findings), tuple(left_out), tuple(consequences))
+
+
+def _parted(issues: Sequence[Issue]) -> tuple[list[Issue], list[Issue]]:
+    """Return causes and consequences: a cause is no milder and stands in no later line."""
+    if len({issue.code for issue in issues}) < 2:
+        return list(issues), []
+    first_line: dict[tuple[str, int], int] = {}
+    for issue in issues:
+        key = issue.code, _RANK[issue.severity]
+        first_line[key] = min(issue.line, first_line.get(key, issue.line))
+
+    def is_consequence(issue: Issue) -> bool:
+        ranks = range(_RANK[issue.severity] + 1)
+        causes = (first_line.get((code, rank)) for code in follows(issue.code) for rank in ranks)
+        return any(line is not None and line <= issue.line for line in causes)
+
+    consequences = [issue for issue in issues if is_consequence(issue)]
+    following = set(map(id, consequences))
+    return [issue for issue in issues if id(issue) not in following], consequences
+
+
+def _joined(issues: Sequence[Issue]) -> list[Finding]:
+    """Join equal findings; where a code has many sentences, those that differ in their figures only."""
+    equal = _grouped(issues, lambda issue: (issue.severity, issue.code, issue.message, issue.remedy))
+    sentences = Counter(group[0].code for group in equal)
+    many = {code for code, count in sentences.items() if count > _MOST_ALIKE}
+
+    def without_figures(issue: Issue) -> Hashable:
+        if issue.code not in many:
+            return issue.severity, issue.code, issue.message, issue.remedy
+        return issue.severity, issue.code, _FIGURE.sub("", issue.message), _FIGURE.sub("", issue.remedy)
+
+    return [Finding(group) for group in _grouped(issues, without_figures)]
+
+
+def _grouped(issues: Iterable[Issue], key: Callable[[Issue], Hashable]) -> list[tuple[Issue, ...]]:
+    groups: dict[Hashable, list[Issue]] = {}
+    for issue in issues:
+        groups.setdefault(key(issue), []).append(issue)
+    return [tuple(group) for group in groups.values()]
+
+
+def _counted(issues: Sequence[Issue], one: str, several: str) -> Iterator[str]:
+    """Yield the line that counts findings with their codes, nothing where there are none."""
+    if issues:
+        counts = Counter(issue.code for issue in issues)
+        named = ", ".join(f"{code} {count:,}" for code, count in counts.most_common())
+        yield f"… and {len(issues):,} {one if len(issues) == 1 else several}: {named}"
 
 
 class Gcode2KrlError(Exception):
-    """Base of all errors a user can act on; ``issues`` holds every finding, ``source`` the file's name."""
+    """Base of all errors a user can act on; ``issues`` holds every finding, ``source`` the file's name.
+
+    Its text is what the commands print: `told` of the findings.
+    """
 
     exit_code = 2
 
     def __init__(self, issues: Issue | Iterable[Issue], source: str = "") -> None:
         self.issues: tuple[Issue, ...] = (issues,) if isinstance(issues, Issue) else tuple(issues)
         self.source = source
-        super().__init__("\n".join(issue.text(source) for issue in self.issues))
+        super().__init__("\n".join(told(self.issues).lines(source)))
 
 
 class NotUnderstoodError(Gcode2KrlError):

@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from gcode2krl.errors import Issue
+from gcode2krl.errors import Issue, told
 
-MOST_FINDINGS = 20
+_COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
 
 
 class Console:
@@ -20,18 +20,20 @@ class Console:
         self.quiet, self.as_json = quiet, as_json
 
     def findings(self, issues: Iterable[Issue], source: str, notes: bool = True) -> None:
-        """Print one line a finding, at most 20, then the count; errors first."""
-        order = {"error": 0, "warning": 1, "note": 2}
-        shown = [issue for issue in issues if notes or issue.severity != "note"]
-        shown.sort(key=lambda issue: order[issue.severity])
-        for issue in shown[:MOST_FINDINGS]:
-            colour = {"error": "red", "warning": "yellow", "note": "cyan"}[issue.severity]
-            line = issue.text(source)
-            click.echo(
-                line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1), err=True
-            )
-        if len(shown) > MOST_FINDINGS:
-            click.echo(f"… and {len(shown) - MOST_FINDINGS} more findings", err=True)
+        """Print a line a finding, at most 20, then the counts; errors first, equal findings as one."""
+        shown = told(issue for issue in issues if notes or issue.severity != "note")
+        for finding in shown.findings:
+            word = f"{finding.first.severity}:"
+            coloured = click.style(word, fg=_COLOURS[finding.first.severity])
+            click.echo(finding.text(source).replace(word, coloured, 1), err=True)
+        for line in shown.counts():
+            click.echo(line, err=True)
+
+    def explain_hint(self, issues: Iterable[Issue]) -> None:
+        """Say on a terminal how to learn more about the first error."""
+        findings = told(issues).findings
+        if findings and sys.stderr.isatty():
+            self.hint(f"`gcode2krl explain {findings[0].first.code}` says more")
 
     def failed(self, message: str, code: int) -> int:
         """Print one error line and return the exit code."""
@@ -70,6 +72,6 @@ class Console:
 def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
     """Return findings as the objects of the JSON contract."""
     return [
-        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.remedy}
+        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.advice()}
         for i in issues
     ]

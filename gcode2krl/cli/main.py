@@ -2,12 +2,14 @@
 
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.codes import closest
+from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
 
 _COMMANDS = {
@@ -22,6 +24,7 @@ _COMMANDS = {
         "stiffness-map",
         "make-test",
         "models",
+        "explain",
     )
 }
 _OWN_OPTIONS = ("-h", "--help", "--version")
@@ -41,8 +44,27 @@ class _Commands(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if args and args[0] not in _COMMANDS and args[0] not in _OWN_OPTIONS:
+            _refuse_mistyped(args[0])
             args = ["translate", *args]
         return super().parse_args(ctx, args)
+
+
+def _refuse_mistyped(word: str) -> None:
+    """Raise where a first word is no command and cannot be a part: no option, no ending, no such file."""
+    if word.startswith("-") or Path(word).suffix or _is_there(word):
+        return
+    near = closest(word.lower(), _COMMANDS)
+    if near:
+        sentence = f"no command {word!r}: did you mean {near!r}?"
+        raise input_error("command-unknown", sentence, "`gcode2krl --help` lists the commands")
+    raise input_error("file-unreadable", f"no such file {word!r}", "`gcode2krl --help` lists the commands")
+
+
+def _is_there(word: str) -> bool:
+    try:
+        return Path(word).exists()
+    except OSError:  # a name that is too long for a file
+        return False
 
 
 @click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
@@ -61,12 +83,14 @@ def main(args: list[str] | None = None) -> None:
 
 
 def _run(args: list[str] | None) -> int:
-    console = Console()
+    words = sys.argv[1:] if args is None else args
+    console = Console(quiet="-q" in words or "--quiet" in words)
     try:
         result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False)
         return int(result) if isinstance(result, int) else 0
     except Gcode2KrlError as error:
         console.findings(error.issues, error.source)
+        console.explain_hint(error.issues)
         return error.exit_code
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
@@ -77,7 +101,7 @@ def _run(args: list[str] | None) -> int:
     except (MemoryError, RecursionError) as error:
         return console.failed(f"not enough memory for this input ({type(error).__name__})", 2)
     except Exception as error:  # a defect of ours: one line for the user, the rest on request
-        if "-v" in (args or sys.argv) or "--verbose" in (args or sys.argv):
+        if "-v" in words or "--verbose" in words:
             raise
         return console.failed(
             f"internal error, please report it: {type(error).__name__}: {error} -> -v shows the details",

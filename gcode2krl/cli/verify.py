@@ -54,4 +54,6 @@ def command(
             f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, "
             f"{report.max_speed_difference_mm_min:.2f} mm/min"
         )
+        if not report.ok:
+            console.explain_hint(report.issues)
     return 0 if report.ok else 1

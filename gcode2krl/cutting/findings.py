@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.sections import Tool
 from gcode2krl.tables import Forces
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-MOST_PER_KIND = 20
 _CONTACT_MM = 0.01
 """Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
 _PLUNGE_RAD = 20.0 * RAD_PER_DEG
@@ -195,12 +194,12 @@ def _tools(forces: Forces) -> NDArray[np.int32]:
 
 
 def _starts(wrong: Bools) -> list[int]:
-    """Return where stretches begin, at most `MOST_PER_KIND`."""
+    """Return where stretches begin, at most `MOST_PLACES`."""
     begins = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
-    return [int(row) for row in begins[:MOST_PER_KIND]]
+    return [int(row) for row in begins[:MOST_PLACES]]
 
 
 def _end(wrong: Bools, start: int) -> int:
     """Return the row behind a stretch."""
-    rest = np.flatnonzero(~wrong[start:])
-    return start + int(rest[0]) if len(rest) else len(wrong)
+    length = int(np.argmin(wrong[start:]))  # stops at the first False
+    return start + length if not wrong[start + length] else len(wrong)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import krc4
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.triggers import most_active, view
@@ -22,7 +22,6 @@ from gcode2krl.units import MS_PER_S
 Floats = NDArray[np.float64]
 _ROUNDING_S = 0.001
 """A delay is written in whole ms."""
-_MOST_PER_CHECK = 20
 _REMEDY = "translate again"
 
 
@@ -167,7 +166,7 @@ def _form_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
     wrong |= (read.distance != 0.0) | (read.delay_ms < 0.0) | (read.delay_ms != np.rint(read.delay_ms))
     return [
         _issue(program, row, "pilot-knot", f"the trigger of knot {row} is not as in the sidecar")
-        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK].tolist()
+        for row in np.flatnonzero(wrong)[:MOST_PLACES].tolist()
     ]
 
 
@@ -193,7 +192,7 @@ def _timing(
     )
     issues = []
     for code, wrong, what in checks:
-        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK].tolist():
+        for row in np.flatnonzero(wrong)[:MOST_PLACES].tolist():
             sentence = f"knot {row}, {lead_s[row]:.3f} s ahead: {what}"
             issues.append(_issue(program, row, code, sentence))
     return lead_s, issues

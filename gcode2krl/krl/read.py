@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.units import MM_PER_M
 
@@ -148,7 +148,7 @@ class _Reader:
         where = np.concatenate([np.arange(a, b) for _, a, b in runs])
         axes = kind == sc.PTP_AXES
         motion = (kind == sc.LIN) | (kind == sc.PTP) | axes
-        for row in np.flatnonzero(blend == sc.MALFORMED)[:20]:
+        for row in np.flatnonzero(blend == sc.MALFORMED)[:MOST_PLACES]:
             self._issue(
                 "krl-malformed",
                 int(line[row]),

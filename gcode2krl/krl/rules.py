@@ -5,13 +5,12 @@ import re
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.rsi_rules import rsi_issues
 from gcode2krl.units import MM_PER_M
 
-_MOST_PER_CHECK = 20
 _FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
 _KNOWN_WORDS = frozenset(
     [
@@ -65,14 +64,14 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
     )
     incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
     incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
-    for row in np.flatnonzero(incomplete)[:_MOST_PER_CHECK]:
+    for row in np.flatnonzero(incomplete)[:MOST_PLACES]:
         issues.append(
             Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
         )
     speed = program.speed_mm_s / MM_PER_M
     for row in np.flatnonzero(
         ~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6)))
-    )[:_MOST_PER_CHECK]:
+    )[:MOST_PLACES]:
         issues.append(
             Issue(
                 "error",
@@ -102,7 +101,7 @@ def _blend_issues(program: KrlProgram) -> list[Issue]:
             in_file(program, statement.file) + f"{statement.text[:40]!r} breaks a blended corner",
             "use a TRIGGER, or stop there",
         )
-        for statement in stopping[:_MOST_PER_CHECK]
+        for statement in stopping[:MOST_PLACES]
     ]
 
 
@@ -143,7 +142,7 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
         issues.append(
             Issue("error", "krl-initmov", 0, f"BAS(#INITMOV,0) stands {starts} times, must be once")
         )
-    return issues[:_MOST_PER_CHECK]
+    return issues[:MOST_PLACES]
 
 
 def in_file(program: KrlProgram, file: str) -> str:

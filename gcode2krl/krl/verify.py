@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.compose import SIDECAR, Layout, compose, turn_bits
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
@@ -33,7 +33,6 @@ SPEED_LIMIT_MM_S = 0.1 / S_PER_MIN
 JOINT_LIMIT_DEG = 0.001
 CDIS_LIMIT_MM = 0.0006
 WAIT_LIMIT_S = 0.0006
-_MOST_PER_CHECK = 20
 _REMEDY = "translate again"
 
 
@@ -249,7 +248,7 @@ def _difference_issues(
     )
     issues = []
     for code, wrong, sentence, amount in checks:
-        for row in np.flatnonzero(wrong)[:_MOST_PER_CHECK]:
+        for row in np.flatnonzero(wrong)[:MOST_PLACES]:
             text = sentence.format(amount[row]) if amount is not None else sentence
             gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
             text = in_file(program, program.file[program.file_of[row]]) + text + gcode

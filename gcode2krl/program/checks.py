@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.program.needs import doubtful_issues, lacks_geometry, missing_issues
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
-_MOST_PER_CHECK = 20
 _SLOWEST_MM_S = 0.001
 
 
@@ -38,7 +37,7 @@ def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
 def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
     """Return the first row of each run of wrong rows."""
     starts = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
-    return [int(row) for row in starts[:_MOST_PER_CHECK]]
+    return [int(row) for row in starts[:MOST_PLACES]]
 
 
 def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
@@ -46,12 +45,39 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]
     from_known = np.concatenate([[False], known[:-1]])
     for row in _stretches(feed & ~(known & from_known)):
         both = toolpath.known[row - 1] & toolpath.known[row]
-        missing = ", ".join(name for name, is_known in zip("XYZ", both, strict=True) if not is_known)
         yield Issue(
             "error", "undefined-position", int(toolpath.source_line[row]),
-            f"feed move from a position whose {missing} has not been programmed",
+            f"feed move {_while_unknown(toolpath, row, ~both)}",
             "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too)",
         )  # fmt: skip
+
+
+def _while_unknown(toolpath: Toolpath, row: int, missing: NDArray[np.bool_]) -> str:
+    """Return which axes are not known at a move: left out in the whole program, or lost in some line."""
+    nowhere = axes_nowhere(toolpath)
+    if nowhere:
+        return f"while {nowhere}"
+    known_before = np.flatnonzero(toolpath.known[:row, missing].all(axis=1))
+    since = ""
+    if len(known_before):
+        line = int(toolpath.source_line[known_before[-1] + 1])
+        since = f" since line {line} (G28, G53 or a change of G43)"
+    return f"while {_axes(missing)} not known{since}"
+
+
+def axes_nowhere(toolpath: Toolpath) -> str:
+    """Return the words for axes that no line gives a position, empty where each has one, or nothing moves."""
+    known: NDArray[np.bool_] = np.any(toolpath.known, axis=0)
+    lines = int(toolpath.source_line.max(initial=0))
+    return (
+        "" if known.all() or lines == 0 else f"{_axes(~known)} given no absolute position in {lines:,} lines"
+    )
+
+
+def _axes(chosen: NDArray[np.bool_]) -> str:
+    """Return ``Z is`` or ``X, Y and Z are``."""
+    *others, last = (name for name, is_chosen in zip("XYZ", chosen, strict=True) if is_chosen)
+    return f"{', '.join(others)} and {last} are" if others else f"{last} is"
 
 
 def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
@@ -81,7 +107,7 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
             "error",
             "spindle-off",
             int(toolpath.source_line[row]),
-            "feed move with the spindle off",
+            f"feed move with the spindle off{_why_off(toolpath, row)}",
             "program S and M3 before it",
         )
     for row in _stretches(feed & (speed < 0)):
@@ -95,6 +121,17 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
     for event in toolpath.events:
         if event.kind == "spindle":
             yield from _spindle_speed(event, toolpath, cell)
+
+
+def _why_off(toolpath: Toolpath, row: int) -> str:
+    """Return what left the spindle off before a row, empty where nothing ever switched it on."""
+    before = [event for event in toolpath.events if event.kind == "spindle" and event.row < row]
+    if not before:
+        return ""
+    values = before[-1].values
+    if values["m"] != 5:
+        return f": M{values['m']} in line {values['line']} has no S"
+    return f": {'M6' if values.get('implied') else 'M5'} in line {values['line']} stopped it"
 
 
 def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:

@@ -18,7 +18,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.parts import edges, in_parts
 from gcode2krl.program.blending import corner_cdis
-from gcode2krl.program.checks import check_toolpath
+from gcode2krl.program.checks import axes_nowhere, check_toolpath
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M
@@ -103,9 +103,10 @@ class _Plan:
         plain = toolpath.is_position() & ~toolpath.machine
         plain[0] = False
         if not (plain & np.concatenate([[False], np.ones(len(plain) - 1, dtype=bool)])).any():
+            nowhere = axes_nowhere(toolpath)
             raise input_error(
                 "no-motion",
-                "the program has no move to a programmed position",
+                "the program has no move to a programmed position" + (f": {nowhere}" if nowhere else ""),
                 "program X, Y and Z",
                 source=toolpath.source,
             )

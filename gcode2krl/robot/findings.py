@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.parts import ROWS
 from gcode2krl.robot.branch import Branch, Path
 from gcode2krl.robot.jacobian import smallest_singular_value
@@ -34,7 +34,6 @@ Floats = NDArray[np.float64]
 
 WEAK_SIGMA = 0.03
 """Smallest singular value below which an excessive joint speed is called a singularity of the arm."""
-_MOST_PER_CHECK = 20
 _NEIGHBOURS = 2
 """Rows before and behind the beginning of a stretch that are sampled with it."""
 _GAP = 1000
@@ -61,7 +60,7 @@ def joint_findings(
         findings += _wrist_findings(line, joints, bits, targets)
     findings += _ptp_findings(targets, q, cell)
     findings += _load_findings(cell)
-    return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * _MOST_PER_CHECK])
+    return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * MOST_PLACES])
 
 
 def _sampled(
@@ -107,7 +106,7 @@ def _spans(wrong: Bits, samples: NDArray[np.int64]) -> list[tuple[int, int]]:
     several[1:] |= several[:-1].copy()
     for bit in ALL_BITS:
         starts, ends = _runs((wrong & bit) != 0)
-        for start, end in zip(starts[:_MOST_PER_CHECK], ends[:_MOST_PER_CHECK], strict=True):
+        for start, end in zip(starts[:MOST_PLACES], ends[:MOST_PLACES], strict=True):
             begins = start + np.append(0, np.flatnonzero(several[start:end]))
             for neighbour in range(2 * _NEIGHBOURS + 1):
                 chosen[begins + neighbour] = True
@@ -124,7 +123,7 @@ def _runs(has: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def _stretches(bits: Bits, bit: int) -> list[int]:
-    return [int(sample) for sample in _runs((bits & bit) != 0)[0][:_MOST_PER_CHECK]]
+    return [int(sample) for sample in _runs((bits & bit) != 0)[0][:MOST_PLACES]]
 
 
 def _source_line(line: Line, sample: int, targets: Targets) -> int:

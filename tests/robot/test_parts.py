@@ -154,6 +154,7 @@ def test_findings_of_stretches_are_those_of_the_whole_program(monkeypatch, speed
 @pytest.mark.parametrize(("gap", "most_rows"), [(0, 20 * 5 + 5 + 6), (100, 392 + 5 + 6)])
 def test_spans_hold_the_beginnings_of_the_first_runs_of_each_kind(monkeypatch, gap, most_rows):
     monkeypatch.setattr(findings, "_GAP", gap)
+    monkeypatch.setattr(findings, "MOST_PLACES", 20)
     wrong, samples = np.zeros(3000, dtype=np.uint16), np.ones(3000, dtype=np.int64)
     wrong[10::20] |= 1
     wrong[2000:2910] |= findings.FAST
