@@ -88,9 +88,11 @@ def serve(
 ) -> tuple[Session, Statistics]:
     """Answer telegrams until the session is closed or ``stop`` is set; returns how it ended.
 
-    The first well-formed telegram decides who the peer is. ``told`` is called when the phase changes.
+    Where ``robot_address`` is set, only its datagrams are read. The first well-formed telegram decides who
+    the peer is, address and port. ``told`` is called when the phase changes.
     """
     stop = stop or threading.Event()
+    robot = device.settings.link.robot_address
     session, statistics = begin(device), Statistics()
     peer: tuple[str, int] | None = None
     warm_up(device)
@@ -110,7 +112,7 @@ def serve(
                 _note(before, session, recorder, told)
                 continue
             data, sender = received
-            telegram = _parsed(data, sender, peer, statistics)
+            telegram = _parsed(data, sender, peer, robot, statistics)
             if telegram is None:
                 session = silent(session, arrived_s - heard_s, device.settings)
                 _note(before, session, recorder, told)
@@ -155,9 +157,13 @@ def _receive(server: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
 
 
 def _parsed(
-    data: bytes, sender: tuple[str, int], peer: tuple[str, int] | None, statistics: Statistics
+    data: bytes,
+    sender: tuple[str, int],
+    peer: tuple[str, int] | None,
+    robot: str | None,
+    statistics: Statistics,
 ) -> Telegram | None:
-    if peer is not None and sender != peer:
+    if _is_foreign(sender, peer, robot):
         statistics.foreign += 1
         return None
     try:
@@ -167,6 +173,13 @@ def _parsed(
         return None
     statistics.telegrams += 1
     return telegram
+
+
+def _is_foreign(sender: tuple[str, int], peer: tuple[str, int] | None, robot: str | None) -> bool:
+    """Tell whether a datagram comes from somebody else than the controller, as far as it is known."""
+    if peer is not None:
+        return sender != peer
+    return robot is not None and sender[0] != robot
 
 
 def _send(server: socket.socket, text: bytes, sender: tuple[str, int]) -> None:
