@@ -23,6 +23,7 @@ from gcode2krl import robot as arm
 from gcode2krl.cell import Cell
 from gcode2krl.online.compensator import Compensator, compensator
 from gcode2krl.online.limits import Bounds
+from gcode2krl.online.server import warm_up
 from gcode2krl.online.session import Phase, Session, begin, exchange, silent
 from gcode2krl.online.telegram import Answer, MalformedError, Telegram, answer_text, parse
 from gcode2krl.online_section import Gains, Online, Probe, RobotLink
@@ -149,7 +150,11 @@ class Watch:
         cycles = max((ipoc - self.last_ipoc) / (1000.0 * bounds.cycle_s), 1.0) if self.last_ipoc >= 0 else 1.0
         probe = self.device.settings.probe.amplitude_mm if bounds.is_vector else 0.0
         most = max(float(bounds.most[0]), probe) if bounds.is_vector else 1.0
-        size = np.linalg.norm(answer.correction) if bounds.is_vector else np.abs(answer.correction / bounds.most).max()
+        size = (
+            np.linalg.norm(answer.correction)
+            if bounds.is_vector
+            else np.abs(answer.correction / bounds.most).max()
+        )
         if size > most * (1.0 + ROUNDING):
             self._fail(f"a correction of {size:.4g}")
         report.answers += 1
@@ -241,7 +246,9 @@ def _tells(**told: float) -> Fault:
 
 def _stalls(now: Cycle) -> None:
     """The robot is stuck while its program goes on."""
-    now.telegram = replace(now.telegram, command_mm=now.telegram.command_mm + [0.0, 0.3 * now.rng.random(), 5.0])
+    now.telegram = replace(
+        now.telegram, command_mm=now.telegram.command_mm + [0.0, 0.3 * now.rng.random(), 5.0]
+    )
 
 
 def _bends(now: Cycle) -> None:
@@ -439,7 +446,9 @@ _SHORT = (Phase.RESTING, Phase.PROBING, Phase.SETTLING)
 
 def _refused(rng: np.random.Generator) -> None:
     """Parse what is no telegram."""
-    data = GARBAGE[int(rng.integers(len(GARBAGE)))] if rng.random() < 0.5 else rng.bytes(int(rng.integers(300)))
+    data = (
+        GARBAGE[int(rng.integers(len(GARBAGE)))] if rng.random() < 0.5 else rng.bytes(int(rng.integers(300)))
+    )
     try:
         parse(data)
     except MalformedError:
@@ -473,10 +482,16 @@ def drive(cycles: int, seed: int = 1, say: Callable[[str], None] | None = None) 
     names, rng, report = list(FAULTS), episodes.rng, episodes.report
     pairs = list(itertools.product(PHASES, names))
     shown = 0
+    for mode in ("cartesian", "axis"):
+        warm_up(compensator(episodes.cell, Online(mode=mode), load_frame="base"))
     while report.cycles < cycles:
         for index in rng.permutation(len(pairs)):
             target, name = pairs[index]
-            more = tuple(str(n) for n in rng.choice(names, int(rng.integers(0, 3)))) if rng.random() < 0.3 else ()
+            more = (
+                tuple(str(n) for n in rng.choice(names, int(rng.integers(0, 3))))
+                if rng.random() < 0.3
+                else ()
+            )
             episodes.run(target, (name, *more))
             if say is not None and report.cycles // 100_000 > shown:
                 shown = report.cycles // 100_000
@@ -488,7 +503,9 @@ def drive(cycles: int, seed: int = 1, say: Callable[[str], None] | None = None) 
 
 def main(argv: list[str] | None = None) -> int:
     """Print the figures; exit code 1 where a limit was broken."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cycles", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(argv)
@@ -498,7 +515,9 @@ def main(argv: list[str] | None = None) -> int:
     print(f"{report.cycles} cycles, {report.answers} answers, {time.perf_counter() - began_s:.0f} s")
     print(f"pairs of state and fault that met: {pairs} of {len(PHASES) * len(FAULTS)}")
     print(f"largest step {report.largest_step:.6f}, largest rate {report.largest_rate:.6f} of the limit")
-    print(f"largest correction {report.largest_sum:.6f} of the limit; slowest answer {report.slowest_s * 1e3:.1f} ms")
+    print(
+        f"largest correction {report.largest_sum:.6f} of the limit; slowest answer {report.slowest_s * 1e3:.1f} ms"
+    )
     for words, count in report.ended.most_common():
         print(f"  ended {words}: {count}")
     print(f"violations: {len(report.violations)}")

@@ -77,7 +77,9 @@ class RobotLink(Section):
             return self
         robot = IPv4Address(self.robot_address)
         if robot.is_unspecified:
-            raise ValueError(f"robot_address: found {self.robot_address!r}, allowed: the controller's address")
+            raise ValueError(
+                f"robot_address: found {self.robot_address!r}, allowed: the controller's address"
+            )
         if IPv4Address(self.address).is_loopback and not robot.is_loopback:
             raise ValueError(
                 f"the controller at {self.robot_address} cannot reach {self.address}: give address, that of "

@@ -274,8 +274,8 @@ def serve_command(
     """Answer a controller's RSI telegrams with corrections. Not a safety function, not hard real time.
 
     Listens on loopback unless [online.link] or --address says otherwise, talks to one controller (that of
-    robot_address, else the first that sends a telegram), and stays at zero until the robot has shown in air that it takes corrections as absolute. The force comes in the
-    telegram (element Force).
+    robot_address, else the first that sends a telegram), and stays at zero until the robot has shown in air
+    that it takes corrections as absolute. The force comes in the telegram (element Force).
     """
     console = Console(quiet, as_json)
     cell = read_cell(cell_path)

@@ -19,6 +19,7 @@ import numpy as np
 from gcode2krl.errors import input_error
 from gcode2krl.frames import Floats
 from gcode2krl.online.compensator import Compensator, start, step
+from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.recorder import Recorder
 from gcode2krl.online.session import Phase, Session, begin, exchange, sample_of, silent
@@ -145,6 +146,7 @@ def warm_up(device: Compensator) -> None:
         values=nothing[:4], load=nothing,
     )  # fmt: skip
     step(device, start(device), sample_of(rests, np.zeros(6)))
+    towards(np.zeros_like(device.bounds.most), np.zeros_like(device.bounds.most), device.bounds)
 
 
 def _receive(server: socket.socket) -> tuple[bytes, tuple[str, int]] | None:

@@ -226,9 +226,7 @@ def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator
     knot = knot_of(telegram.values, session.knot, device)
     told = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
     state, out = step(device, session.device, sample_of(told, load))
-    after = replace(
-        session, device=state, sent=out.correction[0], gate=int(out.gate[0]), knot=knot
-    )
+    after = replace(session, device=state, sent=out.correction[0], gate=int(out.gate[0]), knot=knot)
     return _enter(after, Phase.HELD, "sensor") if out.sensor_lost[0] else after
 
 
