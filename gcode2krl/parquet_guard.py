@@ -5,7 +5,10 @@ process ends. So the footer and the header of every page are read here first, by
 what is there: Parquet format 2.9 (parquet.thrift), written in Thrift's compact protocol.
 """
 
-from collections.abc import Sequence
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -80,6 +83,30 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> "pl.DataFr
     if frame.height != rows:
         raise DamagedError(f"{frame.height} rows read of {rows} announced")
     return frame
+
+
+@contextmanager
+def _panics_unsaid() -> Iterator[None]:
+    """Keep back what a panic writes to standard error by itself; anything else is said afterwards."""
+    try:
+        before = os.dup(2)
+    except OSError:  # there is no standard error
+        yield
+        return
+    panicked = False
+    with tempfile.TemporaryFile() as words:
+        os.dup2(words.fileno(), 2)
+        try:
+            yield
+        except BaseException:
+            panicked = True
+            raise
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+            words.seek(0)
+            if not panicked and (said := words.read()):
+                os.write(2, said)
 
 
 def _footer(stream: BinaryIO, size: int) -> dict[int, Any]:

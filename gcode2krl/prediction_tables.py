@@ -40,6 +40,8 @@ def read_table(file: Path, kind_of: Callable[[str], str | None]) -> "pl.DataFram
         for name, kind in kinds.items():
             if outline.columns[name] != kind:
                 raise DamagedError(f"column {name}: found {outline.columns[name]}, allowed: {kind}")
+        if outline.rows == 0:
+            raise DamagedError("no rows")
         frame = read_parquet(file, list(kinds))
         _refuse_other_types(frame, kinds)
     except OSError as error:
