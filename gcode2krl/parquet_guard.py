@@ -73,10 +73,10 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> "pl.DataFr
     import polars as pl
 
     rows = outline_of(file).rows
+    wanted = None if columns is None else list(columns)
     try:
-        frame = pl.read_parquet(
-            file, columns=None if columns is None else list(columns), use_statistics=False
-        )
+        with _panics_unsaid():
+            frame = pl.read_parquet(file, columns=wanted, use_statistics=False)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         why = str(error).splitlines() or [type(error).__name__]
         raise DamagedError(why[0][:120]) from None
