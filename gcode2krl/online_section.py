@@ -10,6 +10,7 @@ from gcode2krl.sections import Finite, NotNegative, Positive, Section, SignalNum
 
 PortNumber = Annotated[int, Field(strict=True, ge=1, le=65535)]
 CYCLES_S = (0.004, 0.012)
+_BROADCAST = IPv4Address("255.255.255.255")
 LEAD_SHARE_OF_BLEND = 0.2
 """The share of the blend time that belongs to the best lead; see `Online.pilot_lead_s`."""
 
@@ -27,6 +28,9 @@ class RobotLink(Section):
 
     address: str = "127.0.0.1"
     """Where the server listens, and where the controller looks for it; loopback unless stated."""
+    robot_address: str | None = None
+    """The controller's address: only its datagrams are read. None: the first that sends a telegram is the
+    controller; not allowed where the server listens on every network (``0.0.0.0``)."""
     port: PortNumber = 49152
     sensor_type: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,32}$")] = "ImFree"
     """``SENTYPE`` of the controller's file, sent in every answer."""
@@ -48,13 +52,40 @@ class RobotLink(Section):
     retract_mm: Positive = 50.0
     """Along the tool axis, out of the part, where the link is lost in a cut."""
 
-    @field_validator("address")
+    @field_validator("address", "robot_address")
     @classmethod
-    def _is_an_address(cls, text: str) -> str:
+    def _is_an_address(cls, text: str | None) -> str | None:
+        if text is None:
+            return None
         try:
-            return str(IPv4Address(text))
+            address = IPv4Address(text)
         except AddressValueError:
             raise ValueError(f"found {text!r}, allowed: an IPv4 address such as 192.168.1.10") from None
+        if address.is_multicast or address == _BROADCAST:
+            raise ValueError(f"found {text!r}, allowed: the address of one computer")
+        return str(address)
+
+    @model_validator(mode="after")
+    def _one_robot(self) -> Self:
+        """Whoever listens everywhere must know whom to."""
+        if self.robot_address is None:
+            if IPv4Address(self.address).is_unspecified:
+                raise ValueError(
+                    f"address {self.address} listens on every network: give robot_address, the controller's "
+                    "address, or the address that this computer has in the robot's network"
+                )
+            return self
+        robot = IPv4Address(self.robot_address)
+        if robot.is_unspecified:
+            raise ValueError(
+                f"robot_address: found {self.robot_address!r}, allowed: the controller's address"
+            )
+        if IPv4Address(self.address).is_loopback and not robot.is_loopback:
+            raise ValueError(
+                f"the controller at {self.robot_address} cannot reach {self.address}: give address, that of "
+                "this computer in the robot's network"
+            )
+        return self
 
     @model_validator(mode="after")
     def _own_outputs(self) -> Self:
@@ -130,6 +161,17 @@ class Online(Section):
         if min(values) <= 0.0:
             raise ValueError(f"found {min(values):g}, allowed: above 0")
         return values
+
+    @model_validator(mode="after")
+    def _probe_is_one_step(self) -> Self:
+        """The proof switches the probe on and off, and takes it back at once from a robot that adds up."""
+        step_mm = min(self.step_mm, self.rate_mm_s * self.cycle_s)
+        if self.probe.amplitude_mm > step_mm:
+            raise ValueError(
+                f"probe.amplitude_mm {self.probe.amplitude_mm:g} is more than one step of the correction, "
+                f"{step_mm:g} mm (the smaller of step_mm and rate_mm_s * cycle_s): lower it, or raise them"
+            )
+        return self
 
     @property
     def pilot_lead_s(self) -> float:

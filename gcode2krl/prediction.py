@@ -6,8 +6,7 @@ side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_
 """
 
 import re
-import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.prediction_record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
+from gcode2krl.prediction_tables import PARQUET_TYPES, check_numbers, check_references, read_table
 from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Table, Targets, Toolpath
 
-SCHEMA = "gcode2krl/prediction/1"
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
 _ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)")
 _AXES = {3: "xyz", 4: "xyzw"}
@@ -100,69 +100,92 @@ class Prediction:
     @classmethod
     def load(cls, folder: str | Path) -> "Prediction":
         """Read a folder that `save` wrote; raises `NotUnderstoodError` naming the file it cannot read."""
-        import polars as pl
-
         place = Path(folder)
-        record = _read_record(place / "prediction.toml")
-        found: dict[str, Any] = {}
-        for name in ("toolpath", "targets", "motion"):
-            file = place / f"{name}.parquet"
-            if not file.exists() and name == "motion":
-                continue
-            try:
-                found[name] = pl.read_parquet(file)
-            except (OSError, pl.exceptions.PolarsError) as error:
-                raise input_error("file-unreadable", f"cannot read: {error}", source=str(file)) from None
-        issues = tuple(Issue(**issue) for issue in record["issues"])
-        source = str(record["inputs"].get("program", ""))
+        record = read_record(place / "prediction.toml")
+        cell = _cell_of(record, place / "prediction.toml")
+        names = ["toolpath", "targets", *(["motion"] if (place / "motion.parquet").exists() else [])]
+        frames = {name: read_table(place / f"{name}.parquet", _kind_of(name)) for name in names}
         try:
-            toolpath = _table(
-                Toolpath, found["toolpath"], events=_events(record["toolpath_events"]), source=source
+            return cls(
+                cell=cell, inputs=record.inputs.model_dump(exclude_unset=True), **_parts(record, frames, cell)
             )
-            targets = _table(
-                Targets,
-                found["targets"],
-                events=_events(record["targets_events"]),
-                source=source,
-                issues=issues,
-            )
-            motion = _table(Motion, found["motion"]) if "motion" in found else None
-            beside = found.get("motion", ())
-            joints = _table(Joints, beside) if "q1_rad" in beside else None
-            forces = (
-                _table(Forces, beside, relative_band=record.get("forces_relative_band", 0.0))
-                if "force_base_x_N" in beside
-                else None
-            )
-            deflection = (
-                _table(Deflection, beside, relative_band=record.get("deflection_relative_band", 0.0))
-                if "deflection_base_x_mm" in beside
-                else None
-            )
-        except (KeyError, ValueError, pl.exceptions.PolarsError) as error:
-            raise input_error(
-                "prediction-columns", f"not the tables of a prediction: {error}", source=str(place)
-            ) from None
-        cell = cell_from_resolved(record["cell"], source=str(place / "prediction.toml"))
-        added = {
-            name: beside[name].to_numpy() for name in getattr(beside, "columns", ()) if _ADDED.fullmatch(name)
-        }
-        return cls(toolpath, targets, cell, motion, joints, record["inputs"], forces, deflection, (), added)
+        except (KeyError, ValueError) as error:
+            words = f"not the tables of a prediction: {str(error)[:200]}"
+            raise input_error("prediction-columns", words, REMEDY, source=str(place)) from None
 
 
-def _read_record(file: Path) -> dict[str, Any]:
+def _cell_of(record: PredictionRecord, file: Path) -> Cell:
+    """Return the cell of a prediction; of what is wrong with it the first is said."""
     try:
-        record = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise input_error("not-toml", str(error), source=str(file)) from None
-    if record.get("schema") != SCHEMA:
-        found = record.get("schema")
-        raise input_error(
-            "prediction-schema", f"schema: found {found!r}, allowed: {SCHEMA}", source=str(file)
-        )
-    return record
+        return cell_from_resolved(record.cell, source=str(file))
+    except NotUnderstoodError as error:
+        first, *rest = error.issues
+        more = f" (and {len(rest)} more)" if rest else ""
+        message = f"cell: {first.message}{more}"
+        raise NotUnderstoodError(Issue("error", first.code, 0, message, REMEDY), str(file)) from None
+
+
+def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict[str, Any]:
+    """Return the tables of a prediction; raises `KeyError` or `ValueError` where they do not fit."""
+    source, motion_frame = record.inputs.program, frames.get("motion")
+    paths, poses = len(frames["toolpath"]), len(frames["targets"])
+    toolpath = _table(
+        Toolpath,
+        frames["toolpath"],
+        source=source,
+        events=events_of(record.toolpath_events, paths, "toolpath"),
+    )
+    targets = _table(
+        Targets, frames["targets"], source=source, issues=record.findings(),
+        events=events_of(record.targets_events, poses, "targets"),
+    )  # fmt: skip
+    parts: dict[str, Any] = {"toolpath": toolpath, "targets": targets}
+    if motion_frame is not None:
+        parts["motion"] = _table(Motion, motion_frame)
+        bands = {"forces": record.forces_relative_band, "deflection": record.deflection_relative_band}
+        for name, kind, mark in _BESIDE:
+            if mark in motion_frame.columns:
+                band = {"relative_band": bands[name]} if name in bands else {}
+                parts[name] = _table(kind, motion_frame, **band)
+        parts["added"] = {
+            name: motion_frame[name].to_numpy() for name in motion_frame.columns if _ADDED.fullmatch(name)
+        }
+    for table in parts.values():
+        if isinstance(table, Table):
+            check_numbers(table)
+    check_references(toolpath, targets, parts.get("motion"), parts.get("forces"), set(cell.tool))
+    return parts
+
+
+_BESIDE: tuple[tuple[str, type[Table], str], ...] = (
+    ("joints", Joints, "q1_rad"), ("forces", Forces, "force_base_x_N"),
+    ("deflection", Deflection, "deflection_base_x_mm"),
+)  # fmt: skip
+"""What stands beside Motion, and a column that only it has."""
+_TABLES: dict[str, tuple[type[Table], ...]] = {
+    "toolpath": (Toolpath,), "targets": (Targets,), "motion": (Motion, *(kind for _, kind, _ in _BESIDE)),
+}  # fmt: skip
+
+
+def _kind_of(file: str) -> Callable[[str], str | None]:
+    """Return what tells the Parquet type of a column of a file by its name, None for one that is not ours."""
+    specs = [spec for kind in _TABLES[file] for spec in fields(kind) if "tail" in spec.metadata]
+    fixed: dict[str, str] = {}
+    counted = [_ADDED] if file == "motion" else []
+    for spec in specs:
+        tail = spec.metadata["tail"]
+        if tail == (None,):
+            counted.append(_counted_pattern(spec.name))
+        else:
+            names = _names_on_disk(spec, tail[0] if tail else 0)
+            fixed |= dict.fromkeys(names, PARQUET_TYPES[spec.metadata["dtype"].kind])
+
+    def kind_of(name: str) -> str | None:
+        if any(pattern.fullmatch(name) for pattern in counted):
+            return PARQUET_TYPES["f"]
+        return fixed.get(name)
+
+    return kind_of
 
 
 def column_names(name: str, width: int) -> list[str]:
@@ -184,9 +207,14 @@ def _names_on_disk(spec: Field[Any], width: int) -> list[str]:
     return [f"{stem}_{number}_{unit}" for number in range(width)]
 
 
-def _counted(name: str, columns: list[str]) -> list[str]:
+def _counted_pattern(name: str) -> re.Pattern[str]:
     stem, unit = name.rsplit("_", 1)
-    return [column for column in columns if re.fullmatch(rf"{stem}_\d+_{unit}", column)]
+    return re.compile(rf"{stem}_\d{{1,3}}_{unit}")
+
+
+def _counted(name: str, columns: list[str]) -> list[str]:
+    pattern = _counted_pattern(name)
+    return [column for column in columns if pattern.fullmatch(column)]
 
 
 def _columns(table: Table) -> Iterator[tuple[str, Any]]:
@@ -207,6 +235,9 @@ def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
         tail = spec.metadata["tail"]
         width = tail[0] if tail else 0
         names = _names_on_disk(spec, len(_counted(spec.name, frame.columns)) if width is None else width)
+        absent = [name for name in names if name not in frame.columns]
+        if absent:
+            raise ValueError(f"column {absent[0]} is missing")
         parts = [frame[name].to_numpy() for name in names]
         columns[spec.name] = np.stack(parts, axis=1) if tail else parts[0]
     return kind(**columns, **more)
@@ -218,7 +249,3 @@ def _issue_record(issue: Issue) -> dict[str, Any]:
 
 def _event_record(event: Event) -> dict[str, Any]:
     return {"row": event.row, "kind": event.kind, "values": event.values}
-
-
-def _events(records: list[dict[str, Any]]) -> tuple[Event, ...]:
-    return tuple(Event(record["row"], record["kind"], record["values"]) for record in records)

@@ -260,6 +260,7 @@ def replay_command(
     "--mode", type=click.Choice(["cartesian", "axis"]), help="What is corrected; default: the cell's."
 )
 @click.option("--address", metavar="IP", help="Where to listen; default: the cell's, loopback.")
+@click.option("--robot-address", metavar="IP", help="The controller's: only its telegrams are read.")
 @click.option("--port", type=int, metavar="N", help="UDP port; default: the cell's, 49152.")
 @click.option("--cycle-ms", type=click.Choice(["4", "12"]), help="#IPO_FAST or #IPO; default: the cell's.")
 @click.option("--most-mm", type=float, metavar="MM", help="Largest correction; default: the cell's.")
@@ -272,9 +273,9 @@ def serve_command(
 ) -> int:  # fmt: skip
     """Answer a controller's RSI telegrams with corrections. Not a safety function, not hard real time.
 
-    Listens on loopback unless [online.link] or --address says otherwise, talks to one controller, and stays
-    at zero until the robot has shown in air that it takes corrections as absolute. The force comes in the
-    telegram (element Force).
+    Listens on loopback unless [online.link] or --address says otherwise, talks to one controller (that of
+    robot_address, else the first that sends a telegram), and stays at zero until the robot has shown in air
+    that it takes corrections as absolute. The force comes in the telegram (element Force).
     """
     console = Console(quiet, as_json)
     cell = read_cell(cell_path)
@@ -302,6 +303,8 @@ def serve_command(
     with open_socket(device) as socket, Recorder(Path(output) if output else None, _RUN_HEAD) as recorder:
         address, port = socket.getsockname()
         console.hint(f"listening on {address}:{port}; Ctrl-C ends it. This is not a safety function.")
+        if settings.link.robot_address is None and not address.startswith("127."):
+            console.hint("whoever sends a telegram first is the controller: robot_address names it")
         try:
             session, statistics = serve(
                 device, socket, recorder,
@@ -361,7 +364,8 @@ def _gates(cycles: dict[str, int]) -> str:
 
 def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
     """Return the settings with the options of `serve` laid over them."""
-    link = {key: options[key] for key in ("address", "port") if options[key] is not None}
+    keys = ("address", "robot_address", "port")
+    link = {key: options[key] for key in keys if options[key] is not None}
     changes: dict[str, Any] = {"link": {**settings.link.model_dump(), **link}}
     if options["mode"] is not None:
         changes["mode"] = options["mode"]
@@ -377,6 +381,9 @@ def _controller_files(cell: Cell, form: Any, name: str, folder: Path) -> list[Pa
     from gcode2krl.krl.files import write_together
     from gcode2krl.krl.rsi_files import rsi_files
 
+    if cell.online.link.address == "0.0.0.0":
+        words = "the controller cannot look for the server at 0.0.0.0"
+        raise input_error("online-address", words, "give --address, that of the PC in the robot's network")
     texts = rsi_files(name, cell.online, cell.pilot, form)
     try:
         folder.mkdir(exist_ok=True)

@@ -5,7 +5,10 @@ point, its top the lower of the lowest rapid that stays at its height and the hi
 program of one depth, which would have no thickness, begins where its first feed move does.
 """
 
+import io
+import logging
 import math
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +18,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
+from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
 from gcode2krl.errors import input_error
 from gcode2krl.sections import Tool
 from gcode2krl.tables import Toolpath
@@ -107,29 +111,49 @@ def load_mesh(file: Path) -> "trimesh.Trimesh":
 
     Raises `NotUnderstoodError` where there is no file, it is no mesh, it has holes or its unit is not mm.
     """
-    import trimesh
-
-    remedy = "export a closed solid as STL, PLY or 3MF in mm"
     if not file.is_file():
-        raise input_error("file-unreadable", "cannot read the stock: no such file", remedy, source=str(file))
+        raise input_error("file-unreadable", "cannot read the stock: no such file", REMEDY, source=str(file))
     try:
-        mesh: Any = trimesh.load(file, force="mesh")
-    except Exception as error:  # what a reader of a foreign format raises is not known
-        why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise input_error("stock-mesh", f"not a mesh: {why}", remedy, source=str(file)) from None
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise input_error("stock-mesh", "the mesh has no faces", remedy, source=str(file))
-    if not np.isfinite(mesh.vertices).all():
-        raise input_error("stock-mesh", "the mesh has points that are not numbers", remedy, source=str(file))
+        mesh = _solid_of(*read_mesh_file(file))
+    except OSError as error:
+        words = f"cannot read the stock: {error.strerror}"
+        raise input_error("file-unreadable", words, REMEDY, source=str(file)) from None
+    except MeshError as error:
+        raise input_error("stock-mesh", str(error), REMEDY, source=str(file)) from None
     span = float(np.ptp(mesh.bounds, axis=0).max())
     if span < _METRES_MM:
         sentence = f"the mesh is {span:.4g} mm large, so probably in metres"
         raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
     if span > _LARGEST_MM:
-        sentence = f"the mesh is {span:.0f} mm large, so probably not in mm"
+        sentence = f"the mesh is {span:.4g} mm large, so probably not in mm"
         raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
     if not mesh.is_watertight:
-        raise input_error("stock-mesh", "the mesh is not closed", remedy, source=str(file))
+        raise input_error("stock-mesh", "the mesh is not closed", REMEDY, source=str(file))
+    return mesh
+
+
+def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
+    """Return the mesh of a file that was looked through; raises `MeshError` where there is none in it.
+
+    From its bytes, so that it cannot name other files, and without a word of the reader's own.
+    """
+    import trimesh
+
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", DeprecationWarning)  # a text that is no number ends its reading
+            mesh: Any = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh")
+    except Exception as error:  # what a reader of a foreign format raises is not known
+        why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise MeshError(f"not a mesh: {why}") from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise MeshError("the mesh has no faces")
+    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        raise MeshError("a triangle with a corner that is not there")
+    if not np.isfinite(mesh.vertices).all():
+        raise MeshError("the mesh has points that are not numbers")
     solid: trimesh.Trimesh = mesh
     return solid
 

@@ -29,7 +29,11 @@ def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
     yield from _tools(targets, on, off)
     yield from _homes(targets, on, off)
     yield from _halts(targets, cell, on, off)
-    if IPv4Address(cell.online.link.address).is_loopback:
+    address = IPv4Address(cell.online.link.address)
+    if address.is_unspecified:
+        sentence = f"the controller cannot look for the server at {address}"
+        yield Issue("error", "online-address", 0, sentence, "give [online.link] address of the PC")
+    if address.is_loopback:
         sentence = f"the controller will look for the server at itself, {cell.online.link.address}"
         yield Issue("warning", "online-address", 0, sentence, "give [online.link] address of the PC")
 

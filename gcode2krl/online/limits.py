@@ -81,6 +81,13 @@ def limited(state: LimitState, wanted: Floats, held: Bools, bounds: Bounds) -> t
     return after, out
 
 
+def towards(sent: Floats, wanted: Floats, bounds: Bounds) -> Floats:
+    """Return the correction (w,) one step nearer to a wanted one (w,): the way of whatever has no force."""
+    change = wanted - sent
+    _shrink(change, bounds.step, bounds.is_vector)
+    return sent + change
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _limit(
     wanted: Floats, held: Bools, sent: Floats, integral: Floats, before: Floats, most: Floats, step: Floats,

@@ -19,6 +19,7 @@ import numpy as np
 from gcode2krl.errors import input_error
 from gcode2krl.frames import Floats
 from gcode2krl.online.compensator import Compensator, start, step
+from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.recorder import Recorder
 from gcode2krl.online.session import Phase, Session, begin, exchange, sample_of, silent
@@ -88,9 +89,11 @@ def serve(
 ) -> tuple[Session, Statistics]:
     """Answer telegrams until the session is closed or ``stop`` is set; returns how it ended.
 
-    The first well-formed telegram decides who the peer is. ``told`` is called when the phase changes.
+    Where ``robot_address`` is set, only its datagrams are read. The first well-formed telegram decides who
+    the peer is, address and port. ``told`` is called when the phase changes.
     """
     stop = stop or threading.Event()
+    robot = device.settings.link.robot_address
     session, statistics = begin(device), Statistics()
     peer: tuple[str, int] | None = None
     warm_up(device)
@@ -110,7 +113,7 @@ def serve(
                 _note(before, session, recorder, told)
                 continue
             data, sender = received
-            telegram = _parsed(data, sender, peer, statistics)
+            telegram = _parsed(data, sender, peer, robot, statistics)
             if telegram is None:
                 session = silent(session, arrived_s - heard_s, device.settings)
                 _note(before, session, recorder, told)
@@ -143,6 +146,7 @@ def warm_up(device: Compensator) -> None:
         values=nothing[:4], load=nothing,
     )  # fmt: skip
     step(device, start(device), sample_of(rests, np.zeros(6)))
+    towards(np.zeros_like(device.bounds.most), np.zeros_like(device.bounds.most), device.bounds)
 
 
 def _receive(server: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
@@ -155,9 +159,13 @@ def _receive(server: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
 
 
 def _parsed(
-    data: bytes, sender: tuple[str, int], peer: tuple[str, int] | None, statistics: Statistics
+    data: bytes,
+    sender: tuple[str, int],
+    peer: tuple[str, int] | None,
+    robot: str | None,
+    statistics: Statistics,
 ) -> Telegram | None:
-    if peer is not None and sender != peer:
+    if _is_foreign(sender, peer, robot):
         statistics.foreign += 1
         return None
     try:
@@ -167,6 +175,13 @@ def _parsed(
         return None
     statistics.telegrams += 1
     return telegram
+
+
+def _is_foreign(sender: tuple[str, int], peer: tuple[str, int] | None, robot: str | None) -> bool:
+    """Tell whether a datagram comes from somebody else than the controller, as far as it is known."""
+    if peer is not None:
+        return sender != peer
+    return robot is not None and sender[0] != robot
 
 
 def _send(server: socket.socket, text: bytes, sender: tuple[str, int]) -> None:

@@ -3,10 +3,14 @@
     waiting -> resting -> probing -> settling -> running -> held | zero | closed
 
 The correction is zero until the robot has shown, standing in air, that it takes corrections as absolute: a
-small correction along the tool axis moves it by as much and no more, and without it the robot goes back.
-Whatever goes wrong afterwards ends in one of three states that are never left: ``held`` sends the last
-correction unchanged (a correction is never taken back in material), ``zero`` sends none (a robot that adds
-corrections up), ``closed`` does not answer, and the controller's own time-out stops the robot.
+small correction along the tool axis moves it by as much and no more, and without it the robot goes back. A
+robot that adds corrections up is seen here, and ends in ``zero``.
+Whatever goes wrong after this proof ends in one of two states that are never left: ``held`` sends the last
+correction unchanged and tells the program to stop (a correction is never taken back in material),
+``closed`` does not answer, and the controller's own time-out stops the robot. The way into ``closed`` is
+open to a robot that gets away although the correction stands, and to one that was started anew: what is
+held would be a jump to it.
+No answer differs from the one before by more than one step of `limits.Bounds`, in any state.
 """
 
 import enum
@@ -16,6 +20,8 @@ import numpy as np
 
 from gcode2krl.frames import Floats, rotation_from_quaternion
 from gcode2krl.online.compensator import Compensator, Samples, State, joints_at, start, step
+from gcode2krl.online.feed import feed_of
+from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import NO_KNOT_YET, Announced, Gate
 from gcode2krl.online.telegram import Answer, Telegram
 from gcode2krl.online_section import Online
@@ -30,7 +36,11 @@ SEEN_SHARE, BACK_SHARE, ADDS_UP_SHARE = 0.4, 0.3, 1.6
 SEEN_CYCLES = 2
 RUNAWAY_CYCLES = 3
 RUNAWAY_MM = 0.5
-"""How far beyond the largest correction the robot may be from the program, normal to it."""
+"""How far beyond the largest correction the robot may be from the program, normal to it; our choice, above
+what a position controller overshoots. Where it is held already: beyond where it was then."""
+STILL_THERE_SHARE = 0.5
+"""A robot that has less of the held correction than this has lost it; our choice, as a lag or a decimal
+does not take half of it away while the link is silent."""
 
 
 class Phase(enum.Enum):
@@ -73,6 +83,8 @@ class Session:
     """Telegrams in a row in which the probe was seen."""
     away: int = 0
     """Telegrams in a row in which the robot was too far from the program."""
+    furthest_mm: float = 0.0
+    """How far from the program the robot may be, normal to it."""
     gate: int = Gate.NOT_STARTED
     knot: int = UNKNOWN_KNOT
     """The knot that the values of the form ``values`` mean."""
@@ -99,12 +111,17 @@ def exchange(
 
     ``load`` (6,) is what the force sensor says now, NaN where it says nothing.
     """
+    before = session
     session, is_new = _counted(session, telegram.ipoc, device.settings)
     if session.phase is Phase.CLOSED or not is_new:
         return session, None
     if session.phase is Phase.WAITING:
         session = _enter(session, Phase.RESTING, "", rest_mm=telegram.position_mm)
+    if _silent_too_long(before, session, device.settings) and _has_lost_it(session, telegram, device):
+        return _enter(session, Phase.CLOSED, "restarted"), None
     session = _STEPS[session.phase](session, telegram, load, device)
+    if session.phase is Phase.CLOSED:
+        return session, None
     session = replace(session, cycles=session.cycles + 1)
     return session, Answer(telegram.ipoc, session.sent, session.ready)
 
@@ -148,7 +165,9 @@ def _counted(session: Session, ipoc: int, settings: Online) -> tuple[Session, bo
 def _rest(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
     """Zero, until the robot has stood for some time."""
     probe = device.settings.probe
-    session = replace(session, sent=np.zeros_like(session.sent))
+    session = _towards_zero(session, device)
+    if session.sent.any():
+        return replace(session, cycles=0)
     if np.abs(telegram.position_mm - session.rest_mm).max() > probe.rest_mm:
         return replace(session, rest_mm=telegram.position_mm, cycles=0)
     if session.cycles < probe.rest_cycles:
@@ -163,17 +182,17 @@ def _probe(session: Session, telegram: Telegram, load: Floats, device: Compensat
     probe = device.settings.probe
     moved = _moved(session, telegram)
     if moved > ADDS_UP_SHARE * probe.amplitude_mm:
-        return _adds_up(session)
+        return _adds_up(session, device)
     seen = session.seen + 1 if moved >= SEEN_SHARE * probe.amplitude_mm else 0
     if seen >= SEEN_CYCLES or session.cycles >= probe.most_cycles:
-        return _enter(session, Phase.SETTLING, "", seen=seen, sent=np.zeros_like(session.sent))
+        return _towards_zero(_enter(session, Phase.SETTLING, "", seen=seen), device)
     shift = probe.amplitude_mm * session.probe
     if len(session.sent) == 6:
         joints = joints_at(telegram.q_command_rad[None], shift[None], device.cell)[0]
         shift = joints - telegram.q_command_rad
     if not np.isfinite(shift).all():
-        return _enter(session, Phase.ZERO, "reach", sent=np.zeros_like(session.sent))
-    return replace(session, sent=shift, seen=seen)
+        return _towards_zero(_enter(session, Phase.ZERO, "reach"), device)
+    return replace(session, sent=towards(session.sent, shift, device.bounds), seen=seen)
 
 
 def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
@@ -181,7 +200,10 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
     probe = device.settings.probe
     moved = _moved(session, telegram)
     if moved > ADDS_UP_SHARE * probe.amplitude_mm:
-        return _adds_up(session)
+        return _adds_up(session, device)
+    session = _towards_zero(session, device)
+    if session.sent.any():
+        return replace(session, cycles=0)
     if session.cycles < probe.settle_cycles:
         return session
     beside = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
@@ -190,27 +212,34 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
     if not session.seen:
         return _enter(session, Phase.RESTING, "probe-not-seen", rest_mm=telegram.position_mm)
     if moved > BACK_SHARE * probe.amplitude_mm:
-        return _adds_up(session)
-    return _enter(session, Phase.RUNNING, "", device=start(device), away=0)
+        return _adds_up(session, device)
+    furthest_mm = device.settings.most_mm + RUNAWAY_MM
+    return _enter(session, Phase.RUNNING, "", device=start(device), away=0, furthest_mm=furthest_mm)
 
 
 def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
     """Compensate, as long as the robot is where it should be and the sensor is there."""
-    away = session.away + 1 if _too_far(session, telegram, device.settings) else 0
-    if away >= RUNAWAY_CYCLES:
-        return _adds_up(session)
+    session = _watched(session, telegram)
+    if session.away >= RUNAWAY_CYCLES:
+        most_mm = _away_mm(session, telegram) + RUNAWAY_MM
+        return _enter(session, Phase.HELD, "too-far", away=0, furthest_mm=most_mm)
     knot = knot_of(telegram.values, session.knot, device)
     told = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
     state, out = step(device, session.device, sample_of(told, load))
-    after = replace(
-        session, device=state, sent=out.correction[0], away=away, gate=int(out.gate[0]), knot=knot
-    )
+    after = replace(session, device=state, sent=out.correction[0], gate=int(out.gate[0]), knot=knot)
     return _enter(after, Phase.HELD, "sensor") if out.sensor_lost[0] else after
 
 
-def _stay(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Send what was sent."""
-    return session
+def _hold(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Send what was sent; nothing more to a robot that gets away although the correction stands."""
+    feed, _ = feed_of(session.device.feed, telegram.command_mm[None])
+    session = _watched(replace(session, device=session.device._replace(feed=feed)), telegram)
+    return _enter(session, Phase.CLOSED, "adds-up") if session.away >= RUNAWAY_CYCLES else session
+
+
+def _to_zero(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
+    """Go to zero and stay there."""
+    return _towards_zero(session, device)
 
 
 _STEPS = {
@@ -218,14 +247,19 @@ _STEPS = {
     Phase.PROBING: _probe,
     Phase.SETTLING: _settle,
     Phase.RUNNING: _run,
-    Phase.HELD: _stay,
-    Phase.ZERO: _stay,
+    Phase.HELD: _hold,
+    Phase.ZERO: _to_zero,
 }
 
 
-def _adds_up(session: Session) -> Session:
-    """The robot adds corrections up: for such a robot zero is to stand still, at once."""
-    return _enter(session, Phase.ZERO, "adds-up", sent=np.zeros_like(session.sent))
+def _adds_up(session: Session, device: Compensator) -> Session:
+    """The robot adds corrections up before one was made: for such a robot zero is to stand still."""
+    return _towards_zero(_enter(session, Phase.ZERO, "adds-up"), device)
+
+
+def _towards_zero(session: Session, device: Compensator) -> Session:
+    """One step nearer to zero; the probe is at most one step (`Online`), so this is zero for a probe."""
+    return replace(session, sent=towards(session.sent, np.zeros_like(session.sent), device.bounds))
 
 
 def _moved(session: Session, telegram: Telegram) -> float:
@@ -233,21 +267,52 @@ def _moved(session: Session, telegram: Telegram) -> float:
     return float((telegram.position_mm - session.rest_mm) @ session.probe)
 
 
-def _too_far(session: Session, telegram: Telegram, settings: Online) -> bool:
-    """Tell whether the robot is farther from the program than any correction of ours can have moved it.
+def _watched(session: Session, telegram: Telegram) -> Session:
+    """Count the telegrams in a row in which the robot is farther from the program than it may be."""
+    away = session.away + 1 if _away_mm(session, telegram) > session.furthest_mm else 0
+    return replace(session, away=away)
+
+
+def _away_mm(session: Session, telegram: Telegram) -> float:
+    """Return how far the robot is from the program.
 
     By the applied correction where the controller reports it, else by RIst less RSol, of which only what is
     normal to the movement counts: along it the robot is behind its program.
     """
-    most = settings.most_mm + RUNAWAY_MM
     if np.isfinite(telegram.monitor_mm).all():
-        return float(np.linalg.norm(telegram.monitor_mm)) > most
+        return float(np.linalg.norm(telegram.monitor_mm))
     apart = telegram.position_mm - telegram.command_mm
     along = session.device.feed.direction
     length = float(along @ along)
     if length > 0.0:
         apart = apart - (apart @ along) / length * along
-    return float(np.linalg.norm(apart)) > most
+    return float(np.linalg.norm(apart))
+
+
+def _silent_too_long(before: Session, after: Session, settings: Online) -> bool:
+    """Tell whether the controller has missed so many answers that it gave up: it may be started anew."""
+    cycle_ms = round(settings.cycle_s / _S_PER_MS)
+    return before.ipoc >= 0 and after.ipoc - before.ipoc > settings.link.timeout_cycles * cycle_ms
+
+
+def _has_lost_it(session: Session, telegram: Telegram, device: Compensator) -> bool:
+    """Tell whether sending on what was sent would be a jump: more than a step, and the robot has it no more.
+
+    RSI begins anew at zero; its program waits for `ready` then, but corrections count at once.
+    """
+    sent, step = session.sent, device.bounds.step
+    largest = np.linalg.norm(sent / step) if device.bounds.is_vector else np.abs(sent / step).max()
+    if largest <= 1.0:
+        return False
+    wanted_mm = sent
+    if len(sent) == 6:
+        both = np.stack([telegram.q_command_rad, telegram.q_command_rad + sent])
+        tips, _ = forward(both, device.cell, device.tool)
+        wanted_mm = tips[1] - tips[0]
+    there_mm = telegram.position_mm - telegram.command_mm
+    if np.isfinite(telegram.monitor_mm).all():
+        there_mm = telegram.monitor_mm
+    return float(there_mm @ wanted_mm) < STILL_THERE_SHARE * float(wanted_mm @ wanted_mm)
 
 
 def knot_of(values: Floats, last: int, device: Compensator) -> int:

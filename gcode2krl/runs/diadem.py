@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.runs.tables import printable
 
 Floats = NDArray[np.float64]
 _FIRST_WORD = "DIAEXTENDED"
@@ -56,7 +57,7 @@ class _Block:
 
     @property
     def name(self) -> str:
-        return self.keys.get(200, "?")
+        return printable(self.keys.get(200, "?"))
 
     @property
     def explicit(self) -> bool:

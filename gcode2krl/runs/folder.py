@@ -99,10 +99,9 @@ def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
     """Return the file of a table: the one that ``[files]`` names, else the usual one, else None."""
     named: str | None = getattr(head.files, what)
     if named is not None:
-        if not (place / named).is_file():
-            raise input_error(
-                "file-unreadable", f"files.{what}: no file {named!r} there", source=str(place / "run.toml")
-            )
+        if not _exists(place / named):
+            words = f"files.{what}: no file {named[:80]!r} there"
+            raise input_error("file-unreadable", words, source=str(place / "run.toml"))
         return place / named
     usual = [place / f"{what}{ending}" for ending in _ENDINGS.get(what, (".csv", ".parquet"))]
     found = [file for file in usual if file.is_file()]
@@ -113,6 +112,14 @@ def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
         remedy = f"keep one, or name it: [files] {what} = {found[0].name!r}"
         raise input_error("run-files", f"{what}: several files: {names}", remedy, source=str(place))
     return found[0] if found else None
+
+
+def _exists(path: Path, is_file: bool = True) -> bool:
+    """Tell whether a path leads to a file (or anything); a name that no system takes leads nowhere."""
+    try:
+        return path.is_file() if is_file else path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _controller_logs(place: Path) -> list[Path]:
@@ -135,7 +142,7 @@ def _not_read(place: Path, controller: Path | None) -> list[Issue]:
 
 def _gear_ratio(place: Path, head: RunHead) -> tuple[float, ...] | None:
     """Return the gear ratios of the cell that ``run.toml`` names."""
-    if head.cell is None or not (place / head.cell).is_file():
+    if head.cell is None or not _exists(place / head.cell):
         return None
     return load_cell(place / head.cell).robot.drives.gear_ratio
 
@@ -145,8 +152,12 @@ def _paths(place: Path, head: RunHead) -> list[Issue]:
     named = {key: getattr(head, key) for key in ("cell", "program", "prediction")}
     return [
         Issue(
-            "warning", "run-path", 0, f"run.toml: {key}: nothing at {value!r}", "relative to the run's folder"
+            "warning",
+            "run-path",
+            0,
+            f"run.toml: {key}: nothing at {value[:80]!r}",
+            "relative to the run's folder",
         )
         for key, value in named.items()
-        if value is not None and not (place / value).exists()
+        if value is not None and not _exists(place / value, is_file=False)
     ]

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from gcode2krl import library
-from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.toml_guard import NotTomlError, read_bounded_toml
 
 FrameName = Literal["base", "tcp", "sensor"]
 Origin = Literal["interpolator", "filtered", "measured"]
@@ -114,17 +114,12 @@ def read_head(file: Path) -> tuple[RunHead, tuple[Issue, ...]]:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return library.read_toml(file)
-    except NotUnderstoodError as error:
-        first = error.issues[0]
-        remedy = "a run needs a run.toml; an empty one will do" if first.code == "file-unreadable" else _DOCS
-        raise NotUnderstoodError(
-            Issue(first.severity, first.code, 0, first.message, remedy), str(file)
-        ) from None
-    except RecursionError:
-        raise NotUnderstoodError(
-            Issue("error", "not-toml", 0, "nested too deeply", _DOCS), str(file)
-        ) from None
+        return read_bounded_toml(file)
+    except OSError as error:
+        words, remedy = f"cannot read: {error.strerror}", "a run needs a run.toml; an empty one will do"
+        raise input_error("file-unreadable", words, remedy, source=str(file)) from None
+    except NotTomlError as error:
+        raise input_error("not-toml", str(error), _DOCS, source=str(file)) from None
 
 
 def _wrong_key(detail: Any) -> Issue:

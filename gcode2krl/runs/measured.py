@@ -18,6 +18,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 TIME = "t_s"
 LEAST_ROWS = 10
+LARGEST_VALUE = 1e15
+"""No instrument states more, in whatever unit; our choice. Squares and differences of what is below are
+numbers."""
 _GAP_STEPS, _GAP_JITTERS = 1.5, 5.0
 """A step is a gap above this many times the median, plus so many times what the clock usually jitters."""
 
@@ -188,6 +191,7 @@ def build(
         wanted = ", ".join(SIGNALS[kind][0].columns)
         raise missing_column(sheet, [wanted], f"a table of measured values has {TIME} and, say, {wanted}")
     strict = [c for signal in used if not signal.gaps for c in signal.columns if c in there]
+    _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in there)))
     finite = np.stack([np.isfinite(sheet.columns[name]) for name in (TIME, *strict)], axis=1)
     kept = np.flatnonzero(finite.all(axis=1))
     _refuse_few(len(kept), len(finite), sheet)
@@ -262,6 +266,17 @@ def _refuse_few(kept: int, rows: int, sheet: Sheet) -> None:
             "trace-short", f"{kept} usable rows{lost}, at least {LEAST_ROWS} are needed",
             "record the whole program", line=sheet.first_row if rows else 0, source=sheet.source,
         )  # fmt: skip
+
+
+def _refuse_absurd(sheet: Sheet, names: tuple[str, ...]) -> None:
+    for name in names:
+        values = np.abs(np.nan_to_num(sheet.columns[name], posinf=0.0, neginf=0.0))
+        if values.max(initial=0.0) > LARGEST_VALUE:
+            row = int(np.argmax(values)) + sheet.first_row
+            words = f"row {row}, column {name}: {values.max():.3g} is no measured value"
+            raise input_error(
+                "trace-number", words, "export the recording again", line=row, source=sheet.source
+            )
 
 
 def _findings(table: Measured, first_lost: int) -> Iterator[Issue]:

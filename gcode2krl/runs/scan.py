@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.runs.measured import LEAST_ROWS, XYZ
+from gcode2krl.runs.measured import LARGEST_VALUE, LEAST_ROWS, XYZ
 from gcode2krl.runs.tables import missing_column, read_sheet
 
 Floats = NDArray[np.float64]
@@ -49,6 +49,10 @@ def read_scan(path: str | Path) -> Scan:
             "trace-short", f"{len(points) - lost} points, at least {LEAST_ROWS} are needed", source=str(file)
         )
     kept = np.ascontiguousarray(points[keep])
+    if np.abs(kept).max() > LARGEST_VALUE:
+        row = int(np.argmax(np.abs(kept).max(axis=1)))
+        words = f"point {row + 1}: {np.abs(kept).max():.3g} mm is no measured value"
+        raise input_error("trace-unit", words, "export the scan in mm", source=str(file))
     kept.flags.writeable = False
     text = f"{file.name}: {lost} of {len(points)} points dropped for missing values"
     return Scan(kept, str(file), lost, (Issue("warning", "trace-dropped", 0, text),) if lost else ())
@@ -75,7 +79,8 @@ def _read_ply(file: Path) -> Floats:
         there = (len(data) - body) // layout.itemsize
         _refuse(file, f"{count} vertices announced, {there} there: the file is cut off")
     table = np.frombuffer(data, dtype=layout, count=count, offset=body)
-    return np.stack([table[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    with np.errstate(invalid="ignore"):  # a NaN that signals
+        return np.stack([table[axis].astype(np.float64) for axis in "xyz"], axis=1)
 
 
 def _ply_header(data: bytes, file: Path) -> tuple[str, int, list[tuple[str, str]], int]:

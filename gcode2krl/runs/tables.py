@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.parquet_guard import DamagedError, read_parquet
 
 if TYPE_CHECKING:
     import polars as pl
 
 Floats = NDArray[np.float64]
 _EMPTY_WORDS = ("", "nan", "null", "none", "na")
-_MOST_NAMES = 12
+_MOST_NAMES, _LONGEST_NAME = 12, 60
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Sheet:
     def listing(self) -> str:
         """Return the columns of the file as words for an error."""
         more = f" and {len(self.names) - _MOST_NAMES} more" if len(self.names) > _MOST_NAMES else ""
-        return ", ".join(self.names[:_MOST_NAMES]) + more
+        return ", ".join(name[:_LONGEST_NAME] for name in self.names[:_MOST_NAMES]) + more
 
 
 def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
@@ -52,12 +53,17 @@ def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
     """
     file = Path(path)
     frame, first_row = _read_frame(file)
-    names = tuple(name.strip() for name in frame.columns)
+    names = tuple(printable(name.strip()) for name in frame.columns)
     _refuse_twins(names, file)
     frame.columns = list(names)
     needed = set(wanted)
     columns = {name: _numbers(frame[name], name, first_row, file) for name in names if name in needed}
     return Sheet(columns, names, first_row, str(file))
+
+
+def printable(name: str) -> str:
+    """Return a name of a file as it may stand in a line for a person."""
+    return name if name.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in name)
 
 
 def missing_column(sheet: Sheet, missing: Iterable[str], remedy: str) -> NotUnderstoodError:
@@ -80,7 +86,7 @@ def _read_frame(file: Path) -> "tuple[pl.DataFrame, int]":
         with file.open("rb") as stream:
             parquet = stream.read(4) == b"PAR1"
         if parquet:
-            return pl.read_parquet(file), 1
+            return read_parquet(file), 1
         return _without_trailing_blanks(pl.read_csv(file, infer_schema=False)), 2
     except OSError as error:
         why = error.strerror or str(error).splitlines()[0]
@@ -88,6 +94,10 @@ def _read_frame(file: Path) -> "tuple[pl.DataFrame, int]":
     except pl.exceptions.NoDataError:
         raise input_error(
             "trace-empty", "the file is empty", "export the trace with a header line", source=str(file)
+        ) from None
+    except DamagedError as error:
+        raise input_error(
+            "trace-unreadable", f"a damaged Parquet file: {error}", "export it again", source=str(file)
         ) from None
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise _no_table(file, str(error)) from None

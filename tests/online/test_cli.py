@@ -70,7 +70,9 @@ def test_simulate_says_it_to_a_person_and_draws(online, tmp_path):
         ("serve", "--address", "203.0.113.1"), ("serve", "--pilot", "nothing.csv"),
         ("serve", "--files", "a", "--name", "much too long a name"),
         ("serve", "--address", "the robot"), ("serve", "--tool", "99"),
-        ("serve", "--files", "a/b/c"), ("serve", "--most-mm", "99"),
+        ("serve", "--files", "a/b/c"), ("serve", "--most-mm", "99"), ("serve", "--address", "0.0.0.0"),
+        ("serve", "--robot-address", "192.168.1.20"),
+        ("serve", "--files", "a", "--address", "0.0.0.0", "--robot-address", "192.168.1.20"),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_line_and_exit_code_2(online, arguments):

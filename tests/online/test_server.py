@@ -59,9 +59,9 @@ def running(cell, *, folder=None, force=None, **link):
 class Wire:
     """The controller's socket."""
 
-    def __init__(self, port, wait_s=5.0):
+    def __init__(self, port, wait_s=5.0, host="127.0.0.1"):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
+        self.socket.bind((host, 0))
         self.socket.settimeout(wait_s)
         self.to = ("127.0.0.1", port)
 
@@ -157,6 +157,51 @@ def test_the_port_of_another_program_is_an_error_of_one_line(cell):
 
 def test_it_listens_on_loopback_only_unless_told():
     assert Online().link.address == "127.0.0.1"
+
+
+def test_the_first_stranger_is_not_the_peer_where_the_robot_is_pinned(cell):
+    """A program on another address sends a sound telegram first, and goes on; the robot is served."""
+    with running(cell, robot_address="127.0.0.1") as (port, outcome):
+        stranger = Wire(port, 0.05, host="127.0.0.2")
+        other = Krc(cell, ipoc=999)
+        assert stranger.ask(other.telegram()) is None
+        wire, krc = Wire(port), Krc(cell)
+        for _ in range(20):
+            exchange(wire, krc, 5)
+            stranger.ask(other.telegram(), wait=False)
+        assert krc.ready
+    _, statistics = outcome["end"]
+    assert krc.answered == statistics.answered == 100
+    assert statistics.foreign == 21
+
+
+def test_without_a_pinned_robot_the_first_sound_telegram_decides(cell):
+    with running(cell) as (port, outcome):
+        first, second = Wire(port, host="127.0.0.2"), Wire(port, 0.05)
+        assert first.ask(Krc(cell).telegram()) is not None
+        assert second.ask(Krc(cell).telegram()) is None
+    assert outcome["end"][1].foreign == 1
+
+
+@pytest.mark.parametrize(
+    ("link", "words"),
+    [
+        ({"address": "0.0.0.0"}, "give robot_address"),
+        ({"robot_address": "192.168.1.20"}, "cannot reach 127.0.0.1"),
+        ({"address": "192.168.1.10", "robot_address": "0.0.0.0"}, "the controller's address"),
+        ({"address": "192.168.1.10", "robot_address": "robot"}, "IPv4"),
+        ({"address": "239.0.0.1"}, "one computer"),
+        ({"address": "255.255.255.255"}, "one computer"),
+    ],
+)
+def test_addresses_that_cannot_be_meant_are_refused(link, words):
+    with pytest.raises(ValueError, match=words):
+        RobotLink(**link)
+
+
+def test_listening_everywhere_needs_the_robots_address():
+    link = RobotLink(address="0.0.0.0", robot_address="192.168.1.20")
+    assert (link.address, link.robot_address) == ("0.0.0.0", "192.168.1.20")
 
 
 # RSIPI (github.com/otherworld-dev/rsi-pi): a controller's echo server that others wrote

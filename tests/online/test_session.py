@@ -99,14 +99,15 @@ def test_a_robot_that_ignores_corrections_stays_at_zero(cell, device):
     assert np.linalg.norm(log.array(), axis=1).max() <= 0.1 + 1e-12
 
 
-def test_a_robot_that_begins_to_add_up_while_running_is_stopped(cell, device, settings):
+def test_a_robot_that_begins_to_add_up_while_running_gets_no_more_answers_and_no_step(cell, device, settings):
     def change(k, krc):
         krc.relative = k >= 300
 
     krc = Krc(cell, decimals=4, speed_mm_s=0.0)
     session, log = talk(device, krc, 500, load=lambda k: 3 * ramp(k), change=change)
-    assert (session.phase, session.reason) == (Phase.ZERO, "adds-up")
-    assert not log.array()[-1].any()
+    assert (session.phase, session.reason) == (Phase.CLOSED, "adds-up")
+    assert not any(log.answered[-150:])
+    check(log, settings)
 
 
 @pytest.mark.parametrize("mode", ["cartesian", "axis"])

@@ -1,0 +1,25 @@
+"""Fuzz what comes from outside: cells, prediction folders, run folders, meshes, telegrams.
+
+    python benchmarks/fuzz.py predictions --count 10000 --seed 1
+"""
+
+import argparse
+import sys
+from importlib import import_module
+
+KINDS = ("cells", "predictions", "runs", "meshes", "telegrams")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Hand over to the benchmark of a kind."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("--count", help="cases; default: that of the kind")
+    parser.add_argument("--seed", default="1")
+    chosen = parser.parse_args(argv)
+    count = ["--count", chosen.count] if chosen.count is not None else []
+    return int(import_module(f"fuzz_{chosen.kind}").main([*count, "--seed", chosen.seed]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
