@@ -1,32 +1,68 @@
 """Compiled kernels: quickly loaded, and never older than the code they were made from.
 
-numba notices a change of the file a kernel stands in, but not of a file whose functions it calls. After an
-edit or a pull in a checkout an old kernel would go on moving the robot; so what is older than the newest
-source of its folder is thrown away and compiled again.
+numba notices a change of the file a kernel stands in, but not of a file whose functions it calls or whose
+numbers it uses. After an edit or a pull in a checkout, or another version installed over the old one, an old
+kernel would go on moving the robot. So a package whose kernels use other files names these; beside its
+kernels stands a digest of them, and where that differs the kernels are thrown away and compiled again.
 """
 
 import contextlib
 import gc
 import importlib
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 _LINEAR_ALGEBRA = "scipy.linalg.cython_blas"
 _ARRAY_FUNCTIONS = "numba.np.arraymath"
+_DIGEST = "kernels.sha256"
 
 
-def drop_stale(folder: Path) -> int:
-    """Delete the compiled kernels of a folder that are older than one of its sources; return how many."""
-    kernels = [*(folder / "__pycache__").glob("*.nb[ic]")]
-    if not kernels:
+def drop_stale(folder: Path, *used: str) -> int:
+    """Delete the compiled kernels of a folder if one of the files they use has changed; return how many.
+
+    ``used`` are the files, relative to the folder, that kernels in other files of the folder use.
+    """
+    import hashlib
+
+    digest = hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in used)).hexdigest()
+    for cache in cache_folders(folder):
+        with contextlib.suppress(OSError):  # cannot be written: numba takes the next one, too
+            return _renew(cache, digest)
+    return 0
+
+
+def cache_folders(folder: Path) -> Sequence[Path]:
+    """Return where numba may keep a folder's kernels; it takes the first that it can write to.
+
+    That is the folder named by NUMBA_CACHE_DIR, ``__pycache__``, or the user's cache where the package is
+    installed for all users.
+    """
+    config, caching, appdirs = (
+        importlib.import_module(f"numba.{name}") for name in ("core.config", "core.caching", "misc.appdirs")
+    )
+    below = caching._CacheLocator.get_suitable_cache_subpath(str(folder / "any.py"))
+    named = [Path(config.CACHE_DIR) / below] if config.CACHE_DIR else []
+    of_user = Path(appdirs.AppDirs(appname="numba", appauthor=False).user_cache_dir) / below
+    return [*named, folder / "__pycache__", of_user]
+
+
+def _renew(cache: Path, digest: str) -> int:
+    """Delete the kernels in a cache that were made from other sources; raise OSError if it is read-only."""
+    cache.mkdir(parents=True, exist_ok=True)
+    if not os.access(cache, os.W_OK):
+        raise PermissionError(cache)
+    record = cache / _DIGEST
+    if record.exists() and record.read_text(encoding="ascii") == digest:
         return 0
-    newest = max(source.stat().st_mtime for source in folder.glob("*.py"))
-    stale = [kernel for kernel in kernels if kernel.stat().st_mtime < newest]
-    for kernel in stale:
-        with contextlib.suppress(OSError):  # another process may have been quicker
-            kernel.unlink()
-    return len(stale)
+    kernels = list(cache.glob("*.nb[ic]"))
+    for kernel in kernels:
+        kernel.unlink(missing_ok=True)  # another process may have been quicker
+    fresh = cache / f"{_DIGEST}.{os.getpid()}"
+    fresh.write_text(digest, encoding="ascii")
+    fresh.replace(record)  # last: whoever is interrupted begins anew
+    return len(kernels)
 
 
 def load_numba() -> None:

@@ -6,6 +6,10 @@ from gcode2krl.cutting.cut import Removal, cut, force_basis, no_forces, remove
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
 from gcode2krl.kernel_cache import drop_stale
 
-drop_stale(Path(__file__).parent)  # compiled kernels are looked up when they are first called
+# compiled kernels are looked up when they are first called
+drop_stale(
+    Path(__file__).parent,
+    "edge.py", "kernels.py", "removal.py", "rings.py", "slices.py", "sweep.py", "walls.py",
+)  # fmt: skip
 
 __all__ = ["Load", "Removal", "cut", "cutting_load", "force_basis", "mean_force", "no_forces", "remove"]

@@ -54,6 +54,20 @@ def stretches_of(part: Part) -> Ints:
     return number
 
 
+def stretches_of_all(parts: Sequence[Part]) -> Ints:
+    """Return the number of the stretch of time of each value of all parts, as `Target.whiten` orders them.
+
+    No two runs have a number in common, however long they are.
+    """
+    numbers, first = [], 0
+    for part in parts:
+        own = stretches_of(part)
+        own -= own.min(initial=0)  # a table may begin before its model
+        numbers.append(np.tile(first + own, part.shape[1]))
+        first += int(own.max(initial=-1)) + 1
+    return np.concatenate(numbers)
+
+
 def rows_of(part: Part, signatures: Floats, nuisance: Sequence[Nuisance], noise: Sequence[Noise]) -> Rows:
     """Return signatures (k, n, s) and nuisance of a part through its filters."""
     shared = [each.columns for each in nuisance if each.shared]

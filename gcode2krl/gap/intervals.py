@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.gap.evidence import PRIOR, stretches_of
+from gcode2krl.gap.evidence import PRIOR, stretches_of_all
 from gcode2krl.gap.examine import Examination, replans
 from gcode2krl.gap.free import FIXED
 from gcode2krl.gap.signatures import PHASE
@@ -96,9 +96,7 @@ def _covariance(found: Examination) -> Floats:
     scaled = unbounded_jacobian(found.target, found.fitted) * scale
     # what the data do not see at all is as uncertain as it was before them
     inverse = np.linalg.inv(scaled.T @ scaled + PRIOR**-2 * np.eye(len(scale)))
-    clusters = np.concatenate([
-        np.tile(1000 * number + stretches_of(part), part.shape[1]) for number, part in enumerate(found.parts)
-    ])  # fmt: skip
+    clusters = stretches_of_all(found.parts)
     rows = len(clusters)
     scores = scaled[:rows] * residual[:rows, None]
     names = np.unique(clusters)

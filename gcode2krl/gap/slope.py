@@ -1,7 +1,7 @@
 """How the residual of a fit changes with its numbers, and what that says of how sure they are."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gap.evidence import stretches_of
+from gcode2krl.gap.evidence import stretches_of_all
 from gcode2krl.gap.free import Fitted
-from gcode2krl.gap.part import Part
 from gcode2krl.gap.target import Target
 
 Floats = NDArray[np.float64]
-_MOST_STRETCHES = 100_000
 
 
 @dataclass(frozen=True)
@@ -81,14 +79,6 @@ def slope_of(target: Target, fitted: Fitted, number: int) -> Slope:
     if others.shape[1]:
         mine = mine - others @ np.linalg.lstsq(others, mine, rcond=1e-9)[0]
     return Slope(residual, mine, stretches_of_all(target.parts))
-
-
-def stretches_of_all(parts: Sequence[Part]) -> NDArray[np.int64]:
-    """Return the number of the stretch of time of each value of all parts, as `Target.whiten` orders them."""
-    return np.concatenate([
-        _MOST_STRETCHES * number + np.tile(stretches_of(part), part.shape[1])
-        for number, part in enumerate(parts)
-    ])  # fmt: skip
 
 
 def residual_jacobian(target: Target, fitted: Fitted) -> tuple[Floats, Floats]:

@@ -8,4 +8,5 @@ from gcode2krl.kernel_cache import drop_stale, load_numba
 __all__ = ["CHORD_TOLERANCE_MM", "read_gcode", "read_stream"]
 
 load_numba()  # what the first kernel needs
-drop_stale(Path(__file__).parent)  # compiled kernels are looked up when they are first called
+# compiled kernels are looked up when they are first called
+drop_stale(Path(__file__).parent, "arcs.py", "findings.py", "state.py")
