@@ -12,7 +12,8 @@ class Issue:
     """One finding.
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
-    kebab-case word, used by ``--allow CODE:LINE``.
+    kebab-case word, used by ``--allow CODE:LINE``. ``excerpt`` quotes the input, with a caret
+    before the culprit.
     """
 
     severity: Severity
@@ -20,6 +21,7 @@ class Issue:
     line: int
     message: str
     remedy: str = ""
+    excerpt: str = ""
 
     def text(self, source: str = "") -> str:
         """Return the finding on one line, ``part.nc:120: error: … [code] — remedy``."""
@@ -28,7 +30,8 @@ class Issue:
             place = f"line {self.line}"
         head = f"{place}: {self.severity}: " if place else f"{self.severity}: "
         tail = f" -> {self.remedy}" if self.remedy else ""
-        return f"{head}{self.message} [{self.code}]{tail}"
+        near = f", near `{self.excerpt}`" if self.excerpt else ""
+        return f"{head}{self.message}{near} [{self.code}]{tail}"
 
 
 class Gcode2KrlError(Exception):
