@@ -10,11 +10,29 @@ from numba import njit
 
 from gcode2krl.gcode import findings as f
 
-RADIUS_TOLERANCE_MM = 0.01
-"""Largest difference of the radii at start and end of an arc given by its centre; stricter than LinuxCNC,
-which lets up to 0.028 mm pass and draws a spiral."""
+RADIUS_WARNING_MM = 0.01
+"""From this difference of the radii at start and end on a finding tells it: the chord tolerance."""
+SPIRAL_MM, SPIRAL_INCH_MM = 0.02 * math.sqrt(2.0), 0.002 * math.sqrt(2.0) * 25.4
+"""LinuxCNC's bound under G21 and G20: what two (three) decimals of start, end and centre can amount to."""
+SPIRAL_SHARE, SPIRAL_MOST = 0.001, 100.0
+"""Beyond the bound LinuxCNC reads up to 0.1 % of the radius, and never more than 100 times the bound."""
+FITS, SPIRAL, MISFIT = 0, 1, 2
 SMALLEST_RADIUS_MM = 0.00127
 """LinuxCNC's 0.00005 inch: a smaller radius is zero, and R may miss half the chord by as much."""
+
+
+@njit(cache=True)
+def radii_fit(start_mm, end_mm, unit_mm):
+    """Tell whether the radii at start and end fit, by the rule of LinuxCNC (``interp_arc.cc``)."""
+    difference = abs(start_mm - end_mm)
+    if difference <= RADIUS_WARNING_MM:
+        return FITS
+    bound = SPIRAL_MM if unit_mm == 1.0 else SPIRAL_INCH_MM
+    if difference > SPIRAL_MOST * bound:
+        return MISFIT
+    if difference > bound and difference > SPIRAL_SHARE * max(start_mm, end_mm):
+        return MISFIT
+    return SPIRAL
 
 
 @njit(cache=True)

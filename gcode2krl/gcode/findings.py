@@ -1,10 +1,12 @@
 """What can be wrong with a line of G-code: number in the kernels, stable code, sentence, remedy.
 
-The compiled kernels report a finding as (number, line, a, b); the sentence is made here. In a sentence
-``{a}`` and ``{b}`` are numbers, ``{word}`` is the letter whose code is ``a``, ``{g}`` and ``{h}`` are G or M
-numbers given as ten times their value.
+The compiled kernels report a finding as (number, line, a, b, c); the sentence is made here. In a sentence
+``{a}``, ``{b}`` and ``{c}`` are numbers, ``{word}`` is the letter whose code is ``a``, ``{words}`` are the
+letters whose bits are set in ``a``, ``{g}`` and ``{h}`` are G or M numbers given as ten times their value,
+``{state}`` names the modal state that led there.
 """
 
+import math
 from typing import NamedTuple
 
 from gcode2krl.errors import Issue, Severity
@@ -70,7 +72,8 @@ class Finding(NamedTuple):
     TOO_MANY_M,
     DWELL_WITH_ARC,
     BAD_LINE_NUMBER,
-) = range(50)
+    UNKNOWN_START,
+) = range(51)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -109,8 +112,8 @@ FINDINGS: dict[int, Finding] = {
     ROTARY_WORD: Finding(
         "error",
         "rotary-axis",
-        "{word} is a rotary or secondary axis and the cell declares no machine",
-        "only X, Y, Z are read; rotary axes need a [machine] in the cell, which this version does not know",
+        "{word}{b:g}: a rotary or secondary axis that is not at 0, and the cell declares no machine",
+        "leave {word} at 0; rotary axes need a [machine] in the cell, which this version does not know",
     ),
     REPEATED_WORD: Finding("error", "repeated-word", "{word} stands twice in the block", "keep one"),
     SAME_GROUP_G: Finding(
@@ -132,23 +135,29 @@ FINDINGS: dict[int, Finding] = {
     UNSUPPORTED_M: Finding("error", "unsupported-m", "M{g}: {reason}", "{remedy}"),
     BAD_M: Finding("error", "bad-m", "M{a:g} is not a whole number from 0 to 9999", "check the line"),
     NO_FEED: Finding(
-        "error", "no-feed", "feed move without a feed", "program F before the first G1, G2 or G3"
+        "error",
+        "no-feed",
+        "feed move without a feed: no F above 0 since {state}",
+        "program F before the first G1, G2 or G3",
     ),
     NEGATIVE_FEED: Finding("error", "negative-feed", "F{a:g} is negative", "feeds are positive"),
     NO_INVERSE_TIME: Finding(
         "error",
         "no-inverse-time-feed",
-        "feed move without F under G93",
+        "feed move without F under G93 of line {a:.0f}",
         "inverse time needs F in every feed block",
     ),
     FEED_PER_REV_STOPPED: Finding(
         "error",
         "feed-per-rev-stopped",
-        "feed per revolution (G95) with the spindle speed at zero",
+        "feed per revolution (G95 of line {a:.0f}) with the spindle speed at zero",
         "program S and M3 first",
     ),
     NO_MOTION_MODE: Finding(
-        "error", "no-motion-mode", "axis words without G0, G1, G2 or G3", "program a motion mode"
+        "error",
+        "no-motion-mode",
+        "axis words without G0, G1, G2 or G3: {state}",
+        "program a motion mode",
     ),
     TWO_AXIS_CODES: Finding(
         "error",
@@ -159,11 +168,14 @@ FINDINGS: dict[int, Finding] = {
     UNUSED_WORD: Finding(
         "error",
         "unused-word",
-        "nothing in this block uses {word}",
+        "nothing in this block uses {words}{state}",
         "remove it, or add the code it belongs to",
     ),
     ARC_NO_CENTRE: Finding(
-        "error", "arc-no-centre", "G{g} without I, J, K or R", "give the centre or the radius"
+        "error",
+        "arc-no-centre",
+        "G{g} without I, J, K or R{state}",
+        "give the centre or the radius; a straight move needs G1",
     ),
     ARC_BOTH_FORMATS: Finding(
         "error", "arc-both-formats", "the arc has R and a centre (I, J, K)", "keep one of them"
@@ -171,8 +183,8 @@ FINDINGS: dict[int, Finding] = {
     ARC_RADIUS_MISMATCH: Finding(
         "error",
         "arc-radius-mismatch",
-        "arc: radius {a:.4f} mm at the start and {b:.4f} mm at the end differ by more than 0.01 mm",
-        "check I, J, K, the plane (G17-G19), G90.1/G91.1 and the post's decimals",
+        "arc: radius {a:.4f} mm at the start and {b:.4f} mm at the end differ by {difference:.4f} mm",
+        "check I, J, K, the plane (G17-G19) and G90.1/G91.1; the post must write {decimals} decimals",
     ),
     ARC_RADIUS_TOO_SMALL: Finding(
         "error",
@@ -190,7 +202,7 @@ FINDINGS: dict[int, Finding] = {
     ARC_WRONG_OFFSET: Finding(
         "error",
         "arc-wrong-offset",
-        "{word} is not in the plane of this arc",
+        "{word}{b:g} is not in the plane of this arc (G{c:.0f})",
         "check the plane (G17: I J, G18: I K, G19: J K)",
     ),
     ARC_TURNS: Finding("error", "arc-turns", "P{a:g} turns: not a whole number from 1 to 1000", "check P"),
@@ -251,7 +263,16 @@ FINDINGS: dict[int, Finding] = {
         "write them in separate blocks",
     ),
     BAD_LINE_NUMBER: Finding(
-        "error", "bad-line-number", "N is followed by a negative number", "line numbers are positive"
+        "error",
+        "bad-line-number",
+        "N is not followed by a plain number",
+        "write N and digits before a word of its own, or remove it",
+    ),
+    UNKNOWN_START: Finding(
+        "error",
+        "undefined-position",
+        "feed move from a position that has not been programmed; arcs after it cannot fit",
+        "program X, Y and Z with G0 first",
     ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
@@ -278,19 +299,38 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     810: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
     920: (f"coordinate shifts in the program: {_LATER}", "put the offset into [work_offsets] of the cell"),
     960: ("constant surface speed is for lathes", "program S in rpm"),
-    970: (f"spindle speed mode words: {_LATER}", "remove G97; S is always in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
     190: ("spindle orientation is not mapped", "map it in [m_code] of the cell once it is read"),
-    480: ("override switches have no meaning here", "remove it"),
-    600: ("pallet change has no meaning here", "use M0"),
+    610: ("setting the tool number without a change is not read", "use T and M6"),
     620: (f"digital and analogue I/O words: {_LATER}", "map an own M-code in [m_code] of the cell"),
     700: (f"saving modal state: {_LATER}", "remove it"),
     980: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
 
-def make_issue(number: int, line: int, a: float, b: float) -> Issue:
+SPIRAL_SENTENCE = (
+    "{count} with radii that differ at start and end, most by {difference:.4f} mm "
+    "({a:.4f} and {b:.4f} mm); read as a spiral"
+)
+SPIRAL_REMEDY = "let the post write X, Y, Z, I, J, K with {decimals} decimals"
+_DIFFERENCE_MM = 0.01
+_LAST_PLACES = 2.0 * math.sqrt(2.0)
+"""Radii of an arc differ by at most so many units of the last place that its words are rounded to: start
+and end are each off by half a unit in two coordinates, the centre by as much and twice, on both radii."""
+
+
+def decimals_needed(unit_mm: float) -> int:
+    """Return the decimals that keep the radii of an arc within 0.01 mm, for words in units of ``unit_mm``."""
+    return math.ceil(math.log10(_LAST_PLACES * unit_mm / _DIFFERENCE_MM))
+
+
+def letters_of(bits: float) -> str:
+    """Return the letters whose bits are set, A first."""
+    return "".join(chr(65 + k) for k in range(26) if int(bits) >> k & 1)
+
+
+def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0, excerpt: str = "") -> Issue:
     """Return the `Issue` for one row of the kernels' findings."""
     finding = FINDINGS[number]
     reason, remedy = "", ""
@@ -300,10 +340,15 @@ def make_issue(number: int, line: int, a: float, b: float) -> Issue:
     values = {
         "a": a,
         "b": b,
+        "c": c,
         "word": chr(int(a)) if 0 < a < 128 else "?",
+        "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
         "char": _printable(int(a)) if 0 <= a < 256 else "?",
         "g": f"{a / 10:g}",
         "h": f"{b / 10:g}",
+        "difference": abs(a - b),
+        "decimals": decimals_needed(25.4 if c < 0 else 1.0),
+        "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
     }
@@ -313,7 +358,21 @@ def make_issue(number: int, line: int, a: float, b: float) -> Issue:
         line,
         finding.sentence.format(**values),
         finding.remedy.format(**values),
+        excerpt,
     )
+
+
+def _state(number: int, line: int, a: float, b: float, c: float) -> str:
+    """Name the modal state that led to a finding."""
+    if number == NO_FEED:
+        return f"G{b:.0f} of line {a:.0f}" if a else "the start"
+    if number == NO_MOTION_MODE:
+        return f"G80 of line {a:.0f} ended the motion mode" if a else "none has been programmed before"
+    if number == ARC_NO_CENTRE:
+        return f"; it is in force since line {b:.0f}" if b != line else ""
+    if number == UNUSED_WORD and set(letters_of(a)) & set("IJKPR"):
+        return f"; G{b:.0f} is in force since line {c:.0f}" if b >= 0 else "; no motion mode is in force"
+    return ""
 
 
 def _nearest_below(reasons: dict[int, tuple[str, str]], number: int) -> tuple[str, str]:

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.errors import Issue, NotUnderstoodError, Severity, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode.columns import Columns
-from gcode2krl.gcode.findings import make_issue
+from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
+from gcode2krl.gcode.report import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
+from gcode2krl.gcode.rows import ROW
 from gcode2krl.gcode.state import (
     EVENT_COOLANT,
     EVENT_M,
@@ -38,8 +40,6 @@ _MOST_REST_BYTES = 8_000_000
 """How much behind the program's end is looked at for lines that are not read."""
 _MOST_ISSUES = 1000
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_INCH_DECIMALS = 4
-_INCH_EXTENT_MM = 60.0
 
 Progress = Callable[[int], None]
 
@@ -112,13 +112,15 @@ def read_stream(
         tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
     )
     offsets, offset_known = _work_offsets(cell)
-    interpreter = _Interpreter(name, chord_tolerance_mm, block_delete, offsets, offset_known, lengths)
+    from_table = cell is not None and cell.program.tool_length == "from_table"
+    options = np.array([chord_tolerance_mm, float(block_delete), float(from_table)])
+    interpreter = _Interpreter(name, options, offsets, offset_known, lengths)
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     for first_line, text, words in _scanned(_pieces(stream, name)):
         if not interpreter.ended:
             head = head or text[:4000].tobytes()
-            interpreter.feed(words, text, size)
+            interpreter.feed(words, text, first_line, size)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
@@ -197,13 +199,16 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
 
 
 def _reject_binary(block: bytes, name: str) -> None:
-    if b"\x00" in block[:65536]:
+    place = block[:65536].find(b"\x00")
+    if place >= 0:
         remedy = (
             "unpack or export the program as text"
             if block[:2] == b"\x1f\x8b"
             else "export the program as text"
         )
-        raise input_error("binary-file", "this is not a text file", remedy, source=name)
+        line = 1 + block.count(b"\n", 0, place)
+        what = f"this is not a text file: byte {place + 1} is NUL"
+        raise input_error("binary-file", what, remedy, line=line, source=name)
 
 
 class _Interpreter:
@@ -212,20 +217,20 @@ class _Interpreter:
     def __init__(
         self,
         name: str,
-        chord_tolerance_mm: float,
-        block_delete: bool,
+        options: NDArray[np.float64],
         offsets: NDArray[np.float64],
         offset_known: NDArray[np.bool_],
         tool_length: NDArray[np.float64],
     ) -> None:
         self.name = name
         self.state = initial_state()
-        self.counts = np.zeros(6, dtype=np.int64)
-        self.rows = np.zeros(_BUFFER_ROWS, dtype=machine.ROW)
-        self.events = np.zeros(256, dtype=machine.EVENT)
+        self.counts = np.zeros(COUNTS, dtype=np.int64)
+        self.rows = np.zeros(_BUFFER_ROWS, dtype=ROW)
+        self.events = np.zeros(256, dtype=EVENT)
         self.columns = Columns()
-        self.found = np.zeros(_MOST_ISSUES, dtype=machine.FOUND)
-        self.options = np.array([chord_tolerance_mm, float(block_delete)])
+        self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
+        self.texts: dict[int, bytes] = {}
+        self.options = options
         self.offsets, self.offset_known, self.tool_length = offsets, offset_known, tool_length
         self.messages: list[str] = []
         self.most_decimals = 0
@@ -241,12 +246,17 @@ class _Interpreter:
         row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
         row["offset_tool"] = -1
         row["rapid"], row["line"] = 1, 0
-        self.counts[0] = 1
+        self.counts[ROWS] = 1
 
-    def feed(self, words: Words, text: NDArray[np.uint8], size: int) -> None:
+    def feed(self, words: Words, text: NDArray[np.uint8], first_line: int, size: int) -> None:
         """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
+        found_before = int(self.counts[FINDINGS])
+        self._execute(words, text, size)
+        self._remember_lines(text, first_line, found_before)
+
+    def _execute(self, words: Words, text: NDArray[np.uint8], size: int) -> None:
         columns = (words.letter, words.value, words.extra, words.line)
-        self.counts[3] = 0
+        self.counts[MARKS] = 0
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         first_message = len(self.messages)
         words.value[words.letter == ord("(")] += first_message
@@ -265,15 +275,28 @@ class _Interpreter:
                 return
             self._make_room(stuck=at == before)
 
+    def _remember_lines(self, text: NDArray[np.uint8], first_line: int, found_before: int) -> None:
+        """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
+        new = self.found[found_before : self.counts[FINDINGS]]
+        wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
+        if not wanted:
+            return
+        ends = np.flatnonzero(text == ord("\n"))
+        starts = np.concatenate([[0], ends + 1])
+        for number in wanted:
+            row = number - first_line
+            if row < len(ends):
+                self.texts[number] = text[starts[row] : ends[row]].tobytes()
+
     def _make_room(self, *, stuck: bool) -> None:
         """Hand all rows but the last, which may still change, to the table; grow what is too small."""
-        done = int(self.counts[0]) - 1
+        done = int(self.counts[ROWS]) - 1
         if stuck and done == 0:  # an arc that is longer than the buffer
             self.rows = _grown(self.rows)
         self.columns.append(self.rows[:done])
         self.rows[0] = self.rows[done]
-        self.counts[0], self.counts[5] = 1, self.counts[5] + done
-        if self.counts[1] + machine.EVENTS_PER_BLOCK > len(self.events):
+        self.counts[ROWS], self.counts[ROWS_BEFORE] = 1, self.counts[ROWS_BEFORE] + done
+        if self.counts[EVENTS] + machine.EVENTS_PER_BLOCK > len(self.events):
             self.events = _grown(self.events)
 
     def check_rest(self, text: NDArray[np.uint8], first_line: int) -> bool:
@@ -288,70 +311,17 @@ class _Interpreter:
 
     def finish(self, head: bytes) -> Toolpath:
         """Raise the errors that were found, or return the table."""
-        found = [
-            make_issue(int(r["number"]), int(r["line"]), float(r["a"]), float(r["b"]))
-            for r in self.found[: self.counts[2]]
-        ]
-        errors = [issue for issue in found if issue.severity == "error"]
-        severity: Severity = "error" if errors else "warning"
-        unseen = int(self.counts[4])
-        unknown = int(self.state["unknown_feed_line"][0])
-        if unknown and any(i.code == "arc-radius-mismatch" and i.line > unknown for i in errors):
-            sentence = "feed move from a position that has not been programmed; arcs after it cannot fit"
-            errors.insert(
-                0, Issue("error", "undefined-position", unknown, sentence, "program X, Y and Z with G0 first")
-            )
-        more = [Issue(severity, "more", 0, f"{unseen} more findings", "mend these first")] if unseen else []
-        if errors:
-            raise NotUnderstoodError([*errors, *more], self.name)
-        found += more
-        issues = [*found, *self._whole_program_issues(head)]
-        return self._toolpath(tuple(issues))
-
-    def _whole_program_issues(self, head: bytes) -> Iterator[Issue]:
-        state = self.state[0]
-        if not state["ended"]:
-            cut_off = state["tape_marks"] == 1
-            code = "cut-off" if cut_off else "no-program-end"
-            what = (
-                "the file begins with % and ends without %, M2 or M30"
-                if cut_off
-                else "no M2, M30 or % at the end"
-            )
-            yield Issue("warning", code, 0, what, "is the file complete?")
-        if self.rest_line:
-            yield Issue(
-                "warning",
-                "after-end",
-                self.rest_line,
-                "lines behind the program's end are not read",
-                "remove them or the early M2/M30/%",
-            )
-        if not state["unit_named"]:
-            yield self._unit_issue()
-        elif state["unit_mm"] == 1.0 and _says_inch(head):
-            yield Issue(
-                "warning",
-                "unit-doubtful",
-                0,
-                "a comment at the top speaks of inches, the program says G21 (mm)",
-                "check the post's unit",
-            )
-
-    def _unit_issue(self) -> Issue:
-        small = self.state["largest_mm"][0] < _INCH_EXTENT_MM
-        if small and self.most_decimals >= _INCH_DECIMALS:
-            return Issue(
-                "warning",
-                "unit-doubtful",
-                0,
-                "no G20 or G21, and the numbers look like inches (four decimals, small); read as mm",
-                "write G20 or G21 at the start",
-            )
-        return Issue("warning", "unit-unnamed", 0, "no G20 or G21; read as mm", "write G21 at the start")
+        found = found_issues(self.found, self.counts, self.state[0], self.texts)
+        if any(issue.severity == "error" for issue in found):
+            raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
+        whole = program_issues(
+            self.state[0], self.texts,
+            rest_line=self.rest_line, most_decimals=self.most_decimals, head=head,
+        )  # fmt: skip
+        return self._toolpath((*found, *whole))
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
-        self.columns.append(self.rows[: self.counts[0]])
+        self.columns.append(self.rows[: self.counts[ROWS]])
         axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (self.columns.count, 3))
         return Toolpath(
             **self.columns.finished(),
@@ -379,7 +349,7 @@ class _Interpreter:
             yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
 
     def _plain_events(self) -> Iterator[Event]:
-        for event in self.events[: self.counts[1]]:
+        for event in self.events[: self.counts[EVENTS]]:
             row, kind, a, b, line = (
                 int(event["row"]),
                 int(event["kind"]),
@@ -414,8 +384,3 @@ def _grown(array: NDArray[np.void]) -> NDArray[np.void]:
 def _decode(span: NDArray[np.uint8]) -> str:
     text = span.tobytes().decode("utf-8", errors="replace").strip()
     return text[3:].lstrip(" ,").strip()
-
-
-def _says_inch(head: bytes) -> bool:
-    comments = [line.lower() for line in head.splitlines() if line.lstrip()[:1] in (b"(", b";")]
-    return any(b"inch" in line and b"mm" not in line for line in comments)

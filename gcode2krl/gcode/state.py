@@ -2,6 +2,10 @@
 
 The state is one numpy record, so that compiled code can read and write it and a run can stop and go on
 between pieces of a file. All lengths in it are mm; the position is the tool tip in the part frame.
+
+After a block that was not understood some of the state is in *doubt*: a bit of ``doubt`` for each thing that
+the block might have set. A finding that rests on doubtful state is a consequence: it is counted, not
+reported. What is stated anew is out of doubt. Doubt begins only with an error, so it never hides the first.
 """
 
 import numpy as np
@@ -46,8 +50,31 @@ STATE = np.dtype(
         ("blocks", "i8"),
         ("largest_mm", "f8"),
         ("unknown_feed_line", "i4"),  # first feed move from a position not programmed
+        ("unknown_reported", "i1"),
+        ("doubt", "i4"),  # bits of what a block that was not understood may have set
+        ("motion_line", "i4"),  # where the motion mode was named, 0 = nowhere
+        ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
+        ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
+        ("note_count", "i4", 4),  # blocks with something harmless, by NOTE_…
+        ("note_line", "i4", 4),  # the first of them
+        ("note_word", "i4", 4),
+        ("misfits", "i4"),  # arcs whose radii differ too much
+        ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
+        ("spirals", "i4"),  # arcs that are read although their radii differ
+        ("spiral_line", "i4"),  # the worst of them
+        ("spiral_start", "f8"),
+        ("spiral_end", "f8"),
+        ("spiral_unit_mm", "f8"),
     ]
 )
+
+DOUBT_X, DOUBT_Y, DOUBT_Z, DOUBT_MOTION, DOUBT_FEED, DOUBT_UNIT = (1 << k for k in range(6))
+DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SPEED = (
+    1 << k for k in range(6, 12)
+)
+DOUBT_POSITION = DOUBT_X | DOUBT_Y | DOUBT_Z
+DOUBT_ALL = (1 << 12) - 1
+NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE = range(4)
 
 
 def initial_state() -> NDArray[np.void]:
@@ -82,11 +109,12 @@ def _group_table() -> NDArray[np.int8]:
         9: (98, 99),
         10: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
         11: (61, 61.1, 64),
+        12: (97,),
     }
     unsupported = (
         *(5, 5.1, 5.2, 5.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1, 43.1, 43.2),
         *(43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89),
-        *(92, 92.1, 92.2, 92.3, 96, 97),
+        *(92, 92.1, 92.2, 92.3, 96),
     )
     table = np.full(1000, UNKNOWN_GROUP, dtype=np.int8)
     for group, codes in groups.items():
@@ -99,7 +127,41 @@ def _group_table() -> NDArray[np.int8]:
 
 GROUP_OF_G = _group_table()
 """Modal group of a G-code given as ten times its number, (1000,)."""
-GROUPS = 12
+GROUPS = 13
+
+
+def _doubt_table() -> NDArray[np.int32]:
+    table = np.full(1000, DOUBT_MOTION | DOUBT_POSITION, dtype=np.int32)  # of a code nobody knows
+    effects: dict[int, tuple[float, ...]] = {
+        DOUBT_X: (7, 8),
+        DOUBT_Z: (43.1, 43.2),
+        DOUBT_POSITION: (10, 43.4, 43.5, 52, 92, 92.1, 92.2, 92.3),
+        DOUBT_SPEED: (96,),
+        0: (41, 41.1, 42, 42.1),
+    }
+    for doubt, codes in effects.items():
+        for code in codes:
+            table[round(code * 10)] = doubt
+    return table
+
+
+DOUBT_OF_G = _doubt_table()
+"""What is in doubt after a G-code that is not read, given as ten times its number, (1000,)."""
+DOUBT_OF_GROUP = np.array(
+    [
+        DOUBT_POSITION, DOUBT_MOTION, DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE | DOUBT_FEED,
+        DOUBT_UNIT, 0, DOUBT_Z, 0, DOUBT_POSITION, 0, DOUBT_SPEED,
+    ],
+    dtype=np.int32,
+)  # fmt: skip
+"""What is in doubt after two codes of one modal group, (GROUPS,)."""
+DOUBT_OF_LETTER = np.zeros(26, dtype=np.int32)
+"""What is in doubt after a word whose value cannot be read, by its letter, (26,)."""
+for _letter, _doubt in {
+    "X": DOUBT_X, "Y": DOUBT_Y, "Z": DOUBT_Z, "F": DOUBT_FEED, "S": DOUBT_SPEED, "T": DOUBT_TOOL,
+    "G": DOUBT_ALL, "M": DOUBT_ALL, "O": DOUBT_ALL,
+}.items():  # fmt: skip
+    DOUBT_OF_LETTER[ord(_letter) - 65] = _doubt
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5

@@ -1,8 +1,10 @@
 """Bytes to words: a compiled scanner that turns a piece of G-code text into columns.
 
-A word is (letter, value, line). Three things that are not words travel in the same stream so that their
-order is kept: ``/`` (block delete), ``%`` (tape mark), ``(`` (a message comment; value = its number) and
-``!`` (the line cannot be read; value = number of the finding, ``extra`` = what was found).
+A word is (letter, value, line). Things that are not words travel in the same stream so that their order is
+kept: ``/`` (block delete), ``%`` (tape mark), ``(`` (a message comment; value = its number), ``!`` (something
+cannot be read; value = number of the finding, ``extra`` = what was found) and a small letter (a word whose
+value cannot be read). A line has at most one ``!`` of its characters; the words around it are still read, so
+that what follows is judged by its own faults.
 """
 
 from typing import NamedTuple
@@ -35,7 +37,8 @@ class Words(NamedTuple):
 
 def scan(text: NDArray[np.uint8], first_line: int) -> Words:
     """Scan whole lines of text, uint8 (b,); ``first_line`` is the file line of the first."""
-    letters = np.empty(len(text) + 2, dtype=np.uint8)  # upper bound; pages never touched cost nothing
+    room = 2 * len(text) + 2  # a byte makes at most two words; pages never touched cost nothing
+    letters = np.empty(room, dtype=np.uint8)
     values = np.empty(len(letters))
     lines = np.empty(len(letters), dtype=np.int32)
     extras = np.zeros(1024)  # only the first findings are ever shown
@@ -54,6 +57,81 @@ def _is_message(text, i, end):
     return (text[i] | 32) == 109 and (text[i + 1] | 32) == 115 and (text[i + 2] | 32) == 103
 
 
+@njit(cache=True)
+def _is_function(text, i):
+    """Tell whether a function with its argument stands at ``i``, as in ``XABS[#1]``."""
+    letters = 0
+    while i < len(text) and (text[i] | 32) >= 97 and (text[i] | 32) <= 122:
+        letters += 1
+        i += 1
+    return letters > 1 and i < len(text) and text[i] == 91
+
+
+@njit(cache=True)
+def _blank(c):
+    return c in (_SPACE, _TAB, _RETURN)
+
+
+@njit(cache=True)
+def _after_bracket(text, i, end):
+    """Return the place behind the bracket expression that opens at ``i``."""
+    depth = 0
+    while i < end:
+        if text[i] == 91:
+            depth += 1
+        elif text[i] == 93:
+            depth -= 1
+            if depth == 0:
+                return i + 1
+        i += 1
+    return end
+
+
+@njit(cache=True)
+def _after_value(text, i, end):
+    """Return the place behind a number, parameter, function or bracket expression that begins at ``i``."""
+    while i < end and (_blank(text[i]) or text[i] == 35 or text[i] == 43 or text[i] == 45):  # blanks # + -
+        i += 1
+    if i < end and text[i] == 60:  # <name>
+        while i < end and text[i] != 62:
+            i += 1
+        return min(i + 1, end)
+    while i < end and (text[i] | 32) >= 97 and (text[i] | 32) <= 122:  # a function: its name, its argument
+        i += 1
+    while i < end and (text[i] == 46 or (text[i] >= 48 and text[i] <= 57)):
+        i += 1
+    while i < end and (
+        text[i] == 91 or (text[i] == 47 and i + 1 < end and text[i + 1] == 91)
+    ):  # a/[b] of ATAN
+        i = _after_bracket(text, i + (text[i] == 47), end)
+    return i
+
+
+@njit(cache=True)
+def _line_end(text, i):
+    while i < len(text) and text[i] != _NEWLINE:
+        i += 1
+    return i
+
+
+@njit(cache=True)
+def _after_comment(text, i):
+    """Return (finding, place behind) of the comment ``( )`` that opens at ``i``."""
+    n = len(text)
+    end = i + 1
+    while end < n and text[end] != 41 and text[end] != _NEWLINE and text[end] != 40:
+        end += 1
+    if end < n and text[end] == 41:
+        return f.OK, end + 1
+    if end >= n or text[end] == _NEWLINE:
+        return f.COMMENT_OPEN, end
+    depth = 1
+    while end < n and text[end] != _NEWLINE and depth > 0:
+        depth += 1 if text[end] == 40 else (-1 if text[end] == 41 else 0)
+        end += 1
+    return f.COMMENT_NESTED, end
+
+
 @njit(cache=True, nogil=True)
 def _scan(text, first_line, letters, values, lines, extras, spans):
     n = len(text)
@@ -65,6 +143,8 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
     line = first_line
     line_start = 0
     words_in_line = 0
+    marked = False
+    previous = 0  # letter of the word before
     while i < n:
         c = text[i]
         if c in (_SPACE, _TAB, _RETURN, _END_OF_TAPE):
@@ -81,32 +161,27 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             line += 1
             line_start = i
             words_in_line = 0
+            marked = False
+            previous = 0
             continue
         error = 0
+        lost = 0  # letter of the word whose value cannot be read
         found = float(c)
         upper = c & 223 if c >= 97 and c <= 122 else c
         if c == 59:  # ; comment to the end of the line
-            end = i + 1
-            while end < n and text[end] != _NEWLINE:
-                end += 1
-            i = end
+            i = _line_end(text, i)
             continue
         if c == 40:  # ( comment )
-            end = i + 1
-            while end < n and text[end] != 41 and text[end] != _NEWLINE and text[end] != 40:
-                end += 1
-            if end >= n or text[end] == _NEWLINE:
-                error = f.COMMENT_OPEN
-            elif text[end] == 40:
-                error = f.COMMENT_NESTED
-            else:
-                if _is_message(text, i + 1, end) and messages < len(spans):
+            error, end = _after_comment(text, i)
+            if error == f.OK:
+                if _is_message(text, i + 1, end - 1) and messages < len(spans):
                     letters[count], values[count], lines[count] = 40, messages, line
-                    spans[messages, 0], spans[messages, 1] = i + 1, end
+                    spans[messages, 0], spans[messages, 1] = i + 1, end - 1
                     messages += 1
                     count += 1
-                i = end + 1
+                i = end
                 continue
+            i = end
         elif c == 37 or (c == 47 and words_in_line == 0):  # % and /
             letters[count], values[count], lines[count] = c, 0.0, line
             count += 1
@@ -119,8 +194,10 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             digits = 0
             significant = 0
             decimals = 0
+            before_point = 0
             point = False
             started = False
+            signed = False
             while i < n:
                 d = text[i]
                 if d >= 48 and d <= 57:
@@ -137,34 +214,41 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                 elif d == 46 and not point:
                     point = True
                     started = True
+                    before_point = digits
                 elif (d == 45 or d == 43) and not started:
                     started = True
+                    signed = True
                     if d == 45:
                         sign = -1.0
                 elif d != _SPACE and d != _TAB:
                     break
                 i += 1
+            found = float(upper)
             if digits == 0:
                 error = f.NO_NUMBER
-                found = float(upper)
+                lost = upper
                 if upper == 79:
                     error = f.O_WORD
-                elif i < n and (text[i] == 35 or text[i] == 91):
+                elif upper == 78:
+                    error, lost = f.BAD_LINE_NUMBER, 0
+                elif i < n and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
                     error = f.EXPRESSION
+                    i = _after_value(text, i, _line_end(text, i))
             elif error != 0:
-                found = float(upper)
+                lost = upper
             elif upper == 79:
-                while i < n and (text[i] == _SPACE or text[i] == _TAB or text[i] == _RETURN):
+                while i < n and _blank(text[i]):
                     i += 1
                 alone = i >= n or text[i] == _NEWLINE or text[i] == 40 or text[i] == 59
                 if words_in_line == 0 and alone and not point and sign > 0:
                     words_in_line += 1  # a program number, O1001, says nothing about motion
                     continue
                 error = f.O_WORD
-            elif upper == 78:  # N: line number, no word
+                lost = upper
+            elif upper == 78:  # N: line number, no word; digits, or digits.digits, as LinuxCNC reads it
                 if words_in_line > 0:
                     error = f.N_NOT_FIRST
-                elif sign < 0:
+                elif signed or (point and (before_point == 0 or before_point == digits)):
                     error = f.BAD_LINE_NUMBER
                 else:
                     words_in_line += 1
@@ -176,18 +260,38 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                 lines[count] = line
                 count += 1
                 words_in_line += 1
+                previous = upper
                 if upper >= 88 and decimals > most_decimals:
                     most_decimals = decimals
                 continue
-        elif c == 35 or c == 91 or c == 93 or c == 61:  # # [ ] =
+        elif c == 35:  # #1 = value: an assignment; what is no assignment is a lone parameter
             error = f.EXPRESSION
+            end = _line_end(text, i)
+            i = _after_value(text, i, end)
+            while i < end and _blank(text[i]):
+                i += 1
+            if i < end and text[i] == 61:
+                i = _after_value(text, i + 1, end)
+        elif c == 91 or c == 93 or c == 61:  # [ ] =
+            error = f.EXPRESSION
+            lost = previous
+            i += 1
         else:
             error = f.BAD_CHARACTER
-        letters[count], values[count], lines[count] = 33, error, line
-        if marks < len(extras):
-            extras[marks] = found
-        marks += 1
-        count += 1
-        while i < n and text[i] != _NEWLINE:
+            lost = previous
             i += 1
+        words_in_line += 1
+        if not marked:
+            letters[count], values[count], lines[count] = 33, error, line
+            if marks < len(extras):
+                extras[marks] = found
+            marks += 1
+            count += 1
+            marked = True
+        if lost > 0:
+            letters[count], values[count], lines[count] = lost + 32, 0.0, line
+            count += 1
+        if error == f.O_WORD:
+            i = _line_end(text, i)
+        previous = 0
     return count, messages, most_decimals

@@ -16,20 +16,17 @@ OFFSETS = json.loads((REFERENCE / "offsets.json").read_text(encoding="ascii"))
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 AXES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}  # first, second, normal
 
-REFUSED_HERE = {
-    "arc_radius_tolerance": "arc radii may differ by 0.01 mm here, by 0.028 mm there",
-    "arc_radius_tolerance_inch": "the same in inches",
-    "overrides": "M48 and M49 are not read",
-}
-"""Programs that LinuxCNC runs and this reader refuses on purpose."""
 ACCEPTED_HERE = {
     "g43_unknown_tool": "tool-undeclared",
     "unknown_tool": "a tool that is only preselected does nothing",
     "unknown_m": "an event; translation refuses it where the cell has no KRL for it",
     "m_too_large": "the same",
     "percent_in_program": "a lone closing tape mark ends the program",
+    "arc_k_zero_in_xy": "centre-zero",
+    "g28_with_rapid": "home-beside-rapid",
+    "g28_with_motion": "home-beside-rapid",
 }
-"""Programs that LinuxCNC refuses and this reader reads on purpose."""
+"""Programs that LinuxCNC refuses and this reader reads on purpose; a code is that of the finding it gives."""
 
 POSITION_MM = 1e-6
 FEED_MM_S = 1e-7
@@ -68,7 +65,7 @@ def _last_rows(toolpath):
     return np.flatnonzero(ends) + 1
 
 
-RUNNING = [case for case in EXPECTED["programs"] if _name(case) not in REFUSED_HERE]
+RUNNING = EXPECTED["programs"]
 programs = pytest.mark.parametrize("case", RUNNING, ids=_name)
 
 
@@ -163,17 +160,11 @@ def _named(group, names):
     return [case for case in EXPECTED[group] if _name(case) in names]
 
 
-@pytest.mark.parametrize("case", _named("programs", REFUSED_HERE), ids=_name)
-def test_what_is_stricter_here_is_refused(case):
-    with pytest.raises(Gcode2KrlError):
-        _read(case)
-
-
 @pytest.mark.parametrize("case", _named("errors", ACCEPTED_HERE), ids=_name)
 def test_what_is_read_here_in_spite_of_linuxcnc(case):
     toolpath = _read(case)
     code = ACCEPTED_HERE[_name(case)]
-    assert code != "tool-undeclared" or [issue.code for issue in toolpath.issues].count(code) >= 1
+    assert " " in code or code in [issue.code for issue in toolpath.issues]
 
 
 @pytest.mark.parametrize("case", [c for c in EXPECTED["errors"] if _name(c) not in ACCEPTED_HERE], ids=_name)

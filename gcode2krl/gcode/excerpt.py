@@ -1,0 +1,73 @@
+"""The culprit of a finding, quoted: its block on one line, with a caret before the word that is wrong."""
+
+import re
+
+from gcode2krl.gcode import findings as f
+
+_BEFORE, _AFTER = 24, 32
+_COMMENT = re.compile(r"\([^()]*\)|;.*")
+_FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
+_ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
+_OF_LETTER_A = {f.NUMBER_TOO_LONG, f.UNKNOWN_LETTER, f.ROTARY_WORD, f.BAD_INTEGER, f.ARC_WRONG_OFFSET}
+_FIXED = {
+    f.COMMENT_OPEN: r"\((?!.*\))", f.COMMENT_NESTED: r"(?<=[^(])\((?=[^()]*\))|\(", f.O_WORD: "O",
+    f.EXPRESSION: r"[A-Z]?\s*[-+]?\s*[#\[\]=]|[A-Z](?=[A-Z]+\[)",
+    f.NEGATIVE_FEED: "F", f.NEGATIVE_SPEED: "S", f.DWELL_NEGATIVE: "P", f.NEGATIVE_TOLERANCE: "P",
+    f.ARC_TURNS: "P", f.NO_FEED: _FEED_WORD, f.NO_INVERSE_TIME: _FEED_WORD,
+    f.FEED_PER_REV_STOPPED: _FEED_WORD,
+    f.NO_MOTION_MODE: "[XYZABCUVW]", f.TOOL_NOT_SELECTED: r"M\s*0*6(?!\d)", f.DWELL_NO_P: r"G\s*0*4(?![\d.])",
+    f.ARC_NO_CENTRE: r"G\s*0*[23](?![\d.])|[XYZ]", f.ARC_BOTH_FORMATS: "R", f.ARC_RADIUS_MISMATCH: _ARC_WORD,
+    f.ARC_RADIUS_TOO_SMALL: "R", f.ARC_R_FULL_CIRCLE: "R", f.ARC_ZERO_RADIUS: _ARC_WORD,
+    f.ARC_NEEDS_OFFSETS: "[IJK]", f.N_NOT_FIRST: "N", f.BAD_LINE_NUMBER: "N", f.TOO_FAR: "[XYZ]",
+    f.G53_NEEDS_RAPID_OR_FEED: r"G\s*53", f.G53_INCREMENTAL: r"G\s*53", f.DWELL_WITH_ARC: r"G\s*0*4(?![\d.])",
+    f.H_DIFFERS: "H", f.TOO_MANY_M: r"M(?=[^M]*$)", f.BAD_M: "M",
+}  # fmt: skip
+
+
+def quote(block: bytes, number: int, a: float, b: float) -> str:
+    """Return the block with a caret before what finding ``number`` is about: ``G1 X10 ^I5``."""
+    text = block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
+    at = _place(text, number, a, b)
+    start = max(0, at - _BEFORE)
+    stop = min(len(text), at + _AFTER)
+    before, after = (_printable(part) for part in (text[start:at].lstrip(), text[at:stop].rstrip()))
+    return ("..." if start else "") + before + "^" + after + ("..." if stop < len(text) else "")
+
+
+def _printable(text: str) -> str:
+    return "".join(c if 32 <= ord(c) < 127 else "?" for c in text)
+
+
+def _place(text: str, number: int, a: float, b: float) -> int:
+    """Return the column of the culprit, the first word where it cannot be told."""
+    code = text.upper() if len(text.upper()) == len(text) else text
+    if number not in (f.COMMENT_OPEN, f.COMMENT_NESTED):
+        code = _COMMENT.sub(lambda comment: " " * len(comment[0]), code)
+    found = re.search(_pattern(number, a, b), code) or re.search(r"[^\s/]", code)
+    return found.start() if found else 0
+
+
+def _pattern(number: int, a: float, b: float) -> str:
+    letter = re.escape(chr(int(a))) if 0 <= a < 256 else "?"
+    if number == f.BAD_CHARACTER:
+        return letter
+    if number == f.NO_NUMBER:
+        return letter + r"(?!\s*[-+]?\s*\.?\s*\d)"
+    if number == f.REPEATED_WORD:
+        return f"{letter}(?=[^{letter}]*$)"
+    if number in _OF_LETTER_A:
+        return letter
+    if number == f.UNUSED_WORD:
+        return f"[{f.letters_of(a)}]"
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
+        return _word("G", a)
+    if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
+        return _word("G", b)
+    if number in (f.UNSUPPORTED_M, f.SAME_GROUP_M):
+        return _word("M", a if number == f.UNSUPPORTED_M else b)
+    return _FIXED.get(number, r"[^\s/]")
+
+
+def _word(letter: str, tenfold: float) -> str:
+    """Return the pattern of a G or M word, its number given as ten times its value."""
+    return rf"{letter}\s*0*{re.escape(f'{tenfold / 10:g}')}(?:\.0*)?(?![\d.])"

@@ -1,0 +1,171 @@
+"""What the interpreter found, as Issues: causes first, equal arcs together, consequences counted."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.errors import Issue, Severity
+from gcode2krl.gcode import findings as f
+from gcode2krl.gcode.excerpt import quote
+from gcode2krl.gcode.report import CONSEQUENCES, DROPPED, FINDINGS
+from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
+
+Record = Any
+"""A numpy record; numpy does not type its fields."""
+
+_INCH_DECIMALS = 4
+_INCH_EXTENT_MM = 60.0
+_NOTES = {
+    NOTE_ROTARY: (
+        "rotary-zero",
+        "{word}0 is no motion where the cell declares no rotary axes, and is not read ({blocks})",
+        "nothing to do; without rotary words in the post the note goes away",
+    ),
+    NOTE_CENTRE: (
+        "centre-zero",
+        "{word}0 is not in the plane of its arc and says nothing ({blocks})",
+        "nothing to do; a post for LinuxCNC leaves it out",
+    ),
+    NOTE_HOME: (
+        "home-beside-rapid",
+        "G0 and G{home} in one block: read as G{home} by way of the point; G0 stays in force ({blocks})",
+        "nothing to do; for LinuxCNC write them in separate blocks",
+    ),
+    NOTE_OVERRIDE: (
+        "override-switch",
+        "M{number} switches overrides, which have no meaning on this robot; not read ({blocks})",
+        "nothing to do; the override stands on the robot's panel",
+    ),
+}
+
+
+def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
+    """Return the file lines that the findings and notes so far speak of."""
+    own = {int(line) for line in found["line"]}
+    return own | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
+
+
+def found_issues(
+    found: NDArray[np.void], counts: NDArray[np.int64], state: Record, texts: Mapping[int, bytes]
+) -> list[Issue]:
+    """Return the findings in the order of the file, then how many more there are.
+
+    ``texts`` are the blocks by line, for quoting them.
+    """
+    rows = found[: counts[FINDINGS]]
+    issues = [_issue(row, texts) for row in rows]
+    misfits = [k for k, row in enumerate(rows) if row["number"] == f.ARC_RADIUS_MISMATCH]
+    if misfits:
+        issues[misfits[0]] = _of_all_misfits(
+            issues[misfits[0]], rows[misfits[0]], [int(rows[k]["line"]) for k in misfits], state
+        )
+    issues = [issue for k, issue in enumerate(issues) if k not in misfits[1:]]
+    severity: Severity = "error" if any(issue.severity == "error" for issue in issues) else "warning"
+    if counts[DROPPED]:
+        issues.append(Issue(severity, "more", 0, f"{int(counts[DROPPED])} more findings", "mend these first"))
+    if counts[CONSEQUENCES]:
+        sentence = f"{int(counts[CONSEQUENCES])} more findings rest on the errors above and are not listed"
+        issues.append(Issue("note", "consequences", 0, sentence, "mend the errors, then read again"))
+    return issues
+
+
+def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
+    number, line = int(row["number"]), int(row["line"])
+    a, b, c = (float(row[name]) for name in "abc")
+    excerpt = quote(texts[line], number, a, b) if line in texts else ""
+    return f.make_issue(number, line, a, b, c, excerpt)
+
+
+def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) -> Issue:
+    """Arcs whose radii differ too much are one finding: mostly one setting of the post is wrong."""
+    count = int(state["misfits"])
+    message, remedy = issue.message, issue.remedy
+    if count > 1:
+        others = ", ".join(map(str, lines[1:]))
+        rest = ", …" if count > len(lines) else ""
+        message += f"; so do {count - 1} more (lines {others}{rest})"
+    if state["misfits_other_centre"] == count:
+        now, other, how = (
+            ("G91.1", "G90.1", "absolute") if abs(row["c"]) == 911 else ("G90.1", "G91.1", "relative")
+        )
+        message += f"; {now} is in force, and with {other} the radii fit"
+        remedy = f"write {other} before the first arc: I, J, K look {how}"
+    return replace(issue, message=message, remedy=remedy)
+
+
+def program_issues(
+    state: Record, texts: Mapping[int, bytes], *, rest_line: int, most_decimals: int, head: bytes
+) -> Iterator[Issue]:
+    """Yield the warnings and notes about a program that is understood."""
+    yield from _spirals(state, texts)
+    yield from _notes(state, texts)
+    if not state["ended"]:
+        yield _no_end(cut_off=state["tape_marks"] == 1)
+    if rest_line:
+        yield Issue(
+            "warning",
+            "after-end",
+            rest_line,
+            "lines behind the program's end are not read",
+            "remove them or the early M2/M30/%",
+        )
+    if not state["unit_named"]:
+        yield _unit_issue(state, most_decimals)
+    elif state["unit_mm"] == 1.0 and _says_inch(head):
+        yield Issue(
+            "warning",
+            "unit-doubtful",
+            0,
+            "a comment at the top speaks of inches, the program says G21 (mm)",
+            "check the post's unit",
+        )
+
+
+def _spirals(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
+    count, line = int(state["spirals"]), int(state["spiral_line"])
+    if not count:
+        return
+    start, end = float(state["spiral_start"]), float(state["spiral_end"])
+    sentence = f.SPIRAL_SENTENCE.format(
+        count="an arc" if count == 1 else f"{count} arcs", difference=abs(start - end), a=start, b=end
+    )
+    remedy = f.SPIRAL_REMEDY.format(decimals=f.decimals_needed(float(state["spiral_unit_mm"])))
+    excerpt = quote(texts[line], f.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
+    yield Issue("warning", "arc-radius-differs", line, sentence, remedy, excerpt)
+
+
+def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
+    for which, (code, sentence, remedy) in _NOTES.items():
+        count, line, word = (int(state[name][which]) for name in ("note_count", "note_line", "note_word"))
+        if not count:
+            continue
+        values = {"word": chr(word) if word < 128 else "", "home": word // 10, "number": word}
+        blocks = "in one block" if count == 1 else f"in {count} blocks"
+        yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
+
+
+def _no_end(*, cut_off: bool) -> Issue:
+    if cut_off:
+        what = "the file begins with % and ends without %, M2 or M30"
+        return Issue("warning", "cut-off", 0, what, "is the file complete?")
+    return Issue("warning", "no-program-end", 0, "no M2, M30 or % at the end", "is the file complete?")
+
+
+def _unit_issue(state: Record, most_decimals: int) -> Issue:
+    if state["largest_mm"] < _INCH_EXTENT_MM and most_decimals >= _INCH_DECIMALS:
+        return Issue(
+            "warning",
+            "unit-doubtful",
+            0,
+            "no G20 or G21, and the numbers look like inches (four decimals, small); read as mm",
+            "write G20 or G21 at the start",
+        )
+    return Issue("warning", "unit-unnamed", 0, "no G20 or G21; read as mm", "write G21 at the start")
+
+
+def _says_inch(head: bytes) -> bool:
+    comments = [line.lower() for line in head.splitlines() if line.lstrip()[:1] in (b"(", b";")]
+    return any(b"inch" in line and b"mm" not in line for line in comments)
