@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample, sample_times
 from gcode2krl.parts import edges, in_parts
@@ -57,12 +58,11 @@ class Chain:
     constant acceleration vector between v1 and v2 with d1/d2 = v1/v2."""
 
     def corner_error_mm(self) -> Floats:
-        """Return the corner errors (n,): the distance of the vertex to the parabola's middle."""
+        """Return the corner errors (n,): the distance of the vertex to the parabola."""
         d, error = self.blend_mm, np.zeros(len(self.blend_mm))
         corners = np.flatnonzero(d > 0)
-        before, after = self.scale[corners], self.scale[corners + 1]
-        cos_turn = 1.0 - 2.0 * self.cos_half[corners] ** 2
-        error[corners] = d[corners] * np.sqrt(before**2 + after**2 - 2.0 * before * after * cos_turn) / 4.0
+        before, after = d[corners] * self.scale[corners], d[corners] * self.scale[corners + 1]
+        error[corners] = parabola_distance(before, after, self.cos_half[corners])
         return error
 
 
