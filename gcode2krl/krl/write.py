@@ -15,7 +15,7 @@ from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.pilot_plan import PilotPlan, plan_pilot
 from gcode2krl.krl.read import read_texts
-from gcode2krl.krl.release import released
+from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import file_names
 from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.verify import VerifyReport, compare
@@ -70,7 +70,7 @@ def write_krl(
     cell : needed with Targets; a Prediction has its own.
     joints : joints at the targets where they are known already.
     name : program name; default: the file's stem.
-    allow : findings released by hand, ``CODE:LINE``; the header lists them.
+    allow : findings released by hand, ``CODE:LINE`` or ``CODE`` for all of a kind; the header lists them.
     guard : compare frames, robot and inputs before the first motion.
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
     options : words for the header.
@@ -95,6 +95,7 @@ def write_krl(
     if online is not None:
         _refuse_name(online, file)
         issues += online_issues(targets, cell)
+    header_allowed = header_words([*issues, *source.issues], allow)
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
     plan = _pilot_plan(source, pilot, joints, file is not None)
@@ -108,7 +109,7 @@ def write_krl(
         split if file is not None else "defs",
         single_file=file is None,
         options=options,
-        allowed=tuple(allow),
+        allowed=header_allowed,
         forces=known,
         online=online or "",
     )
