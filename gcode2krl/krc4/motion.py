@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 _MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
 """Share of the time above which a loss is a finding."""
+_NO_LENGTH_MM = 1e-6
+"""What is shorter is rounding: another tool whose tip stands at the same place moves nowhere."""
 _STRAIGHT_COS = 1e-7
 """cos(alpha/2) below which a line goes straight on and there is no corner."""
 
@@ -119,6 +121,7 @@ def _sizes(start: Floats, end: Floats) -> Floats:
     def part(first: int, behind: int) -> None:
         x, y, z = (end[first:behind] - start[first:behind]).T
         np.sqrt(x * x + y * y + z * z, out=size[first:behind])
+        size[first:behind][size[first:behind] < _NO_LENGTH_MM] = 0.0
 
     in_parts(part, edges(len(size)))
     return size
