@@ -22,8 +22,10 @@ _WORTH_SAYING = 0.01
 """Share of the time above which a loss is a finding."""
 _NO_LENGTH_MM = 1e-6
 """What is shorter is rounding: another tool whose tip stands at the same place moves nowhere."""
-_STRAIGHT_COS = 1e-7
-"""cos(alpha/2) below which a line goes straight on and there is no corner."""
+_STRAIGHT_COS, _NEARLY_STRAIGHT_COS = 1e-7, 0.01
+"""cos(alpha/2) below which a line goes straight on and there is no corner, and below which it may."""
+_WRITTEN_MM = 1e-3
+"""The last decimal of a position in the KRL text."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     length, speed, acceleration, angle = _with_orientation(size, speed, from_rotation, to_rotation, cell)
     d, cos_half = _blends(start, end, size, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
-    d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
+    d[stop | _goes_straight_on(d, cos_half)] = 0.0
     scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell)
     return Chain(
         first=first,
@@ -266,6 +268,15 @@ def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floa
 
     in_parts(part, edges(max(len(size) - 1, 0)))
     return d, cos_half
+
+
+def _goes_straight_on(d: Floats, cos_half: Floats) -> NDArray[np.bool_]:
+    """Mark the vertices (n,) that are no corners: their curve is off by less than the text can say.
+
+    So a tangent stays one when its points are rounded to the decimals of the text.
+    """
+    near = (cos_half < _NEARLY_STRAIGHT_COS) & (d * cos_half / 2.0 < _WRITTEN_MM / 2.0)
+    return np.asarray((cos_half < _STRAIGHT_COS) | near)
 
 
 def _scales(

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from gcode2krl import krc4
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
 from gcode2krl.krl.pilot_text import NO_KNOT_YET, SUBPROGRAM, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
-from gcode2krl.krl.triggers import most_active, view
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, force_at, in_contact
 from gcode2krl.pilot.sidecar import NOT_YET
@@ -75,7 +75,8 @@ def check_pilot(
         lead, found = _timing(program, pilot, windows, cell)
         issues += found
         lead_s = float(lead.min())
-    active = most_active(program.triggers.motion, view(cell))
+    order = read_order(len(program.ptp), _halts(program), cell)
+    active = most_active(order[program.triggers.motion], view(cell))
     if active > cell.pilot.max_active:
         sentence = f"{active} triggers wait at the same time, allowed are {cell.pilot.max_active}"
         issues.append(_issue(program, 0, "pilot-active", sentence))
@@ -118,6 +119,15 @@ def _checksum_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
 
 def _known(value: float) -> float | None:
     return None if np.isnan(value) else value
+
+
+def _halts(program: KrlProgram) -> NDArray[np.int64]:
+    """Return the motions behind which a wait or a halt holds the advance run."""
+    texts: dict[int, list[str]] = {}
+    for statement in program.statements:
+        texts.setdefault(statement.motion, []).append(statement.text)
+    rows = [motion - 1 for motion, said in texts.items() if motion > 0 and halts_advance(said)]
+    return np.union1d(np.flatnonzero(program.wait_s > 0), np.array(rows, dtype=np.int64))
 
 
 def _ends_early(program: KrlProgram, pilot: PilotText) -> bool:

@@ -11,11 +11,12 @@ from gcode2krl import krc4
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krc4 import Chain
+from gcode2krl.krl.advance import most_active, view
 from gcode2krl.krl.cuts import cut_for
 from gcode2krl.krl.pieces import Pieces, split
 from gcode2krl.krl.pilot_check import PilotCase
 from gcode2krl.krl.pilot_text import PilotText
-from gcode2krl.krl.triggers import Triggers, most_active, place_triggers, view
+from gcode2krl.krl.triggers import Triggers, place_triggers
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
 from gcode2krl.pilot.knots import LEAD_DECIMALS
@@ -264,11 +265,11 @@ class _Plan:
 
     def _waiting(self, triggers: Triggers) -> Rows:
         """Return how many triggers (k,) wait from each on."""
-        row = np.where(triggers.row < 0, len(self.targets) + len(triggers.row), triggers.row)
-        return np.searchsorted(row, row + view(self.cell)) - np.arange(len(row))
+        order = triggers.order
+        return np.searchsorted(order, order + view(self.cell)) - np.arange(len(order))
 
     def _too_many(self, triggers: Triggers) -> bool:
-        return most_active(triggers.row, view(self.cell)) > self.cell.pilot.max_active
+        return most_active(triggers.order, view(self.cell)) > self.cell.pilot.max_active
 
     def _header(self) -> PilotHeader:
         pilot = self.cell.pilot

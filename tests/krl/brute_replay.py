@@ -25,7 +25,7 @@ _NUMBER = r"[-+]?\d+(?:\.\d+)?"
 _SETTING = re.compile(rf"\$(VEL\.CP|ACC\.CP|APO\.CDIS)\s*=\s*({_NUMBER})")
 _MOTION = re.compile(r"(LIN|PTP)\s*\{([^{}]*)\}\s*(C_DIS)?")
 _TRIGGER = re.compile(
-    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:\$\w+\[\d+\]=(\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
+    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:\$\w+\[\d+\]=(-?\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
 )
 
 
@@ -173,8 +173,9 @@ def _corners(moves, law):
     for i, (move, after) in enumerate(itertools.pairwise(moves)):
         after.scale = move.scale
         cos_turn = float(np.clip(move.way @ after.way, -1.0, 1.0))
-        straight = math.sqrt((1.0 - cos_turn) / 2.0) < 1e-7
+        cos_half = math.sqrt((1.0 - cos_turn) / 2.0)
         d = min(move.cdis, move.length / 2, after.length / 2)
+        straight = cos_half < 1e-7 or (cos_half < 0.01 and d * cos_half < 1e-3)  # less than the text can say
         move.legs, move.plans_as_corner = (d, d), not straight
         ratio = after.speed / move.speed
         if straight or ratio == 1.0:
