@@ -36,7 +36,8 @@ def prepare(place: Path) -> Try:
 
     probe = Probe(rest_cycles=5, settle_cycles=5)
     devices = [
-        compensator(load_cell(), Online(mode=mode, probe=probe), load_frame="sensor") for mode in ("cartesian", "axis")
+        compensator(load_cell(), Online(mode=mode, probe=probe), load_frame="sensor")
+        for mode in ("cartesian", "axis")
     ]
     for device in devices:
         warm_up(device)

@@ -111,10 +111,18 @@ def test_a_panic_of_the_reader_is_one_line_and_says_nothing_by_itself(tmp_path, 
 
 
 CHANGES = {
-    "time that falls": ("motion", lambda f: f.with_columns(time_s=pl.col("time_s").reverse()), "does not rise"),
+    "time that falls": (
+        "motion",
+        lambda f: f.with_columns(time_s=pl.col("time_s").reverse()),
+        "does not rise",
+    ),
     "time that is no number": ("motion", lambda f: f.with_columns(time_s=pl.lit(np.nan)), "not a number"),
     "a position without end": ("motion", lambda f: f.with_columns(position_x_mm=pl.lit(np.inf)), "infinite"),
-    "a move that is not there": ("motion", lambda f: f.with_columns(move=pl.lit(999, pl.Int32)), "Motion.move"),
+    "a move that is not there": (
+        "motion",
+        lambda f: f.with_columns(move=pl.lit(999, pl.Int32)),
+        "Motion.move",
+    ),
     "a tool that is not there": ("motion", lambda f: f.with_columns(tool=pl.lit(99, pl.Int32)), "tool 99"),
     "a target of no row": ("targets", lambda f: f.with_columns(move=pl.lit(-2, pl.Int32)), "Targets.move"),
     "no orientation": ("targets", lambda f: f.with_columns(rotation_w=pl.lit(5.0)), "length 1"),

@@ -32,7 +32,12 @@ Floats = NDArray[np.float64]
 @common_options
 @gcode_options
 @click.option("--name", help="Program name; default: the output's name.")
-@click.option("--allow", multiple=True, metavar="CODE:LINE", help="Release one finding; may be repeated.")
+@click.option(
+    "--allow",
+    multiple=True,
+    metavar="CODE[:LINE]",
+    help="Release one finding, or all of a kind; may be repeated.",
+)
 @click.option("--strict", is_flag=True, help="Warnings refuse the program too.")
 @click.option("--no-guard", is_flag=True, help="Leave out the checks at the program's start.")
 @click.option(
@@ -216,12 +221,12 @@ def _words(**options: Any) -> str:
 
 def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: str | None) -> None:
     """Refuse what cannot move at all, or not be corrected online, before its motion is planned."""
-    from gcode2krl.krl.release import released
+    from gcode2krl.krl.release import matching, released
     from gcode2krl.krl.rsi_refusals import online_issues
 
     issues = [*targets.issues, *(online_issues(targets, cell) if online is not None else ())]
     if any(issue.severity == "error" for issue in issues):
-        released(issues, allow)
+        released(issues, matching(issues, allow))
 
 
 def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 _REVERSAL_COS = -1.0 + 1e-12
+_HALVINGS = 52
+"""Bisections that leave nothing of an interval of length 1 in double precision."""
 
 
 def effective_acceleration(v_mm_s: ArrayLike, a_mm_s2: ArrayLike, k_s: ArrayLike) -> Floats:
@@ -38,7 +40,7 @@ def corner(
     Returns
     -------
     d_mm : (n,) min(CDIS, L1/2, L2/2); 0 where a line has no length or the path reverses.
-    error_mm : (n,) distance of the corner to the parabola's apex, d·cos(alpha/2)/2 (from eq. 1-3).
+    error_mm : (n,) distance of the corner to the parabola, d·cos(alpha/2)/2 at its apex (from eq. 1-3).
     a_p_mm_s2 : (n,) v²·cos(alpha/2)/d (eq. 6).
     duration_s : (n,) 2·d/v.
     """
@@ -57,6 +59,40 @@ def corner(
     a_p = np.where(positive, v**2 * cos_half / np.where(positive, d, 1.0), 0.0)
     duration = np.where(v > 0, 2.0 * d / np.where(v > 0, v, 1.0), 0.0)
     return d, d * cos_half / 2.0, a_p, duration
+
+
+def parabola_distance(before_mm: Floats, after_mm: Floats, cos_half: Floats) -> Floats:
+    """Return the distance (n,) in mm of a corner to its parabola, whose distances may differ.
+
+    The parabola t²·q - (1 - t)²·p leaves the line p = ``before_mm`` ahead of the corner and joins the next
+    one q = ``after_mm`` behind it (eq. 1-3 with unequal distances); ``cos_half`` = cos(alpha/2). With
+    r = t/(1 - t) its nearest point is the one positive root of q²·r³ + p·q·c·r² - p·q·c·r - p², c = cosine
+    of the turn; equal distances have it in the middle.
+    """
+    p, q, s = before_mm, after_mm, cos_half
+    distance = p * s / 2.0
+    unequal = np.flatnonzero((p != q) & (p > 0) & (q > 0))
+    if len(unequal):
+        p, q, s = p[unequal], q[unequal], s[unequal]
+        t = _nearest_share(p / q, 1.0 - 2.0 * s**2)
+        ahead, behind = (1.0 - t) ** 2 * p, t**2 * q
+        distance[unequal] = np.sqrt((ahead - behind) ** 2 + 4.0 * ahead * behind * s**2)
+    return distance
+
+
+def _nearest_share(ratio: Floats, cos_turn: Floats) -> Floats:
+    """Return t (n,) of the parabola's point that is nearest to the corner, by bisection.
+
+    ``ratio`` = p/q. The root is the only one in 0 < t < 1 (the cubic's discriminant is negative).
+    """
+    low, high = np.zeros_like(ratio), np.ones_like(ratio)
+    bend = ratio * cos_turn
+    for _ in range(_HALVINGS):
+        t = (low + high) / 2.0
+        rest = 1.0 - t
+        beyond = t**3 - ratio**2 * rest**3 > bend * t * rest * (rest - t)
+        low, high = np.where(beyond, low, t), np.where(beyond, t, high)
+    return (low + high) / 2.0
 
 
 def speed_step(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample, sample_times
 from gcode2krl.parts import edges, in_parts
@@ -19,8 +20,12 @@ Floats = NDArray[np.float64]
 _MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
 """Share of the time above which a loss is a finding."""
-_STRAIGHT_COS = 1e-7
-"""cos(alpha/2) below which a line goes straight on and there is no corner."""
+_NO_LENGTH_MM = 1e-6
+"""What is shorter is rounding: another tool whose tip stands at the same place moves nowhere."""
+_STRAIGHT_COS, _NEARLY_STRAIGHT_COS = 1e-7, 0.01
+"""cos(alpha/2) below which a line goes straight on and there is no corner, and below which it may."""
+_WRITTEN_MM = 1e-3
+"""The last decimal of a position in the KRL text."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +62,11 @@ class Chain:
     constant acceleration vector between v1 and v2 with d1/d2 = v1/v2."""
 
     def corner_error_mm(self) -> Floats:
-        """Return the corner errors (n,): the distance of the vertex to the parabola's middle."""
+        """Return the corner errors (n,): the distance of the vertex to the parabola."""
         d, error = self.blend_mm, np.zeros(len(self.blend_mm))
         corners = np.flatnonzero(d > 0)
-        before, after = self.scale[corners], self.scale[corners + 1]
-        cos_turn = 1.0 - 2.0 * self.cos_half[corners] ** 2
-        error[corners] = d[corners] * np.sqrt(before**2 + after**2 - 2.0 * before * after * cos_turn) / 4.0
+        before, after = d[corners] * self.scale[corners], d[corners] * self.scale[corners + 1]
+        error[corners] = parabola_distance(before, after, self.cos_half[corners])
         return error
 
 
@@ -79,7 +83,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     length, speed, acceleration, angle = _with_orientation(size, speed, from_rotation, to_rotation, cell)
     d, cos_half = _blends(start, end, size, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
-    d[stop | (cos_half < _STRAIGHT_COS)] = 0.0
+    d[stop | _goes_straight_on(d, cos_half)] = 0.0
     scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell)
     return Chain(
         first=first,
@@ -119,6 +123,7 @@ def _sizes(start: Floats, end: Floats) -> Floats:
     def part(first: int, behind: int) -> None:
         x, y, z = (end[first:behind] - start[first:behind]).T
         np.sqrt(x * x + y * y + z * z, out=size[first:behind])
+        size[first:behind][size[first:behind] < _NO_LENGTH_MM] = 0.0
 
     in_parts(part, edges(len(size)))
     return size
@@ -263,6 +268,15 @@ def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floa
 
     in_parts(part, edges(max(len(size) - 1, 0)))
     return d, cos_half
+
+
+def _goes_straight_on(d: Floats, cos_half: Floats) -> NDArray[np.bool_]:
+    """Mark the vertices (n,) that are no corners: their curve is off by less than the text can say.
+
+    So a tangent stays one when its points are rounded to the decimals of the text.
+    """
+    near = (cos_half < _NEARLY_STRAIGHT_COS) & (d * cos_half / 2.0 < _WRITTEN_MM / 2.0)
+    return np.asarray((cos_half < _STRAIGHT_COS) | near)
 
 
 def _scales(

@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 _ROOM = 0.8
+"""A move that a slow place holds back over more than this share of its length runs slowly as a whole."""
+_NEARLY, _SHORT = 0.99, 4.0
+"""So does one that is shorter than this many times the reach of a place that is only a little slower: chords
+of an arc are alike but for the micrometre they are rounded to, which must not decide how they are run."""
 UNLIMITED = -1
 """Number of moves in view where the look-ahead model is off."""
 
@@ -125,7 +129,7 @@ def _margins(length, speed, blend, stop, vertex, k):
                 break
             reach = blend[j - 1] + 0.5 * bound[j] * k - way
             if bound[j] < top[i] and reach > 0.0:
-                if reach > _ROOM * length[i]:
+                if reach > _ROOM * length[i] or _is_alike(bound[j], top[i], reach, length[i]):
                     top[i] = bound[j]
                 else:
                     head[i] = max(head[i], reach)
@@ -141,7 +145,7 @@ def _margins(length, speed, blend, stop, vertex, k):
                 break
             reach = blend[j] + 0.5 * bound[j + 1] * k - way
             if bound[j + 1] < top[i] and reach > 0.0:
-                if reach + head[i] > _ROOM * length[i]:
+                if reach + head[i] > _ROOM * length[i] or _is_alike(bound[j + 1], top[i], reach, length[i]):
                     top[i] = bound[j + 1]
                 else:
                     tail[i] = max(tail[i], reach)
@@ -160,6 +164,12 @@ def _margins(length, speed, blend, stop, vertex, k):
         vertex[i] = min(vertex[i], top[i])
         vertex[i + 1] = min(vertex[i + 1], top[i])
     return head, tail, top
+
+
+@njit(cache=True)
+def _is_alike(slow, fast, reach, length):
+    """Tell whether a short move need not distinguish its speed from that of a slow place."""
+    return slow > _NEARLY * fast and length < _SHORT * reach
 
 
 @njit(cache=True)
@@ -227,7 +237,8 @@ def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out):
         if abs(drift) > 1e-9:
             s = start + length[i]
         if stop[i] or i == count - 1:
-            rest = k + (wait[i] if i < count - 1 else 0.0)
+            rest = k if length[i] > 0.0 else 0.0  # what does not move has nothing to smear
+            rest += wait[i] if i < count - 1 else 0.0
             if rest > 0.0:
                 out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = t, s, 0.0, 0.0, area
                 used += 1

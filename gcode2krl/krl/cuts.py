@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.krc4 import Chain
+from gcode2krl.krl.advance import view
 from gcode2krl.krl.pieces import Pieces
-from gcode2krl.krl.triggers import Triggers, view
+from gcode2krl.krl.triggers import Triggers
 from gcode2krl.krl.windows import Windows
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MM_PER_M
@@ -46,7 +47,7 @@ def cut_for(
     room = np.floor(np.maximum(high - low, 0.0) / apart).sum() + len(low)
     cuts = np.empty(int(min(room, len(fire_s) * view(cell))) + 1)
     count = _cut(
-        triggers.row, here_mm, before_mm, np.searchsorted(windows.row, triggers.row), windows.begin_mm,
+        triggers.order, here_mm, before_mm, np.searchsorted(windows.row, triggers.row), windows.begin_mm,
         low, high, apart, cell.pilot.max_active, view(cell), cuts,
     )  # fmt: skip
     return _pieces(cuts[:count], windows, targets, cell) if count else None

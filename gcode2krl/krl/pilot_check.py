@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from gcode2krl import krc4
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
+from gcode2krl.krl.pilot_text import NO_KNOT_YET, SUBPROGRAM, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
-from gcode2krl.krl.triggers import most_active, view
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, force_at, in_contact
 from gcode2krl.pilot.sidecar import NOT_YET
@@ -65,15 +65,17 @@ def check_pilot(
     controller can do it, is an error.
     """
     pilot, knots = case.text, case.text.knots
-    error_N, rms_N = _errors_of(knots, case.motion, case.force_N)
+    ends = _ends_early(program, pilot)
+    error_N, rms_N = _errors_of(knots, case.motion, case.force_N, ends)
     issues = [*_checksum_issues(program, pilot), *_form_issues(program, pilot)]
     lead_s: float | None = None
     windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
-    if len(program.triggers.motion) == len(knots) > 0 and len(windows.row):
+    if len(program.triggers.motion) == len(knots) + ends > ends and len(windows.row):
         lead, found = _timing(program, pilot, windows, cell)
         issues += found
         lead_s = float(lead.min())
-    active = most_active(program.triggers.motion, view(cell))
+    order = read_order(len(program.ptp), _halts(program), cell)
+    active = most_active(order[program.triggers.motion], view(cell))
     if active > cell.pilot.max_active:
         sentence = f"{active} triggers wait at the same time, allowed are {cell.pilot.max_active}"
         issues.append(_issue(program, 0, "pilot-active", sentence))
@@ -118,14 +120,39 @@ def _known(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def _errors_of(knots: Knots, motion: Motion, force_N: Floats | None) -> tuple[float | None, float | None]:
+def _halts(program: KrlProgram) -> NDArray[np.int64]:
+    """Return the motions behind which a wait or a halt holds the advance run."""
+    texts: dict[int, list[str]] = {}
+    for statement in program.statements:
+        texts.setdefault(statement.motion, []).append(statement.text)
+    rows = [motion - 1 for motion, said in texts.items() if motion > 0 and halts_advance(said)]
+    return np.union1d(np.flatnonzero(program.wait_s > 0), np.array(rows, dtype=np.int64))
+
+
+def _ends_early(program: KrlProgram, pilot: PilotText) -> bool:
+    """Tell whether the last trigger says that there is no knot any more."""
+    read = program.triggers
+    if len(read.motion) == 0:
+        return False
+    if pilot.header.form == "index":
+        return bool(read.written[-1, 0] == NO_KNOT_YET)
+    return len(read.motion) > len(pilot.knots) and not read.written[-1].any()
+
+
+def _errors_of(
+    knots: Knots, motion: Motion, force_N: Floats | None, ends_early: bool
+) -> tuple[float | None, float | None]:
     """Return the largest and the RMS distance of forces to the ramps that the online side makes of knots.
 
     The figures of the compression count the ramps along the path as well; the larger ones are returned.
+    Behind a pilot force that ends early nothing is said of the force.
     """
     if force_N is None:
         return _known(knots.max_error_N), _known(knots.rms_error_N)
     off = force_N - force_at(knots, motion.time_s)
+    if ends_early:
+        said = motion.time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
+        off, force_N = off[said], force_N[said]
     square = np.einsum("ij,ij->i", off, off)
     acting = in_contact(force_N)
     mean = float(np.mean(square[acting])) if acting.any() else 0.0
@@ -145,7 +172,7 @@ def _issue(program: KrlProgram, row: int, code: str, sentence: str) -> Issue:
 def _form_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
     """Check that there is a trigger for each knot, in order, that writes what the sidecar says."""
     read, header, knots = program.triggers, pilot.header, pilot.knots
-    count = len(read.motion)
+    count = len(read.motion) - _ends_early(program, pilot)
     if count != len(knots):
         return [
             _issue(program, count, "pilot-count", f"{count} triggers, the sidecar has {len(knots)} knots")
@@ -159,11 +186,12 @@ def _form_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
         sentence = f"triggers write to {', '.join(read.names)}, the sidecar says {name}"
         return [_issue(program, row, "pilot-form", sentence)]
     if by_index:
-        wrong = read.written[:, 0] != np.arange(count)
+        wrong = read.written[:count, 0] != np.arange(count)
     else:
         said = np.column_stack([knots.force_N, knots.lead_s])
-        wrong = ~(np.abs(read.written - said) <= 1e-9 + 1e-12 * np.abs(said)).all(axis=1)
-    wrong |= (read.distance != 0.0) | (read.delay_ms < 0.0) | (read.delay_ms != np.rint(read.delay_ms))
+        wrong = ~(np.abs(read.written[:count] - said) <= 1e-9 + 1e-12 * np.abs(said)).all(axis=1)
+    unlike = (read.distance != 0.0) | (read.delay_ms < 0.0) | (read.delay_ms != np.rint(read.delay_ms))
+    wrong = np.append(wrong, np.zeros(len(unlike) - count, dtype=np.bool_)) | unlike
     return [
         _issue(program, row, "pilot-knot", f"the trigger of knot {row} is not as in the sidecar")
         for row in np.flatnonzero(wrong)[:MOST_PLACES].tolist()
@@ -180,19 +208,23 @@ def _timing(
     carried = windows.row[window] == read.motion
     fire_s = windows.begin_s[window] + read.delay_ms / MS_PER_S
     outside = ~carried | (fire_s > windows.end_s[window] + _ROUNDING_S)
-    lead_s = knots.time_s - fire_s
+    count = len(knots)
+    lead_s = knots.time_s - fire_s[:count]
     cycle_s, least_s = cell.controller.cycle_s, np.minimum(knots.lead_s, pilot.header.lead_s)
     together = np.diff(fire_s, prepend=-np.inf) < cycle_s - _ROUNDING_S
-    together |= np.diff(knots.time_s, prepend=-np.inf) < cycle_s * (1.0 - 1e-3)
+    together[:count] |= np.diff(knots.time_s, prepend=-np.inf) < cycle_s * (1.0 - 1e-3)
+    beyond = np.zeros(len(fire_s), dtype=np.bool_)
+    beyond[count:] = fire_s[count:] > knots.time_s[-1] - pilot.header.lead_s + _ROUNDING_S
     checks = (
         ("pilot-window", outside, "its instant is not within the motion that carries it"),
         ("pilot-lead", ~(lead_s >= least_s - _ROUNDING_S), "announced too late"),
         ("pilot-lead", ~(np.abs(lead_s - knots.lead_s) <= cycle_s), "its lead is not that of the sidecar"),
         ("pilot-cycle", together, f"within one cycle of {cycle_s:g} s with the knot before"),
+        ("pilot-lead", beyond, "its end is told too late"),
     )
     issues = []
     for code, wrong, what in checks:
         for row in np.flatnonzero(wrong)[:MOST_PLACES].tolist():
-            sentence = f"knot {row}, {lead_s[row]:.3f} s ahead: {what}"
-            issues.append(_issue(program, row, code, sentence))
+            place = f"knot {row}, {lead_s[row]:.3f} s ahead" if row < count else "end of the pilot force"
+            issues.append(_issue(program, row, code, f"{place}: {what}"))
     return lead_s, issues

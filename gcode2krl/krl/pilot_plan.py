@@ -1,6 +1,6 @@
 """From predicted forces to what a program says of them: knots, their triggers, and the motions they need."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Literal
 
@@ -11,11 +11,12 @@ from gcode2krl import krc4
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krc4 import Chain
+from gcode2krl.krl.advance import most_active, view
 from gcode2krl.krl.cuts import cut_for
 from gcode2krl.krl.pieces import Pieces, split
 from gcode2krl.krl.pilot_check import PilotCase
 from gcode2krl.krl.pilot_text import PilotText
-from gcode2krl.krl.triggers import Triggers, most_active, place_triggers, view
+from gcode2krl.krl.triggers import Triggers, place_triggers
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
 from gcode2krl.pilot.knots import LEAD_DECIMALS
@@ -35,6 +36,10 @@ _LITTLE_SOONER_S, _MOST_SOONER_S = 0.2, 1.0
 """How much earlier than needed a knot may be announced, rather than that motions are cut, and at most."""
 _SAFE_S = 0.002
 """Added to the lead: what an instant read from the samples of a Motion may be off by."""
+_NONE, _ENDS = "the program carries no pilot force", "the pilot force ends before this line"
+_LEAST_KNOTS = 2
+_TRIALS = 8
+"""How often a pilot force is shortened before it is left out."""
 _SAME_TIME = 0.5
 """Share of a cycle by which pieces may change the time of a program."""
 
@@ -51,29 +56,52 @@ class PilotPlan:
     issues: tuple[Issue, ...]
 
 
-def plan_pilot(prediction: Prediction, joints: Joints, form: Form, sidecar: bool = True) -> PilotPlan:
+def plan_pilot(
+    prediction: Prediction, joints: Joints, form: Form, sidecar: bool = True, *, asked: bool = True
+) -> PilotPlan | Issue:
     """Return the pilot of a prediction with forces, and the targets and joints with the motions it needs.
 
     Where the knots of the default tolerance cannot be announced in time, the tolerance is raised, with a
-    finding. Raises `RefusedError` where that does not help either, or the tolerance is stated in the cell.
+    finding. Where that does not help either, or the tolerance is stated in the cell, a pilot that was asked
+    for raises `RefusedError`; one that was not ends before that place, with a warning, and where nothing is
+    left of it the warning is returned instead.
     """
-    plan = _Plan(prediction, joints, form, sidecar)
-    stated = prediction.cell.pilot.tolerance_N
+    try:
+        outcome = _fitting(_Plan(prediction, joints, form, sidecar), asked)
+    except RefusedError as error:  # the motion is not that of the targets
+        outcome = error.issues[0]
+    if not isinstance(outcome, Issue):
+        return outcome
+    if asked:
+        raise RefusedError(outcome)
+    return left_out(outcome)
+
+
+def left_out(reason: Issue) -> Issue:
+    """Return the warning that a program has no pilot force."""
+    return replace(reason, severity="warning", code="pilot-left-out", message=f"{_NONE}: {reason.message}")
+
+
+def _fitting(plan: "_Plan", asked: bool) -> PilotPlan | Issue:
+    """Return the plan with the finest tolerance that can be announced."""
+    stated = plan.cell.pilot.tolerance_N
     knots = plan.knots(stated)
     first_N = knots.tolerance_N
     outcome = plan.announce(knots)
-    for factor in _COARSER if stated is None else ():
-        if isinstance(outcome, PilotPlan):
-            break
-        knots = plan.knots(factor * first_N)
+    if isinstance(outcome, PilotPlan):
+        return outcome
+    if stated is None:
+        knots = plan.knots(_COARSER[-1] * first_N)
         outcome = plan.announce(knots)
     if isinstance(outcome, Issue):
-        raise RefusedError(outcome)
-    if knots.tolerance_N == first_N:
-        return outcome
-    sentence = (
-        f"knots were too close to be announced: tolerance {knots.tolerance_N:.1f} N, not {first_N:.1f} N"
-    )
+        return outcome if asked else plan.up_to(knots, outcome)
+    for factor in _COARSER[:-1]:
+        finer = plan.announce(plan.knots(factor * first_N))
+        if isinstance(finer, PilotPlan):
+            outcome = finer
+            break
+    used_N = outcome.text.knots.tolerance_N
+    sentence = f"knots were too close to be announced: tolerance {used_N:.1f} N, not {first_N:.1f} N"
     raised = Issue("warning", "pilot-tolerance", 0, sentence, "state [pilot] tolerance_N, or --pilot none")
     return replace(outcome, issues=(raised, *outcome.issues))
 
@@ -126,7 +154,7 @@ class _Plan:
         is not enough, long motions are cut; and what is then left is announced still earlier.
         """
         triggers, _ = self._place(knots, self.windows)
-        if most_active(triggers.row, view(self.cell)) <= self.cell.pilot.max_active:
+        if not self._too_many(triggers):
             return self._planned(knots, triggers, self.windows, self.targets, self.joints)
         whole = (self.windows, self.targets, self.joints)
         outcome = self._earlier(knots, _LITTLE_SOONER_S, *whole)
@@ -138,6 +166,39 @@ class _Plan:
             other = self._earlier(knots, _MOST_SOONER_S, *whole)
             outcome = outcome if isinstance(other, Issue) else other
         return outcome
+
+    def up_to(self, knots: Knots, why: Issue) -> PilotPlan | Issue:
+        """Announce the first knots, as many as can be, then that there is no knot any more."""
+        count = len(knots)
+        for _ in range(_TRIALS):
+            count = min(count - 1, self._count_in_time(knots, count))
+            if count < _LEAST_KNOTS:
+                break
+            outcome = self._ending(_first(knots, count), int(knots.line[count]), why)
+            if isinstance(outcome, PilotPlan):
+                return outcome
+        return why
+
+    def _count_in_time(self, knots: Knots, count: int) -> int:
+        """Return how many of the first knots can be announced without motions that are cut."""
+        tried = _first(knots, count)
+        triggers, sooner_s = self._place(tried, self.windows, spread=True)
+        fits = (triggers.row >= 0) & (triggers.fire_s <= tried.time_s) & (sooner_s <= _MOST_SOONER_S)
+        waiting = self._waiting(triggers) <= self.cell.pilot.max_active
+        fits[self.cell.pilot.max_active :] &= waiting[: -self.cell.pilot.max_active]
+        return count if fits.all() else int(np.argmin(fits))
+
+    def _ending(self, knots: Knots, end_line: int, why: Issue) -> PilotPlan | Issue:
+        """Announce knots and, the lead ahead of the last one, that no knot follows."""
+        triggers, sooner_s = self._place(knots, self.windows, spread=True, ends=True)
+        if sooner_s.max(initial=0.0) > _MOST_SOONER_S or self._too_many(triggers):
+            return self._too_dense(knots)
+        outcome = self._planned(knots, triggers, self.windows, self.targets, self.joints, end_line)
+        if isinstance(outcome, Issue):
+            return outcome
+        sentence = f"{_ENDS}: {why.message}"
+        ended = Issue("warning", "pilot-left-out", end_line, sentence, why.remedy)
+        return replace(outcome, issues=(ended, *outcome.issues))
 
     def _in_pieces(self, knots: Knots, pieces: Pieces) -> PilotPlan | Issue:
         """Announce knots in a program whose motions are cut."""
@@ -154,27 +215,41 @@ class _Plan:
     ) -> PilotPlan | Issue:
         """Announce knots by triggers that are moved to earlier motions where too many would wait."""
         triggers, sooner_s = self._place(knots, windows, spread=True)
-        if sooner_s > most_s or most_active(triggers.row, view(self.cell)) > self.cell.pilot.max_active:
+        if sooner_s.max(initial=0.0) > most_s or self._too_many(triggers):
             return self._too_dense(knots)
         return self._planned(knots, triggers, windows, targets, joints)
 
     def _planned(
-        self, knots: Knots, triggers: Triggers, windows: Windows, targets: Targets, joints: Joints
-    ) -> PilotPlan | Issue:
-        late = np.flatnonzero((triggers.row < 0) | (triggers.fire_s > knots.time_s))
-        if len(late):
-            return _refusal("pilot-late", int(knots.line[late[0]]), "no motion is left to announce it in")
-        announced = replace(knots, lead_s=np.round(knots.time_s - triggers.fire_s, LEAD_DECIMALS))
-        text = PilotText(announced, self._header(), self.cell.pilot.hash_variable, triggers, self.sidecar)
+        self, knots: Knots, triggers: Triggers, windows: Windows, targets: Targets, joints: Joints,
+        end_line: int | None = None,
+    ) -> PilotPlan | Issue:  # fmt: skip
+        count = len(knots)
+        late = np.flatnonzero((triggers.row[:count] < 0) | (triggers.fire_s[:count] > knots.time_s))
+        if len(late) or (triggers.row < 0).any():
+            line = int(knots.line[late[0]]) if len(late) else int(knots.line[-1])
+            return _refusal("pilot-late", line, "no motion is left to announce it in")
+        lead_s = np.round(knots.time_s - triggers.fire_s[:count], LEAD_DECIMALS)
+        announced = replace(knots, lead_s=lead_s)
+        text = PilotText(
+            announced,
+            self._header(),
+            self.cell.pilot.hash_variable,
+            triggers,
+            self.sidecar,
+            end_line=end_line,
+        )
         case = PilotCase(text, self.motion, self.force_N, windows)
         issues = (*knots.issues, *_short_leads(announced, self.cell))
         return PilotPlan(text, targets, joints, case, issues)
 
-    def _place(self, knots: Knots, windows: Windows, spread: bool = False) -> tuple[Triggers, float]:
-        """Return the trigger of each knot, and by how much one is at most earlier than it needs to be.
+    def _place(
+        self, knots: Knots, windows: Windows, spread: bool = False, ends: bool = False
+    ) -> tuple[Triggers, Floats]:
+        """Return the trigger of each knot, and (k,) by how much it is earlier than it needs to be.
 
         A receiver of values ramps towards the knot it has been told, so it must hear of it before the knot
-        before; one that has the sidecar need not.
+        before; one that has the sidecar need not. ``ends`` adds one that acts the lead ahead of the last
+        knot, so that no receiver runs beyond it.
         """
         earliest_s = windows.earliest_s(knots.time_s)
         told_s = knots.time_s.copy()
@@ -182,8 +257,19 @@ class _Plan:
             same = earliest_s[1:] == earliest_s[:-1]
             told_s[1:] = np.where(same, knots.time_s[:-1], knots.time_s[1:])
         deadline_s = told_s - self.cell.pilot.lead_s - _SAFE_S
+        if ends:
+            end_s = knots.time_s[-1] - self.cell.pilot.lead_s - _SAFE_S
+            deadline_s, earliest_s = np.append(deadline_s, end_s), np.append(earliest_s, earliest_s[-1])
         triggers = place_triggers(deadline_s, earliest_s, windows, self.cell, spread=spread)
-        return triggers, float(np.nan_to_num(deadline_s - triggers.fire_s).max(initial=0.0))
+        return triggers, np.nan_to_num(deadline_s - triggers.fire_s)
+
+    def _waiting(self, triggers: Triggers) -> Rows:
+        """Return how many triggers (k,) wait from each on."""
+        order = triggers.order
+        return np.searchsorted(order, order + view(self.cell)) - np.arange(len(order))
+
+    def _too_many(self, triggers: Triggers) -> bool:
+        return most_active(triggers.order, view(self.cell)) > self.cell.pilot.max_active
 
     def _header(self) -> PilotHeader:
         pilot = self.cell.pilot
@@ -211,7 +297,7 @@ class _Plan:
     def _too_dense(self, knots: Knots) -> Issue:
         """Return where most knots come together, without being announced early."""
         triggers, _ = self._place(knots, self.windows)
-        waiting = np.searchsorted(triggers.row, triggers.row + view(self.cell)) - np.arange(len(knots))
+        waiting = self._waiting(triggers)
         worst = int(np.argmax(waiting))
         sentence = (
             f"{waiting[worst]} knots of the pilot force would wait to be announced at the same time, "
@@ -222,6 +308,12 @@ class _Plan:
 
 def _refusal(code: str, line: int, sentence: str) -> Issue:
     return Issue("error", code, line, sentence, "raise [pilot] tolerance_N, or --pilot none")
+
+
+def _first(knots: Knots, count: int) -> Knots:
+    """Return the first knots."""
+    rows = {spec.name: getattr(knots, spec.name)[:count] for spec in fields(knots) if "tail" in spec.metadata}
+    return replace(knots, **rows)
 
 
 def _direction_changes(chain: Chain, windows: Windows, motion: Motion) -> Rows:

@@ -35,6 +35,9 @@ class PilotText:
     """False on standard output."""
     stated: int | None = None
     """The checksum to state; None = that of the targets and knots."""
+    end_line: int | None = None
+    """G-code line from which on the program has no pilot force any more; None = it has one throughout.
+    The triggers are one more than the knots then: the last says that there is no knot."""
 
     def before(self, motions: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
         """Return the text of all triggers, and where in it that of each motion (p + 1,) begins."""
@@ -51,14 +54,22 @@ class PilotText:
 
     def _actions(self) -> list[str]:
         """Return what each trigger does; ``PRIO=-1`` lets the controller choose the priority."""
+        end = [self._no_knot()] if self.end_line is not None else []
         if self.header.form == "index":
-            return [f"{self.header.variable}={knot}" for knot in range(len(self.knots))]
+            return [*(f"{self.header.variable}={knot}" for knot in range(len(self.knots))), *end]
         columns = [*self.knots.force_N.T.tolist(), self.knots.lead_s.tolist()]
         n, s = FORCE_DECIMALS, LEAD_DECIMALS
-        return [
+        told = [
             f"{SUBPROGRAM}({x:.{n}f},{y:.{n}f},{z:.{n}f},{lead_s:.{s}f}) PRIO=-1"
             for x, y, z, lead_s in zip(*columns, strict=True)
         ]
+        return [*told, *end]
+
+    def _no_knot(self) -> str:
+        """Return what puts the receiver back to where it was before the first knot: it knows no force."""
+        if self.header.form == "index":
+            return f"{self.header.variable}={NO_KNOT_YET}"
+        return f"{SUBPROGRAM}({','.join(['0.0'] * VALUES)}) PRIO=-1"
 
     def start_statements(self, checksum: int) -> str:
         """Return what the program sets before its first motion."""

@@ -1,5 +1,6 @@
 """Which findings keep a program from being written, and what a person may release by hand."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -26,9 +27,10 @@ NEVER_RELEASED = frozenset(
 
 
 def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False) -> tuple[Issue, ...]:
-    """Return the findings with those released by ``CODE:LINE`` turned into warnings.
+    """Return the findings with those released by hand turned into warnings.
 
-    ``strict`` refuses warnings too.
+    ``CODE:LINE`` releases the findings of a line, ``CODE`` all of a kind in the file. ``strict`` refuses
+    warnings too.
 
     Raises
     ------
@@ -37,37 +39,61 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
     NotUnderstoodError
         Where a release has no such form, matches nothing, or may not be given.
     """
-    findings = [
-        replace(issue, severity="error") if issue.code in STRICTER_HERE else issue for issue in issues
-    ]
+    found = _as_written(issues)
+    findings = list(found)
     for word in allow:
-        code, line = _parse(word)
-        matches = [
-            k
-            for k, issue in enumerate(findings)
-            if issue.severity == "error" and issue.code == code and issue.line == line
-        ]
+        matches = _matches(found, word)
         if not matches:
-            raise input_error("allow", f"--allow {word}: no such finding", "use CODE:LINE as printed")
-        if code in NEVER_RELEASED:
-            raise input_error(
-                "allow", f"--allow {word}: {code} cannot be released", findings[matches[0]].remedy
-            )
+            remedy = "use CODE:LINE as printed, or CODE for all of a kind"
+            raise input_error("allow", f"--allow {word}: no such finding", remedy)
+        first = found[matches[0]]
+        if first.code in NEVER_RELEASED:
+            raise input_error("allow", f"--allow {word}: {first.code} cannot be released", first.remedy)
         for k in matches:
-            found = findings[k]
-            findings[k] = replace(found, severity="warning", message=f"{found.message} (released by hand)")
+            message = f"{found[k].message} (released by hand)"
+            findings[k] = replace(found[k], severity="warning", message=message)
     refusing = ("error", "warning") if strict else ("error",)
     if any(issue.severity in refusing for issue in findings):
         raise RefusedError(sorted(findings, key=lambda issue: (issue.severity != "error", issue.line)))
     return tuple(findings)
 
 
-def _parse(word: str) -> tuple[str, int]:
-    code, _, line = word.rpartition(":")
-    if not code or not line.isdigit():
+def matching(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:
+    """Return the releases that match an error so far; later stages may find what the others mean."""
+    found = _as_written(issues)
+    return tuple(word for word in allow if _matches(found, word))
+
+
+def header_words(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:
+    """Return what the program's header says of releases: those of a whole file with their number."""
+    found = _as_written(issues)
+    return tuple(
+        word if ":" in word else f"{word} (whole file, {len(_matches(found, word))})" for word in allow
+    )
+
+
+def _as_written(issues: Iterable[Issue]) -> list[Issue]:
+    """Return the findings as they count for a program for a robot."""
+    return [replace(issue, severity="error") if issue.code in STRICTER_HERE else issue for issue in issues]
+
+
+def _matches(findings: Sequence[Issue], word: str) -> list[int]:
+    """Return the errors (rows) that a release means."""
+    code, line = _parse(word)
+    return [
+        k
+        for k, issue in enumerate(findings)
+        if issue.severity == "error" and issue.code == code and line in (None, issue.line)
+    ]
+
+
+def _parse(word: str) -> tuple[str, int | None]:
+    """Return code and line of a release; no line means the whole file."""
+    code, colon, line = word.partition(":")
+    if not re.fullmatch(r"[a-z0-9-]+", code) or (colon and not re.fullmatch(r"[0-9]{1,9}", line)):
         raise input_error(
             "allow",
-            f"--allow {word}: not of the form CODE:LINE",
-            "use CODE:LINE as printed, LINE 0 for the whole file",
+            f"--allow {word}: not of the form CODE:LINE or CODE",
+            "use CODE:LINE as printed, or CODE for all of a kind",
         )
-    return code, int(line)
+    return code, int(line) if colon else None

@@ -1,4 +1,4 @@
-"""Which trigger announces a knot: the motion that carries it and its delay, and how many wait at a time."""
+"""Which trigger announces a knot: the motion that carries it and its delay."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
+from gcode2krl.krl.advance import view
 from gcode2krl.krl.windows import Windows
 from gcode2krl.units import MS_PER_S
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
+_BEYOND = np.iinfo(np.int64).max // 2
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class Triggers:
 
     row: Rows
     """(k,) row of Targets; -1 where no motion is left that could carry the trigger."""
+    order: Rows
+    """(k,) that motion's number in the order in which the advance run reads; beyond all without a motion."""
     delay_ms: Rows
     fire_s: Floats
     """(k,) instant in the time of the Motion; NaN without a motion."""
@@ -39,29 +43,19 @@ def place_triggers(
     window = np.full(count, -1, dtype=np.int64)
     delay = np.zeros(count, dtype=np.int64)
     if len(windows.row) == 0:
-        return Triggers(window, delay, np.full(count, np.nan))
+        return Triggers(window, np.full(count, _BEYOND), delay, np.full(count, np.nan))
     _place(
-        deadline_s, earliest_s, windows.row, windows.begin_s, windows.end_s, cell.controller.cycle_s,
+        deadline_s, earliest_s, windows.order, windows.begin_s, windows.end_s, cell.controller.cycle_s,
         cell.pilot.max_active, view(cell) if spread else 0, window, delay,
     )  # fmt: skip
     found = window >= 0
     fire_s = windows.begin_s[window] + delay / MS_PER_S
-    return Triggers(np.where(found, windows.row[window], -1), delay, np.where(found, fire_s, np.nan))
-
-
-def view(cell: Cell) -> int:
-    """Return how many motions in a row have their triggers waiting at the same time.
-
-    While one motion runs, the advance run has read ``$ADVANCE`` more and what stands before the next.
-    """
-    advance = 5 if cell.controller.advance == "unlimited" else cell.controller.advance
-    return advance + 2 if advance else 1
-
-
-def most_active(row: Rows, in_view: int) -> int:
-    """Return the largest number of triggers (at rising rows) within so many motions in a row."""
-    waiting = np.searchsorted(row, row + in_view, side="left") - np.arange(len(row))
-    return int(waiting.max(initial=0))
+    return Triggers(
+        row=np.where(found, windows.row[window], -1),
+        order=np.where(found, windows.order[window], _BEYOND),
+        delay_ms=delay,
+        fire_s=np.where(found, fire_s, np.nan),
+    )
 
 
 @njit(cache=True, nogil=True)

@@ -150,6 +150,7 @@ def compare(
     """
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
+    issues += _start_issues(program, targets)
     if len(program.ptp) != len(targets):
         issues.append(
             Issue(
@@ -254,6 +255,17 @@ def _difference_issues(
             text = in_file(program, program.file[program.file_of[row]]) + text + gcode
             issues.append(Issue("error", code, int(program.line[row]), text, _REMEDY))
     return issues
+
+
+def _start_issues(program: KrlProgram, targets: Targets) -> list[Issue]:
+    """Check that the first programmed position is reached at rest: there the predicted motion begins."""
+    first = int(np.argmax(targets.move >= 0))
+    if first >= len(program.cdis_mm) or program.cdis_mm[first] == 0.0:  # NaN: C_DIS of unknown width
+        return []
+    file = in_file(program, program.file[program.file_of[first]])
+    text = f"{file}the first programmed position is passed by C_DIS; the prediction starts there at rest"
+    remedy = "translate again; a prediction of an older version must be made again"
+    return [Issue("error", "verify-start", int(program.line[first]), text, remedy)]
 
 
 def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, ...]:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
+from gcode2krl.krl.advance import halts_advance, read_order
+from gcode2krl.krl.statements import event_statements
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MM_PER_M
 
@@ -30,6 +32,8 @@ class Windows:
 
     row: Rows
     """(w,) row of Targets."""
+    order: Rows
+    """(w,) its number in the order in which the advance run reads, see `read_order`."""
     begin_s: Floats
     """(w,) instant from which a delay counts, in the time of the Motion."""
     end_s: Floats
@@ -73,11 +77,12 @@ def windows_of(targets: Targets, chain: Chain, motion: Motion, cell: Cell) -> Wi
     end_s = clock.arrival(arrive_mm, stops[1:])
     begin_s = clock.departure(leave_mm if COUNTS_FROM_END_OF_ARC else _arc_starts(arrive_mm), stops[:-1])
     rows = chain.first + 1 + np.arange(len(straight_mm))
-    carries = ~targets.ptp[rows] & (straight_mm + head_mm + tail_mm > 0)
+    carries = ~targets.ptp[rows] & (straight_mm + head_mm + tail_mm > _AT_REST_MM)
     begin_s, end_s = begin_s[carries], end_s[carries]
     begin_s = np.maximum.accumulate(begin_s)
     return Windows(
         row=rows[carries],
+        order=read_order(len(targets), _halts(targets, cell), cell)[rows[carries]],
         begin_s=begin_s,
         end_s=np.maximum(end_s, begin_s),
         begin_mm=leave_mm[carries],
@@ -127,6 +132,12 @@ def _arc_lengths(chain: Chain, head_mm: Floats, tail_mm: Floats) -> Floats:
     r = np.sqrt(r2)
     area = (1.0 + m) * root1 - m * root0 + r2 * (np.arcsinh((1.0 + m) / r) - np.arcsinh(m / r))
     return np.asarray(np.where(bends, np.sqrt(b) * area, np.sqrt(pp) + np.sqrt(qq)))
+
+
+def _halts(targets: Targets, cell: Cell) -> Rows:
+    """Return the rows of Targets behind which the advance run waits: dwells, and events that say so."""
+    rows = {event.row for event in targets.events if halts_advance(event_statements(event, cell).split("\n"))}
+    return np.union1d(np.flatnonzero(targets.wait_s > 0), np.array(sorted(rows), dtype=np.int64))
 
 
 def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats) -> Floats:

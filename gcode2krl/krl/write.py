@@ -12,10 +12,11 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krl.compose import SIDECAR, Layout, compose
 from gcode2krl.krl.files import write_together
 from gcode2krl.krl.names import name_problem, suggested_name
-from gcode2krl.krl.pilot_check import PilotFigures
-from gcode2krl.krl.pilot_plan import PilotPlan, plan_pilot
+from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
+from gcode2krl.krl.pilot_plan import PilotPlan, left_out, plan_pilot
+from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import read_texts
-from gcode2krl.krl.release import released
+from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import file_names
 from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.verify import VerifyReport, compare
@@ -70,13 +71,14 @@ def write_krl(
     cell : needed with Targets; a Prediction has its own.
     joints : joints at the targets where they are known already.
     name : program name; default: the file's stem.
-    allow : findings released by hand, ``CODE:LINE``; the header lists them.
+    allow : findings released by hand, ``CODE:LINE`` or ``CODE`` for all of a kind; the header lists them.
     guard : compare frames, robot and inputs before the first motion.
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
     options : words for the header.
     strict : warnings refuse the program too.
     pilot : how the program carries the pilot force, by default as the cell says where the prediction has
-        forces, and not without a path; ``index`` needs the sidecar beside the program.
+        forces, and not without a path; ``index`` needs the sidecar beside the program. The default is left
+        out from where it cannot be announced, with a warning; a form that is named is carried or refused.
     online : name of the RSI files of a program that is corrected online by the cell's ``[online]``; they
         are written beside it. RSI is on from above the first cut to above the last.
 
@@ -95,26 +97,31 @@ def write_krl(
     if online is not None:
         _refuse_name(online, file)
         issues += online_issues(targets, cell)
+    header_allowed = header_words([*issues, *source.issues], allow)
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
     plan = _pilot_plan(source, pilot, joints, file is not None)
-    text, case = None, None
-    if plan is not None:
-        issues += released(plan.issues, (), strict)
-        targets, joints, text, case = plan.targets, plan.joints, plan.text, plan.case
     known = isinstance(source, Prediction) and source.forces is not None
     layout = Layout(
         guard,
         split if file is not None else "defs",
         single_file=file is None,
         options=options,
-        allowed=tuple(allow),
+        allowed=header_allowed,
         forces=known,
         online=online or "",
     )
-    texts = compose(targets, joints, cell, program_name, layout, text)
+    bare = _Content(targets, joints)
+    content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
+    texts, report = _composed(content, cell, program_name, layout)
+    failed = [issue for issue in report.issues if issue.severity == "error"]
+    if pilot is None and failed and all(issue.code.startswith("pilot-") for issue in failed):
+        plan, content = left_out(failed[0]), bare
+        texts, report = _composed(content, cell, program_name, layout)
+    if plan is not None:
+        issues += released([plan] if isinstance(plan, Issue) else plan.issues, (), strict)
+    targets = content.targets
     issues += released(_size_issues(texts, targets, cell), (), strict)
-    report = compare(read_texts(texts, f"{program_name}.src"), targets, joints, cell, pilot=case)
     if not report.ok:
         raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
     written: dict[Path, bytes] = {}
@@ -124,10 +131,37 @@ def write_krl(
     return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues), targets)
 
 
+@dataclass(frozen=True)
+class _Content:
+    """What a program says: its motions, and a pilot force or none."""
+
+    targets: Targets
+    joints: Joints
+    text: PilotText | None = None
+    case: PilotCase | None = None
+
+    @classmethod
+    def of(cls, plan: PilotPlan) -> "_Content":
+        return cls(plan.targets, plan.joints, plan.text, plan.case)
+
+
+def _composed(
+    content: _Content, cell: Cell, name: str, layout: Layout
+) -> tuple[dict[str, bytes], VerifyReport]:
+    """Return the files of a program, and what reading them back finds."""
+    targets, joints = content.targets, content.joints
+    texts = compose(targets, joints, cell, name, layout, content.text)
+    return texts, compare(read_texts(texts, f"{name}.src"), targets, joints, cell, pilot=content.case)
+
+
 def _pilot_plan(
     source: Targets | Prediction, form: PilotForm | None, joints: Joints, sidecar: bool
-) -> PilotPlan | None:
-    """Return the pilot force to write, None where there is none to write or it is not wanted."""
+) -> PilotPlan | Issue | None:
+    """Return the pilot force to write, None where there is none to write or it is not wanted.
+
+    One that was not asked for by name is left out where it cannot be announced, with a finding.
+    """
+    asked = form is not None
     if isinstance(source, Targets):
         if form in ("index", "values"):
             sentence = f"pilot {form}: Targets have no forces"
@@ -140,7 +174,7 @@ def _pilot_plan(
     if form == "index" and not sidecar:
         sentence = "--pilot index needs the sidecar .pilot.csv, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src, or --pilot values")
-    return plan_pilot(source, joints, form, sidecar)
+    return plan_pilot(source, joints, form, sidecar, asked=asked)
 
 
 def _refuse_name(online: str, file: Path | None) -> None:

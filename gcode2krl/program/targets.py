@@ -222,7 +222,7 @@ class _Plan:
             for target, dwell_s in self._dwells(row, stand, kept_index):
                 wait[target] += dwell_s
         said = self._said_by_moves(move, kind, tolerance_mm)
-        exact = self._exact_stops(said, kind, tool, wait, events)
+        exact = self._exact_stops(said, move, kind, tool, wait, events)
         return Targets(
             position_mm=position,
             rotation=rotation,
@@ -334,15 +334,18 @@ class _Plan:
     def _exact_stops(
         self,
         said: "_Said",
+        move: NDArray[np.int32],
         kind: NDArray[np.int8],
         tool: NDArray[np.int32],
         wait: Floats,
         events: tuple[Event, ...],
     ) -> NDArray[np.bool_]:
+        """Mark the targets (p) that are reached at rest; among them both ends of the predicted motion."""
         exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0) | said.exact_stop
         exact[:-1] |= (said.rapid[:-1] != said.rapid[1:]) | (kind[1:] != _LIN)
         exact[1:] |= tool[1:] != tool[:-1]  # the way there began with another tip
         exact[[event.row for event in events]] = True
+        exact[np.flatnonzero(move >= 0)[[0, -1]]] = True
         exact[-1] = True
         return exact
 

@@ -1,0 +1,43 @@
+"""What the advance run has read: whose triggers wait at the same time, and what holds it up."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.cell import Cell
+
+Rows = NDArray[np.int64]
+
+
+def view(cell: Cell) -> int:
+    """Return how many motions in a row have their triggers waiting at the same time.
+
+    While one motion runs, the advance run has read ``$ADVANCE`` more and what stands before the next.
+    """
+    advance = 5 if cell.controller.advance == "unlimited" else cell.controller.advance
+    return advance + 2 if advance else 1
+
+
+def most_active(row: Rows, in_view: int) -> int:
+    """Return the largest number of triggers (at rising numbers of `read_order`) within so many motions."""
+    waiting = np.searchsorted(row, row + in_view, side="left") - np.arange(len(row))
+    return int(waiting.max(initial=0))
+
+
+def read_order(motions: int, halts: Rows, cell: Cell) -> Rows:
+    """Return numbers (p + 1,) of motions between which as many are in view as the advance run reads ahead.
+
+    It reads nothing behind a wait or a halt before that is over: where one stands behind a motion
+    (``halts``), the next is as far as if others lay between, so their triggers never wait together.
+    """
+    after = np.zeros(motions + 1, dtype=np.int64)
+    after[np.unique(halts) + 1] = view(cell)
+    return np.arange(motions + 1) + np.cumsum(after)
+
+
+def halts_advance(statements: Sequence[str]) -> bool:
+    """Tell whether statements hold the advance run: a WAIT or a HALT that no CONTINUE precedes."""
+    first = [text.split(maxsplit=1)[0].upper() for text in statements if text.strip()]
+    holds = [word in ("WAIT", "HALT") for word in first]
+    return any(hold and before != "CONTINUE" for before, hold in zip(["", *first], holds, strict=False))
