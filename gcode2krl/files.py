@@ -130,10 +130,10 @@ def leftovers(target: Path) -> list[Path]:
     )
     found = []
     with contextlib.suppress(OSError):
-        for name in os.listdir(target.parent):
-            match = pattern.fullmatch(name) if name.startswith(".") else None
-            if match and _is_left(target.with_name(name), match[1], match[2]):
-                found.append(target.with_name(name))
+        for file in target.parent.iterdir():
+            match = pattern.fullmatch(file.name)
+            if match and _is_left(file, match[1], match[2]):
+                found.append(file)
     return found
 
 

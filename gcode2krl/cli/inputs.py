@@ -96,7 +96,7 @@ def require_outputs(outputs: list[Path], *inputs: str | Path | None) -> None:
     """Refuse outputs of which one is an input, or another of them, or has no folder, or is one."""
     for output in outputs:
         if not output.parent.is_dir():
-            sentence = f"the folder {str(output.parent)!r} does not exist"
+            sentence = f"cannot write: the folder {str(output.parent)!r} does not exist"
             raise input_error("output-unwritable", sentence, "create it first", source=str(output))
         if output.is_dir():
             remedy = "name a file, or remove the folder"

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
 _FIGURES = (
-    "path", "kinematics", "joints", "force", "force_path", "deflection", "deflection_path", "deflection_joints"
+    "path", "kinematics", "joints",
+    "force", "force_path", "deflection", "deflection_path", "deflection_joints",
 )  # fmt: skip
 
 

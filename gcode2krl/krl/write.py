@@ -26,6 +26,7 @@ from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
 
 SUFFIX = ".src"
+_ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
 
@@ -200,13 +201,12 @@ def program_file(
     problem = name_problem(place.stem, taken)
     good = suggested_name(name if name is not None else place.stem, taken)
     if problem:
-        sentence = (
-            f"{place.stem!r} cannot be a program's name: {problem}; a controller needs file and DEF alike"
-        )
-        raise input_error("krl-name", sentence, f"-o {good}.src", source=place.name)
+        sentence = f"{place.stem!r} cannot be a program's name: {problem}{_ALIKE}"
+        raise input_error("krl-name", sentence, f"-o {place.with_name(good)}.src", source=place.name)
     if name is not None and name.upper() != place.stem.upper():
-        sentence = f"--name {name} and the file {place.name} differ; a controller needs file and DEF alike"
-        raise input_error("krl-name", sentence, f"-o {name}.src, or leave out --name", source=place.name)
+        sentence = f"--name {name} and the file {place.name} differ{_ALIKE}"
+        remedy = f"-o {place.with_name(name)}.src, or leave out --name"
+        raise input_error("krl-name", sentence, remedy, source=place.name)
     return place, []
 
 
