@@ -65,7 +65,8 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[str | Path]) -> None
     seen: dict[str, Path] = {}
     existing: list[Path] = []
     for output in outputs:
-        other = seen.setdefault(str(output.absolute()).casefold(), output)  # Windows knows no case
+        name = str(output.parent.resolve() / output.name).casefold()  # Windows knows no case
+        other = seen.setdefault(name, output)
         if other is not output:
             sentence = f"{output.name} would be written twice, with different content"
             raise input_error("output-is-input", sentence, "choose different names", source=str(output))

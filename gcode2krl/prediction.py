@@ -114,7 +114,7 @@ class Prediction:
         for name, table in (("forces", self.forces), ("deflection", self.deflection)):
             if table is not None:
                 record[f"{name}_relative_band"] = table.relative_band
-        return {**files, place / RECORD: tomli_w.dumps(record).encode("utf-8")}
+        return {**files, place / RECORD: tomli_w.dumps(record).encode("utf-8", "replace")}
 
     @classmethod
     def load(cls, folder: str | Path) -> "Prediction":

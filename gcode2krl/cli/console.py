@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from gcode2krl.cli.standard_files import closed, tell
 from gcode2krl.errors import Issue
 
 MOST_FINDINGS = 20
@@ -27,15 +28,13 @@ class Console:
         for issue in shown[:MOST_FINDINGS]:
             colour = {"error": "red", "warning": "yellow", "note": "cyan"}[issue.severity]
             line = issue.text(source)
-            click.echo(
-                line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1), err=True
-            )
+            tell(line.replace(f"{issue.severity}:", click.style(f"{issue.severity}:", fg=colour), 1))
         if len(shown) > MOST_FINDINGS:
-            click.echo(f"… and {len(shown) - MOST_FINDINGS} more findings", err=True)
+            tell(f"… and {len(shown) - MOST_FINDINGS} more findings")
 
     def failed(self, message: str, code: int) -> int:
         """Print one error line and return the exit code."""
-        click.echo(f"{click.style('error:', fg='red')} {message}", err=True)
+        tell(f"{click.style('error:', fg='red')} {message}")
         return code
 
     def say(self, text: str) -> None:
@@ -46,10 +45,12 @@ class Console:
     def hint(self, text: str) -> None:
         """Print a passing remark on standard error."""
         if not self.quiet:
-            click.echo(text, err=True)
+            tell(text)
 
     def json(self, result: dict[str, Any]) -> None:
         """Print the one JSON object of a command."""
+        if sys.stdout is None:
+            raise closed("standard output")
         click.echo(json.dumps(result, indent=2, allow_nan=False))
 
     @contextmanager

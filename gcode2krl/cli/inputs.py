@@ -64,10 +64,14 @@ def read_part(
         if part == STANDARD:
             if sys.stdin is None:
                 raise input_error("file-unreadable", "standard input is closed", "name a file")
-            return read_stream(
-                sys.stdin.buffer, "stdin", cell,
-                chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance,
-            )  # fmt: skip
+            try:
+                return read_stream(
+                    sys.stdin.buffer, "stdin", cell,
+                    chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance,
+                )  # fmt: skip
+            except OSError as error:
+                sentence = f"cannot read standard input: {error.strerror}"
+                raise input_error("file-unreadable", sentence, "name a file") from None
         return read_gcode(
             part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance
         )
@@ -131,6 +135,14 @@ def require_fit_outputs(plot: str | None, apply_to: str | None, cell: str | None
         require_other(Path(apply_to), *data)
     if plot is not None:
         require_other(Path(plot), apply_to, *data, *cell_files(cell))
+
+
+def require_part(part: str) -> None:
+    """Refuse a folder where G-code is wanted."""
+    if part != STANDARD and Path(part).is_dir():
+        raise input_error(
+            "file-unreadable", "this is a folder, no G-code", "name the file", source=part or "the input"
+        )
 
 
 def existing(*inputs: str | Path | None) -> list[Path]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import click
+import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
@@ -34,6 +35,8 @@ def command(
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
+        if at and not np.isfinite(at).all():
+            raise input_error("option-value", f"--at {at}: found no numbers", "give X Y Z in mm")
         if output == STANDARD:
             click.echo(_gcode(cell_path, at), nl=False)
             return 0

@@ -18,6 +18,7 @@ from gcode2krl.cli.inputs import (
     read_part,
     require_folder,
     require_other,
+    require_part,
 )
 from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -68,6 +69,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        require_part(part)
         folder = _folder(part, output)
         inputs = existing(part, *cell_files(cell_path), *effect_files(effect_folders))
         _require_outputs(folder, part_mesh, inputs)
@@ -190,6 +192,8 @@ def _draw(prediction: Prediction, folder: Path, inputs: list[Path]) -> list[Path
 def _folder(part: str, output: str | None) -> Path:
     if output == STANDARD or (output is None and part == STANDARD):
         raise input_error("option-value", "a prediction is a folder", "give -o prediction/")
+    if output == "":
+        raise input_error("option-value", "-o: the name is empty", "give -o prediction/")
     folder = Path(output) if output is not None else Path(part).with_suffix(".prediction")
     if folder.exists() and not folder.is_dir():
         raise input_error("output-unwritable", "this is a file", "name a folder", source=str(folder))

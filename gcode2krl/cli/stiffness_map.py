@@ -17,6 +17,8 @@ from gcode2krl.tables import Bools, Floats
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 Three = tuple[float, float, float]
+MOST_LOAD_N = 1e6
+"""No robot holds it: a slip of the unit."""
 LATERAL_N = 100.0
 """Size of the load where none is given."""
 _AXIS = np.array([[0.0, 0.0, 1.0]])
@@ -109,6 +111,9 @@ class Case:
         for name, values in (("--load", load), ("--feed", feed)):
             if values is not None and not (np.isfinite(values).all() and np.any(values)):
                 raise input_error("option-value", f"{name} {values} has no direction", "give three numbers")
+        if load is not None and np.linalg.norm(load) > MOST_LOAD_N:
+            sentence = f"--load {load}: more than {MOST_LOAD_N:g} N"
+            raise input_error("option-value", sentence, "give newtons")
         own = None if load is None else np.array(load, dtype=float)
         return cls(cell, number, own, np.array(feed if feed is not None else (0.0, 0.0, 0.0), dtype=float))
 

@@ -1,6 +1,5 @@
 """``gcode2krl translate part.nc -o part.src``, the default command."""
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -22,8 +21,10 @@ from gcode2krl.cli.inputs import (
     read_part,
     require_figure,
     require_outputs,
+    require_part,
 )
 from gcode2krl.cli.loads import largest
+from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
@@ -76,7 +77,9 @@ Floats = NDArray[np.float64]
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
 )
-@click.option("--comment-every", type=click.IntRange(0), help="A G-code line number every so many motions.")
+@click.option(
+    "--comment-every", type=click.IntRange(0, 10**9), help="A G-code line number every so many motions."
+)
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
@@ -94,6 +97,7 @@ def command(
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
+        require_part(part)
         place = _place(part, output, name)
         _refuse_online(online, both, compensate, place)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
@@ -146,8 +150,7 @@ def command(
         console.json(_result((), error.issues))
         return error.exit_code
     if output == STANDARD:
-        sys.stdout.buffer.write(written.texts[f"{written.name}.src"])
-        sys.stdout.buffer.flush()
+        write_bytes(written.texts[f"{written.name}.src"])
         console.findings(written.issues, part)
         return 0
     if as_json:
@@ -205,6 +208,8 @@ def _place(part: str, output: str | None, name: str | None) -> Path | None:
     """Return the file or the folder to write into, None for standard output."""
     if output == STANDARD:
         return None
+    if output == "":
+        raise input_error("option-value", "-o: the name is empty", "give -o part.src")
     if part == STANDARD and output is None:
         raise input_error("option-value", "standard input needs an output", "give -o part.src, or -o -")
     place = Path(output) if output is not None else Path(part).parent
