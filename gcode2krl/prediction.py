@@ -6,7 +6,7 @@ side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,10 +16,17 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.files import Content, make_folder, refuse_inputs, write_together
 from gcode2krl.prediction_record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction_tables import PARQUET_TYPES, check_numbers, check_references, read_table
 from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Table, Targets, Toolpath
 
+RECORD = "prediction.toml"
+_UNFINISHED = f'schema = "{SCHEMA}"\nunfinished = true\n'.encode("ascii")
+_OURS = re.compile(rb'^schema = "gcode2krl/prediction/\d+"', re.MULTILINE)
+_MOST_OF_RECORD = 4096
+_IGNORED = re.compile(r"\.DS_Store|Thumbs\.db|desktop\.ini|\..+\.(?:part|old)")
+"""Files that make no folder somebody's: those of desktops, and leftovers of a killed run."""
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
 _ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)")
 _AXES = {3: "xyz", 4: "xyzw"}
@@ -52,17 +59,31 @@ class Prediction:
         found = (issue for table in later if table is not None for issue in table.issues)
         return (*self.targets.issues, *found, *self.skipped)
 
-    def save(self, folder: str | Path, csv: bool = False) -> list[Path]:
-        """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files."""
-        place = Path(folder)
-        try:
-            place.mkdir(exist_ok=True)
-            return list(self._write(place, csv))
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise input_error("output-unwritable", f"cannot write: {why}", source=str(place)) from None
+    def save(self, folder: str | Path, csv: bool = False, inputs: Iterable[str | Path] = ()) -> list[Path]:
+        """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files.
 
-    def _write(self, place: Path, csv: bool) -> Iterator[Path]:
+        The folder must be empty or hold a prediction. While it is written it says that it is unfinished, so
+        that what a killed run leaves is not read as a whole. ``inputs`` are never overwritten.
+        """
+        place = Path(folder)
+        refuse_foreign(place)
+        make_folder(place)
+        files, record = self._files(place, csv), place / RECORD
+        refuse_inputs(files, inputs)
+        before = record.read_bytes() if record.is_file() else None
+        write_together({record: _UNFINISHED})
+        try:
+            write_together(files)
+        except BaseException:
+            if before is None:
+                record.unlink(missing_ok=True)
+            else:
+                write_together({record: before})
+            raise
+        return list(files)
+
+    def _files(self, place: Path, csv: bool) -> dict[Path, Content]:
+        """Return the files and what writes them, the record last."""
         import polars as pl
         import tomli_w
 
@@ -76,13 +97,12 @@ class Prediction:
                 if beside is not None:
                     tables["motion"] |= dict(_columns(beside))
             tables["motion"] |= self.added
+        files: dict[Path, Content] = {}
         for name, columns in tables.items():
             frame = pl.DataFrame(columns)
-            frame.write_parquet(place / f"{name}.parquet")
-            yield place / f"{name}.parquet"
+            files[place / f"{name}.parquet"] = frame.write_parquet
             if csv:
-                frame.write_csv(place / f"{name}.csv")
-                yield place / f"{name}.csv"
+                files[place / f"{name}.csv"] = frame.write_csv
         record: dict[str, Any] = {
             "schema": SCHEMA,
             "inputs": self.inputs,
@@ -94,8 +114,7 @@ class Prediction:
         for name, table in (("forces", self.forces), ("deflection", self.deflection)):
             if table is not None:
                 record[f"{name}_relative_band"] = table.relative_band
-        (place / "prediction.toml").write_bytes(tomli_w.dumps(record).encode("utf-8"))
-        yield place / "prediction.toml"
+        return {**files, place / RECORD: tomli_w.dumps(record).encode("utf-8", "replace")}
 
     @classmethod
     def load(cls, folder: str | Path) -> "Prediction":
@@ -186,6 +205,21 @@ def _kind_of(file: str) -> Callable[[str], str | None]:
         return fixed.get(name)
 
     return kind_of
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Raise where a folder exists, is not empty, and holds no prediction of ours."""
+    if not folder.is_dir():
+        return
+    record = folder / RECORD
+    if record.is_file() and _OURS.search(record.read_bytes()[:_MOST_OF_RECORD]):
+        return
+    others = sorted(file.name for file in folder.iterdir() if not _IGNORED.fullmatch(file.name))
+    if others:
+        what = "and no prediction of ours" if RECORD not in others else "which is no prediction of ours"
+        named = RECORD if RECORD in others else others[0]
+        sentence = f"the folder is not empty: it holds {named}, {what}"
+        raise input_error("output-foreign", sentence, "name a new folder", source=str(folder))
 
 
 def column_names(name: str, width: int) -> list[str]:

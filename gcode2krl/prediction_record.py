@@ -115,6 +115,9 @@ def read_record(file: Path) -> PredictionRecord:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
     except NotTomlError as error:
         raise input_error("not-toml", str(error), REMEDY, source=str(file)) from None
+    if tables.get("unfinished"):
+        sentence = "the prediction was not written to its end"
+        raise input_error("prediction-unfinished", sentence, "predict again", source=str(file))
     found = tables.get("schema")
     if found != SCHEMA:
         message = f"schema: found {repr(found)[:60]}, allowed: {SCHEMA}"

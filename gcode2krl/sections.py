@@ -457,7 +457,7 @@ class Program(Section):
     """How the KRL text is laid out."""
 
     max_lines: Annotated[int, Field(strict=True, ge=100)] = 5000
-    comment_every: Annotated[int, Field(strict=True, ge=0)] = 50
+    comment_every: Annotated[int, Field(strict=True, ge=0, le=10**9)] = 50
     """A comment with the G-code line every so many motions; 0 = only at events."""
     tool_length: Literal["g43", "from_table"] = "g43"
     """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in

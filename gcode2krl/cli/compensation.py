@@ -1,6 +1,7 @@
 """``--compensate offline``: the prediction with targets moved against its own deflection."""
 
 import io
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +15,10 @@ if TYPE_CHECKING:
     from gcode2krl.compensate import Compensated
 
 
-def compensated(prediction: Prediction, plot: str | None) -> Prediction:
+def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str | Path] = ()) -> Prediction:
     """Return the prediction of the compensated program; ``plot`` draws the path before and after.
+
+    ``inputs`` are files that the drawing must not overwrite.
 
     Raises
     ------
@@ -36,7 +39,7 @@ def compensated(prediction: Prediction, plot: str | None) -> Prediction:
     )
     motion, joints, forces, deflection = done.evaluated
     if plot is not None:
-        _draw(done, motion, Path(plot))
+        _draw(done, motion, Path(plot), inputs)
     return replace(
         prediction,
         targets=done.targets,
@@ -48,16 +51,16 @@ def compensated(prediction: Prediction, plot: str | None) -> Prediction:
     )
 
 
-def _draw(done: "Compensated", motion: Motion, file: Path) -> None:
+def _draw(done: "Compensated", motion: Motion, file: Path, inputs: Sequence[str | Path]) -> None:
     """Draw the bent path without and with the correction."""
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
     from gcode2krl.report.compensation_figure import compensation_figure
     from gcode2krl.report.drawing import look
 
-    require_other(file)
+    require_other(file, *inputs)
     picture = io.BytesIO()
     before, after = ((one.intended_mm, one.offset_mm, one.cuts) for one in (done.before, done.after))
     with look():
         figure = compensation_figure(before, after, motion.position_mm)
-        figure.savefig(picture, format=file.suffix.lower().removeprefix(".") or "png", dpi=130)
-    write_together({file: picture.getvalue()})
+        figure.savefig(picture, format=file.suffix.lower().removeprefix("."), dpi=130)
+    write_together({file: picture.getvalue()}, inputs)

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from gcode2krl.cli.standard_files import closed, tell
 from gcode2krl.errors import Issue, told
 
 _COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
@@ -25,9 +26,9 @@ class Console:
         for finding in shown.findings:
             word = f"{finding.first.severity}:"
             coloured = click.style(word, fg=_COLOURS[finding.first.severity])
-            click.echo(finding.text(source).replace(word, coloured, 1), err=True)
+            tell(finding.text(source).replace(word, coloured, 1))
         for line in shown.counts():
-            click.echo(line, err=True)
+            tell(line)
 
     def explain_hint(self, issues: Iterable[Issue]) -> None:
         """Say on a terminal how to learn more about the first error."""
@@ -37,7 +38,7 @@ class Console:
 
     def failed(self, message: str, code: int) -> int:
         """Print one error line and return the exit code."""
-        click.echo(f"{click.style('error:', fg='red')} {message}", err=True)
+        tell(f"{click.style('error:', fg='red')} {message}")
         return code
 
     def say(self, text: str) -> None:
@@ -48,10 +49,12 @@ class Console:
     def hint(self, text: str) -> None:
         """Print a passing remark on standard error."""
         if not self.quiet:
-            click.echo(text, err=True)
+            tell(text)
 
     def json(self, result: dict[str, Any]) -> None:
         """Print the one JSON object of a command."""
+        if sys.stdout is None:
+            raise closed("standard output")
         click.echo(json.dumps(result, indent=2, allow_nan=False))
 
     @contextmanager

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.inputs import common_options
+from gcode2krl.cli.inputs import common_options, effect_files, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 
@@ -30,6 +30,8 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        if apply_to is not None:
+            require_other(Path(apply_to), *folders, *holdout, *effect_files(effects))
         gap = _diagnosis(folders, holdout, effects, from_log, cell_path, console)
         added = _apply(
             gap, apply_to, cell_path, [Path(each).name for each in folders[0 if from_log else 1 :]]
@@ -93,10 +95,4 @@ def _apply(gap: Any, apply_to: str | None, cell_path: str | None, sources: list[
         return 0
     from gcode2krl.gap.apply import apply_to_cell
 
-    file = Path(apply_to)
-    if not file.parent.is_dir():
-        raise input_error(
-            "output-unwritable", f"the folder {str(file.parent)!r} does not exist", "create it first",
-            source=apply_to,
-        )  # fmt: skip
-    return int(apply_to_cell(gap, file, Path(cell_path) if cell_path else None, sources))
+    return int(apply_to_cell(gap, Path(apply_to), Path(cell_path) if cell_path else None, sources))

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_other
+from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
 from gcode2krl.units import MS_PER_S
 
@@ -44,9 +44,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        for output in (plot, apply_to):
-            if output is not None:
-                require_other(Path(output), trace, *((part,) if part else ()))
+        require_fit_outputs(plot, apply_to, cell_path, trace, part)
         result = _identify(trace, part, read_cell(cell_path), tolerance, console)
         files = []
         if plot is not None:
@@ -209,7 +207,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
     import tomli_w
 
     from gcode2krl import library
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
 
     data = library.read_toml(file) if file.exists() else {}
     section = data.get("controller", {})
@@ -243,15 +241,10 @@ def _is_own_cdis(result: "Identification", cell: Cell) -> bool:
 
 
 def _save_figure(result: "Identification", file: Path) -> Path:
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import look
 
-    formats = ("png", "svg", "pdf")
     kind = file.suffix.lower().removeprefix(".")
-    if kind not in formats:
-        raise input_error(
-            "option-value", f"figure {file.name!r}: allowed endings {', '.join(formats)}", source=str(file)
-        )
     picture = io.BytesIO()
     with look():
         figure(result).savefig(picture, format=kind, dpi=130)

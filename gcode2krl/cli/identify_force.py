@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import require_other
+from gcode2krl.cli.inputs import require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.units import MS_PER_S
@@ -41,9 +41,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        for output in (plot, apply_to):
-            if output is not None:
-                require_other(Path(output))
+        require_fit_outputs(plot, apply_to, None, run_folder, prediction)
         run, predicted = _inputs(run_folder, prediction)
         with console.progress("fitting", None):
             fit = _fit(run, predicted)
@@ -141,7 +139,7 @@ def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
 
     from gcode2krl import library
     from gcode2krl.cutting.identify_force import NAMES
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
 
     data = library.read_toml(file) if file.exists() else {}
     material = cell.material
@@ -160,7 +158,7 @@ def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
 def _save_figure(fit: "ForceFit", file: Path) -> Path:
     from matplotlib.figure import Figure
 
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import BLUE, GREY, VERMILION, look, thin
 
     picture = io.BytesIO()
@@ -176,6 +174,6 @@ def _save_figure(fit: "ForceFit", file: Path) -> Path:
         handles, names = axes.get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=3)
         figure.suptitle("Measured force and the fitted law")
-        figure.savefig(picture, format=file.suffix.lower().removeprefix(".") or "png", dpi=130)
+        figure.savefig(picture, format=file.suffix.lower().removeprefix("."), dpi=130)
     write_together({file: picture.getvalue()})
     return file

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, read_cell, require_other
+from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError
 
 if TYPE_CHECKING:
@@ -54,7 +54,9 @@ def command(
         from gcode2krl.compliance.sensor_poses import read_poses
 
         if output is not None:
-            require_other(Path(output), poses)
+            calibration = read_cell(cell_path).online.calibration  # is measured anew
+            others = (file for file in cell_files(cell_path) if str(file.resolve()) != calibration)
+            require_other(Path(output), poses, *others)
         result = identify_sensor(read_poses(poses, read_cell(cell_path)), gravity, noise_N, noise_Nmm)
         if output is not None:
             files.append(_write(result, Path(output)))
@@ -76,7 +78,7 @@ def command(
 
 def _write(result: "SensorIdentification", file: Path) -> Path:
     from gcode2krl.compliance.sensor import calibration_toml
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
 
     write_together({file: calibration_toml(result.calibration).encode("utf-8")})
     return file

@@ -8,15 +8,13 @@ import click
 
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, read_cell, require_other
-from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
+from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import UM_PER_MM
 
 if TYPE_CHECKING:
     from gcode2krl.compliance.estimate import Estimate
     from gcode2krl.compliance.identify_stiffness import JointFit, StiffnessIdentification
-
-_FORMATS = ("png", "svg", "pdf")
 
 
 @click.command("stiffness")
@@ -37,7 +35,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        result, files = _run(measurements, read_cell(cell_path), plot, apply_to, console)
+        result, files = _run(measurements, cell_path, plot, apply_to, console)
     except Gcode2KrlError as error:
         if not as_json:
             error.source = error.source or measurements
@@ -55,15 +53,14 @@ def command(
 
 
 def _run(
-    measurements: str, cell: Cell, plot: str | None, apply_to: str | None, console: Console
+    measurements: str, cell_path: str | None, plot: str | None, apply_to: str | None, console: Console
 ) -> "tuple[StiffnessIdentification, list[Path]]":
     from gcode2krl.compliance.identify_stiffness import identify_stiffness
     from gcode2krl.compliance.measurements import read_measurements
 
+    cell = read_cell(cell_path)
     readings = read_measurements(measurements)
-    for output in (plot, apply_to):
-        if output is not None:
-            require_other(Path(output), measurements, readings.source)
+    require_fit_outputs(plot, apply_to, cell_path, measurements, readings.source)
     with console.progress("fitting", None):
         result = identify_stiffness(readings, cell)
     files = []
@@ -134,14 +131,10 @@ def _joint_record(fit: "JointFit", cell: Cell) -> dict[str, Any]:
 
 def _save_figure(result: "StiffnessIdentification", file: Path, cell: Cell) -> Path:
     from gcode2krl.cli.stiffness_figure import figure
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import look
 
     kind = file.suffix.lower().removeprefix(".")
-    if kind not in _FORMATS:
-        raise input_error(
-            "option-value", f"figure {file.name!r}: allowed endings {', '.join(_FORMATS)}", source=str(file)
-        )
     picture = io.BytesIO()
     with look():
         figure(result, cell).savefig(picture, format=kind, dpi=130)

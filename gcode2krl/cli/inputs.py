@@ -1,6 +1,7 @@
 """Reading the inputs that several commands share: the part, the cell, and the words about the first run."""
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,14 @@ import click
 
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.cli.console import Console
-from gcode2krl.errors import input_error
+from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.files import refuse_inputs
+from gcode2krl.library import read_toml
 from gcode2krl.tables import Toolpath
 
 STANDARD = "-"
+FIGURES = ("png", "svg", "pdf")
+_LONGEST_PATH = 1000
 
 
 def common_options(function: Any) -> Any:
@@ -57,10 +62,16 @@ def read_part(
     size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else None
     with console.progress("reading", size) as advance:
         if part == STANDARD:
-            return read_stream(
-                sys.stdin.buffer, "stdin", cell,
-                chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance,
-            )  # fmt: skip
+            if sys.stdin is None:
+                raise input_error("file-unreadable", "standard input is closed", "name a file")
+            try:
+                return read_stream(
+                    sys.stdin.buffer, "stdin", cell,
+                    chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance,
+                )  # fmt: skip
+            except OSError as error:
+                sentence = f"cannot read standard input: {error.strerror}"
+                raise input_error("file-unreadable", sentence, "name a file") from None
         return read_gcode(
             part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance
         )
@@ -80,24 +91,100 @@ def _say_first_run(console: Console) -> None:
         console.hint("first run on this machine: compiling, once (some seconds)")
 
 
-def require_other(output: Path, *inputs: str) -> None:
-    """Refuse an output that is one of the inputs, or whose folder does not exist."""
-    if not output.parent.is_dir():
+def require_other(output: Path, *inputs: str | Path | None) -> None:
+    """Refuse an output that is one of the inputs (files, folders), or whose folder does not exist."""
+    require_outputs([output], *inputs)
+
+
+def require_outputs(outputs: list[Path], *inputs: str | Path | None) -> None:
+    """Refuse outputs of which one is an input, or another of them, or has no folder, or is one."""
+    for output in outputs:
+        if not output.parent.is_dir():
+            sentence = f"cannot write: the folder {str(output.parent)!r} does not exist"
+            raise input_error("output-unwritable", sentence, "create it first", source=str(output))
+        if output.is_dir():
+            remedy = "name a file, or remove the folder"
+            raise input_error("output-unwritable", "this is a folder", remedy, source=str(output))
+    refuse_inputs(outputs, existing(*inputs))
+
+
+def require_folder(folder: str | Path | None, names: Iterable[str], inputs: Iterable[Path]) -> None:
+    """Refuse a folder to write into that cannot be one, or in which an input has the name of an output."""
+    if folder is None:
+        return
+    place = Path(folder)
+    if place.is_dir():
+        require_outputs([place / name for name in names], *inputs)
+        return
+    require_outputs([place], *inputs)
+    if place.exists():
+        raise input_error("output-unwritable", "this is a file", "name a folder", source=str(place))
+
+
+def require_figure(name: str | None) -> None:
+    """Refuse the name of a figure that cannot be drawn."""
+    if name is not None and Path(name).suffix.lower().removeprefix(".") not in FIGURES:
+        sentence = f"figure {Path(name).name!r}: allowed endings {', '.join(FIGURES)}"
+        raise input_error("option-value", sentence, "name it figure.png", source=name)
+
+
+def require_fit_outputs(plot: str | None, apply_to: str | None, cell: str | None, *data: str | None) -> None:
+    """Refuse outputs of a fit: a figure over any input, a cell file over the data; the cell is rewritten."""
+    require_figure(plot)
+    if apply_to is not None:
+        require_other(Path(apply_to), *data)
+    if plot is not None:
+        require_other(Path(plot), apply_to, *data, *cell_files(cell))
+
+
+def require_part(part: str) -> None:
+    """Refuse a folder where G-code is wanted."""
+    if part != STANDARD and Path(part).is_dir():
         raise input_error(
-            "output-unwritable",
-            f"the folder {str(output.parent)!r} does not exist",
-            "create it first",
-            source=str(output),
+            "file-unreadable", "this is a folder, no G-code", "name the file", source=part or "the input"
         )
-    if output.is_dir():
-        raise input_error(
-            "output-unwritable", "this is a folder", "name a file, part.src", source=str(output)
-        )
-    for path in inputs:
-        if path != STANDARD and Path(path).exists() and output.exists() and output.samefile(path):
-            raise input_error(
-                "output-is-input",
-                "the output is the input",
-                "choose another name with -o",
-                source=str(output),
-            )
+
+
+def existing(*inputs: str | Path | None) -> list[Path]:
+    """Return the inputs that are files or folders, without those that are not given."""
+    return [Path(path) for path in inputs if path is not None and path != STANDARD]
+
+
+def effect_files(folders: Iterable[str]) -> list[Path]:
+    """Return the files of folders with effects."""
+    return [file for folder in folders for file in Path(folder).glob("*.py")]
+
+
+def cell_files(path: str | None) -> list[Path]:
+    """Return a cell file and every file that it names, however deep: models, bases, meshes, calibration.
+
+    What cannot be read is left out: whoever reads the cell says so.
+    """
+    found: list[Path] = []
+    waiting = [Path(path)] if path is not None else []
+    while waiting:
+        file = waiting.pop()
+        if file in found:
+            continue
+        found.append(file)
+        if file.suffix.lower() == ".toml" or len(found) == 1:
+            waiting += (file.parent / name for name in _names_in(file) if (file.parent / name).is_file())
+    return found
+
+
+def _names_in(file: Path) -> list[str]:
+    """Return the texts of a TOML file that may be names of files."""
+    try:
+        values: list[Any] = [read_toml(file)]
+    except (Gcode2KrlError, RecursionError):
+        return []
+    names = []
+    while values:
+        value = values.pop()
+        if isinstance(value, dict):
+            values += value.values()
+        elif isinstance(value, list):
+            values += value
+        elif isinstance(value, str) and 0 < len(value) < _LONGEST_PATH and "\0" not in value:
+            names.append(value)
+    return names

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
@@ -79,7 +80,9 @@ def commands() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
-    sys.exit(_run(args))
+    reserve_standard_files()
+    code = _run(args)
+    sys.exit(code if flushed() else 2)
 
 
 def _run(args: list[str] | None) -> int:
@@ -94,10 +97,15 @@ def _run(args: list[str] | None) -> int:
         return error.exit_code
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
+    except click.exceptions.NoArgsIsHelpError as error:
+        return console.failed(_which(error), 2)
     except click.ClickException as error:
         return console.failed(f"{error.format_message()} -> `gcode2krl --help` lists the options", 2)
     except BrokenPipeError:
         return 2
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else "standard input or output: "
+        return console.failed(f"{place}{error.strerror or error} -> check path, rights and space", 2)
     except (MemoryError, RecursionError) as error:
         return console.failed(f"not enough memory for this input ({type(error).__name__})", 2)
     except Exception as error:  # a defect of ours: one line for the user, the rest on request
@@ -107,6 +115,15 @@ def _run(args: list[str] | None) -> int:
             f"internal error, please report it: {type(error).__name__}: {error} -> -v shows the details",
             2,
         )
+
+
+def _which(error: click.exceptions.NoArgsIsHelpError) -> str:
+    """Return the line for a command that lacks the word behind it."""
+    context = error.ctx
+    path = context.command_path if context is not None else "gcode2krl"
+    command = context.command if context is not None else commands
+    words = command.list_commands(context) if context and isinstance(command, click.Group) else []
+    return f"{path}: name one of {', '.join(words)} -> `{path} --help` tells more"
 
 
 if __name__ == "__main__":

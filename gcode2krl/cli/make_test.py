@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import click
+import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import STANDARD, common_options, read_cell, require_other
+from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 
@@ -34,12 +35,19 @@ def command(
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
+        if at and not np.isfinite(at).all():
+            raise input_error("option-value", f"--at {at}: found no numbers", "give X Y Z in mm")
         if output == STANDARD:
             click.echo(_gcode(cell_path, at), nl=False)
             return 0
         file = Path(output)
-        require_other(file, *((cell_path,) if cell_path else ()))
-        write = _write_krl if file.suffix.lower() == ".src" else _write_gcode
+        write = _write_gcode
+        outputs = [file]
+        if file.suffix.lower() == ".src":
+            from gcode2krl.krl import output_files
+
+            write, outputs = _write_krl, output_files(file, None)
+        require_outputs(outputs, *cell_files(cell_path))
         files, lines, issues = write(file, cell_path, at)
     except Gcode2KrlError as error:
         if not as_json:
@@ -69,14 +77,15 @@ def _write_krl(
     from gcode2krl.predict import controller_test_targets
 
     cell = read_cell(cell_path)
-    written = write_krl(controller_test_targets(cell, at), file, cell, options="test of the controller")
+    targets, inputs = controller_test_targets(cell, at), cell_files(cell_path)
+    written = write_krl(targets, file, cell, options="test of the controller", inputs=inputs)
     return list(written.files), sum(text.count(b"\n") for text in written.texts.values()), written.issues
 
 
 def _write_gcode(
     file: Path, cell_path: str | None, at: tuple[float, float, float] | None
 ) -> tuple[list[Path], int, tuple[Issue, ...]]:
-    from gcode2krl.krl.files import write_together
+    from gcode2krl.files import write_together
 
     text = _gcode(cell_path, at)
     write_together({file: text.encode("ascii")})

@@ -8,14 +8,26 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.cli.inputs import (
+    cell_files,
+    common_options,
+    existing,
+    gcode_options,
+    read_cell,
+    read_part,
+    require_folder,
+    require_other,
+)
 from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.files import make_folder, write_together
 from gcode2krl.online_section import Online
 from gcode2krl.prediction import Prediction
 
 TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
 """As the test piece's file states it."""
 _MS = 1000.0
+_FIGURES = ("deviation", "signals")
+_RUN_FILES = ("run.toml", "rsi.log", "force.csv", "events.csv")
 
 
 @click.group("online")
@@ -52,6 +64,8 @@ def simulate_command(
     Without PART the test piece of Haehn & Weigold 2020.
     """
     console = Console(quiet, as_json)
+    inputs = existing(part, *cell_files(cell_path))
+    require_folder(plot, [f"{name}.png" for name in _FIGURES], inputs)
     cell = read_cell(cell_path)
     settings = _changed(cell.online, options)
     world_values = _world_values(options)
@@ -70,7 +84,7 @@ def simulate_command(
     lines = prediction.toolpath.source_line[motion.move] if motion is not None else np.zeros(0, np.int32)
     outcome = outcome_json(twin, runs, judged, lines)
     issues = [*prediction.issues, *findings(twin, runs, judged)]
-    files = _draw(prediction, twin, runs, judged, outcome, Path(plot)) if plot is not None else []
+    files = _draw(prediction, twin, runs, judged, outcome, Path(plot), inputs) if plot is not None else []
     if as_json:
         console.json({**outcome, "files": [str(file) for file in files], "issues": issue_dicts(issues)})
         return 0
@@ -182,16 +196,13 @@ def _test_piece() -> Path:
 
 
 def _draw(
-    prediction: Prediction, twin: Any, runs: Any, judged: Any, outcome: dict[str, Any], folder: Path
-) -> list[Path]:
+    prediction: Prediction, twin: Any, runs: Any, judged: Any, outcome: dict[str, Any], folder: Path,
+    inputs: list[Path],
+) -> list[Path]:  # fmt: skip
     from gcode2krl.online.surface import surface_of
     from gcode2krl.report.figures import save_figures
     from gcode2krl.report.twin_figures import Map, Signals, deviation_figure, signal_figure
 
-    if not folder.parent.is_dir():
-        raise input_error(
-            "output-unwritable", f"the folder {str(folder.parent)!r} does not exist", "create it"
-        )
     maps = {
         words.capitalize() if words[0] != "C" else words: Map(
             *surface_of(prediction, runs[case], judged), outcome[f"{case}_mm"]
@@ -206,8 +217,8 @@ def _draw(
     )  # fmt: skip
     worst = np.where(judged.counts, runs["cartesian"].normal_mm, 0.0)
     around_s = float(run.time_s[int(np.argmax(worst))]) if len(worst) else 0.0
-    drawn = {"deviation": deviation_figure(maps), "signals": signal_figure(signals, around_s)}
-    return save_figures(drawn, folder)
+    drawn = (deviation_figure(maps), signal_figure(signals, around_s))
+    return save_figures(dict(zip(_FIGURES, drawn, strict=True)), folder, inputs)
 
 
 @command.command("replay")
@@ -222,6 +233,9 @@ def replay_command(
 ) -> int:  # fmt: skip
     """Send a recorded run through the compensator: what would it have done?"""
     console = Console(quiet, as_json)
+    inputs = existing(run, sidecar, *cell_files(cell_path))
+    if output is not None:
+        require_other(Path(output), *inputs)
     cell = read_cell(cell_path)
     from gcode2krl.online.replay import as_json as replay_json
     from gcode2krl.online.replay import columns, replay
@@ -236,8 +250,7 @@ def replay_command(
     if output is not None:
         import polars as pl
 
-        require_other(Path(output), run)
-        pl.DataFrame(columns(result)).write_csv(output)
+        write_together({Path(output): pl.DataFrame(columns(result)).write_csv}, inputs)
     if as_json:
         console.json({**found, "issues": issue_dicts(result.issues)})
         return 0
@@ -278,12 +291,16 @@ def serve_command(
     that it takes corrections as absolute. The force comes in the telegram (element Force).
     """
     console = Console(quiet, as_json)
+    inputs = existing(sidecar, *cell_files(cell_path))
+    require_folder(output, _RUN_FILES, inputs)
     cell = read_cell(cell_path)
     settings = _link_changed(cell.online, options)
     knots, header = _pilot(sidecar)
     form = header.form if header is not None else "none"
     if files is not None:
-        written = _controller_files(cell.model_copy(update={"online": settings}), form, name, Path(files))
+        written = _controller_files(
+            cell.model_copy(update={"online": settings}), form, name, Path(files), inputs
+        )
         if settings.link.address.startswith("127."):
             console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
         if as_json:
@@ -376,20 +393,15 @@ def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
     return _valid(settings, changes)
 
 
-def _controller_files(cell: Cell, form: Any, name: str, folder: Path) -> list[Path]:
+def _controller_files(cell: Cell, form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:
     """Write what belongs into the controller's folder ``SensorInterface``."""
-    from gcode2krl.krl.files import write_together
     from gcode2krl.krl.rsi_files import rsi_files
 
     if cell.online.link.address == "0.0.0.0":
         words = "the controller cannot look for the server at 0.0.0.0"
         raise input_error("online-address", words, "give --address, that of the PC in the robot's network")
     texts = rsi_files(name, cell.online, cell.pilot, form)
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise input_error("output-unwritable", f"cannot write: {why}", source=str(folder)) from None
+    make_folder(folder)
     files = {folder / key: text.replace("\n", "\r\n").encode("ascii") for key, text in texts.items()}
-    write_together(files)
+    write_together(files, inputs)
     return list(files)

@@ -7,14 +7,34 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.cli.inputs import (
+    STANDARD,
+    cell_files,
+    common_options,
+    effect_files,
+    existing,
+    gcode_options,
+    read_cell,
+    read_part,
+    require_folder,
+    require_other,
+    require_part,
+)
 from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.prediction import Prediction
+from gcode2krl.files import write_together
+from gcode2krl.prediction import RECORD, Prediction, refuse_foreign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+_MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
+_CORNERS = "corners.csv"
+_FIGURES = (
+    "path", "kinematics", "joints",
+    "force", "force_path", "deflection", "deflection_path", "deflection_joints",
+)  # fmt: skip
 
 
 @click.command("predict")
@@ -49,7 +69,10 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        require_part(part)
         folder = _folder(part, output)
+        inputs = existing(part, *cell_files(cell_path), *effect_files(effect_folders))
+        _require_outputs(folder, part_mesh, inputs)
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.predict import add_effects, corner_table, predict_toolpath
@@ -60,13 +83,13 @@ def command(
                 toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings, forces=not no_forces
             )
             prediction = add_effects(prediction, effects, effect_folders)
-            files = prediction.save(folder, csv=csv)
             corners = corner_table(prediction)
-            files.append(_save_corners(corners, folder))
+            files = prediction.save(folder, csv=csv, inputs=inputs)
+            files.append(_save_corners(corners, folder, inputs))
             if part_mesh is not None:
-                files.append(_save_part(prediction, Path(part_mesh)))
+                files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
-                files += _draw(prediction, folder)
+                files += _draw(prediction, folder, inputs)
     except Gcode2KrlError as error:
         if not as_json:
             error.source = error.source or part
@@ -111,29 +134,44 @@ def command(
     return 0
 
 
-def _save_part(prediction: Prediction, file: Path) -> Path:
+def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) -> None:
+    """Raise where an output is an input, has no folder, or the folder is somebody else's."""
+    refuse_foreign(folder)
+    tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
+    names = [*tables, RECORD, _CORNERS, *(f"{name}.png" for name in _FIGURES)]
+    require_folder(folder, names, inputs)
+    if part_mesh is None:
+        return
+    file = Path(part_mesh)
+    if file.suffix.lower() not in _MESHES:
+        sentence = f"--part {file.name!r}: allowed endings {', '.join(_MESHES)}"
+        raise input_error("option-value", sentence, "name it left.stl", source=part_mesh)
+    require_other(file, *inputs)
+
+
+def _save_part(prediction: Prediction, file: Path, inputs: list[Path]) -> Path:
     """Write the part that is left as a mesh."""
     from gcode2krl.cutting import remove
     from gcode2krl.cutting.raw_part import to_mesh
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
-    require_other(file)
-    left = remove(prediction.toolpath, prediction.motion, prediction.cell).part
-    to_mesh(left).export(file)
+    mesh = to_mesh(remove(prediction.toolpath, prediction.motion, prediction.cell).part)
+    content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
+    write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)
     return file
 
 
-def _save_corners(corners: dict[str, Any], folder: Path) -> Path:
+def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> Path:
     """Write the table of corners as CSV."""
     import polars as pl
 
-    file = folder / "corners.csv"
-    pl.DataFrame(corners).write_csv(file)
+    file = folder / _CORNERS
+    write_together({file: pl.DataFrame(corners).write_csv}, inputs)
     return file
 
 
-def _draw(prediction: Prediction, folder: Path) -> list[Path]:
+def _draw(prediction: Prediction, folder: Path, inputs: list[Path]) -> list[Path]:
     """Draw path, speed and joints; returns the files."""
     from gcode2krl.report import figures as fig
 
@@ -148,12 +186,14 @@ def _draw(prediction: Prediction, folder: Path) -> list[Path]:
         "joints": fig.joints_figure(motion, joints, limits, speeds),
         **_load_figures(prediction),
     }
-    return fig.save_figures(drawn, folder)
+    return fig.save_figures(drawn, folder, inputs)
 
 
 def _folder(part: str, output: str | None) -> Path:
     if output == STANDARD or (output is None and part == STANDARD):
         raise input_error("option-value", "a prediction is a folder", "give -o prediction/")
+    if output == "":
+        raise input_error("option-value", "-o: the name is empty", "give -o prediction/")
     folder = Path(output) if output is not None else Path(part).with_suffix(".prediction")
     if folder.exists() and not folder.is_dir():
         raise input_error("output-unwritable", "this is a file", "name a folder", source=str(folder))

@@ -8,7 +8,7 @@ from gcode2krl import library
 from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.compliance.identify_stiffness import KEYS, JointFit, StiffnessIdentification
 from gcode2krl.errors import input_error
-from gcode2krl.krl.files import write_together
+from gcode2krl.files import write_together
 from gcode2krl.sections import VIRTUAL_JOINTS
 
 _OF_END_EFFECTOR = ("sensor", "spindle")

@@ -9,13 +9,16 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, read_cell
+from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
+from gcode2krl.files import write_together
 from gcode2krl.sections import VIRTUAL_JOINTS
 from gcode2krl.tables import Bools, Floats
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 Three = tuple[float, float, float]
+MOST_LOAD_N = 1e6
+"""No robot holds it: a slip of the unit."""
 LATERAL_N = 100.0
 """Size of the load where none is given."""
 _AXIS = np.array([[0.0, 0.0, 1.0]])
@@ -23,6 +26,7 @@ _ACROSS = np.eye(3)[:2]
 _SPIN_STEP_DEG = 2.0
 _STEPS_TO_REACH = 25
 _MOST_POSES = 100_000
+_TABLES = ("workspace", "spin", "joints")
 
 
 @click.command("stiffness-map")
@@ -52,13 +56,15 @@ def command(
     within the joint limits. Figures and CSV go into the folder.
     """
     console = Console(quiet, as_json)
+    folder, inputs = Path(output), cell_files(cell_path)
     try:
+        require_folder(folder, [f"{name}{kind}" for name in _TABLES for kind in (".png", ".csv")], inputs)
         cell = read_cell(cell_path)
         case = Case.of(cell, load, feed, tool)
         with console.progress("mapping", None):
             plane, spins = plane_map(case, at[2], step), spin_map(case, at)
             result, shares = pose_cost(case, at)
-            files = _save(case, at, plane, spins, shares, Path(output))
+            files = _save(case, at, plane, spins, shares, folder, inputs)
     except Gcode2KrlError as error:
         if not as_json:
             raise
@@ -105,6 +111,9 @@ class Case:
         for name, values in (("--load", load), ("--feed", feed)):
             if values is not None and not (np.isfinite(values).all() and np.any(values)):
                 raise input_error("option-value", f"{name} {values} has no direction", "give three numbers")
+        if load is not None and np.linalg.norm(load) > MOST_LOAD_N:
+            sentence = f"--load {load}: more than {MOST_LOAD_N:g} N"
+            raise input_error("option-value", sentence, "give newtons")
         own = None if load is None else np.array(load, dtype=float)
         return cls(cell, number, own, np.array(feed if feed is not None else (0.0, 0.0, 0.0), dtype=float))
 
@@ -250,8 +259,9 @@ def pose_cost(case: Case, at_mm: Three) -> tuple[dict[str, Any], dict[str, float
 
 
 def _save(
-    case: Case, at: Three, plane: PlaneMap, spins: SpinMap, shares: dict[str, float], folder: Path
-) -> list[Path]:
+    case: Case, at: Three, plane: PlaneMap, spins: SpinMap, shares: dict[str, float], folder: Path,
+    inputs: list[Path],
+) -> list[Path]:  # fmt: skip
     """Write figures and CSV; returns the files."""
     import polars as pl
 
@@ -285,12 +295,7 @@ def _save(
         },
         "joints": {"joint": list(shares), "share_mm": list(shares.values())},
     }  # fmt: skip
-    try:
-        files = save_figures(figures, folder)
-        for name, columns in tables.items():
-            files.append(folder / f"{name}.csv")
-            pl.DataFrame(columns).write_csv(files[-1])
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise input_error("output-unwritable", f"cannot write: {why}", source=str(folder)) from None
-    return files
+    drawn = save_figures(figures, folder, inputs)
+    written = {folder / f"{name}.csv": pl.DataFrame(columns).write_csv for name, columns in tables.items()}
+    write_together(written, inputs)
+    return [*drawn, *written]

@@ -38,6 +38,7 @@ def summary_lines(
 
     yield f"{part} -> {_files(written)} ({size_mb:.2f} MB)"
     yield f"  program    {written.name}: {len(toolpath) - 1} moves, {len(targets)} motions, lines {lines}"
+    yield from (f"  name       {issue.message}" for issue in written.issues if issue.code == "krl-name")
     if prediction.motion is not None:
         yield f"  time       {_duration(prediction.motion.time_s[-1])} of motion, without spindle and tools"
     yield f"  path       {steps_m[feed].sum():.3f} m at feed, {steps_m[rapid].sum():.3f} m rapid"

@@ -1,6 +1,5 @@
 """``gcode2krl translate part.nc -o part.src``, the default command."""
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +11,20 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, read_cell, read_part, require_other
+from gcode2krl.cli.inputs import (
+    STANDARD,
+    cell_files,
+    common_options,
+    existing,
+    gcode_options,
+    read_cell,
+    read_part,
+    require_figure,
+    require_outputs,
+    require_part,
+)
 from gcode2krl.cli.loads import largest
+from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
@@ -27,11 +38,14 @@ Floats = NDArray[np.float64]
 @click.command("translate")
 @click.argument("part")
 @click.option(
-    "-o", "--output", metavar="PART.src", help="Output; default: beside the input. - is standard output."
+    "-o",
+    "--output",
+    metavar="PART.src",
+    help="Output, or its folder; default: beside the input. - is stdout.",
 )
 @common_options
 @gcode_options
-@click.option("--name", help="Program name; default: the output's name.")
+@click.option("--name", help="Program name, where -o names no file; a controller needs both alike.")
 @click.option(
     "--allow",
     multiple=True,
@@ -68,7 +82,9 @@ Floats = NDArray[np.float64]
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
 )
-@click.option("--comment-every", type=click.IntRange(0), help="A G-code line number every so many motions.")
+@click.option(
+    "--comment-every", type=click.IntRange(0, 10**9), help="A G-code line number every so many motions."
+)
 def command(
     part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
     tolerance: float | None, chord_tolerance: float, block_delete: bool,
@@ -86,9 +102,13 @@ def command(
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
-        file = _output_file(part, output, cell_path)
-        _refuse_online(online, both, compensate, file)
+        require_part(part)
+        place = _place(part, output, name)
+        _refuse_online(online, both, compensate, place)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
+        inputs = existing(part, *cell_files(cell_path))
+        require_figure(compensate_plot)
+        require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.predict import corner_errors, predict_toolpath, solve_joints, targets_and_joints
@@ -102,8 +122,8 @@ def command(
             online=online,
             both=both,
         )
-        if file is None and name is None and part != STANDARD:
-            name = suggested_name(Path(part).stem)
+        if place is None and name is None and part != STANDARD:
+            name = suggested_name(Path(part).stem, cell.program.externals)
         with console.progress("planning, writing, verifying", None):
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
@@ -113,11 +133,11 @@ def command(
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
 
-                prediction = compensated(prediction, compensate_plot)
+                prediction = compensated(prediction, compensate_plot, inputs)
                 joints = solve_joints(prediction.targets, cell)
             written = write_krl(
                 prediction,
-                file,
+                place,
                 joints=joints,
                 name=name,
                 allow=allow,
@@ -127,6 +147,7 @@ def command(
                 strict=strict,
                 pilot=pilot,
                 online=online,
+                inputs=inputs,
             )
     except Gcode2KrlError as error:
         if not as_json:
@@ -134,8 +155,7 @@ def command(
         console.json(_result((), error.issues))
         return error.exit_code
     if output == STANDARD:
-        sys.stdout.buffer.write(written.texts[f"{written.name}.src"])
-        sys.stdout.buffer.flush()
+        write_bytes(written.texts[f"{written.name}.src"])
         console.findings(written.issues, part)
         return 0
     if as_json:
@@ -189,18 +209,31 @@ def _from_part(error: Gcode2KrlError, part: str) -> Gcode2KrlError:
     return error
 
 
-def _output_file(part: str, output: str | None, cell_path: str | None) -> Path | None:
+def _place(part: str, output: str | None, name: str | None) -> Path | None:
+    """Return the file or the folder to write into, None for standard output."""
     if output == STANDARD:
         return None
-    if output is None and part == STANDARD:
+    if output == "":
+        raise input_error("option-value", "-o: the name is empty", "give -o part.src")
+    if part == STANDARD and output is None:
         raise input_error("option-value", "standard input needs an output", "give -o part.src, or -o -")
-    file = Path(output) if output is not None else Path(part).with_suffix(".src")
-    if file.suffix.lower() != ".src":
-        raise input_error(
-            "option-value", f"the output {file.name!r} does not end in .src", "name it part.src"
-        )
-    require_other(file, part, *([cell_path] if cell_path else []))
-    return file
+    place = Path(output) if output is not None else Path(part).parent
+    if part == STANDARD and name is None and place.is_dir():
+        raise input_error("option-value", "standard input has no name", "give -o part.src, or --name PART")
+    return place
+
+
+def _outputs(
+    place: Path | None, name: str | None, part: str, cell: Cell, online: str | None, plot: str | None
+) -> list[Path]:
+    """Return what will be written, but for the parts of a long program; raises where a name is bad."""
+    from gcode2krl.krl import output_files, program_file
+
+    outputs = [Path(plot)] if plot is not None else []
+    if place is not None:
+        file, _ = program_file(place, name, part, cell.program.externals)
+        outputs += output_files(file, online)
+    return outputs
 
 
 def _with_options(cell: Cell, max_lines: int | None, comment_every: int | None) -> Cell:

@@ -1,5 +1,6 @@
 """``gcode2krl verify part.src part.nc``."""
 
+import math
 from typing import Literal
 
 import click
@@ -50,10 +51,13 @@ def command(
         console.findings(report.issues, program)
         state = "agrees with" if report.ok else "DIFFERS from"
         console.say(f"{program} {state} {part}: {report.motions} motions of {report.intended}")
-        console.say(
-            f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, "
-            f"{report.max_speed_difference_mm_min:.2f} mm/min"
-        )
+        if math.isnan(report.max_deviation_mm + report.max_rotation_deg + report.max_speed_difference_mm_min):
+            console.say("  largest deviation not known: not every motion can be compared")
+        else:
+            console.say(
+                f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, "
+                f"{report.max_speed_difference_mm_min:.2f} mm/min"
+            )
         if not report.ok:
             console.explain_hint(report.issues)
     return 0 if report.ok else 1

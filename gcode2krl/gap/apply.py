@@ -7,6 +7,7 @@ from typing import Any
 from gcode2krl import library
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import input_error
+from gcode2krl.files import write_together
 from gcode2krl.gap.result import Gap
 
 
@@ -45,9 +46,5 @@ def apply_to_cell(gap: Gap, file: Path, base: Path | None, sources: Sequence[str
     kept = [entry for entry in before if (entry.get("name"), entry.get("target")) not in same]
     data["effects"] = [*kept, *entries]
     resolve_cell(data, beside=file.parent, source=str(file))
-    try:
-        file.write_bytes(tomli_w.dumps(data).encode("utf-8"))
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise input_error("output-unwritable", f"cannot write: {why}", source=str(file)) from None
+    write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return len(entries)

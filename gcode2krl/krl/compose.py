@@ -252,6 +252,7 @@ class _Composer:
             rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
             frame_checks=checks,
+            unnumbered=st.unnumbered(self.cell, tools),
             declarations="\n".join(declarations),
             message_setup=MESSAGE_SETUP,
             base=st.base_statement(self.cell),

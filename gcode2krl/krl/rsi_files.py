@@ -10,15 +10,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.krl.names import DEVICES
 from gcode2krl.online_section import Online
 from gcode2krl.sections import Pilot
 
 Form = Literal["index", "values", "none"]
 LONGEST_NAME = 16
-RESERVED = frozenset(
-    ["CON", "PRN", "AUX", "NUL", *(f"{word}{k}" for word in ("COM", "LPT") for k in range(1, 10))]
-)
-"""Names that Windows, on which a KRC4 runs, keeps for devices."""
 MOST_TURN_DEG = 0.1
 """We correct positions, no orientations: a turn beyond is none of ours."""
 MONITOR_SHARE = 1.2
@@ -58,7 +55,7 @@ class _Channel:
 def is_file_name(name: str) -> bool:
     """Tell whether files of that name can be named on a controller."""
     return re.fullmatch(rf"[A-Za-z0-9_]{{1,{LONGEST_NAME}}}", name) is not None and (
-        name.upper() not in RESERVED
+        name.upper() not in DEVICES
     )
 
 

@@ -45,6 +45,19 @@ def base_statement(cell: Cell) -> str:
     return f"BAS (#BASE,{number} )" if number is not None else f"$BASE={frame_text(cell.base_matrix())}"
 
 
+def unnumbered(cell: Cell, tools: list[int]) -> str:
+    """Return which of ``$ACT_BASE`` and ``$ACT_TOOL`` are not those in use, as frames are set by value.
+
+    Only ``BAS(#BASE,n)`` and ``BAS(#TOOL,n)`` set them; a frame assigned to ``$BASE`` or ``$TOOL`` leaves
+    them at what ``BAS(#INITMOV,0)`` or the last number set (KUKA's BAS.SRC of KSS 8).
+    """
+    by_value = {
+        "$ACT_BASE": cell.frames.base_data is None,
+        "$ACT_TOOL": any(cell.tool[number].tool_data is None for number in tools),
+    }
+    return ", ".join(name for name, stale in by_value.items() if stale)
+
+
 def tool_statements(cell: Cell, number: int) -> str:
     """Return the statements that set ``$TOOL`` and ``$LOAD`` for a tool."""
     tool = cell.tool[number]
@@ -91,6 +104,7 @@ def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
 def event_statements(event: Event, cell: Cell) -> str:
     """Return the KRL of an event, from the cell's templates; a note where it was released without one."""
     line = event.values["line"]
+    place = f"line {line}" if line else "end of the program"
     if event.kind == "tool":
         number = event.values["tool"]
         text = render(cell, "tool_change", tool=number, line=line)
@@ -110,7 +124,7 @@ def event_statements(event: Event, cell: Cell) -> str:
         cell, f"m_code.M{code}", rpm=rpm, m=code, p=event.values.get("p"),
         text=ascii_text(event.values.get("text", "")), line=line,
     )  # fmt: skip
-    return f"; line {line}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
+    return f"; {place}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
 
 
 def render(cell: Cell, key: str, **values: Any) -> str:

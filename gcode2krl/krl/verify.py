@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,11 @@ from gcode2krl.krl.compose import SIDECAR, Layout, compose, turn_bits
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_plan import pilot_forces
-from gcode2krl.krl.pilot_text import PilotText
+from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
+from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.pilot import knot_rows, read_pilot
 from gcode2krl.predict import plan_motion, set_targets, solve_joints
 from gcode2krl.prediction import Prediction
@@ -90,9 +91,12 @@ def verify_krl(
     """
     program = read_krl(path)
     targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)
+    parts = missing_parts(program, cell.program.externals)
+    if parts:  # nothing behind them could be told from a difference
+        return _not_whole(program, targets, parts)
     joints = solve_joints(targets, cell)
-    issues = _data_issues(Path(path), program)
-    pilot = _pilot_of(program, Path(path), cell)
+    issues: list[Issue] = []
+    pilot, announced = _pilot_of(program, Path(path), cell)
     case: PilotCase | None = None
     if pilot is not None:
         if prediction is not None:
@@ -100,39 +104,58 @@ def verify_krl(
             case = PilotCase(pilot, motion, force_N)
         else:
             case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s))
+    if announced:
         pieces = pieces_in(
             program.position_mm, program.ptp, program.cdis_mm, targets, cell, POSITION_LIMIT_MM
         )
         targets, joints, _ = split(targets, joints, pieces, cell)
-    elif len(program.triggers.motion):
+    if announced and pilot is None:
         issues.append(_no_sidecar(program, Path(path)))
+        program = _without_pilot(program, cell)
+    alone = declares_itself(program)
     online = rsi_name(program, Path(path).parent)
-    layout = Layout(guard=program.guard, online=online)
+    layout = Layout(guard=program.guard, online=online, single_file=alone)
     expected = compose(targets, joints, cell, program.name, layout, pilot)
+    if not alone:
+        issues += data_issues(Path(path), program, expected[f"{program.name}.dat"])
     if online:
         issues += rsi_file_issues(Path(path), online, expected)
     intended = read_texts(expected, f"{program.name}.src")
     return compare(program, targets, joints, cell, intended, issues, case)
 
 
-def _pilot_of(program: KrlProgram, path: Path, cell: Cell) -> PilotText | None:
-    """Return the pilot force that belongs to a program; None where the program has none, or no sidecar."""
+def _not_whole(program: KrlProgram, targets: Targets, issues: Sequence[Issue]) -> VerifyReport:
+    """Return the report of a program of which parts are missing: nothing else is said of it."""
+    nan = float("nan")
+    return VerifyReport(nan, nan, nan, len(program.ptp), len(targets), issues=tuple(issues))
+
+
+def _pilot_of(program: KrlProgram, path: Path, cell: Cell) -> tuple[PilotText | None, bool]:
+    """Return the pilot force that belongs to a program, None without a sidecar, and whether it has one."""
     variable = _normal(cell.pilot.hash_variable)
     announced = any(_normal(statement.text).startswith(f"{variable}=") for statement in program.statements)
-    sidecar = path.with_suffix(SIDECAR)
-    if not sidecar.is_file() or not (announced or len(program.triggers.motion)):
-        return None
+    announced |= len(program.triggers.motion) > 0
+    sidecar = beside(path, SIDECAR)
+    if not sidecar.is_file() or not announced:
+        return None, announced
     knots, header = read_pilot(sidecar)
     stated = checksum_of(program, knot_rows(knots))  # a piece is known no better than as it was read
-    return PilotText(knots, header, cell.pilot.hash_variable, stated=stated)
+    return PilotText(knots, header, cell.pilot.hash_variable, stated=stated), announced
 
 
 def _no_sidecar(program: KrlProgram, path: Path) -> Issue:
-    name = path.with_suffix(SIDECAR).name
-    sentence = f"{name} is missing: the triggers of the program are not known to fit"
-    return Issue(
-        "error", "pilot-sidecar", int(program.triggers.line[0]), sentence, "keep it beside the program"
-    )
+    name, lines = path.with_suffix(SIDECAR).name, program.triggers.line
+    why = "the pilot force that the program announces is not known to fit"
+    return missing(name, "pilot-sidecar", int(lines[0]) if len(lines) else 0, why)
+
+
+def _without_pilot(program: KrlProgram, cell: Cell) -> KrlProgram:
+    """Return a program without what it sets and calls for a pilot force whose sidecar is missing."""
+    own = (cell.pilot.index_variable, cell.pilot.hash_variable, f"{cell.pilot.value_variable}[")
+    prefixes = tuple(_normal(name) for name in own)
+    statements = tuple(s for s in program.statements if not _normal(s.text).startswith(prefixes))
+    uncalled = {key: text for key, text in program.uncalled.items() if not key.endswith(f"/{SUBPROGRAM}")}
+    return replace(program, statements=statements, uncalled=uncalled)
 
 
 def compare(
@@ -151,26 +174,25 @@ def compare(
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
     issues += _start_issues(program, targets)
-    if len(program.ptp) != len(targets):
-        issues.append(
-            Issue(
-                "error",
-                "verify-count",
-                _first_difference(program, targets),
-                f"{len(program.ptp)} motions read, {len(targets)} intended",
-                _REMEDY,
-            )
-        )
-    count = min(len(program.ptp), len(targets))
+    paired = len(program.ptp) == len(targets)
+    count = len(targets)
+    if not paired:  # behind the first difference every motion would be compared with another
+        count, line = _first_difference(program, targets)
+        text = f"{len(program.ptp)} motions read, {len(targets)} intended; they differ from this line on"
+        issues.append(Issue("error", "verify-count", line, text, _REMEDY))
     deviation, rotation_deg, speed = _differences(program, targets, joints, cell, count)
+    issues += _home_issues(program, targets, joints, count)
     issues += _difference_issues(program, targets, joints, count, deviation, rotation_deg, speed)
     if intended is not None:
-        issues += _statement_issues(program.statements, intended.statements, program)
+        read, wished = (
+            tuple(s for s in p.statements if paired or s.motion <= count) for p in (program, intended)
+        )
+        issues += _statement_issues(read, wished, program)
         own, wanted = (_own_declarations(p.declarations) for p in (program, intended))
         issues += _statement_issues(own, wanted, program)
         issues += _uncalled_issues(program, intended)
     figures: PilotFigures | None = None
-    if pilot is not None and len(program.ptp) == len(targets):
+    if pilot is not None and paired:
         figures, found = check_pilot(program, pilot, targets, cell)
         issues += found
     order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
@@ -184,9 +206,9 @@ def compare(
         for row in order
     )
     return VerifyReport(
-        max_deviation_mm=_largest(deviation),
-        max_rotation_deg=_largest(rotation_deg),
-        max_speed_difference_mm_min=_largest(speed) * S_PER_MIN,
+        max_deviation_mm=_largest(deviation, paired),
+        max_rotation_deg=_largest(rotation_deg, paired),
+        max_speed_difference_mm_min=_largest(speed, paired) * S_PER_MIN,
         motions=len(program.ptp),
         intended=len(targets),
         worst=worst,
@@ -212,13 +234,32 @@ def _differences(
         angle = fr.angle_between(fr.quaternion_from_rotation(read), abc[:, 3:])
         rotation[rows] = angle[run] * DEG_PER_RAD
     rotation[np.isnan(program.abc_deg[:count]).any(axis=1)] = np.nan
-    joint_deg = np.abs(program.q_deg[:count] - joints.q_rad[:count] * DEG_PER_RAD).max(axis=1)
-    good_home = home & (joint_deg <= JOINT_LIMIT_DEG)
-    deviation[good_home], rotation[good_home] = 0.0, 0.0
+    deviation[home], rotation[home] = 0.0, 0.0  # judged by its joints
     speed = np.where(
         targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count])
     )
     return deviation, rotation, speed
+
+
+def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: int) -> list[Issue]:
+    """Return where HOME is another, axis by axis."""
+    issues = []
+    for row in np.flatnonzero(targets.home[:count] & program.ptp[:count]):
+        found, wanted = program.q_deg[row], joints.q_rad[row] * DEG_PER_RAD
+        wrong = np.flatnonzero(~(np.abs(found - wanted) <= JOINT_LIMIT_DEG))
+        if not len(wrong):
+            continue
+        if np.isnan(found).all():
+            text = "HOME is not given by its joints, A1 to A6"
+        else:
+            text = "HOME: " + ", ".join(
+                f"A{k + 1} is {'missing' if np.isnan(found[k]) else f'{found[k]:.4f}'}, "
+                f"intended {wanted[k]:.4f} deg"
+                for k in wrong
+            )
+        text = in_file(program, program.file[program.file_of[row]]) + text
+        issues.append(Issue("error", "verify-position", int(program.line[row]), text, _REMEDY))
+    return issues
 
 
 def _difference_issues(
@@ -240,9 +281,12 @@ def _difference_issues(
     status |= pose & (program.status_turn[:count, 1] != turn)
     checks = (
         ("verify-motion", other_kind, "PTP and LIN exchanged", None),
-        ("verify-position", ~(deviation <= POSITION_LIMIT_MM), "{:.4f} mm off", deviation),
-        ("verify-rotation", ~(rotation_deg <= ROTATION_LIMIT_DEG), "{:.4f} deg off", rotation_deg),
-        ("verify-speed", ~(speed <= SPEED_LIMIT_MM_S), "speed {:.3f} mm/s off", speed),
+        ("verify-position", deviation > POSITION_LIMIT_MM, "{:.4f} mm off", deviation),
+        ("verify-position", np.isnan(deviation), "X, Y or Z is missing", None),
+        ("verify-rotation", rotation_deg > ROTATION_LIMIT_DEG, "{:.4f} deg off", rotation_deg),
+        ("verify-rotation", np.isnan(rotation_deg), "A, B or C is missing", None),
+        ("verify-speed", speed > SPEED_LIMIT_MM_S, "speed {:.3f} mm/s off", speed),
+        ("verify-speed", np.isnan(speed) & ~other_kind, "no $VEL.CP is set before it", None),
         ("verify-cdis", ~(cdis <= CDIS_LIMIT_MM), "approximation {:.3f} mm off", cdis),
         ("verify-wait", ~(wait <= WAIT_LIMIT_S), "dwell {:.3f} s off", wait),
         ("verify-status", status, "S or T differs from the predicted branch", None),
@@ -275,21 +319,6 @@ def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, .
     )
 
 
-def _data_issues(path: Path, program: KrlProgram) -> list[Issue]:
-    """Check the ``.dat`` beside the program: it must be there and have its name."""
-    inside = any(s.text.upper().startswith("EXT BAS") for s in program.declarations)
-    data = path.with_suffix(".dat")
-    if inside:
-        return []
-    if not data.is_file():
-        return [Issue("error", "krl-data", 0, f"{data.name} is missing", _REMEDY)]
-    named = re.search(r"^\s*DEFDAT\s+(\w+)", data.read_text("ascii", "replace"), re.IGNORECASE | re.MULTILINE)
-    if named is None or named.group(1).upper() != program.name:
-        text = f"{data.name} is not the data list of {program.name}"
-        return [Issue("error", "krl-data", program.def_line, text, _REMEDY)]
-    return []
-
-
 def _statement_issues(
     read: tuple[Statement, ...], intended: tuple[Statement, ...], program: KrlProgram
 ) -> list[Issue]:
@@ -303,7 +332,10 @@ def _statement_issues(
     here = read[min(at, len(read) - 1)] if read else Statement(0, "", program.file[0], 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
-    text = f"{in_file(program, here.file)}found {have[:60]!r}, intended {want[:60]!r}"
+    text = f"found {have[:60]!r}, intended {want[:60]!r}"
+    if _normal(have) == _normal(want):
+        text = f"{have[:60]!r} stands behind motion {read[at].motion}, intended behind {intended[at].motion}"
+    text = in_file(program, here.file) + text
     remedy = "translate again, with the cell it was made with"
     return [Issue("error", "verify-statement", here.line, text, remedy)]
 
@@ -319,20 +351,23 @@ def _uncalled_issues(program: KrlProgram, intended: KrlProgram) -> list[Issue]:
     ]
 
 
-def _first_difference(program: KrlProgram, targets: Targets) -> int:
-    """Return the .src line at which the motions begin to differ."""
+def _first_difference(program: KrlProgram, targets: Targets) -> tuple[int, int]:
+    """Return the row and the .src line at which the motions begin to differ."""
     count = min(len(program.ptp), len(targets))
     off = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
-    rows = np.flatnonzero(~(off <= POSITION_LIMIT_MM) & ~targets.home[:count])
-    return int(program.line[rows[0]]) if len(rows) else int(program.line[-1]) if len(program.line) else 0
+    joints = ~np.isnan(program.q_deg[:count]).any(axis=1)
+    other = np.where(targets.home[:count], ~joints, ~(off <= POSITION_LIMIT_MM))
+    row = int(np.argmax(other)) if other.any() else count
+    line = program.line[min(row, len(program.line) - 1)] if len(program.line) else 0
+    return row, int(line)
 
 
 def _normal(text: str) -> str:
     return re.sub(r"\s+", "", text).upper()
 
 
-def _largest(values: Floats) -> float:
-    return float("nan") if np.isnan(values).any() else float(values.max(initial=0.0))
+def _largest(values: Floats, paired: bool) -> float:
+    return float(values.max(initial=0.0)) if paired and not np.isnan(values).any() else float("nan")
 
 
 def _number(value: float) -> float | None:

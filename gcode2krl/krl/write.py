@@ -1,5 +1,6 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +10,8 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.files import write_together
 from gcode2krl.krl.compose import SIDECAR, Layout, compose
-from gcode2krl.krl.files import write_together
 from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import PilotPlan, left_out, plan_pilot
@@ -25,6 +26,8 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
 
+SUFFIX = ".src"
+_ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
 
@@ -61,16 +64,18 @@ def write_krl(
     strict: bool = False,
     pilot: PilotForm | None = None,
     online: str | None = None,
+    inputs: Sequence[str | Path] = (),
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
     Parameters
     ----------
     source : Targets from `set_targets`, or a Prediction; errors among its ``issues`` refuse the program.
-    path : the ``.src``; None composes and verifies without writing (everything in one ``.src`` text).
+    path : the ``.src``, or the folder that it is written into under a name that a controller takes; None
+        composes and verifies without writing (everything in one ``.src`` text).
     cell : needed with Targets; a Prediction has its own.
     joints : joints at the targets where they are known already.
-    name : program name; default: the file's stem.
+    name : program name; default: the file's stem. A controller needs both alike.
     allow : findings released by hand, ``CODE:LINE`` or ``CODE`` for all of a kind; the header lists them.
     guard : compare frames, robot and inputs before the first motion.
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
@@ -81,19 +86,25 @@ def write_krl(
         out from where it cannot be announced, with a warning; a form that is named is carried or refused.
     online : name of the RSI files of a program that is corrected online by the cell's ``[online]``; they
         are written beside it. RSI is on from above the first cut to above the last.
+    inputs : files and folders that must not be overwritten, beside those that the tables name.
 
     Raises
     ------
     RefusedError
         Where a finding forbids the program, or its own verification does.
     NotUnderstoodError
-        Where the output cannot be written or a name or release is wrong.
+        Where the output cannot be written or is an input, or a name or release is wrong.
     """
     targets, cell = (source.targets, source.cell) if isinstance(source, Prediction) else (source, cell)
     if cell is None:
         raise input_error("option-value", "write_krl needs a cell with Targets")
-    file = Path(path) if path is not None else None
-    program_name, issues = _program_name(file, name)
+    file: Path | None = None
+    issues: list[Issue] = []
+    if path is not None:
+        file, issues = program_file(path, name, targets.source, cell.program.externals)
+    elif name is not None:
+        _require_name(name, cell.program.externals)
+    program_name = file.stem.upper() if file is not None else (name or "PART").upper()
     if online is not None:
         _refuse_name(online, file)
         issues += online_issues(targets, cell)
@@ -127,7 +138,7 @@ def write_krl(
     written: dict[Path, bytes] = {}
     if file is not None:
         written = {_place(file, part, program_name): text for part, text in texts.items()}
-        write_together(written)
+        write_together(written, [*_inputs(targets, cell), *inputs])
     return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues), targets)
 
 
@@ -185,6 +196,12 @@ def _refuse_name(online: str, file: Path | None) -> None:
         raise input_error("option-value", sentence, "give -o part.src")
 
 
+def output_files(file: Path, online: str | None) -> list[Path]:
+    """Return the files that a program may consist of, but for its parts."""
+    rsi = [file.with_name(name) for name in file_names(online)] if online is not None else []
+    return [file, file.with_suffix(".dat"), file.with_suffix(SIDECAR), *rsi]
+
+
 def _place(file: Path, part: str, program_name: str) -> Path:
     if part == f"{program_name}.src":
         return file
@@ -194,31 +211,69 @@ def _place(file: Path, part: str, program_name: str) -> Path:
     return file.with_name(part)
 
 
-def _program_name(file: Path | None, name: str | None) -> tuple[str, list[Issue]]:
-    """Return the program's name and what there is to say about it."""
+def program_file(
+    path: str | Path, name: str | None, source: str, taken: Sequence[str] = ()
+) -> tuple[Path, list[Issue]]:
+    """Return the ``.src`` that a program becomes, and what there is to say about its name.
+
+    Where ``path`` is a folder the name is ``name``, or made from that of the source (G-code) so that a
+    controller takes it. A file must have a good name already, as a controller finds the program by it.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where file or name are no names for a program, or differ.
+    """
+    place = Path(path)
     if name is not None:
-        problem = name_problem(name) if name else "is empty"
-        if problem:
-            raise input_error(
-                "krl-name",
-                f"--name {name!r}: {problem}",
-                "at most 24 of A-Z, 0-9, _; not starting with a digit",
-            )
-        if file is not None and file.stem.upper() != name.upper():
-            sentence = f"the file {file.name} holds the program {name.upper()}"
-            remedy = f"call it {name.upper()}.src on the controller"
-            return name.upper(), [Issue("warning", "krl-name", 0, sentence, remedy)]
-        return name.upper(), []
-    stem = file.stem if file is not None else "PART"
-    good = suggested_name(stem)
-    if good == stem.upper():
-        return good, []
-    remedy = f"name the output {good}.src, or give --name"
-    return good, [
-        Issue(
-            "warning", "krl-name", 0, f"{stem!r} is no KRL program name; the program is called {good}", remedy
-        )
+        _require_name(name, taken)
+    if place.is_dir() and place.suffix.lower() != SUFFIX:
+        return _file_in(place, name, Path(_last_step(source)).stem, taken)
+    if place.suffix.lower() != SUFFIX:
+        sentence = f"the output {place.name!r} does not end in .src and is no folder"
+        raise input_error("option-value", sentence, "name it part.src, or create the folder first")
+    problem = name_problem(place.stem, taken)
+    good = suggested_name(name if name is not None else place.stem, taken)
+    if problem:
+        sentence = f"{place.stem!r} cannot be a program's name: {problem}{_ALIKE}"
+        raise input_error("krl-name", sentence, f"-o {place.with_name(good)}.src", source=place.name)
+    if name is not None and name.upper() != place.stem.upper():
+        sentence = f"--name {name} and the file {place.name} differ{_ALIKE}"
+        remedy = f"-o {place.with_name(name)}.src, or leave out --name"
+        raise input_error("krl-name", sentence, remedy, source=place.name)
+    return place, []
+
+
+def _file_in(folder: Path, name: str | None, stem: str, taken: Sequence[str]) -> tuple[Path, list[Issue]]:
+    """Return the file in a folder, of a given name or of one made from a stem."""
+    if name is not None:
+        return folder / f"{name}{SUFFIX}", []
+    problem = name_problem(stem, taken)
+    if not problem:
+        return folder / f"{stem}{SUFFIX}", []
+    good = suggested_name(stem, taken)
+    sentence = f"the program is called {good}: {stem!r} cannot be a program's name ({problem})"
+    return folder / f"{good}{SUFFIX}", [
+        Issue("note", "krl-name", 0, sentence, "or choose a name with --name")
     ]
+
+
+def _require_name(name: str, taken: Sequence[str]) -> None:
+    problem = name_problem(name, taken) if name else "is empty"
+    if problem:
+        remedy = f"--name {suggested_name(name, taken)}: at most 24 of A-Z, 0-9, _; not starting with a digit"
+        raise input_error("krl-name", f"--name {name!r}: {problem}", remedy)
+
+
+def _last_step(source: str) -> str:
+    return re.split(r"[\\/]", source)[-1]
+
+
+def _inputs(targets: Targets, cell: Cell) -> list[str]:
+    """Return the files that a program is made from, as far as its tables name them."""
+    stock = cell.stock.mesh if cell.stock is not None else None
+    named = (targets.source, stock, cell.online.calibration)
+    return [name for name in named if name]
 
 
 def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:

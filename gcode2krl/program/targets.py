@@ -328,8 +328,13 @@ class _Plan:
         return [(target, end_s - start_s) for (target, start_s), end_s in zip(marks, ends, strict=True)]
 
     def _next_tool_change(self, index: int) -> int:
-        """Return the (unthinned) target of the tool change after an event, else the last, HOME."""
-        return next((at for k, at in sorted(self.tool_events.items()) if k > index), self.columns.count - 1)
+        """Return the (unthinned) target of the tool change after an event, else the last before HOME."""
+        return next((at for k, at in sorted(self.tool_events.items()) if k > index), self._before_home())
+
+    def _before_home(self) -> int:
+        """Return the (unthinned) target from which the last way to HOME begins, above the work."""
+        away = np.flatnonzero(np.concatenate(self.columns.kind) != _HOME)
+        return int(away[-1]) if len(away) else self.columns.count - 1
 
     def _exact_stops(
         self,
@@ -350,17 +355,32 @@ class _Plan:
         return exact
 
     def _notes(self) -> list[Issue]:
+        notes = self._stopped_by_end()
         if self.cell.is_confirmed:
-            return []
+            return notes
         return [
+            *notes,
             Issue(
                 "note",
                 "cell-not-verified",
                 0,
                 "the cell has not been confirmed by a person; the program begins with a HALT",
                 "`gcode2krl models check` lists what to confirm",
-            )
+            ),
         ]
+
+    def _stopped_by_end(self) -> list[Issue]:
+        """Say what is still on at the program's end, where it is switched off."""
+        last = max(self.tool_events, default=-1)
+        ends = [event for event in self.toolpath.events[last + 1 :] if event.values.get("implied")]
+        if not ends:
+            return []
+        kinds = {event.kind: event.values["m"] for event in ends}
+        on = " and ".join(name for name in ("spindle", "coolant") if name in kinds)
+        codes = " and ".join(f"M{kinds[name]}" for name in ("spindle", "coolant") if name in kinds)
+        sentence = f"the program ends with {on} on: {codes} on the clearance plane, before the way to HOME"
+        line = int(ends[0].values["line"])
+        return [Issue("note", "stopped-by-end", line, sentence, f"program {codes} before the end")]
 
 
 class _Said(NamedTuple):

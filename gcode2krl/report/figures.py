@@ -4,7 +4,8 @@ After figures 4 and 5 of Bigliardi et al. 2022. Needs no display; importing this
 it is imported only where a figure is asked for.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from gcode2krl.files import make_folder, write_together
 from gcode2krl.report.drawing import (
     BLACK,
     BLUE,
@@ -230,19 +232,22 @@ def joints_figure(
     return figure
 
 
-def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+def save_figures(
+    figures: Mapping[str, Figure], folder: Path, inputs: Iterable[str | Path] = ()
+) -> list[Path]:
     """Write each figure as ``<name>.png`` at 150 dpi and return the paths, in the order of ``figures``.
 
     The folder is made if its parent exists. The same figures give the same bytes: no date is written.
+    ``inputs`` are never overwritten.
     """
-    folder.mkdir(exist_ok=True)
-    paths = []
+    make_folder(folder)
+    files = {
+        folder / f"{name}.png": partial(figure.savefig, format="png", dpi=_DPI, metadata={"Software": None})
+        for name, figure in figures.items()
+    }
     with look():
-        for name, figure in figures.items():
-            path = folder / f"{name}.png"
-            figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
-            paths.append(path)
-    return paths
+        write_together(files, inputs)
+    return list(files)
 
 
 def _need_samples(motion: Motion) -> None:

@@ -45,14 +45,21 @@ class Made:
     """A part translated: what went in and what came out."""
 
     def __init__(
-        self, folder: Path, text: str = PART, stem: str = "part", data: dict | None = None, **options
+        self,
+        folder: Path,
+        text: str = PART,
+        stem: str = "part",
+        data: dict | None = None,
+        into_folder: bool = False,
+        **options,
     ):
         self.part = folder / f"{stem}.nc"
         self.part.write_text(text)
         self.cell = resolve_cell({"based_on": "demonstration", **(data or {})})
-        self.toolpath = read(text, self.cell)
+        self.toolpath = read(text, self.cell, self.part.name if into_folder else "part.nc")
         self.targets = set_targets(self.toolpath, self.cell)
-        self.program = write_krl(self.targets, folder / f"{stem}.src", self.cell, **options)
+        output = folder if into_folder else folder / f"{stem}.src"
+        self.program = write_krl(self.targets, output, self.cell, **options)
         self.src = self.program.files[0]
 
     @property
@@ -60,14 +67,17 @@ class Made:
         return self.src.read_bytes().decode("utf-8").split("\n")[:-1]
 
 
-def read(text: str, cell):
+def read(text: str, cell, name: str = "part.nc"):
     """Read G-code from a string."""
-    return read_stream(io.BytesIO(text.encode()), "part.nc", cell)
+    return read_stream(io.BytesIO(text.encode()), name, cell)
 
 
 @pytest.fixture
 def make(tmp_path):
-    """Translate a part: ``make(text, stem=…, data=keys of the cell, **options of write_krl)``."""
+    """Translate a part: ``make(text, stem=…, data=keys of the cell, **options of write_krl)``.
+
+    With ``into_folder`` the output is a folder, and the program is named after the G-code.
+    """
 
     def make(text: str = PART, **options) -> Made:
         return Made(tmp_path, text, **options)

@@ -218,7 +218,7 @@ def test_program_of_another_part_is_noticed(make, tmp_path):
 
 def test_program_of_another_cell_is_noticed(make):
     made = make(data={"frames": {"base": {**OWN_CELL["frames"]["base"], "z_mm": 801.0}}})
-    default = make(stem="default")
+    default = make(stem="usual")
     assert not verify_krl(made.src, made.toolpath, default.cell).ok
 
 
@@ -311,7 +311,7 @@ def test_parts_of_a_long_program(make, tmp_path, split, most):
 def test_each_verifies_with_the_cell_of_the_other(make, tmp_path):
     """How the text is laid out is no difference."""
     made = make(ZIGZAG, data={"program": {"max_lines": 100}})
-    default = make(ZIGZAG, stem="default")
+    default = make(ZIGZAG, stem="usual")
     assert verify_krl(made.src, made.toolpath, default.cell).ok
     assert verify_krl(default.src, made.toolpath, made.cell).ok
 

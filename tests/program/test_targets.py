@@ -287,13 +287,15 @@ def test_events_keep_their_order(plan):
     )
 
 
-def test_spindle_stops_by_the_programs_end_at_home(plan):
-    """M30 stops the spindle, but not while the mill is still in the work."""
+def test_spindle_stops_by_the_programs_end_before_home(plan):
+    """M30 stops the spindle, but neither while the mill is still in the work nor on the way to HOME."""
     made = plan(HEAD + "G0 X0 Y0\nG0 Z5\nM8\nG1 Z-1 F600\nG1 X10\nM30\n")
     last = len(made.targets) - 1
     assert made.targets.home[last]
-    assert ("spindle", 0) in made.events_at(last)
-    assert ("coolant", False) in made.events_at(last)
+    assert made.targets.position_mm[last - 1, 2] == pytest.approx(made.cell.clearance_z_mm)
+    assert ("spindle", 0) in made.events_at(last - 1)
+    assert ("coolant", False) in made.events_at(last - 1)
+    assert made.events_at(last) == []
 
 
 def test_exact_stops(plan):

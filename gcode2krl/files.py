@@ -1,0 +1,229 @@
+"""Writing several files that belong together, all or none; never over an input, nothing half-written left.
+
+All are written beside their places first, then renamed. What a killed run left beside them is removed by the
+next run that writes the same files: the names tell host and process.
+"""
+
+import contextlib
+import os
+import platform
+import re
+import shutil
+import sys
+import tempfile
+import time
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from gcode2krl.errors import NotUnderstoodError, input_error
+
+Content = bytes | Callable[[Path], object]
+"""What a file holds, or what writes it to a path."""
+SURELY_LEFT_S = 86400.0
+"""No run writes a file for a day: one that old is a leftover, whoever wrote it."""
+_HOST = f"{zlib.crc32(platform.node().encode()):08x}"
+_MOST_INPUTS = 10_000
+"""Files of an input folder that outputs are compared with."""
+
+
+def write_together(files: Mapping[Path, Content], inputs: Iterable[str | Path] = ()) -> None:
+    """Write all files or none.
+
+    Raises `NotUnderstoodError` where a file is one of the inputs, a folder does not exist, or the disk
+    refuses; nothing half-written stays.
+    """
+    refuse_inputs(files, inputs)
+    temporary: dict[Path, Path] = {}
+    kept: dict[Path, Path] = {}
+    place = next(iter(files))
+    try:
+        for place, content in files.items():
+            _remove(leftovers(place))
+            temporary[place] = _write_beside(place, content)
+        for place, written in temporary.items():
+            if place.exists():
+                kept[place] = _keep(place, written.with_suffix(".old"))
+        for place, written in temporary.items():
+            written.replace(place)
+    except BaseException as error:
+        _restore(temporary, kept)
+        if isinstance(error, OSError):
+            raise unwritable(place, error.strerror or str(error)) from None
+        raise
+    else:
+        _remove(kept.values())
+    finally:
+        _remove(temporary.values())
+
+
+def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[str | Path]) -> None:
+    """Raise `NotUnderstoodError` where an output is an input by whatever name, or two outputs are one file.
+
+    An input may be a folder: then every file in it counts.
+    """
+    seen: dict[str, Path] = {}
+    existing: list[Path] = []
+    for output in outputs:
+        name = str(output.parent.resolve() / output.name).casefold()  # Windows knows no case
+        other = seen.setdefault(name, output)
+        if other is not output:
+            sentence = f"{output.name} would be written twice, with different content"
+            raise input_error("output-is-input", sentence, "choose different names", source=str(output))
+        if output.exists():
+            existing.append(output)
+    if not existing:
+        return
+    for file in _files_of(inputs):
+        for output in existing:
+            if _is_same(output, file):
+                sentence = f"{output.name} is an input and would be overwritten"
+                raise input_error(
+                    "output-is-input", sentence, "choose another name with -o", source=str(output)
+                )
+
+
+def _files_of(inputs: Iterable[str | Path]) -> Iterable[Path]:
+    for path in map(Path, inputs):
+        if not path.is_dir():
+            yield path
+            continue
+        for count, file in enumerate(path.rglob("*")):
+            if count == _MOST_INPUTS:
+                break
+            yield file
+
+
+def _is_same(output: Path, file: Path) -> bool:
+    """Tell whether two paths are one file: other spelling, symbolic or hard link."""
+    try:
+        return output.samefile(file)
+    except OSError:
+        return False
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder if its parent exists; raises `NotUnderstoodError` where that cannot be."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except FileExistsError:
+        raise input_error(
+            "output-unwritable", "this is a file", "name a folder", source=str(folder)
+        ) from None
+    except OSError as error:
+        raise unwritable(folder, error.strerror or str(error)) from None
+
+
+def unwritable(target: Path, why: str) -> NotUnderstoodError:
+    """Return the error for an output that cannot be written."""
+    return input_error(
+        "output-unwritable", f"cannot write: {why}", "check folder, rights and space", source=str(target)
+    )
+
+
+# --- leftovers of killed runs -----------------------------------------------------------------------------
+
+
+def leftovers(target: Path) -> list[Path]:
+    """Return what runs that live no more have left of writing a file."""
+    pattern = re.compile(
+        rf"\.{re.escape(target.name)}\.(?:([0-9a-f]{{8}})-(\d+)-)?[0-9a-z_]{{8}}\.(?:part|old)"
+    )
+    found = []
+    with contextlib.suppress(OSError):
+        for file in target.parent.iterdir():
+            match = pattern.fullmatch(file.name)
+            if match and _is_left(file, match[1], match[2]):
+                found.append(file)
+    return found
+
+
+def _is_left(file: Path, host: str | None, process: str | None) -> bool:
+    """Tell whether nobody writes a file any more; one of another host only by its age."""
+    if host == _HOST and process is not None and int(process) != os.getpid() and not _lives(int(process)):
+        return True
+    with contextlib.suppress(OSError):
+        return time.time() - file.lstat().st_mtime > SURELY_LEFT_S
+    return False
+
+
+def _lives(process: int) -> bool:
+    """Tell whether a process of this host lives, or may."""
+    if sys.platform == "win32":
+        import ctypes
+
+        synchronize, still_running = 0x00100000, 0x102
+        windows = ctypes.windll.kernel32
+        handle = windows.OpenProcess(synchronize, False, process)
+        if not handle:
+            return bool(windows.GetLastError() == 5)  # access denied: it is somebody else's
+        lives = windows.WaitForSingleObject(handle, 0) == still_running
+        windows.CloseHandle(handle)
+        return bool(lives)
+    try:
+        os.kill(process, 0)  # asks only
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+# --- one file ---------------------------------------------------------------------------------------------
+
+
+def _keep(target: Path, place: Path) -> Path:
+    """Keep a file under a second name: a hard link, or a copy where the disk knows none."""
+    try:
+        place.hardlink_to(target)
+    except (OSError, NotImplementedError):
+        shutil.copyfile(target, place)
+    return place
+
+
+def _restore(temporary: Mapping[Path, Path], kept: Mapping[Path, Path]) -> None:
+    """Put the old files back and take new ones away; an old file that cannot be put back stays kept."""
+    for target, written in temporary.items():
+        replaced = not written.exists()
+        with contextlib.suppress(OSError):
+            if replaced and target in kept:
+                shutil.copyfile(kept[target], target)
+            elif replaced:
+                target.unlink()
+            if target in kept:
+                kept[target].unlink()
+
+
+def _remove(files: Iterable[Path]) -> None:
+    for file in files:
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
+
+
+def _write_beside(target: Path, content: Content) -> Path:
+    if target.is_dir():
+        raise IsADirectoryError(0, "this is a folder")
+    prefix = f".{target.name}.{_HOST}-{os.getpid()}-"
+    descriptor, name = tempfile.mkstemp(prefix=prefix, suffix=".part", dir=target.parent)
+    written = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            if isinstance(content, bytes):
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+        if not isinstance(content, bytes):
+            content(written)
+        mode = target.stat().st_mode if target.exists() else 0o666 & ~_umask()
+        written.chmod(mode & 0o777)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            written.unlink()
+        raise
+    return written
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
