@@ -27,7 +27,8 @@ class Issue:
     """One finding.
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
-    kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``.
+    kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``. ``excerpt`` quotes the
+    input, with a caret before the culprit.
     """
 
     severity: Severity
@@ -35,6 +36,7 @@ class Issue:
     line: int
     message: str
     remedy: str = ""
+    excerpt: str = ""
 
     def advice(self) -> str:
         """Return the remedy; where the finding has none of its own, that of its code in the table."""
@@ -55,7 +57,9 @@ class Issue:
         head = f"{place}: {self.severity}: " if place else f"{self.severity}: "
         advice = self.advice()
         tail = f" -> {advice}" if advice else ""
-        return f"{head}{self.message}{f' ({also})' if also else ''} [{self.code}]{tail}"
+        near = f", near `{self.excerpt}`" if self.excerpt else ""
+        others = f" ({also})" if also else ""
+        return f"{head}{self.message}{near}{others} [{self.code}]{tail}"
 
 
 @dataclass(frozen=True, slots=True)
