@@ -81,7 +81,7 @@ def test_an_axis_without_a_position_is_named_with_what_lost_it(
     part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"])
     assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
     assert (
-        "part.nc:7: error: feed move while Z is not known, last known in line 5 (" in capsys.readouterr().err
+        "part.nc:7: error: feed move while Z is not known, last known in line 6 (" in capsys.readouterr().err
     )
 
 
