@@ -20,8 +20,8 @@ program (nothing is written), a *warning* does so with `--strict` only, a *note*
   lines are printed, at most eight of one code, then the count. `--json` lists every finding.
 - What only follows from another finding (a feed that is missing because the line that sets it could not be
   read) is counted behind its cause and not printed. Mend the cause, and it goes or is shown.
-- `--allow CODE:LINE` releases one error by hand, for the reason that the last column names; the program's
-  header lists it. "never" cannot be released.
+- `--allow CODE:LINE` releases an error by hand; the last column says when a person may. The program's header
+  lists it. "never" cannot be released. A finding is released even where it is only counted.
 
 | code | severity | why | example | remedy | allow |
 | --- | --- | --- | --- | --- | --- |

@@ -36,6 +36,7 @@ def codes() -> Mapping[str, Code]:
     return MappingProxyType({entry.name: entry for entry in entries})
 
 
+@cache
 def follows(name: str) -> frozenset[str]:
     """Return the codes that may cause this one, over any number of steps; empty for an unknown code."""
     known = codes()

@@ -27,8 +27,8 @@ class Issue:
     """One finding.
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
-    kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``.
-    ``excerpt`` quotes the input, with a caret before the culprit.
+    kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``. ``excerpt`` quotes the
+    input, with a caret before the culprit.
     """
 
     severity: Severity
@@ -58,7 +58,8 @@ class Issue:
         advice = self.advice()
         tail = f" -> {advice}" if advice else ""
         near = f", near `{self.excerpt}`" if self.excerpt else ""
-        return f"{head}{self.message}{near}{f' ({also})' if also else ''} [{self.code}]{tail}"
+        others = f" ({also})" if also else ""
+        return f"{head}{self.message}{near}{others} [{self.code}]{tail}"
 
 
 @dataclass(frozen=True, slots=True)

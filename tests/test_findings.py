@@ -32,6 +32,13 @@ def test_equal_findings_are_one_line_with_the_first_lines_and_a_count() -> None:
     assert same == ["p.nc:4: error: '$' (3 times) [bad-character] -> mend it"]
 
 
+def test_the_first_of_equal_findings_quotes_its_line() -> None:
+    issues = [Issue("error", "expression", k, "not read", "plain numbers", f"G1 X^#{k}") for k in (3, 9)]
+    assert told(issues).lines("p.nc") == [
+        "p.nc:3: error: not read, near `G1 X^#3` (also in line 9) [expression] -> plain numbers"
+    ]
+
+
 def test_a_few_figures_are_printed_apart_and_many_are_one_line() -> None:
     few = told([_error("tool-unknown", k, f"T{k} is not in the cell", f"add [tool.{k}]") for k in (1, 2, 7)])
     assert [finding.first.message for finding in few.findings] == [

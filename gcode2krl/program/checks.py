@@ -58,11 +58,11 @@ def _while_unknown(toolpath: Toolpath, row: int, missing: NDArray[np.bool_]) -> 
     if nowhere:
         return f"while {nowhere}"
     known_before = np.flatnonzero(toolpath.known[:row, missing].all(axis=1))
-    since = ""
+    last = ""
     if len(known_before):
-        line = int(toolpath.source_line[known_before[-1] + 1])
-        since = f" since line {line} (G28, G53 or a change of G43)"
-    return f"while {_axes(missing)} not known{since}"
+        line = int(toolpath.source_line[known_before[-1]])
+        last = f", last known in line {line} (lost by G28, G53 or a change of G43)"
+    return f"while {_axes(missing)} not known{last}"
 
 
 def axes_nowhere(toolpath: Toolpath) -> str:

@@ -80,7 +80,9 @@ def test_an_axis_without_a_position_is_named_with_what_lost_it(
     assert "Z is given no absolute position in 6 lines" in capsys.readouterr().err
     part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"])
     assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
-    assert "part.nc:7: error: feed move while Z is not known since line 6 (G28" in capsys.readouterr().err
+    assert (
+        "part.nc:7: error: feed move while Z is not known, last known in line 6 (" in capsys.readouterr().err
+    )
 
 
 def test_a_terminal_is_told_how_to_learn_more(

@@ -13,8 +13,8 @@ from gcode2krl.gcode.findings import FINDINGS
 
 _HEAD = "G21 G90 G17 G94 F500 S8000 M3\nG0 X0 Y0 Z0\n"
 _WORDS_BEHIND = re.compile(r" \(|, | in a cell| before | without ")
-_NO_GCODE = {"line-too-long"}
-"""Examples that are a file and no line."""
+_NO_GCODE = {"line-too-long", "undefined-position"}
+"""The example is a whole file, or a later check of the program finds it too."""
 
 
 def _found(text: str) -> set[str]:
