@@ -124,7 +124,7 @@ def test_the_next_run_removes_what_a_killed_one_left(tmp_path):
             if (tmp_path / name).exists():
                 assert len((tmp_path / name).read_bytes()) == 25000, "no file is half written"
         left += any(file.suffix in (".part", ".old") for file in tmp_path.iterdir())
-        write_together({tmp_path / name: b"x" for name in ("a.src", "a.dat", "a.csv")})
+        write_together({tmp_path / name: b"next " * 5000 for name in ("a.src", "a.dat", "a.csv")})
         assert names(tmp_path) == ["a.csv", "a.dat", "a.src"]
     assert left > 0, "no kill hit a run while it wrote"
 

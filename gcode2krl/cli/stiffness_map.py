@@ -111,7 +111,7 @@ class Case:
         for name, values in (("--load", load), ("--feed", feed)):
             if values is not None and not (np.isfinite(values).all() and np.any(values)):
                 raise input_error("option-value", f"{name} {values} has no direction", "give three numbers")
-        if load is not None and np.linalg.norm(load) > MOST_LOAD_N:
+        if load is not None and max(map(abs, load)) > MOST_LOAD_N:
             sentence = f"--load {load}: more than {MOST_LOAD_N:g} N"
             raise input_error("option-value", sentence, "give newtons")
         own = None if load is None else np.array(load, dtype=float)

@@ -4,6 +4,7 @@ A controller starts the ``DEF`` that is named as its file, so both are alike; KR
 do not tell letters by their case.
 """
 
+import itertools
 import re
 import zlib
 from collections.abc import Iterable
@@ -90,4 +91,5 @@ def suggested_name(stem: str, taken: Iterable[str] = ()) -> str:
     if name[0].isdigit() or name.startswith(OWN_PREFIX):
         name = f"P_{name}"
     name = name[:LONGEST]
-    return f"{name[: LONGEST - 2]}_1" if name_problem(name, taken) else name
+    numbered = (f"{name[: LONGEST - len(str(k)) - 1]}_{k}" for k in itertools.count(1))
+    return name if not name_problem(name, taken) else next(n for n in numbered if not name_problem(n, taken))

@@ -293,7 +293,7 @@ class _Plan:
 
     def _place_events(self, stand: "_StandingAt", kept_index: NDArray[np.int64]) -> tuple[Event, ...]:
         placed: list[Event] = []
-        earliest = 0
+        earliest, switched = 0, 0
         for index, event in enumerate(self.toolpath.events):
             if index in self.tool_events:
                 target = int(kept_index[self.tool_events[index]])
@@ -301,11 +301,14 @@ class _Plan:
                 target = int(kept_index[self._next_tool_change(index)])
             else:
                 target = int(kept_index[stand.at(event.row)])
-            earliest = max(earliest, target)
+            implied = event.values.get("implied")  # may come before M30 and texts, not before another switch
+            row = max(switched if implied else earliest, target)
+            earliest = max(earliest, row)
+            switched = row if event.kind != "message" else switched
             dwell_s = event.values.get("dwell_s", 0.0) - self._dwell_before_change_s(event.row, index)
             values = {**event.values, "dwell_s": dwell_s} if dwell_s > 0 else _without_dwell(event.values)
-            placed.append(Event(earliest, event.kind, values))
-        return tuple(placed)
+            placed.append(Event(row, event.kind, values))
+        return tuple(sorted(placed, key=lambda event: event.row))
 
     def _changes_at(self, row: int) -> list[int]:
         """Return the tool changes (numbers of events) at a row of the Toolpath, in order."""
