@@ -1,6 +1,6 @@
 """Fuzz what comes from outside: cells, prediction folders, run folders, meshes, telegrams.
 
-    python benchmarks/fuzz.py predictions --count 10000 --seed 1
+python benchmarks/fuzz.py predictions --count 10000 --seed 1
 """
 
 import argparse
@@ -12,7 +12,9 @@ KINDS = ("cells", "predictions", "runs", "meshes", "telegrams")
 
 def main(argv: list[str] | None = None) -> int:
     """Hand over to the benchmark of a kind."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("--count", help="cases; default: that of the kind")
     parser.add_argument("--seed", default="1")

@@ -1,4 +1,4 @@
-"""A prediction folder that is damaged, or made to harm, is one line; nothing is allocated by what it announces."""
+"""A prediction folder that is damaged, or made to harm, is one line, whatever it announces."""
 
 import os
 import shutil
@@ -82,8 +82,14 @@ def test_a_constant_table_of_absurd_length_is_refused(tmp_path):
 
 def test_a_long_table_of_real_values_is_read(tmp_path):
     file = tmp_path / "a.parquet"
-    long = pl.DataFrame({"t_s": np.arange(300_000) * 0.012, "zero": np.zeros(300_000), "name": ["x"] * 300_000,
-                         "list": [[1, 2]] * 300_000})  # fmt: skip
+    long = pl.DataFrame(
+        {
+            "t_s": np.arange(300_000) * 0.012,
+            "zero": np.zeros(300_000),
+            "name": ["x"] * 300_000,
+            "list": [[1, 2]] * 300_000,
+        }
+    )
     long.write_parquet(file)
     assert outline_of(file).columns["list"] == "nested"
     assert read_parquet(file).equals(long)
@@ -111,10 +117,18 @@ def test_a_panic_of_the_reader_is_one_line_and_says_nothing_by_itself(tmp_path, 
 
 
 CHANGES = {
-    "time that falls": ("motion", lambda f: f.with_columns(time_s=pl.col("time_s").reverse()), "does not rise"),
+    "time that falls": (
+        "motion",
+        lambda f: f.with_columns(time_s=pl.col("time_s").reverse()),
+        "does not rise",
+    ),
     "time that is no number": ("motion", lambda f: f.with_columns(time_s=pl.lit(np.nan)), "not a number"),
     "a position without end": ("motion", lambda f: f.with_columns(position_x_mm=pl.lit(np.inf)), "infinite"),
-    "a move that is not there": ("motion", lambda f: f.with_columns(move=pl.lit(999, pl.Int32)), "Motion.move"),
+    "a move that is not there": (
+        "motion",
+        lambda f: f.with_columns(move=pl.lit(999, pl.Int32)),
+        "Motion.move",
+    ),
     "a tool that is not there": ("motion", lambda f: f.with_columns(tool=pl.lit(99, pl.Int32)), "tool 99"),
     "a target of no row": ("targets", lambda f: f.with_columns(move=pl.lit(-2, pl.Int32)), "Targets.move"),
     "no orientation": ("targets", lambda f: f.with_columns(rotation_w=pl.lit(5.0)), "length 1"),
@@ -174,10 +188,20 @@ def test_a_record_without_a_part(folder, key):
 
 
 @pytest.mark.parametrize(
-    "text", ["a = " + "[" * 100_000, "a = " + "{a = " * 50_000, "a." * 100_000 + "a = 1", "[a" + ".a" * 100_000 + "]",
-             '"a" . ' * 50_000 + "a = 1", "\x00", "a = 0000-00-00", "a = 1" + "0" * 5000, "# " + "x" * 17_000_000],
+    "text",
+    [
+        "a = " + "[" * 100_000,
+        "a = " + "{a = " * 50_000,
+        "a." * 100_000 + "a = 1",
+        "[a" + ".a" * 100_000 + "]",
+        '"a" . ' * 50_000 + "a = 1",
+        "\x00",
+        "a = 0000-00-00",
+        "a = 1" + "0" * 5000,
+        "# " + "x" * 17_000_000,
+    ],
     ids=["arrays", "tables", "names", "header", "quoted", "nul", "date", "number", "large"],
-)  # fmt: skip
+)
 def test_a_record_that_is_nested_or_huge(folder, text):
     (folder / "prediction.toml").write_text(text, encoding="utf-8")
     refused(folder, "prediction.toml")
