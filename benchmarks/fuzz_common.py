@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-LONGEST_S = 20.0
+LONGEST_S = 60.0
 MOST_MB = 1000.0
 ADDRESS_SPACE = 16 * 2**30
 """A child that asks for more fails instead of taking the machine with it."""

@@ -150,7 +150,8 @@ def tricks(rng: np.random.Generator, files: dict[str, bytes]) -> tuple[str, str,
     choices = (
         b"", b"\n" * 1000, rng.bytes(int(rng.integers(2000))), b"solid a\n" * int(rng.integers(1, 5000)),
         b"solid\n" + b"facet normal 0 0 1\nouter loop\n" * 500, b"ply\n" + b"element vertex 1\n" * 500,
-        b"ply\nformat ascii 1.0\n" + b"property float x\n" * 500 + b"end_header\n", b"PK\x03\x04" + rng.bytes(200),
+        b"ply\nformat ascii 1.0\n" + b"property float x\n" * 500 + b"end_header\n",
+        b"PK\x03\x04" + rng.bytes(200),
         bytes(80) + b"\xff\xff\xff\xff" + bytes(50), bytes(84), b"PK\x05\x06" + bytes(18),
         b"solid a\nendsolid a\n" * 2000, b"<" * 5000, b"solid " + b"facet " * 4000 + b"endsolid",
     )  # fmt: skip

@@ -14,11 +14,47 @@ import numpy as np
 from fuzz_common import Try, main_of, mutated
 
 ROWS = 60
-HEAD = 'angles = "absolute"\nmode = "AUT"\n[frames]\ntracker = "base"\n[noise]\ntcp_mm = 0.03\n[clocks]\ntracker_s = 0.0\n'
-VALUES = ("-1", "0", "1e308", "nan", "inf", "true", '"text"', "[]", "{}", '"../../../etc"', '"run.toml"', '"."',
-          "2147483648", "99999999999999999999", "1979-05-27", '"' + "x" * 5000 + '"', '"\\u0000"')  # fmt: skip
-KEYS = ("cell", "program", "prediction", "started", "angles", "mode", "override_percent", "notes", "frames", "files",
-        "files.controller", "files.scan", "clocks.force_s", "channels.decimals", "noise", "a.b")  # fmt: skip
+HEAD = (
+    'angles = "absolute"\nmode = "AUT"\n[frames]\ntracker = "base"\n[noise]\ntcp_mm = 0.03\n'
+    "[clocks]\ntracker_s = 0.0\n"
+)
+VALUES = (
+    "-1",
+    "0",
+    "1e308",
+    "nan",
+    "inf",
+    "true",
+    '"text"',
+    "[]",
+    "{}",
+    '"../../../etc"',
+    '"run.toml"',
+    '"."',
+    "2147483648",
+    "99999999999999999999",
+    "1979-05-27",
+    '"' + "x" * 5000 + '"',
+    '"\\u0000"',
+)
+KEYS = (
+    "cell",
+    "program",
+    "prediction",
+    "started",
+    "angles",
+    "mode",
+    "override_percent",
+    "notes",
+    "frames",
+    "files",
+    "files.controller",
+    "files.scan",
+    "clocks.force_s",
+    "channels.decimals",
+    "noise",
+    "a.b",
+)
 DEPTHS = (
     "[" * 100_000,
     "{a=" * 20_000,
@@ -76,7 +112,8 @@ def good_files(place: Path) -> Files:
         frame, out = pl.DataFrame(columns), io.BytesIO()
         frame.write_parquet(out)
         files |= {f"{name}.csv": frame.write_csv().encode(), f"{name}.parquet": out.getvalue()}
-    ply = "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    axes = "property float x\nproperty float y\nproperty float z\n"
+    ply = f"ply\nformat {{}} 1.0\nelement vertex {{}}\n{axes}end_header\n"
     text = ply.format("ascii", ROWS) + "\n".join(" ".join(map(str, row)) for row in position.tolist()) + "\n"
     binary = ply.format("binary_little_endian", ROWS).encode() + position.astype("<f4").tobytes()
     files |= {"scan.ply": text.encode(), "scan binary.ply": binary, "rsi.log": _rsi_log(position).encode()}

@@ -247,7 +247,7 @@ def _tells(**told: float) -> Fault:
 def _stalls(now: Cycle) -> None:
     """The robot is stuck while its program goes on."""
     now.telegram = replace(
-        now.telegram, command_mm=now.telegram.command_mm + [0.0, 0.3 * now.rng.random(), 5.0]
+        now.telegram, command_mm=now.telegram.command_mm + np.array([0.0, 0.3 * now.rng.random(), 5.0])
     )
 
 
@@ -466,7 +466,8 @@ def _through_text(telegram: Telegram) -> Telegram:
     xyz = 'X="{:.4f}" Y="{:.4f}" Z="{:.4f}" A="0" B="0" C="0"'
     axes = " ".join(f'A{n}="{{:.4f}}"' for n in range(1, 7))
     text = (
-        f'<Rob Type="KUKA"><RIst {xyz.format(*telegram.position_mm)}/><RSol {xyz.format(*telegram.command_mm)}/>'
+        f'<Rob Type="KUKA"><RIst {xyz.format(*telegram.position_mm)}/>'
+        f"<RSol {xyz.format(*telegram.command_mm)}/>"
         f"<AIPos {axes.format(*(telegram.q_rad * DEG_PER_RAD))}/>"
         f"<ASPos {axes.format(*(telegram.q_command_rad * DEG_PER_RAD))}/>"
         f"<IPOC>{telegram.ipoc}</IPOC></Rob>"
@@ -516,7 +517,8 @@ def main(argv: list[str] | None = None) -> int:
     print(f"pairs of state and fault that met: {pairs} of {len(PHASES) * len(FAULTS)}")
     print(f"largest step {report.largest_step:.6f}, largest rate {report.largest_rate:.6f} of the limit")
     print(
-        f"largest correction {report.largest_sum:.6f} of the limit; slowest answer {report.slowest_s * 1e3:.1f} ms"
+        f"largest correction {report.largest_sum:.6f} of the limit; "
+        f"slowest answer {report.slowest_s * 1e3:.1f} ms"
     )
     for words, count in report.ended.most_common():
         print(f"  ended {words}: {count}")

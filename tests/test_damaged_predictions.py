@@ -1,4 +1,4 @@
-"""A prediction folder that is damaged, or made to harm, is one line; nothing is allocated by what it announces."""
+"""A prediction folder that is damaged, or made to harm, is one line, whatever it announces."""
 
 import os
 import shutil
@@ -82,8 +82,14 @@ def test_a_constant_table_of_absurd_length_is_refused(tmp_path):
 
 def test_a_long_table_of_real_values_is_read(tmp_path):
     file = tmp_path / "a.parquet"
-    long = pl.DataFrame({"t_s": np.arange(300_000) * 0.012, "zero": np.zeros(300_000), "name": ["x"] * 300_000,
-                         "list": [[1, 2]] * 300_000})  # fmt: skip
+    long = pl.DataFrame(
+        {
+            "t_s": np.arange(300_000) * 0.012,
+            "zero": np.zeros(300_000),
+            "name": ["x"] * 300_000,
+            "list": [[1, 2]] * 300_000,
+        }
+    )
     long.write_parquet(file)
     assert outline_of(file).columns["list"] == "nested"
     assert read_parquet(file).equals(long)
@@ -182,10 +188,20 @@ def test_a_record_without_a_part(folder, key):
 
 
 @pytest.mark.parametrize(
-    "text", ["a = " + "[" * 100_000, "a = " + "{a = " * 50_000, "a." * 100_000 + "a = 1", "[a" + ".a" * 100_000 + "]",
-             '"a" . ' * 50_000 + "a = 1", "\x00", "a = 0000-00-00", "a = 1" + "0" * 5000, "# " + "x" * 17_000_000],
+    "text",
+    [
+        "a = " + "[" * 100_000,
+        "a = " + "{a = " * 50_000,
+        "a." * 100_000 + "a = 1",
+        "[a" + ".a" * 100_000 + "]",
+        '"a" . ' * 50_000 + "a = 1",
+        "\x00",
+        "a = 0000-00-00",
+        "a = 1" + "0" * 5000,
+        "# " + "x" * 17_000_000,
+    ],
     ids=["arrays", "tables", "names", "header", "quoted", "nul", "date", "number", "large"],
-)  # fmt: skip
+)
 def test_a_record_that_is_nested_or_huge(folder, text):
     (folder / "prediction.toml").write_text(text, encoding="utf-8")
     refused(folder, "prediction.toml")

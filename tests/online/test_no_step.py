@@ -64,7 +64,7 @@ def test_one_odd_telegram_changes_nothing(cell, device, settings, cycles):
 def test_a_robot_that_goes_on_moving_away_gets_no_answer_any_more(cell, device, settings):
     def changed(k, telegram):
         return replace(
-            telegram, position_mm=telegram.position_mm + [0.0, 1.0 * max(k - 20, 0), 0.0]
+            telegram, position_mm=telegram.position_mm + np.array([0.0, 1.0 * max(k - 20, 0), 0.0])
         )  # 1 mm a cycle
 
     session, log = told(device, Krc(cell, stands_s=0.4), 100, changed)

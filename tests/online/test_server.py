@@ -172,7 +172,7 @@ def test_the_first_stranger_is_not_the_peer_where_the_robot_is_pinned(cell):
         assert krc.ready
     _, statistics = outcome["end"]
     assert krc.answered == statistics.answered == 100
-    assert statistics.foreign == 21
+    assert statistics.foreign in (20, 21)  # the last may come when the server has stopped
 
 
 def test_without_a_pinned_robot_the_first_sound_telegram_decides(cell):
