@@ -1,5 +1,6 @@
 """What all tests share: the checkout's folders and a way to run the command line in-process."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,19 @@ from gcode2krl.cli.main import _run
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.nc"))
+
+
+def pytest_xdist_auto_num_workers(config):
+    """The suite, or a folder of it, on all cores; files and single tests here, where they start at once."""
+    named = [Path(str(argument).partition("::")[0]) for argument in config.args]
+    return None if any(path.is_dir() for path in named) else 0
+
+
+def pytest_configure(config):
+    """Processes beside each other, so none of them needs threads of its own for linear algebra."""
+    if getattr(config.option, "numprocesses", None):
+        for library in ("OMP", "OPENBLAS", "MKL"):
+            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,149 @@
+"""Every example of the README and of the documents runs: Python, commands, and what the README shows."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcode2krl import Prediction, load_cell, predict
+from tests.conftest import ROOT
+from tests.krc4.test_identify import Controller, trace_of, write_csv
+
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+CELL = """based_on = "demonstration"
+
+[stock]
+box_mm = [[0, -100, -30], [300, 100, 0]]
+"""
+ELSEWHERE = {"docs/diagnose_check.md": "hours of cases; .ci/run makes one with the same program"}
+"""Documents with commands that are not run here, and why."""
+SLOW = ("diagnose",)
+
+
+def blocks(language):
+    """Yield document, number and text of each example in a language; those of the set-up run in .ci/run."""
+    for path in DOCUMENTS:
+        name = path.relative_to(ROOT).as_posix()
+        found = re.findall(rf"^```{language}\n(.*?)^```", path.read_text(encoding="utf-8"), re.M | re.S)
+        for number, text in enumerate(found):
+            if name not in ELSEWHERE:
+                yield name, number, text
+
+
+def case(name, number, text):
+    """Return a block or a command as a parameter; whole diagnoses are slow."""
+    marks = [pytest.mark.slow] if any(re.search(rf"\b{word}\b", text) for word in SLOW) else []
+    return pytest.param(text, id=f"{name}:{number}", marks=marks)
+
+
+PYTHON = [case(*each) for each in blocks("python")]
+COMMANDS = [
+    case(name, f"{number}.{line}", command)
+    for name, number, text in blocks("sh")
+    for line, command in enumerate(text.splitlines())
+]
+SHOWN = [
+    case("README.md", number, command)
+    for number, command in enumerate(
+        re.findall(r"<!-- output: (gcode2krl .*?)(?: \| .*?)? -->", DOCUMENTS[0].read_text(encoding="utf-8"))
+    )
+]
+
+
+@pytest.fixture(scope="module")
+def predicted(tmp_path_factory):
+    """A prediction of the test piece."""
+    folder = tmp_path_factory.mktemp("predicted")
+    (folder / "cell.toml").write_text(CELL, encoding="ascii")
+    made = predict(ROOT / "examples" / "test_piece.nc", load_cell(folder / "cell.toml"))
+    made.save(folder / "prediction")
+    return folder / "prediction"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The working folder of the examples: the part and the cell that they name."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("examples", "docs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
+    shutil.copy(ROOT / "examples" / "test_piece.nc", "part.nc")
+    Path("cell.toml").write_text(CELL, encoding="ascii")
+    return tmp_path
+
+
+def measured(folder):
+    """Write a prediction and three runs with play in axis 2 to a folder."""
+    from tests.gap.synthetic import applied, prediction, runs, write
+
+    prediction().save(folder / "prediction")
+    for run in runs(applied("backlash:target=A2,gap_deg=0.02"), 3, 5):
+        write(run, folder)
+
+
+def traced(folder, run):
+    """Write the controller's test program, and the trace of a controller that runs it, to a folder."""
+    assert run("make-test", "controller", "-o", folder / "test.nc").code == 0
+    write_csv(trace_of((folder / "test.nc").read_text(encoding="ascii"), Controller()), folder / "trace.csv")
+
+
+def names_of(prediction):
+    """Return what the short examples take for granted."""
+    load_N = np.zeros_like(prediction.motion.position_mm)
+    load_N[:, 0] = 100.0
+    return {
+        "cell": prediction.cell, "toolpath": prediction.toolpath, "targets": prediction.targets,
+        "motion": prediction.motion, "forces": prediction.forces, "q_rad": prediction.joints.q_rad,
+        "force_root_N": load_N, "moment_root_Nmm": 50.0 * load_N,
+        "feed": np.gradient(prediction.motion.position_mm, axis=0),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("code", PYTHON)
+def test_python(code, folder, predicted):
+    if "load_run" in code:
+        measured(folder)
+    exec(compile(code, "example", "exec"), names_of(Prediction.load(predicted)))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands(command, folder, run):
+    words = shlex.split(command, comments=True)
+    assert words[0] == "gcode2krl"
+    if "diagnose" in words:
+        measured(folder)
+    if "trace.csv" in words:
+        traced(folder, run)
+    done = run(*words[1:])
+    assert done.code == 0, done.err
+
+
+@pytest.mark.parametrize("command", SHOWN)
+def test_what_the_readme_shows_is_what_is_printed(command, folder):
+    """Word for word but for figures: a computer's last digits may differ."""
+    words = shlex.split(command.replace("{tmp}", "."))[1:]
+    done = subprocess.run([sys.executable, "-m", "gcode2krl", *words], capture_output=True, text=True)
+    block = re.escape(f"<!-- output: {command} -->\n```text\n") + r"(.*?)\n```"
+    shown = re.search(block, DOCUMENTS[0].read_text(encoding="utf-8"), re.S).group(1)
+    printed = "\n".join(line.rstrip() for line in (done.stderr + done.stdout).splitlines())
+    assert without_figures(printed) == without_figures(shown)
+
+
+def without_figures(text):
+    return re.sub(r"[\d.]*\d", "#", text).replace("./", "")
+
+
+def test_no_example_is_forgotten():
+    """A block in a language that is not known here would run nowhere."""
+    known = {"", "text", "toml", "python", "sh", "sh setup"}
+    for path in DOCUMENTS:
+        fences = re.findall(r"^```(.*)$", path.read_text(encoding="utf-8"), re.M)
+        assert set(fences[::2]) <= known, path
+        assert set(fences[1::2]) <= {""}, path
+    assert len(PYTHON) >= 7
+    assert len(COMMANDS) >= 7
+    assert len(SHOWN) >= 2
