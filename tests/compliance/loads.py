@@ -24,7 +24,8 @@ vectors = st.lists(st.floats(-1.0, 1.0, width=32), min_size=3, max_size=3)
 
 @functools.cache
 def other_cell():
-    return resolve_cell({"based_on": "demonstration", 
+    return resolve_cell(
+        {
             "robot": {"model": "KR 210 R2700-2"},
             "frames": {
                 "base": {

@@ -98,7 +98,7 @@ class TestDisplace:
 
     def test_a_tool_a_row(self, cell):
         longer = {"diameter_mm": 10.0, "teeth": 2, "length_mm": 180.0}
-        two_tools = resolve_cell({"based_on": "demonstration", "tool": {"7": longer}})
+        two_tools = resolve_cell({"tool": {"7": longer}})
         q, force, moment = random_load(50, seed=3)
         tools = np.where(np.arange(50) % 3 == 0, 7, 1)
         shift, turn = displace(q, force, moment, two_tools, tool=tools)
@@ -156,7 +156,7 @@ class TestDisplace:
 
     def test_missing_stiffness_is_refused_by_name(self, cell):
         assert missing_stiffness(cell) is None
-        without = resolve_cell({"based_on": "demonstration", "robot": {"model": "KR 210 R2700-2"}})
+        without = resolve_cell({"robot": {"model": "KR 210 R2700-2"}})
         with pytest.raises(NotUnderstoodError, match=r"A1, A2, linked_arm, A3, arm, A4, A5, A6") as error:
             displace(HOME, NONE, NONE, without)
         assert "sensor" not in str(error.value)
@@ -214,7 +214,7 @@ class TestPhysics:
             name: {"k_c": 2 * k.k_c, "k_b": 2 * k.k_b, "k_a": 2 * k.k_a}
             for name, k in cell.compliance.virtual_joints.items()
         }
-        stiffer = resolve_cell({"based_on": "demonstration", "compliance": {"virtual_joints": joints}})
+        stiffer = resolve_cell({"compliance": {"virtual_joints": joints}})
         np.testing.assert_allclose(
             displace([q], 2000 * np.array(force), NONE, stiffer)[0],
             displace([q], 1000 * np.array(force), NONE, cell)[0],

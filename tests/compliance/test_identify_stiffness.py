@@ -95,7 +95,7 @@ def test_frames_of_the_joints_against_the_examples_and_the_kinematics(cell):
     frames = joint_frames(np.radians(q_deg), cell)
     for q, found in zip(q_deg, frames, strict=True):
         assert found == pytest.approx(np.array(make.bodies(q)[1:]), abs=1e-9)
-    other = resolve_cell({"based_on": "demonstration", "robot": {"model": "KR 210 R2700-2"}})
+    other = resolve_cell({"robot": {"model": "KR 210 R2700-2"}})
     place, turn = flange_pose(np.radians(q_deg), other.robot.geometry.array())
     flange = joint_frames(np.radians(q_deg), other)[:, JOINTS.index("A6")]
     assert flange[:, :3, 3] == pytest.approx(place, abs=1e-9)
@@ -135,7 +135,7 @@ def test_without_noise_table_1_comes_back(rows, cell, use):
 
 
 def test_another_robot_and_another_stiffness(monkeypatch):
-    cell = resolve_cell({"based_on": "demonstration", "robot": {"model": "KR 210 R2700-2"}, "compliance": {"sensor_height_mm": 40.0}})
+    cell = resolve_cell({"robot": {"model": "KR 210 R2700-2"}, "compliance": {"sensor_height_mm": 40.0}})
     a1, a2, c1, c2, c3, c4 = cell.robot.geometry.array()
     steps = {
         "A1": (0, 0, c1, 0), "A2": (-90, a1, 0, 0),

@@ -42,7 +42,7 @@ def test_the_guess_ends_at_the_lowest_level_rapid():
 
 def test_a_guess_is_marked(toolpath):
     assert height_field_of(toolpath, load_cell(), np.eye(3), [TOOL]).guessed
-    stated = resolve_cell({"based_on": "demonstration", "stock": {"box_mm": [[0, 0, -10], [80, 60, 0]]}})
+    stated = resolve_cell({"stock": {"box_mm": [[0, 0, -10], [80, 60, 0]]}})
     assert not height_field_of(toolpath, stated, np.eye(3), [TOOL]).guessed
 
 
@@ -50,14 +50,14 @@ def test_a_guess_is_marked(toolpath):
 def test_a_mesh_gives_the_field_of_its_upper_side(toolpath, tmp_path, ending):
     solid = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
     solid.export(tmp_path / f"ball.{ending}")
-    cell = resolve_cell({"based_on": "demonstration", "stock": {"mesh": f"ball.{ending}"}}, beside=tmp_path)
+    cell = resolve_cell({"stock": {"mesh": f"ball.{ending}"}}, beside=tmp_path)
     field = height_field_of(toolpath, cell, np.eye(3), [TOOL])
     filled = 2.0 / 3.0 * np.pi * 10.0**3 + np.pi * 10.0**3
     assert field.volume_mm3 == pytest.approx(filled, rel=0.005)
 
 
 def test_a_turned_set_up_sees_the_block_from_its_side(toolpath):
-    cell = resolve_cell({"based_on": "demonstration", "stock": {"box_mm": [[0, 0, -10], [80, 60, 0]]}})
+    cell = resolve_cell({"stock": {"box_mm": [[0, 0, -10], [80, 60, 0]]}})
     turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     field = height_field_of(toolpath, cell, turn, [TOOL])
     assert field.volume_mm3 == pytest.approx(80 * 60 * 10, rel=1e-3)
@@ -104,6 +104,6 @@ def test_a_bad_mesh_gets_one_clear_line(tmp_path, make, word):
 
 
 def test_a_field_that_is_too_fine_is_refused(toolpath):
-    cell = resolve_cell({"based_on": "demonstration", "stock": {"box_mm": [[0, 0, -10], [800, 600, 0]], "resolution_mm": 0.01}})
+    cell = resolve_cell({"stock": {"box_mm": [[0, 0, -10], [800, 600, 0]], "resolution_mm": 0.01}})
     with pytest.raises(NotUnderstoodError, match="resolution_mm"):
         height_field_of(toolpath, cell, np.eye(3), [TOOL])

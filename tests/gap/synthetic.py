@@ -47,7 +47,8 @@ def prediction(program: str = PROGRAM, dt_s: float = 0.012) -> Prediction:
     """Return a prediction with forces of a short part: about 20 s."""
     import io
 
-    cell = resolve_cell({"based_on": "demonstration", 
+    cell = resolve_cell(
+        {
             "stock": {"box_mm": [[0.0, -80.0, -30.0], [120.0, 80.0, 0.0]]},
             "controller": {"cdis_mm": 0.5},
         }

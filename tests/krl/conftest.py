@@ -49,7 +49,7 @@ class Made:
     ):
         self.part = folder / f"{stem}.nc"
         self.part.write_text(text)
-        self.cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+        self.cell = resolve_cell(data or {})
         self.toolpath = read(text, self.cell)
         self.targets = set_targets(self.toolpath, self.cell)
         self.program = write_krl(self.targets, folder / f"{stem}.src", self.cell, **options)

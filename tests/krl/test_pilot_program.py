@@ -27,7 +27,7 @@ the next."""
 
 def predicted(body, data=None):
     """Predict a part that begins above the work at (0, 0, 2)."""
-    cell = resolve_cell({"based_on": "demonstration", **data}) if data else load_cell()
+    cell = resolve_cell(data) if data else load_cell()
     return moved(read(HEAD + body + FOOT, cell), cell)
 
 

@@ -200,7 +200,8 @@ def test_any_base_tool_and_spin(tmp_path, axis, spin_deg):
     a, b, c = controller.rotation.as_euler("ZYX", degrees=True)
     x, y, z = controller.translation
     tool = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "c_deg": c}
-    cell = resolve_cell({"based_on": "demonstration", 
+    cell = resolve_cell(
+        {
             "frames": {"base": BASE, "base_data": 3, "spin": spin_deg},
             "tool": {"1": {"tool_data": 7, "axis": axis, "frame": tool}},
         }

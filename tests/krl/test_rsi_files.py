@@ -74,7 +74,7 @@ def test_limits_stand_in_the_controllers_files_too():
 
 
 def test_both_files_say_what_the_cell_says():
-    own = resolve_cell({"based_on": "demonstration", 
+    own = resolve_cell({
         "online": {
             "most_mm": 1.25,
             "link": {

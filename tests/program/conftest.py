@@ -14,7 +14,7 @@ class Plan:
 
     def __init__(self, text: str, data: dict, tolerance_mm: float | None):
         self.text = text
-        self.cell = resolve_cell({"based_on": "demonstration", **data})
+        self.cell = resolve_cell(data)
         self.toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", self.cell)
         self.targets = set_targets(self.toolpath, self.cell, tolerance_mm)
 

@@ -22,7 +22,7 @@ AT = (40.0, 20.0, -5.0)
 
 @pytest.fixture(scope="module")
 def case():
-    return Case.of(resolve_cell({"based_on": "demonstration"}), None, None, None)
+    return Case.of(resolve_cell({}), None, None, None)
 
 
 def test_pose_is_that_of_a_program_there(case):
@@ -50,7 +50,7 @@ def test_worst_load_is_the_worst_of_all_directions(case):
 
 
 def test_feed_leaves_what_is_normal_to_it():
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = resolve_cell({})
     along = Case.of(cell, (0.0, 500.0, 0.0), (0.0, 1.0, 0.0), None)
     whole = Case.of(cell, (0.0, 500.0, 0.0), None, None)
     q, _ = whole.poses(np.array([AT]), np.zeros(1))

@@ -21,7 +21,7 @@ LOW, HIGH = Kr300.limits_deg.T
 
 def solve(text, **data):
     """Plan a piece of G-code in a cell and solve its joints."""
-    cell = resolve_cell({"based_on": "demonstration", **data})
+    cell = resolve_cell(data)
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", cell)
     targets = set_targets(toolpath, cell)
     joints = solve_joints(targets, cell)
