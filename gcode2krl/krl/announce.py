@@ -141,13 +141,11 @@ class Planner:
                 return
             pieces = pieces.before(slow - view(self.cell))
 
-    def count_in_time(self, knots: Knots, layout: Layout) -> int:
-        """Return how many of the first knots can be announced."""
-        most = self.cell.pilot.max_active
+    def all_in_time(self, knots: Knots, layout: Layout) -> bool:
+        """Tell whether all these knots can be announced, none much earlier than it needs to be."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True)
-        fits = (triggers.row >= 0) & (triggers.fire_s <= knots.time_s) & (sooner_s <= _MOST_SOONER_S)
-        fits[most:] &= (self._waiting(triggers) <= most)[:-most]
-        return len(knots) if fits.all() else int(np.argmin(fits))
+        in_time = (triggers.row >= 0) & (triggers.fire_s <= knots.time_s) & (sooner_s <= _MOST_SOONER_S)
+        return bool(in_time.all()) and not self._too_many(triggers)
 
     def announce_ending(self, knots: Knots, end_line: int, layout: Layout) -> PilotPlan | Issue:
         """Announce knots and, the lead ahead of the last one, that no knot follows."""

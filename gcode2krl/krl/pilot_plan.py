@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.krl.announce import Form, PilotPlan, Planner
+from gcode2krl.krl.announce import Form, Layout, PilotPlan, Planner
 from gcode2krl.pilot import Knots
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints
@@ -68,20 +68,34 @@ def _fitting(plan: Planner, asked: bool) -> PilotPlan | Issue:
 
 def _shortened(plan: Planner, knots: Knots, why: Issue) -> PilotPlan | Issue:
     """Return the plan of as many of the first knots as can be announced; why not where that is none."""
-    counted = [(plan.count_in_time(knots, layout), layout) for layout in plan.layouts(knots)]
+    counted = [(_most_in_time(plan, knots, layout), layout) for layout in plan.layouts(knots)]
     count, layout = max(counted, key=lambda found: found[0])
     count = min(count, len(knots) - 1)
-    for _ in range(_TRIALS):
-        if count < _LEAST_KNOTS:
+    for fewer in range(_TRIALS):  # the end needs a trigger too
+        if count - fewer < _LEAST_KNOTS:
             break
-        line, kept = int(knots.line[count]), _first(knots, count)
-        outcome = plan.announce_ending(kept, line, layout)
+        line = int(knots.line[count - fewer])
+        outcome = plan.announce_ending(_first(knots, count - fewer), line, layout)
         if isinstance(outcome, PilotPlan):
             sentence = "the pilot force ends before this line: its knots are too close to be announced"
             ended = Issue("warning", "pilot-left-out", line, sentence, why.remedy)
             return replace(outcome, issues=(ended, *outcome.issues))
-        count = min(count - 1, plan.count_in_time(kept, layout))
     return why
+
+
+def _most_in_time(plan: Planner, knots: Knots, layout: Layout) -> int:
+    """Return how many of the first knots can be announced, by bisection.
+
+    Triggers of later knots push those of earlier ones, so a shorter pilot force is never harder to announce.
+    """
+    enough, too_many = 0, len(knots) + 1
+    while too_many - enough > 1:
+        count = (enough + too_many) // 2
+        if plan.all_in_time(_first(knots, count), layout):
+            enough = count
+        else:
+            too_many = count
+    return enough
 
 
 def _first(knots: Knots, count: int) -> Knots:
