@@ -29,6 +29,11 @@ class Pieces:
     def __len__(self) -> int:
         return len(self.row)
 
+    def before(self, row: int) -> "Pieces":
+        """Return the pieces of motions before a row of Targets."""
+        kept = self.row < row
+        return Pieces(self.row[kept], self.share[kept], self.cdis_mm[kept])
+
 
 def split(targets: Targets, joints: Joints, pieces: Pieces, cell: Cell) -> tuple[Targets, Joints, Rows]:
     """Return targets and joints with the pieces as rows, each before the row whose motion it cuts.

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.krl.announce import pilot_forces
 from gcode2krl.krl.compose import SIDECAR, Layout, compose, turn_bits
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
-from gcode2krl.krl.pilot_plan import pilot_forces
 from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name

@@ -11,10 +11,11 @@ import numpy as np
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.files import write_together
+from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.compose import SIDECAR, Layout, compose
 from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
-from gcode2krl.krl.pilot_plan import PilotPlan, left_out, plan_pilot
+from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import header_words, released

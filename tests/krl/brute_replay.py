@@ -25,7 +25,7 @@ _NUMBER = r"[-+]?\d+(?:\.\d+)?"
 _SETTING = re.compile(rf"\$(VEL\.CP|ACC\.CP|APO\.CDIS)\s*=\s*({_NUMBER})")
 _MOTION = re.compile(r"(LIN|PTP)\s*\{([^{}]*)\}\s*(C_DIS)?")
 _TRIGGER = re.compile(
-    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:\$\w+\[\d+\]=(-?\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
+    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:([$\w]+(?:\[\d+\])?)=(-?\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
 )
 
 
@@ -41,7 +41,7 @@ class Line:
     cdis_mm: float
     tool: RigidTransform | None
     triggers: list = field(default_factory=list)
-    """(delay in s, numbers written) of the triggers that stand before it."""
+    """(delay in s, variable or subprogram, numbers) of the triggers that stand before it."""
     wait_s: float = 0.0
     """Stated dwell before it."""
     unknown: bool = False
@@ -89,8 +89,8 @@ def read_lines(path):
             elif text.startswith("TRIGGER"):
                 found = _TRIGGER.fullmatch(text)
                 assert found, text
-                numbers = [float(word) for word in (found[2] or found[4]).split(",")]
-                waiting["triggers"].append((int(found[1]) / 1000.0, numbers))
+                numbers = [float(word) for word in (found[3] or found[5]).split(",")]
+                waiting["triggers"].append((int(found[1]) / 1000.0, found[2] or found[4], numbers))
             elif found := _MOTION.fullmatch(text):
                 in_force = (state["VEL.CP"] * 1e3, state["ACC.CP"] * 1e3, state["APO.CDIS"], state["tool"])
                 lines.append(Line(found[1], components(found[2]), bool(found[3]), *in_force, **waiting))
@@ -330,6 +330,7 @@ class Fired:
     real_s: float
     end_s: float
     """When the motion that carries it enters the corner at its end."""
+    name: str
     numbers: list
 
 
@@ -388,9 +389,9 @@ def replay(path, first, last, law):
             continue
         begins, ends, duration, place = chain_law(parts, law)
         for k, begin, end in zip(rows, begins, ends, strict=True):
-            for delay, numbers in lines[k].triggers:
+            for delay, name, numbers in lines[k].triggers:
                 at = clock + begin + delay
-                fired.append(Fired(k, at, at + ahead, clock + end, numbers))
+                fired.append(Fired(k, at, at + ahead, clock + end, name, numbers))
         chains.append((clock, clock + duration, place))
         clock += duration
         row = rows[-1] + 1

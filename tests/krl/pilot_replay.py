@@ -1,9 +1,6 @@
-"""Triggers of a written program carried out by other means: text by regular expressions, corners by numbers.
+"""Triggers of a written program, carried out by `brute_replay`, and what stands between blended motions."""
 
-The start of each motion comes from a finely sampled Motion: its arc length is summed up from positions, the
-arc lengths of the corners from points on their parabolas.
-"""
-
+import math
 import re
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcode2krl.predict import plan_motion
+from tests.krl.brute_replay import Law, replay
 from tests.krl.replay import read_program
 
 FINE_S = 0.0005
@@ -34,25 +32,24 @@ class Fired:
 
 
 def fire(path, targets, cell):
-    """Return the triggers of a program made from ``targets`` (before motions were cut)."""
-    program = read_program(path)
-    motions = program.motions
-    fine = plan_motion(targets, cell, FINE_S)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine.position_mm, axis=0), axis=1))])
-    begin, end = _instants(motions, fine, way, targets, cell)
-    rows, delays, variables, numbers = [], [], [], []
-    for row, motion in enumerate(motions):
-        for statement in motion.before:
-            if not statement.startswith("TRIGGER"):
-                continue
-            found = _TRIGGER.fullmatch(statement)
-            assert found, statement
-            rows.append(row)
-            delays.append(int(found[1]) / 1000)
-            variables.append(found[2] or "GK_PILOT")
-            numbers.append(tuple(float(word) for word in (found[3] or found[4]).split(",")))
-    at = np.array(rows, dtype=int)
-    return Fired(at, begin[at] + np.array(delays), end[at], tuple(variables), tuple(numbers))
+    """Return the triggers of a program made from ``targets`` (before motions were cut).
+
+    How long a way over HOME takes is not in the text: there the predicted Motion is followed.
+    """
+    controller = cell.controller
+    advance = math.inf if controller.advance == "unlimited" else controller.advance
+    ends = np.flatnonzero(targets.move >= 0)[[0, -1]]
+    if targets.ptp[ends[0] + 1 : ends[1]].any():
+        return _fire_along_motion(path, targets, cell)
+    more = len(read_program(path).motions) - len(targets)  # pieces lie between the two ends
+    fired = replay(path, int(ends[0]), int(ends[1]) + more, Law(controller.k_s, advance)).fired
+    return Fired(
+        motion=np.array([one.line for one in fired], dtype=int),
+        time_s=np.array([one.time_s for one in fired]),
+        end_s=np.array([one.end_s for one in fired]),
+        variable=tuple(one.name for one in fired),
+        numbers=tuple(tuple(one.numbers) for one in fired),
+    )
 
 
 def most_waiting(motion, in_view):
@@ -71,6 +68,28 @@ def breaks_of_blending(path):
         for statement in motion.before
         if not STOPS_NOTHING.match(statement)
     ]
+
+
+def _fire_along_motion(path, targets, cell):
+    """The same along a finely sampled Motion: arc length from positions, corners from points on them."""
+    program = read_program(path)
+    motions = program.motions
+    fine = plan_motion(targets, cell, FINE_S)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine.position_mm, axis=0), axis=1))])
+    begin, end = _instants(motions, fine, way, targets, cell)
+    rows, delays, variables, numbers = [], [], [], []
+    for row, motion in enumerate(motions):
+        for statement in motion.before:
+            if not statement.startswith("TRIGGER"):
+                continue
+            found = _TRIGGER.fullmatch(statement)
+            assert found, statement
+            rows.append(row)
+            delays.append(int(found[1]) / 1000)
+            variables.append(found[2] or "GK_PILOT")
+            numbers.append(tuple(float(word) for word in (found[3] or found[4]).split(",")))
+    at = np.array(rows, dtype=int)
+    return Fired(at, begin[at] + np.array(delays), end[at], tuple(variables), tuple(numbers))
 
 
 def _instants(motions, fine, way, targets, cell):

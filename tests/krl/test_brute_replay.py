@@ -114,22 +114,6 @@ class Case:
         assert (np.diff(fired_s) >= CYCLE_S - GRID_S).all()
         return lead_s
 
-    def check_force(self):
-        """A receiver that knows nothing but triggers and sidecar has the predicted force where it knows one."""
-        done, knots = self.replay, self.knots
-        if len(knots) == 0:
-            return
-        told = [fired.time_s + lead for fired, lead in zip(done.fired, knots.lead_s, strict=False)]
-        said = np.stack([np.interp(self.prediction.motion.time_s, told, f, 0, 0) for f in knots.force_N.T], 1)
-        motion_s = self.prediction.motion.time_s
-        known = motion_s <= (told[-1] if len(done.fired) > len(knots) else np.inf)
-        rest = np.array([np.abs(motion_s - begin).argmin() for begin, _ in done.sections])
-        known[rest] = False  # a section begins: its first knots are told as it does
-        off = np.linalg.norm(said - self.force_N, axis=1)[known]
-        steep = np.abs(np.gradient(np.linalg.norm(self.force_N, axis=1), motion_s))[known]
-        limit = self.program.pilot.max_error_N + 0.5 + 2 * GRID_S * np.maximum(steep, steep.max() / 4)
-        assert (off <= limit).all(), (off - limit).max()
-
 
 @pytest.mark.parametrize(
     "seed", [*range(24), *(pytest.param(k, marks=pytest.mark.slow) for k in range(24, 120))]

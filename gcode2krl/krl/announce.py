@@ -1,0 +1,287 @@
+"""Knots of predicted forces to the triggers that announce them, and the motions that carry these."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import krc4
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.krc4 import Chain
+from gcode2krl.krl.advance import most_active, view
+from gcode2krl.krl.cuts import cut_for
+from gcode2krl.krl.pieces import Pieces, split
+from gcode2krl.krl.pilot_check import PilotCase
+from gcode2krl.krl.pilot_text import PilotText
+from gcode2krl.krl.triggers import Triggers, place_triggers
+from gcode2krl.krl.windows import Windows, windows_of
+from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
+from gcode2krl.pilot.knots import LEAD_DECIMALS
+from gcode2krl.prediction import Prediction
+from gcode2krl.tables import Joints, Motion, Targets
+from gcode2krl.units import RAD_PER_DEG
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Form = Literal["index", "values"]
+_SHARP = np.sin(30.0 * RAD_PER_DEG / 2.0)
+"""cos(alpha/2) from which a corner is a change of direction: it turns by 30° or more. Our choice; what turns
+less is left to the tolerance of the knots."""
+_LITTLE_SOONER_S, _MOST_SOONER_S = 0.2, 1.0
+"""How much earlier than needed a knot may be announced, rather than that motions are cut, and at most."""
+_SAFE_S = 0.002
+"""Added to the lead: what an instant read from the samples of a Motion may be off by."""
+_TRIALS = 4
+"""How often pieces that cost time are left out."""
+_SAME_TIME = 0.5
+"""Share of a cycle by which pieces may change the time of a program."""
+
+
+@dataclass(frozen=True)
+class PilotPlan:
+    """The pilot force of a program, and the program with the motions it needs."""
+
+    text: PilotText
+    targets: Targets
+    joints: Joints
+    case: PilotCase
+    """What the program is checked against once it is written."""
+    issues: tuple[Issue, ...]
+
+
+def pilot_forces(prediction: Prediction) -> tuple[Motion, Floats, Floats | None]:
+    """Return the Motion, and forces and deflection (m, 3) in the pilot frame, None where not predicted.
+
+    Raises `NotUnderstoodError` for a prediction without forces.
+    """
+    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
+    if motion is None or forces is None:
+        sentence = "the prediction has no forces to pilot with"
+        raise input_error("option-value", sentence, "predict with a material and stock, or --pilot none")
+
+    def turned(vector: Floats) -> Floats:
+        return to_pilot_frame(vector, motion.rotation, motion.tool, prediction.cell)
+
+    bent = turned(deflection.deflection_base_mm) if deflection is not None else None
+    return motion, turned(forces.force_base_N), bent
+
+
+class Layout(NamedTuple):
+    """The motions of a program and when they run."""
+
+    windows: Windows
+    targets: Targets
+    joints: Joints
+
+
+class Planner:
+    """What stays the same while knots are tried."""
+
+    def __init__(self, prediction: Prediction, joints: Joints, form: Form, sidecar: bool) -> None:
+        self.targets, self.joints, self.cell = prediction.targets, joints, prediction.cell
+        self.form, self.sidecar = form, sidecar
+        self.motion, self.force_N, self.bent_mm = pilot_forces(prediction)
+        self.line = prediction.toolpath.source_line[self.motion.move]
+        self.chain = krc4.build_chain(self.targets, self.cell)
+        self.windows = windows_of(self.targets, self.chain, self.motion, self.cell)
+
+    def knots(self, tolerance_N: float | None) -> Knots:
+        """Return the knots of a tolerance."""
+        return knots_of(
+            self.motion.time_s,
+            self.motion.path_mm,
+            self.force_N,
+            self.bent_mm,
+            _direction_changes(self.chain, self.windows, self.motion),
+            line=self.line,
+            tolerance_N=tolerance_N,
+            cycle_s=self.cell.controller.cycle_s,
+        )
+
+    @cached_property
+    def whole(self) -> Layout:
+        """The program as it is, no motion cut."""
+        return Layout(self.windows, self.targets, self.joints)
+
+    def announce(self, knots: Knots) -> PilotPlan | Issue:
+        """Return the plan that announces the knots, or why there is none.
+
+        Where too many triggers would wait at the same time, knots are announced a little earlier; where that
+        is not enough, long motions are cut; and what is then left is announced still earlier.
+        """
+        triggers, _ = self._place(knots, self.windows)
+        if not self._too_many(triggers):
+            return self._planned(knots, triggers, self.whole)
+        outcome = self._earlier(knots, _LITTLE_SOONER_S, self.whole)
+        if isinstance(outcome, Issue):
+            pieces = self._pieces(knots)
+            if pieces is not None:
+                layout, slow, later_s = self._cut(pieces)
+                free = slow is None
+                outcome = self._earlier(knots, _MOST_SOONER_S, layout) if free else self._slower(later_s)
+        if isinstance(outcome, Issue):
+            other = self._earlier(knots, _MOST_SOONER_S, self.whole)
+            outcome = outcome if isinstance(other, Issue) else other
+        return outcome
+
+    def layouts(self, knots: Knots) -> Iterator[Layout]:
+        """Yield the program as it is, and with its first motions cut, up to where that would cost time."""
+        yield self.whole
+        pieces = self._pieces(knots)
+        for _ in range(_TRIALS):
+            if pieces is None or not len(pieces):
+                return
+            layout, slow, _ = self._cut(pieces)
+            if slow is None:
+                yield layout
+                return
+            pieces = pieces.before(slow - view(self.cell))
+
+    def all_in_time(self, knots: Knots, layout: Layout) -> bool:
+        """Tell whether all these knots can be announced, none much earlier than it needs to be."""
+        triggers, sooner_s = self._place(knots, layout.windows, spread=True)
+        in_time = (triggers.row >= 0) & (triggers.fire_s <= knots.time_s) & (sooner_s <= _MOST_SOONER_S)
+        return bool(in_time.all()) and not self._too_many(triggers)
+
+    def announce_ending(self, knots: Knots, end_line: int, layout: Layout) -> PilotPlan | Issue:
+        """Announce knots and, the lead ahead of the last one, that no knot follows."""
+        triggers, sooner_s = self._place(knots, layout.windows, spread=True, ends=True)
+        if sooner_s.max(initial=0.0) > _MOST_SOONER_S or self._too_many(triggers):
+            return self._too_dense(knots)
+        return self._planned(knots, triggers, layout, end_line)
+
+    def _pieces(self, knots: Knots) -> Pieces | None:
+        triggers, _ = self._place(knots, self.windows)
+        return cut_for(triggers, self.windows, self.chain, self.targets, self.motion, self.cell)
+
+    def _cut(self, pieces: Pieces) -> tuple[Layout, int | None, Floats]:
+        """Return the program with pieces, the row of Targets from which on they cost time, and how much (n,).
+
+        By the controller's model; more than half a cycle counts.
+        """
+        targets, joints, own = split(self.targets, self.joints, pieces, self.cell)
+        chain = krc4.build_chain(targets, self.cell)
+        first, count = self.chain.first, len(self.chain.length_mm)
+        rows = own[first + 1 : first + 1 + count] - first - 1
+        later_s = krc4.plan(chain, self.cell).move_end_s[rows] - self._move_end_s
+        slow = np.flatnonzero(np.abs(later_s) > _SAME_TIME * self.cell.controller.cycle_s)
+        windows = windows_of(targets, chain, self.motion, self.cell)
+        row = first + 1 + int(slow[0]) if len(slow) else None
+        return Layout(windows, targets, joints), row, later_s
+
+    def _earlier(self, knots: Knots, most_s: float, layout: Layout) -> PilotPlan | Issue:
+        """Announce knots by triggers that are moved to earlier motions where too many would wait."""
+        triggers, sooner_s = self._place(knots, layout.windows, spread=True)
+        if sooner_s.max(initial=0.0) > most_s or self._too_many(triggers):
+            return self._too_dense(knots)
+        return self._planned(knots, triggers, layout)
+
+    def _planned(
+        self, knots: Knots, triggers: Triggers, layout: Layout, end_line: int | None = None
+    ) -> PilotPlan | Issue:
+        count = len(knots)
+        late = np.flatnonzero((triggers.row[:count] < 0) | (triggers.fire_s[:count] > knots.time_s))
+        if len(late) or (triggers.row < 0).any():
+            line = int(knots.line[late[0]]) if len(late) else int(knots.line[-1])
+            return _refusal("pilot-late", line, "no motion is left to announce it in")
+        lead_s = np.round(knots.time_s - triggers.fire_s[:count], LEAD_DECIMALS)
+        announced = replace(knots, lead_s=lead_s)
+        text = PilotText(
+            announced,
+            self._header(),
+            self.cell.pilot.hash_variable,
+            triggers,
+            self.sidecar,
+            end_line=end_line,
+        )
+        case = PilotCase(text, self.motion, self.force_N, layout.windows)
+        issues = (*knots.issues, *_short_leads(announced, self.cell))
+        return PilotPlan(text, layout.targets, layout.joints, case, issues)
+
+    def _place(
+        self, knots: Knots, windows: Windows, spread: bool = False, ends: bool = False
+    ) -> tuple[Triggers, Floats]:
+        """Return the trigger of each knot, and (k,) by how much it is earlier than it needs to be.
+
+        A receiver of values ramps towards the knot it has been told, so it must hear of it before the knot
+        before; one that has the sidecar need not. ``ends`` adds one that acts the lead ahead of the last
+        knot, so that no receiver runs beyond it.
+        """
+        earliest_s = windows.earliest_s(knots.time_s)
+        told_s = knots.time_s.copy()
+        if self.form == "values":
+            same = earliest_s[1:] == earliest_s[:-1]
+            told_s[1:] = np.where(same, knots.time_s[:-1], knots.time_s[1:])
+        deadline_s = told_s - self.cell.pilot.lead_s - _SAFE_S
+        if ends:
+            end_s = knots.time_s[-1] - self.cell.pilot.lead_s - _SAFE_S
+            deadline_s, earliest_s = np.append(deadline_s, end_s), np.append(earliest_s, earliest_s[-1])
+        triggers = place_triggers(deadline_s, earliest_s, windows, self.cell, spread=spread)
+        return triggers, np.nan_to_num(deadline_s - triggers.fire_s)
+
+    def _waiting(self, triggers: Triggers) -> Rows:
+        """Return how many triggers (k,) wait from each on."""
+        order = triggers.order
+        return np.searchsorted(order, order + view(self.cell)) - np.arange(len(order))
+
+    def _too_many(self, triggers: Triggers) -> bool:
+        return most_active(triggers.order, view(self.cell)) > self.cell.pilot.max_active
+
+    def _header(self) -> PilotHeader:
+        pilot = self.cell.pilot
+        variable = pilot.index_variable if self.form == "index" else pilot.value_variable
+        return PilotHeader(pilot.frame, self.form, variable, pilot.lead_s)
+
+    @cached_property
+    def _move_end_s(self) -> Floats:
+        return krc4.plan(self.chain, self.cell).move_end_s
+
+    def _slower(self, later_s: Floats) -> Issue:
+        """Return where pieces cost most time."""
+        worst = int(np.argmax(np.abs(np.diff(later_s, prepend=0.0))))
+        sentence = (
+            f"knots so close that the motions between them are too short for the look-ahead cost "
+            f"{np.abs(later_s).max():.2f} s, most at this line"
+        )
+        return _refusal("pilot-slows", int(self.chain.source_line[worst]), sentence)
+
+    def _too_dense(self, knots: Knots) -> Issue:
+        """Return where most knots come together, without being announced early."""
+        triggers, _ = self._place(knots, self.windows)
+        waiting = self._waiting(triggers)
+        worst = int(np.argmax(waiting))
+        sentence = (
+            f"{waiting[worst]} knots of the pilot force would wait to be announced at the same time, "
+            f"{self.cell.pilot.max_active} can, and the motions are too short to be cut"
+        )
+        return _refusal("pilot-dense", int(knots.line[worst]), sentence)
+
+
+def _refusal(code: str, line: int, sentence: str) -> Issue:
+    return Issue("error", code, line, sentence, "raise [pilot] tolerance_N, or --pilot none")
+
+
+def _direction_changes(chain: Chain, windows: Windows, motion: Motion) -> Rows:
+    """Return the samples in the middle of the corners that turn sharply."""
+    sharp = chain.first + 1 + np.flatnonzero(chain.cos_half >= _SHARP)
+    at = np.flatnonzero(np.isin(windows.row[:-1], sharp) & (np.diff(windows.row) == 1))
+    middle_s = (windows.end_s[at] + windows.begin_s[at + 1]) / 2.0
+    return np.minimum(np.searchsorted(motion.time_s, middle_s), len(motion) - 1).astype(np.int64)
+
+
+def _short_leads(knots: Knots, cell: Cell) -> list[Issue]:
+    """Return what there is to say of knots that a section begins with."""
+    short = np.flatnonzero(knots.lead_s < cell.pilot.lead_s)
+    if len(short) == 0:
+        return []
+    worst = int(short[np.argmin(knots.lead_s[short])])
+    sentence = (
+        f"{len(short)} knots of the pilot force are announced less than {cell.pilot.lead_s:.3f} s ahead, "
+        f"this one {knots.lead_s[worst]:.3f} s: the robot starts here"
+    )
+    remedy = "begin the cut with a way in air; the sidecar has each knot's lead"
+    return [Issue("warning", "pilot-lead", int(knots.line[worst]), sentence, remedy)]
