@@ -165,7 +165,10 @@ def test_a_motion_of_other_targets_is_refused(tmp_path):
         prediction.toolpath, other, prediction.cell, prediction.motion, forces=prediction.forces
     )
     with pytest.raises(RefusedError, match="pilot-motion"):
-        write_krl(wrong, tmp_path / "part.src")
+        write_krl(wrong, tmp_path / "part.src", pilot="index")
+    bare = write_krl(wrong, tmp_path / "part.src")
+    assert bare.pilot is None
+    assert "pilot-left-out" in {issue.code for issue in bare.issues}
 
 
 def test_a_position_alone(tmp_path):

@@ -324,7 +324,7 @@ def test_without_look_ahead_every_end_is_a_stop_and_nothing_is_cut(make):
     check(made, in_view=1)
     assert len(made.program.targets) == len(prediction.targets)
     with pytest.raises(RefusedError, match="pilot-dense"):
-        make(prediction, sawtooth(prediction, 0.24, 2.4))
+        make(prediction, sawtooth(prediction, 0.24, 2.4), pilot="index")
 
 
 def noisy(prediction, sigma_N=60.0):
@@ -349,8 +349,9 @@ def test_too_many_knots_are_refused_and_nothing_is_written(tmp_path, sigma_N, st
     body = "".join(f"G1 X{1.2 * k:.1f} Y{0.3 * (k % 2):.1f}\n" for k in range(1, 60))
     data = {"pilot": {"tolerance_N": stated}} if stated else {}
     prediction = predicted(f"G1 Z-1 F1500\n{body}", data)
+    forced = with_forces(prediction, noisy(prediction, sigma_N))
     with pytest.raises(RefusedError, match=r"pilot-(dense|slows)") as refused:
-        write_krl(with_forces(prediction, noisy(prediction, sigma_N)), tmp_path / "part.src")
+        write_krl(forced, tmp_path / "part.src", pilot="index")
     assert "--pilot none" in str(refused.value)
     assert list(tmp_path.iterdir()) == []
 
