@@ -139,6 +139,30 @@ def _line_end(text, i):
 
 
 @njit(cache=True)
+def _without_number(text, i, letter):
+    """Return (finding, letter whose value is lost, place behind) of a letter with no number behind it."""
+    if letter == 79:
+        return f.O_WORD, letter, i
+    if letter == 78:
+        return f.BAD_LINE_NUMBER, 0, i
+    if i < len(text) and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
+        return f.EXPRESSION, letter, _after_value(text, i, _line_end(text, i))
+    return f.NO_NUMBER, letter, i
+
+
+@njit(cache=True)
+def _after_assignment(text, i):
+    """Return the place behind ``#1 = value`` or a lone parameter."""
+    end = _line_end(text, i)
+    i = _after_value(text, i, end)
+    while i < end and _blank(text[i]):
+        i += 1
+    if i < end and text[i] == 61:
+        i = _after_value(text, i + 1, end)
+    return i
+
+
+@njit(cache=True)
 def _after_comment(text, i):
     """Return (finding, place behind) of the comment ``( )`` that opens at ``i``."""
     n = len(text)
@@ -242,16 +266,8 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                     break
                 i += 1
             if digits == 0:
-                error = f.NO_NUMBER
                 found = float(upper)
-                lost = upper
-                if upper == 79:
-                    error = f.O_WORD
-                elif upper == 78:
-                    error, lost = f.BAD_LINE_NUMBER, 0
-                elif i < n and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
-                    error = f.EXPRESSION
-                    i = _after_value(text, i, _line_end(text, i))
+                error, lost, i = _without_number(text, i, upper)
             elif error != 0:
                 found = float(upper)
                 lost = upper
@@ -284,12 +300,7 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                 continue
         elif c == 35:  # #1 = value: an assignment; what is no assignment is a lone parameter
             error = f.EXPRESSION
-            end = _line_end(text, i)
-            i = _after_value(text, i, end)
-            while i < end and _blank(text[i]):
-                i += 1
-            if i < end and text[i] == 61:
-                i = _after_value(text, i + 1, end)
+            i = _after_assignment(text, i)
         elif c == 91 or c == 93 or c == 61:  # [ ] =
             error = f.EXPRESSION
             lost = _previous_letter(letters, lines, count, line)
