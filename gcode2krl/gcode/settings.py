@@ -69,6 +69,7 @@ def apply_settings(
         _path_control(line, s, counts, found, has, word, g[11], used)
     if g[3] >= 0:
         s.absolute = 1 if g[3] == 900 else 0
+        s.distance_line = line
         s.doubt &= ~DOUBT_DISTANCE
     if g[4] >= 0:
         s.arc_absolute = 1 if g[4] == 901 else 0

@@ -12,6 +12,10 @@ from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 _MOST_PER_CHECK = 20
 _SLOWEST_MM_S = 0.001
+_TOUCHED_OFF = (
+    '; if lengths are set by touching off: [program] tool_length = "from_table" in the cell, '
+    "or --allow g43-missing"
+)
 
 
 def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
@@ -27,22 +31,48 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
 
 
 def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
+    """Return the first row of each run of wrong rows, of the first runs."""
+    return _starts(wrong)[:_MOST_PER_CHECK]
+
+
+def _starts(wrong: NDArray[np.bool_]) -> list[int]:
     """Return the first row of each run of wrong rows."""
-    starts = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
-    return [int(row) for row in starts[:_MOST_PER_CHECK]]
+    rows: list[int] = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]])).tolist()
+    return rows
 
 
 def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     known = toolpath.is_position()
     from_known = np.concatenate([[False], known[:-1]])
-    for row in _stretches(feed & ~(known & from_known)):
+    told: set[str] = set()
+    for row in _starts(feed & ~(known & from_known)):
         both = toolpath.known[row - 1] & toolpath.known[row]
-        missing = ", ".join(name for name, is_known in zip("XYZ", both, strict=True) if not is_known)
+        missing = [axis for axis in range(3) if not both[axis]]
+        why = "; ".join(_why_unknown(toolpath, row, axis) for axis in missing)
+        if why in told:  # the same cause again
+            continue
+        told.add(why)
         yield Issue(
             "error", "undefined-position", int(toolpath.source_line[row]),
-            f"feed move from a position whose {missing} has not been programmed",
+            f"feed move from a position whose {', '.join('XYZ'[axis] for axis in missing)} has not been "
+            f"programmed: {why}",
             "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too)",
         )  # fmt: skip
+        if len(told) == _MOST_PER_CHECK:
+            return
+
+
+def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
+    """Name what made an axis unknown, or how long the program has gone without it."""
+    before = np.flatnonzero(toolpath.known[:row, axis])
+    name, line = "XYZ"[axis], int(toolpath.source_line[row])
+    if not len(before):
+        return f"no {name} in the first {line:,} lines"
+    lost = int(before[-1]) + 1
+    line = int(toolpath.source_line[lost])
+    if toolpath.machine[lost]:
+        return f"{name} is unknown since the machine move (G28, G30, G53) in line {line}"
+    return f"{name} is unknown since the tool length changed before line {line}"
 
 
 def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
@@ -67,14 +97,24 @@ def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> I
 
 def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     speed = toolpath.spindle_rad_s
-    for row in _stretches(feed & (speed == 0)):
+    switches = [event for event in toolpath.events if event.kind == "spindle"]
+    rows_of_switches = np.array([event.row for event in switches], dtype=np.int64)
+    told: set[str] = set()
+    for row in _starts(feed & (speed == 0)):
+        last = int(np.searchsorted(rows_of_switches, row)) - 1
+        why = _why_off(switches[last]) if last >= 0 else "no M3 comes before it"
+        if why in told:  # the same cause again
+            continue
+        told.add(why)
         yield Issue(
             "error",
             "spindle-off",
             int(toolpath.source_line[row]),
-            "feed move with the spindle off",
+            f"feed move with the spindle off: {why}",
             "program S and M3 before it",
         )
+        if len(told) == _MOST_PER_CHECK:
+            break
     for row in _stretches(feed & (speed < 0)):
         yield Issue(
             "error",
@@ -86,6 +126,14 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
     for event in toolpath.events:
         if event.kind == "spindle":
             yield from _spindle_speed(event, toolpath, cell)
+
+
+def _why_off(event: Event) -> str:
+    """Name the block that left the spindle standing."""
+    line, m = int(event.values["line"]), int(event.values["m"])
+    if event.values.get("implied"):
+        return f"the spindle was stopped by M6 in line {line}"
+    return f"the spindle was stopped by M5 in line {line}" if m == 5 else f"M{m} without S in line {line}"
 
 
 def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
@@ -133,18 +181,20 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
     other = feed & (toolpath.tool > 0) & (toolpath.length_offset_tool != toolpath.tool)
-    for row in _stretches(other):
+    told: set[tuple[int, int]] = set()
+    for row in _starts(other):
         number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
         tool = cell.tool.get(number)
-        if tool is None or (offset < 0 and not tool.length_mm):
+        if (number, offset) in told or tool is None or (offset < 0 and not tool.length_mm):
             continue
+        told.add((number, offset))
         having = "without G43" if offset < 0 else f"with the length of tool {offset} (G43 H{offset})"
         yield Issue(
             "error",
             "g43-missing",
             int(toolpath.source_line[row]),
             f"tool {number} cuts {having}: Z would be that of another tool or of the spindle nose",
-            f"add G43 H{number} after the tool change",
+            f"add G43 H{number} after the tool change" + (_TOUCHED_OFF if offset < 0 else ""),
         )
 
 
