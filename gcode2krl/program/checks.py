@@ -64,10 +64,13 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]
 
 def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
     """Name what made an axis unknown, or how long the program has gone without it."""
-    before = np.flatnonzero(toolpath.known[:row, axis])
-    name, line = "XYZ"[axis], int(toolpath.source_line[row])
+    name = "XYZ"[axis]
+    known = np.flatnonzero(toolpath.known[:, axis])
+    before = known[known < row]
+    if not len(known):
+        return f"no {name} in {int(toolpath.source_line[-1]):,} lines"
     if not len(before):
-        return f"no {name} in the first {line:,} lines"
+        return f"no {name} before line {int(toolpath.source_line[known[0]]):,}"
     lost = int(before[-1]) + 1
     line = int(toolpath.source_line[lost])
     if toolpath.machine[lost]:
