@@ -343,7 +343,7 @@ FILE_MISTAKES = (
     ),
     Mistake(
         "picture given as G-code", r"(?i)binary|text|character|G-code",
-        {1: "@"}, data=BINARY, or_whole=True,
+        {3: "@"}, data=BINARY, or_whole=True,
     ),
 )  # fmt: skip
 

@@ -112,7 +112,7 @@ FINDINGS: dict[int, Finding] = {
     ROTARY_WORD: Finding(
         "error",
         "rotary-axis",
-        "{word}{b:g}: a rotary or secondary axis that is not at 0, and the cell declares no machine",
+        "{word} is a rotary or secondary axis, here at {b:g}, and the cell declares no machine",
         "leave {word} at 0; rotary axes need a [machine] in the cell, which this version does not know",
     ),
     REPEATED_WORD: Finding("error", "repeated-word", "{word} stands twice in the block", "keep one"),
@@ -271,8 +271,8 @@ FINDINGS: dict[int, Finding] = {
     UNKNOWN_START: Finding(
         "error",
         "undefined-position",
-        "feed move from a position that has not been programmed; arcs after it cannot fit",
-        "program X, Y and Z with G0 first",
+        "feed move from a position that has not been programmed{state}; arcs after it cannot fit",
+        "program X, Y and Z with G0 (and G90) first",
     ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
@@ -368,6 +368,8 @@ def _state(number: int, line: int, a: float, b: float, c: float) -> str:
         return f"G{b:.0f} of line {a:.0f}" if a else "the start"
     if number == NO_MOTION_MODE:
         return f"G80 of line {a:.0f} ended the motion mode" if a else "none has been programmed before"
+    if number == UNKNOWN_START:
+        return f", G91 of line {a:.0f} is in force" if a else ""
     if number == ARC_NO_CENTRE:
         return f"; it is in force since line {b:.0f}" if b != line else ""
     if number == UNUSED_WORD and set(letters_of(a)) & set("IJKPR"):

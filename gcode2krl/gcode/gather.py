@@ -20,7 +20,8 @@ from gcode2krl.gcode.state import (
 
 NOTHING, GOOD, FAULTY = 0, 1, 2
 """A block to be left out, one that is understood, one that has been reported and is only followed."""
-OTHER_AXES = np.array([ord(c) - 65 for c in "ABCUVW"])
+OTHER_AXES = tuple(ord(c) - 65 for c in "ABCUVW")
+IS_OTHER_AXIS = np.array([k in OTHER_AXES for k in range(26)])
 _E = ord("E") - 65
 
 
@@ -38,6 +39,7 @@ def gather(words, i, j, s, rows, counts, events, found, block_delete, has, word,
     m_count = 0
     good = True
     used = False
+    rotary = False
     doubt = 0
     for k in range(i, j):
         c = letter[k]
@@ -67,10 +69,16 @@ def gather(words, i, j, s, rows, counts, events, found, block_delete, has, word,
             good = False
             used = True
         elif c == 71:  # G
-            finding, lost = _g_code(value[k], g_in_group, found, counts, at)
+            code = round(value[k] * 10)
+            used = True
+            if code >= 0 and code <= 999 and value[k] * 10 == code:
+                group = GROUP_OF_G[code]
+                if group >= 0 and g_in_group[group] < 0:
+                    g_in_group[group] = code
+                    continue
+            finding, lost = _odd_g_code(value[k], g_in_group, found, counts, at)
             doubt |= lost
             good = good and finding == f.OK
-            used = True
         elif c == 77:  # M
             code = round(value[k])
             used = True
@@ -103,10 +111,11 @@ def gather(words, i, j, s, rows, counts, events, found, block_delete, has, word,
             has[index] = True
             word[index] = value[k]
             used = True
-    if has[_E]:
+            rotary |= IS_OTHER_AXIS[index]
+    if has[_E] and good:  # else it belongs to what has been reported, as in M68 E0
         report(found, counts, f.UNKNOWN_LETTER, at, _E + 65, 0.0)
         good = False
-    if not _rotary(s, has, word, found, counts, at):
+    if rotary and not _rotary(s, has, word, found, counts, at):
         good = False
     if not used and good:
         return NOTHING, 0
@@ -121,8 +130,8 @@ def _pass_marks(letter, i, j, counts):
 
 
 @njit(cache=True)
-def _g_code(value, g_in_group, found, counts, line):
-    """Enter a G-code into its modal group; return (finding, what is in doubt after it)."""
+def _odd_g_code(value, g_in_group, found, counts, line):
+    """Look closer at a G-code that is not the first of a group; return (finding, what is then in doubt)."""
     code = round(value * 10)
     if code < 0 or code > 999 or abs(value * 10 - code) > 1e-6 or GROUP_OF_G[code] == UNKNOWN_GROUP:
         report(found, counts, f.UNKNOWN_G, line, value * 10, 0.0)

@@ -86,7 +86,8 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
     if count > 1:
         others = ", ".join(map(str, lines[1:]))
         rest = ", …" if count > len(lines) else ""
-        message += f"; so do {count - 1} more (lines {others}{rest})"
+        lines_word = "line" if count == 2 else "lines"
+        message += f"; so do {count - 1} more ({lines_word} {others}{rest})"
     if state["misfits_other_centre"] == count:
         now, other, how = (
             ("G91.1", "G90.1", "absolute") if abs(row["c"]) == 911 else ("G90.1", "G91.1", "relative")

@@ -57,8 +57,10 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
         if _plain_block(letter, words[1], line, i, j, s, rows, counts, offsets):
             i = j
             continue
-        before[0] = state[0]
-        _copy(counts, used_before)
+        arc = _has_arc_word(letter, i, j)
+        if arc:
+            before[0] = state[0]
+            _copy(counts, used_before)
         kind, doubt = gather(
             words,
             i,
@@ -98,7 +100,7 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
             m_codes,
         )
         counts[MUTE] = 0
-        if not done:  # an arc needs more rows than are left: as if the block had not begun
+        if arc and not done:  # an arc needs more rows than are left: as if the block had not begun
             state[0] = before[0]
             _copy(used_before, counts)
             break
@@ -106,6 +108,16 @@ def run(words, start, state, rows, counts, events, found, options, offsets, offs
         s.blocks += 1
         i = j
     return i
+
+
+@njit(cache=True)
+def _has_arc_word(letter, i, j):
+    """Tell whether I, J, K or R is among the words: only such a block can need many rows."""
+    for k in range(i, j):
+        c = letter[k]
+        if (c >= 73 and c <= 75) or c == 82:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -174,8 +186,8 @@ def _block(
     )  # fmt: skip
     axes = has[_X] or has[_Y] or has[_Z]
     for index in OTHER_AXES:
-        axes = axes or has[index]
-        used[index] = True
+        if has[index]:
+            axes, used[index] = True, True
     special = g[0]
     homes = special == 280 or special == 300
     named = g[1] >= 0 and g[1] != 800 and not homes
@@ -206,7 +218,12 @@ def _block(
                 used[index] = True
         if not move(line, s, rows, counts, found, options, offsets, has, word, special):
             return False
-    _report_unused(line, s, counts, found, has, used)
+    unused = 0
+    for index in range(26):
+        if has[index] and not used[index]:
+            unused |= 1 << index
+    if unused:
+        report_unless(s, DOUBT_MOTION, found, counts, f.UNUSED_WORD, line, unused, s.motion, s.motion_line)
     for m in m_codes:
         if stops(m):
             event(s, rows, events, counts, EVENT_M, line, 0 if m == 60 else m, np.nan)
@@ -238,14 +255,3 @@ def _home(line, s, rows, counts, found, offsets, has, word, motion_code, special
     if beside:
         note(s, NOTE_HOME, line, special)
     machine_home(line, s, rows, counts, offsets, has, word, special, any_axis)
-
-
-@njit(cache=True)
-def _report_unused(line, s, counts, found, has, used):
-    """One finding for all words of a block that nothing uses."""
-    unused = 0
-    for index in range(26):
-        if has[index] and not used[index]:
-            unused |= 1 << index
-    if unused:
-        report_unless(s, DOUBT_MOTION, found, counts, f.UNUSED_WORD, line, unused, s.motion, s.motion_line)

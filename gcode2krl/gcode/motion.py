@@ -223,7 +223,7 @@ def _arc(line, s, rows, counts, found, options, offsets, has, word):
     fit = radii_fit(r0, r1, s.unit_mm)
     if fit == MISFIT:
         known = (s.known_x, s.known_y, s.known_z)
-        if s.absolute and not (known[first] and known[second]):
+        if not (known[first] and known[second]):
             _report_unknown_start(s, counts, found, line)
         elif not rests_on_doubt(s, counts, in_doubt):
             cu += u0 - offsets[s.work_offset, first] if s.arc_absolute else offsets[s.work_offset, first] - u0
@@ -267,7 +267,8 @@ def _report_unknown_start(s, counts, found, line):
     if s.unknown_reported:
         counts[CONSEQUENCES] += 1
     else:
-        report(found, counts, f.UNKNOWN_START, min(line, s.unknown_feed_line), 0.0, 0.0)
+        incremental_line = 0 if s.absolute else s.distance_line
+        report(found, counts, f.UNKNOWN_START, min(line, s.unknown_feed_line), incremental_line, 0.0)
     s.unknown_reported = 1
 
 

@@ -42,10 +42,12 @@ def apply_settings(
     line, s, rows, counts, events, found, offset_known, tool_length, from_table, has, word, g, m_codes, used
 ):
     """Take over all modes and values of a block; ``used`` notes which words have been used."""
-    _feed_and_speed(line, s, rows, counts, events, found, has, word, g, used)
-    _tool_and_switches(
-        line, s, rows, counts, events, found, tool_length, from_table, has, word, m_codes, used
-    )
+    if has[_F] or has[_S] or g[5] >= 0:  # a call with so many arrays costs as much as a plain block
+        _feed_and_speed(line, s, rows, counts, events, found, has, word, g, used)
+    if has[_T] or m_codes[0] >= 0:
+        _tool_and_switches(
+            line, s, rows, counts, events, found, tool_length, from_table, has, word, m_codes, used
+        )
     if g[2] >= 0:
         s.plane = g[2] // 10
         s.doubt &= ~DOUBT_PLANE
@@ -67,6 +69,7 @@ def apply_settings(
         _path_control(line, s, counts, found, has, word, g[11], used)
     if g[3] >= 0:
         s.absolute = 1 if g[3] == 900 else 0
+        s.distance_line = line
         s.doubt &= ~DOUBT_DISTANCE
     if g[4] >= 0:
         s.arc_absolute = 1 if g[4] == 901 else 0

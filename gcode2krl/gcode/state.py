@@ -53,6 +53,7 @@ STATE = np.dtype(
         ("unknown_reported", "i1"),
         ("doubt", "i4"),  # bits of what a block that was not understood may have set
         ("motion_line", "i4"),  # where the motion mode was named, 0 = nowhere
+        ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
         ("note_count", "i4", 4),  # blocks with something harmless, by NOTE_…
@@ -112,7 +113,31 @@ def _group_table() -> NDArray[np.int8]:
         12: (97,),
     }
     unsupported = (
-        *(5, 5.1, 5.2, 5.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1, 43.1, 43.2),
+        *(
+            5,
+            5.1,
+            5.2,
+            5.3,
+            6,
+            6.1,
+            6.2,
+            6.3,
+            7,
+            8,
+            10,
+            33,
+            33.1,
+            38.2,
+            38.3,
+            38.4,
+            38.5,
+            41,
+            41.1,
+            42,
+            42.1,
+            43.1,
+            43.2,
+        ),
         *(43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89),
         *(92, 92.1, 92.2, 92.3, 96),
     )

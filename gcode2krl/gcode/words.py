@@ -108,9 +108,57 @@ def _after_value(text, i, end):
 
 
 @njit(cache=True)
+def _is_line_number(text, i, end):
+    """Tell whether N is followed by digits, or digits.digits: what LinuxCNC reads as a line number."""
+    before, behind, point = 0, 0, False
+    for k in range(i, end):
+        c = text[k]
+        if c == 43 or c == 45:
+            return False
+        if c == 46:
+            point = True
+        elif not _blank(c):
+            before += not point
+            behind += point
+    return before > 0 and (behind > 0 or not point)
+
+
+@njit(cache=True)
+def _previous_letter(letters, lines, count, line):
+    """Return the letter of the word before in the line, 0 = none."""
+    if count == 0 or lines[count - 1] != line or letters[count - 1] < 65 or letters[count - 1] > 90:
+        return 0
+    return letters[count - 1]
+
+
+@njit(cache=True)
 def _line_end(text, i):
     while i < len(text) and text[i] != _NEWLINE:
         i += 1
+    return i
+
+
+@njit(cache=True)
+def _without_number(text, i, letter):
+    """Return (finding, letter whose value is lost, place behind) of a letter with no number behind it."""
+    if letter == 79:
+        return f.O_WORD, letter, i
+    if letter == 78:
+        return f.BAD_LINE_NUMBER, 0, i
+    if i < len(text) and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
+        return f.EXPRESSION, letter, _after_value(text, i, _line_end(text, i))
+    return f.NO_NUMBER, letter, i
+
+
+@njit(cache=True)
+def _after_assignment(text, i):
+    """Return the place behind ``#1 = value`` or a lone parameter."""
+    end = _line_end(text, i)
+    i = _after_value(text, i, end)
+    while i < end and _blank(text[i]):
+        i += 1
+    if i < end and text[i] == 61:
+        i = _after_value(text, i + 1, end)
     return i
 
 
@@ -143,8 +191,7 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
     line = first_line
     line_start = 0
     words_in_line = 0
-    marked = False
-    previous = 0  # letter of the word before
+    marked_line = 0
     while i < n:
         c = text[i]
         if c in (_SPACE, _TAB, _RETURN, _END_OF_TAPE):
@@ -161,8 +208,6 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             line += 1
             line_start = i
             words_in_line = 0
-            marked = False
-            previous = 0
             continue
         error = 0
         lost = 0  # letter of the word whose value cannot be read
@@ -188,16 +233,15 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             i += 1
             continue
         elif upper >= 65 and upper <= 90:
+            letter_at = i
             i += 1
             sign = 1.0
             mantissa = 0.0
             digits = 0
             significant = 0
             decimals = 0
-            before_point = 0
             point = False
             started = False
-            signed = False
             while i < n:
                 d = text[i]
                 if d >= 48 and d <= 57:
@@ -214,27 +258,18 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                 elif d == 46 and not point:
                     point = True
                     started = True
-                    before_point = digits
                 elif (d == 45 or d == 43) and not started:
                     started = True
-                    signed = True
                     if d == 45:
                         sign = -1.0
                 elif d != _SPACE and d != _TAB:
                     break
                 i += 1
-            found = float(upper)
             if digits == 0:
-                error = f.NO_NUMBER
-                lost = upper
-                if upper == 79:
-                    error = f.O_WORD
-                elif upper == 78:
-                    error, lost = f.BAD_LINE_NUMBER, 0
-                elif i < n and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
-                    error = f.EXPRESSION
-                    i = _after_value(text, i, _line_end(text, i))
+                found = float(upper)
+                error, lost, i = _without_number(text, i, upper)
             elif error != 0:
+                found = float(upper)
                 lost = upper
             elif upper == 79:
                 while i < n and _blank(text[i]):
@@ -248,7 +283,7 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             elif upper == 78:  # N: line number, no word; digits, or digits.digits, as LinuxCNC reads it
                 if words_in_line > 0:
                     error = f.N_NOT_FIRST
-                elif signed or (point and (before_point == 0 or before_point == digits)):
+                elif not _is_line_number(text, letter_at + 1, i):
                     error = f.BAD_LINE_NUMBER
                 else:
                     words_in_line += 1
@@ -260,38 +295,31 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
                 lines[count] = line
                 count += 1
                 words_in_line += 1
-                previous = upper
                 if upper >= 88 and decimals > most_decimals:
                     most_decimals = decimals
                 continue
         elif c == 35:  # #1 = value: an assignment; what is no assignment is a lone parameter
             error = f.EXPRESSION
-            end = _line_end(text, i)
-            i = _after_value(text, i, end)
-            while i < end and _blank(text[i]):
-                i += 1
-            if i < end and text[i] == 61:
-                i = _after_value(text, i + 1, end)
+            i = _after_assignment(text, i)
         elif c == 91 or c == 93 or c == 61:  # [ ] =
             error = f.EXPRESSION
-            lost = previous
+            lost = _previous_letter(letters, lines, count, line)
             i += 1
         else:
             error = f.BAD_CHARACTER
-            lost = previous
+            lost = _previous_letter(letters, lines, count, line)
             i += 1
         words_in_line += 1
-        if not marked:
+        if marked_line != line:
             letters[count], values[count], lines[count] = 33, error, line
             if marks < len(extras):
                 extras[marks] = found
             marks += 1
             count += 1
-            marked = True
+            marked_line = line
         if lost > 0:
             letters[count], values[count], lines[count] = lost + 32, 0.0, line
             count += 1
         if error == f.O_WORD:
             i = _line_end(text, i)
-        previous = 0
     return count, messages, most_decimals

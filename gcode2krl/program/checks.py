@@ -12,6 +12,10 @@ from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 _SLOWEST_MM_S = 0.001
+_TOUCHED_OFF = (
+    '; if lengths are set by touching off: [program] tool_length = "from_table" in the cell, '
+    "or --allow g43-missing"
+)
 
 
 def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
@@ -45,24 +49,35 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]
     from_known = np.concatenate([[False], known[:-1]])
     for row in _stretches(feed & ~(known & from_known)):
         both = toolpath.known[row - 1] & toolpath.known[row]
+        missing = [axis for axis in range(3) if not both[axis]]
         yield Issue(
-            "error", "undefined-position", int(toolpath.source_line[row]),
-            f"feed move {_while_unknown(toolpath, row, ~both)}",
+            "error",
+            "undefined-position",
+            int(toolpath.source_line[row]),
+            f"feed move from a position whose {_named(missing)} has not been programmed: "
+            + "; ".join(_why_unknown(toolpath, row, axis) for axis in missing),
             "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too)",
-        )  # fmt: skip
+        )
 
 
-def _while_unknown(toolpath: Toolpath, row: int, missing: NDArray[np.bool_]) -> str:
-    """Return which axes are not known at a move: left out in the whole program, or lost in some line."""
-    nowhere = axes_nowhere(toolpath)
-    if nowhere:
-        return f"while {nowhere}"
-    known_before = np.flatnonzero(toolpath.known[:row, missing].all(axis=1))
-    last = ""
-    if len(known_before):
-        line = int(toolpath.source_line[known_before[-1]])
-        last = f", last known in line {line} (lost by G28, G53 or a change of G43)"
-    return f"while {_axes(missing)} not known{last}"
+def _named(axes: list[int]) -> str:
+    return ", ".join("XYZ"[axis] for axis in axes)
+
+
+def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
+    """Return what made an axis unknown, or how long the program has gone without it."""
+    name = "XYZ"[axis]
+    known = np.flatnonzero(toolpath.known[:, axis])
+    before = known[known < row]
+    if not len(known):
+        return f"no {name} in {int(toolpath.source_line[-1]):,} lines"
+    if not len(before):
+        return f"no {name} before line {int(toolpath.source_line[known[0]]):,}"
+    lost = int(before[-1]) + 1
+    line = int(toolpath.source_line[lost])
+    if toolpath.machine[lost]:
+        return f"{name} is unknown since the machine move (G28, G30, G53) in line {line}"
+    return f"{name} is unknown since the tool length changed before line {line}"
 
 
 def axes_nowhere(toolpath: Toolpath) -> str:
@@ -124,14 +139,14 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterato
 
 
 def _why_off(toolpath: Toolpath, row: int) -> str:
-    """Return what left the spindle off before a row, empty where nothing ever switched it on."""
+    """Return what left the spindle off before a row."""
     before = [event for event in toolpath.events if event.kind == "spindle" and event.row < row]
     if not before:
-        return ""
+        return ": no M3 comes before it"
     values = before[-1].values
     if values["m"] != 5:
-        return f": M{values['m']} in line {values['line']} has no S"
-    return f": {'M6' if values.get('implied') else 'M5'} in line {values['line']} stopped it"
+        return f": M{values['m']} without S in line {values['line']}"
+    return f": it was stopped by {'M6' if values.get('implied') else 'M5'} in line {values['line']}"
 
 
 def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
@@ -189,7 +204,7 @@ def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> 
             "g43-missing",
             int(toolpath.source_line[row]),
             f"tool {number} cuts {having}: Z would be that of another tool or of the spindle nose",
-            f"add G43 H{number} after the tool change",
+            f"add G43 H{number} after the tool change" + (_TOUCHED_OFF if offset < 0 else ""),
         )
 
 
