@@ -141,7 +141,8 @@ def forces_and_deflection(
         return forces, None, (replace(missing, severity="note"),)
     with np.errstate(all="ignore"):  # what comes out beyond all sense is a finding
         deflection = compliance.deflect(joints, forces, cell)
-    absurd = result_limits.absurd_deflection(deflection, np.isfinite(joints.q_rad).all(axis=1), line)
+    reached = np.asarray(np.isfinite(joints.q_rad).all(axis=1))
+    absurd = result_limits.absurd_deflection(deflection, reached, line)
     if absurd is not None:
         return forces, None, (absurd,)
     beyond = tuple(result_limits.deflection_findings(deflection, line, cell))

@@ -2,9 +2,9 @@
 
 - Beyond ``[limits]``: a warning with the line where the largest value occurs.
 - Beyond the rated payload: an error. The cutting force and the weight on the flange together must not exceed
-  the weight of the payload that the robot is rated for: by ISO 8373 the rated load is the largest that may act
-  on the mechanical interface in normal use. (Its moment is not judged: the models do not state it. A warning
-  up to twice as much where the stock is only guessed.)
+  the weight of the payload that the robot is rated for: by ISO 8373 the rated load is the largest that may
+  act on the mechanical interface in normal use. (Its moment is not judged: the models do not state it. A
+  warning up to twice as much where the stock is only guessed.)
 - Not finite, or beyond `ABSURD_FORCE_N` or `ABSURD_DEFLECTION_MM`: an error, and the figures are left out.
 """
 
@@ -55,7 +55,7 @@ def motion_findings(motion: Motion, line: Lines, cell: Cell) -> Iterator[Issue]:
     if len(motion) and acceleration.max() > most:
         row = int(acceleration.argmax())
         sentence = (
-            f"the tip is accelerated by {acceleration[row] / MM_PER_M:.1f} m/s2 over one interpolation cycle, "
+            f"the tip is accelerated by {acceleration[row] / MM_PER_M:.1f} m/s2 over one cycle, "
             f"more than {most / MM_PER_M:g}: no robot follows that"
         )
         remedy = "lower F or [controller] rapid_m_s, or raise CDIS there ([limits] acceleration_mm_s2 judges)"
@@ -67,7 +67,9 @@ def force_findings(forces: Forces, line: Lines, cell: Cell) -> Iterator[Issue]:
     size_N, limits = np.linalg.norm(forces.force_base_N, axis=1), cell.limits
     if not len(size_N):
         return
-    remedy = "check S, F and the depth of cut; [limits] {key} judges, [stock] and [material] decide the figure"
+    remedy = (
+        "check S, F and the depth of cut; [limits] {key} judges, [stock] and [material] decide the figure"
+    )
     row = int(size_N.argmax())
     overload = _payload(forces, line, cell)
     if overload is not None:
@@ -95,8 +97,8 @@ def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
         return None
     with_own = f", with the {own_kg:g} kg on the flange {whole_N[row]:.0f} N" if cut_N[row] < rated_N else ""
     sentence = (
-        f"T{forces.tool[row]} is loaded with {cut_N[row]:.0f} N{with_own}; the {cell.robot.model} is rated for "
-        f"{rated_kg:g} kg ({rated_N:.0f} N)"
+        f"T{forces.tool[row]} is loaded with {cut_N[row]:.0f} N{with_own}; the {cell.robot.model} is rated "
+        f"for {rated_kg:g} kg ({rated_N:.0f} N)"
     )
     remedy = "check S, F and the depth of cut, [stock], [material] and [load] mass_kg of the cell"
     guessed = any(issue.code == "stock-guessed" for issue in forces.issues)
@@ -106,7 +108,12 @@ def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
 
 def absurd_forces(forces: Forces, line: Lines) -> Issue | None:
     """Return the finding on forces that mean nothing, None where they do."""
-    columns = (forces.force_base_N, forces.moment_base_Nmm, forces.torque_Nmm[:, None], forces.peak_N[:, None])
+    columns = (
+        forces.force_base_N,
+        forces.moment_base_Nmm,
+        forces.torque_Nmm[:, None],
+        forces.peak_N[:, None],
+    )
     finite = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])
     with np.errstate(over="ignore", invalid="ignore"):
         wrong = ~finite | ~(np.linalg.norm(forces.force_base_N, axis=1) <= ABSURD_FORCE_N)
@@ -143,5 +150,8 @@ def deflection_findings(deflection: Deflection, line: Lines, cell: Cell) -> Iter
     row, most = int(np.argmax(np.nan_to_num(size_mm))) if len(size_mm) else 0, cell.limits.deflection_mm
     if len(size_mm) and size_mm[row] > most:
         sentence = f"the tool bends away by {size_mm[row]:.2f} mm, more than {most:g} mm"
-        remedy = "cut less deep or slower, or state [stock] and a measured [compliance]; [limits] deflection_mm judges"
+        remedy = (
+            "cut less deep or slower, or state [stock] and a measured [compliance]; "
+            "[limits] deflection_mm judges"
+        )
         yield Issue("warning", "deflection-high", int(line[row]), sentence, remedy)

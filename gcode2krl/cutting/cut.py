@@ -85,7 +85,9 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
     overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
     # a rapid through material is a collision, which is found, and no cut
-    force_N, moment_Nmm = (np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm))
+    force_N, moment_Nmm = (
+        np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm)
+    )
     forces = Forces(
         force_base_N=force_N @ to_field,
         moment_base_Nmm=moment_Nmm @ to_field,
@@ -128,7 +130,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:
-    """Return the largest CDIS that tolerances ask for at corners of 90° and less sharp ones, or the cell's."""
+    """Return the largest CDIS that tolerances ask for at corners of 90° and wider, or the cell's."""
     asked = np.append(toolpath.tolerance_mm, cell.controller.tolerance_mm or 0.0)
     return max(cell.controller.cdis_mm, _CDIS_OF_TOLERANCE * float(np.nanmax(asked)))
 

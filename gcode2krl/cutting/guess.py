@@ -4,13 +4,13 @@ In the plane it is the box of the feed moves, widened by the tool's radius; its 
 point. Its top follows from what the feed moves cut and from where they are entered; a rapid at cutting depth
 never lowers it, because that rapid may be the mistake that the stock has to show:
 
-- The *cutting height* is the height below which 95 % of the feed travel across the tool axis lies, without the
+- The *cutting height* is the height that 95 % of the feed travel across the tool axis keeps below, without the
   descents that a feed run begins with, the rises it ends with, and travel at the height of the highest entry.
-- Zero is the top where cuts lie below it, but for skimming at zero itself: posts put Z0 on top of the stock or
-  on its underside. (Not where the cut would be deeper than the edges are long: that zero lies elsewhere.)
-- Otherwise the top is the highest entry, the height at which a feed run begins after a rapid, or the height of
-  most level rapids if that is lower; but the first pass is not taken to be deeper than the step from the
-  highest level of the cuts to the next, or, where all have one level, than the largest tool is wide.
+- Zero is the top where cuts lie below it, skimming at zero itself apart: posts put Z0 on top of the stock or on
+  its underside. (Not where the cut would be deeper than the edges are long: that zero lies elsewhere.)
+- Otherwise the top is the highest entry, where a feed run begins after a rapid, or the height of most level
+  rapids if that is lower; but the first pass is not taken to be deeper than the step from the highest level of
+  the cuts to the next, or, where all have one level, than the largest tool is wide.
 
 All of it is an assumption, so what it finds is a warning.
 """
@@ -54,9 +54,7 @@ class _Feed:
         return np.asarray(self.end_mm[:, 2] - self.start_mm[:, 2])
 
 
-def guessed_box(
-    toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_mm: float = np.inf
-) -> Floats:
+def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_mm: float = np.inf) -> Floats:
     """Return the low and the high corner (2, 3) in mm of the stock that the program seems to expect.
 
     Parameters
@@ -74,7 +72,9 @@ def guessed_box(
     points = np.concatenate([feed.start_mm, feed.end_mm])
     low, high = points[:, :2].min(axis=0) - radius_mm, points[:, :2].max(axis=0) + radius_mm
     bottom = float(feed.end_mm[:, 2].min())
-    deepest_mm = deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf  # zero means nothing along a tilt
+    deepest_mm = (
+        deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf
+    )  # zero means nothing along a tilt
     top = max(_top(feed, _level_rapids(toolpath, position), radius_mm, deepest_mm), bottom)
     return np.array([[*low, bottom], [*high, top]])
 
@@ -158,9 +158,10 @@ class _Cuts:
 
 def _entries_and_exits(feed: _Feed) -> Bools:
     """Return (f,) True for the descents that a feed run begins with and the rises it ends with."""
-    return _leading(feed.rise_mm < -FLAT_MM, feed.entry) | _leading(
-        feed.rise_mm[::-1] > FLAT_MM, feed.exit[::-1]
-    )[::-1]
+    return (
+        _leading(feed.rise_mm < -FLAT_MM, feed.entry)
+        | _leading(feed.rise_mm[::-1] > FLAT_MM, feed.exit[::-1])[::-1]
+    )
 
 
 def _leading(wanted: Bools, first: Bools) -> Bools:

@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 _CONTACT_MM = 0.01
 """Less is rounding of path and cells."""
 _CHORDS_RAD = np.array([0.17, 0.48, 0.79, 1.09, 1.40])
-"""Corners, in the first quadrant, of the rectangles that stand for a circle: 94 % of its area, none beyond."""
+"""Corners, in the first quadrant, of the rectangles that stand for a circle: none of them reaches beyond it."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _underside(work: Work, stock: Stock, before: HeightField) -> Iterator[Issue]
                 "error",
                 "stock-underside",
                 int(work.source_line[low[0]]),
-                f"T{work.numbers[row]} cuts up to {depth_mm:.2f} mm below the underside of the stock{through}",
+                f"T{work.numbers[row]} cuts up to {depth_mm:.2f} mm below the stock's underside{through}",
                 f"check Z; [stock] through_mm = {np.ceil(depth_mm * 10.0) / 10.0:g} allows it above a "
                 "sacrificial board",
             )
@@ -154,7 +154,9 @@ class Footprint:
             found |= s[i1, j1] - s[i0, j1] - s[i1, j0] + s[i0, j0] > 0
         return found
 
-    def _cells(self, middle_mm: Floats, half_mm: float, axis: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _cells(
+        self, middle_mm: Floats, half_mm: float, axis: int
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return the first cell whose middle is within ``half_mm`` and the one behind the last, (n,) each."""
         origin, size = self.field.origin_mm[axis], self.field.cell_mm[axis]
         count = self.sums.shape[1 - axis] - 1

@@ -8,14 +8,16 @@ them costs next to nothing.
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_INCH
+
+if TYPE_CHECKING:  # a cell file costs its library a noticeable start
+    from gcode2krl.cell import Cell
 
 _WORDS = (b"D=", b"DIA", b"MILL")
 _NUMBER = r"(\d+(?:\.\d*)?|\.\d+|\d+/\d+)"
@@ -82,7 +84,7 @@ def _value(text: str) -> float:
     return float(above) / float(below) if below and float(below) else float(above)
 
 
-def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
     """Yield a warning for each tool whose diameter in a comment is not that of the cell.
 
     A comment without a tool number counts where the program has one tool.

@@ -47,7 +47,7 @@ def lowest_points(targets: Targets, cell: Cell) -> Floats:
 
     Of an upright cutter that is its tip; of one that leans, its corner or its rim.
     """
-    x, y, z, w = targets.rotation.T
+    x, y, *_ = targets.rotation.T
     upright = 1.0 - 2.0 * (x * x + y * y)  # z component of the tool axis
     leaning = np.sqrt(np.maximum(0.0, 1.0 - upright**2))
     lowest = np.array(targets.position_mm[:, 2])

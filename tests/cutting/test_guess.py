@@ -55,7 +55,10 @@ POCKET = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\nG0 X0 Y40\nG0 Z2\nG1 Z-5
     [
         (POCKET, 0.0),
         # several depths, and feed heights over the last floor
-        ("G0 X0 Y0\nG0 Z5\nG1 Z-2 F600\nX60\nG0 Z-1\nX0\nG1 Z-4\nX60\nG0 Z-3\nX0\nG1 Z-6\nX60\nG0 Z30\n", 0.0),
+        (
+            "G0 X0 Y0\nG0 Z5\nG1 Z-2 F600\nX60\nG0 Z-1\nX0\nG1 Z-4\nX60\nG0 Z-3\nX0\nG1 Z-6\nX60\nG0 Z30\n",
+            0.0,
+        ),
         # a ramp from above, and a helix of chords
         ("G0 X0 Y0\nG0 Z2\nG1 X20 Z-3 F600\nX0\nX60\nG0 Z30\n", 0.0),
         # zero on the underside: the first pass is as deep as the next
@@ -100,7 +103,9 @@ def test_a_level_rapid_at_cutting_depth_is_seen_and_takes_no_force_away():
 
 
 def test_a_first_entry_below_the_material_is_seen():
-    body = POCKET.replace("G0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\nG0 X0 Y40", "G0 Z-5\nG1 X60 F600\nG0 Z30\nG0 X0 Y40")
+    body = POCKET.replace(
+        "G0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\nG0 X0 Y40", "G0 Z-5\nG1 X60 F600\nG0 Z30\nG0 X0 Y40"
+    )
     forces = run(body)
     assert findings(forces, "rapid-in-stock") == [("warning", line_of(body, "G0 Z-5"))]
     assert largest_N(forces) >= 0.99 * largest_N(run(POCKET)) > 100.0  # samples lie elsewhere
@@ -112,7 +117,10 @@ def test_the_approach_to_a_first_position_in_the_material_is_seen():
     forces = cut(toolpath, plan_motion(toolpath, CELL), CELL)
     assert ("warning", 5) in findings(forces, "rapid-in-stock")
     stated = resolve_cell(
-        {"based_on": "demonstration", "stock": {"box_mm": [[-10, -10, -9], [70, 10, 0]], "resolution_mm": 0.5}}
+        {
+            "based_on": "demonstration",
+            "stock": {"box_mm": [[-10, -10, -9], [70, 10, 0]], "resolution_mm": 0.5},
+        }
     )
     assert ("error", 5) in findings(cut(toolpath, plan_motion(toolpath, stated), stated), "rapid-in-stock")
     beside = text.replace("X0 Y0 Z-5", "X-30 Y0 Z-5")
@@ -146,7 +154,7 @@ def slots(depths, retract, plunge):
 def test_a_forgotten_retract_changes_neither_the_top_nor_the_largest_force(step, passes, zero, slip, deeper):
     depths = [zero - step * (k + 1) for k in range(passes)]
     sound = slots(depths, zero + 15, zero + 2)
-    row = [k for k, line in enumerate(sound) if line.endswith(f"Y{20 * slip}")][0]
+    row = next(k for k, line in enumerate(sound) if line.endswith(f"Y{20 * slip}"))
     low = depths[-1] + deeper * step
     # the retract before the slot is left out, or ends far too low
     wrong = [*sound[: row - 1], *([f"G0 Z{low:.3f}"] if deeper else []), *sound[row:]]
