@@ -4,13 +4,13 @@ In the plane it is the box of the feed moves, widened by the tool's radius; its 
 point. Its top follows from what the feed moves cut and from where they are entered; a rapid at cutting depth
 never lowers it, because that rapid may be the mistake that the stock has to show:
 
-- The *cutting height* is the height that 95 % of the feed travel across the tool axis keeps below, without the
-  descents that a feed run begins with, the rises it ends with, and travel at the height of the highest entry.
-- Zero is the top where cuts lie below it, skimming at zero itself apart: posts put Z0 on top of the stock or on
-  its underside. (Not where the cut would be deeper than the edges are long: that zero lies elsewhere.)
+- The *cutting height* is the height that 95 % of the feed travel across the tool axis keeps below, without
+  the descents that a feed run begins with, the rises it ends with, and travel at the highest entry's height.
+- Zero is the top where cuts lie below it, skimming at zero itself apart: posts put Z0 on top of the stock or
+  on its underside. (Not where the cut would be deeper than the edges are long: that zero lies elsewhere.)
 - Otherwise the top is the highest entry, where a feed run begins after a rapid, or the height of most level
-  rapids if that is lower; but the first pass is not taken to be deeper than the step from the highest level of
-  the cuts to the next, or, where all have one level, than the largest tool is wide.
+  rapids if that is lower; but the first pass is not taken to be deeper than the step from the highest level
+  of the cuts to the next, or, where all have one level, than the largest tool is wide.
 
 All of it is an assumption, so what it finds is a warning.
 """

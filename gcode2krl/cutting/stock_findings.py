@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 _CONTACT_MM = 0.01
 """Less is rounding of path and cells."""
 _CHORDS_RAD = np.array([0.17, 0.48, 0.79, 1.09, 1.40])
-"""Corners, in the first quadrant, of the rectangles that stand for a circle: none of them reaches beyond it."""
+"""Corners, in the first quadrant, of the rectangles that stand for a circle; none reaches beyond it."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 LONG_DWELL_S = 30.0
 """Assumed: a spindle needs some seconds to start, a chip some turns to break; 30 s are a slip of the unit."""
-WIDE_CORNER_MM = 1.0
-"""Assumed: a corner that is rounded by more is not what a milled part asks for."""
+WIDE_CORNER_MM = 3.0
+"""Assumed: a corner that is rounded by more is not what a milled part asks for (the test program of
+`identify controller` rounds by 2.4 mm on purpose)."""
 RUBBING_MM = 0.001
 """Feed per tooth below which nothing comes off: a fifth of the edge radius of the sharpest carbide, 5 µm."""
 THICK_MM, THICK_OF_DIAMETER = 0.2, 0.1

@@ -53,7 +53,7 @@ def test_a_wide_blend_of_cell_and_option(tmp_path):
     assert [line for line, _ in found] == [8]
     assert "10.607 mm" in found[0][1]  # d = half of 60 mm, sqrt(1/2)/2 of it
     assert warnings(tmp_path, body, "blend-wide", tolerance_mm=5.0)
-    assert warnings(tmp_path, body, "blend-wide", {"controller": {"model": "KRC4", "tolerance_mm": 3.0}})
+    assert warnings(tmp_path, body, "blend-wide", {"controller": {"model": "KRC4", "tolerance_mm": 4.0}})
     assert not warnings(tmp_path, body, "blend-wide", tolerance_mm=0.5)
     assert not warnings(tmp_path, body, "blend-wide", {"controller": {"model": "KRC4", "cdis_mm": 2.0}})
 
