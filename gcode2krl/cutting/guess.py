@@ -12,6 +12,7 @@ never lowers it, because that rapid may be the mistake that the stock has to sho
   rapids if that is lower; but the first pass is not taken to be deeper than the step from the highest level
   of the cuts to the next, or, where all have one level, than the largest tool is wide.
 
+A program at zero or above that never rises above its cutting height moves in the air: no stock is left then.
 All of it is an assumption, so what it finds is a warning.
 """
 
@@ -75,7 +76,9 @@ def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_
     deepest_mm = (
         deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf
     )  # zero means nothing along a tilt
-    top = max(_top(feed, _level_rapids(toolpath, position), radius_mm, deepest_mm), bottom)
+    rapids = _level_rapids(toolpath, position)
+    highest = float(position[known & ~toolpath.machine, 2].max())
+    top = max(_top(feed, rapids, highest, radius_mm, deepest_mm), bottom)
     return np.array([[*low, bottom], [*high, top]])
 
 
@@ -99,12 +102,14 @@ def _level_rapids(toolpath: Toolpath, position: Floats) -> Floats:
     return np.asarray(position[level, 2])
 
 
-def _top(feed: _Feed, rapids: Floats, radius_mm: float, deepest_mm: float) -> float:
+def _top(feed: _Feed, rapids: Floats, highest_mm: float, radius_mm: float, deepest_mm: float) -> float:
     highest_entry = float(feed.start_mm[feed.entry, 2].max())
     cuts = _Cuts.of(feed, highest_entry)
     skims = abs(cuts.height_mm) <= FLAT_MM and cuts.middle_mm < 0.0
     if (cuts.height_mm < 0.0 or skims) and -cuts.height_mm <= deepest_mm:
         return 0.0
+    if highest_mm <= cuts.height_mm + FLAT_MM:
+        return cuts.height_mm
     tops = [cuts.height_mm + cuts.first_pass_mm(radius_mm)]
     if highest_entry > cuts.height_mm + FLAT_MM:
         tops.append(highest_entry)

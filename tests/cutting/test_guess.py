@@ -79,6 +79,14 @@ def test_the_top_of_sound_programs(body, wanted):
     assert not findings(run(body), "rapid-in-stock")
 
 
+def test_a_program_that_stays_at_one_height_above_zero_moves_in_the_air():
+    text = "G21 G90\nT1 M6\nS9000 M3\nG43 H1\nG0 X0 Y0 Z60\nG1 X60 F600\nY20\nM5\nM30\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", CELL)
+    forces = cut(toolpath, plan_motion(toolpath, CELL), CELL)
+    assert largest_N(forces) == 0.0
+    assert not findings(forces, "rapid-in-stock")
+
+
 def test_a_rapid_in_a_pocket_that_is_cut_already_is_sound():
     body = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nX60\nG0 X0\nG1 Z-8\nX60\nG0 X10\nG0 Z30\n"
     assert not findings(run(body), "rapid-in-stock")
