@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import compliance, cutting, gcode, krc4, program, robot
+from gcode2krl import compliance, cutting, gcode, krc4, program, result_limits, robot
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 from gcode2krl.krc4 import trial_program
@@ -127,14 +127,26 @@ def forces_and_deflection(
     if cell.material is None:
         remedy = "give [material] in the cell"
         return None, None, (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
+    line = toolpath.source_line[np.clip(motion.move, 0, len(toolpath) - 1)]
     try:
         forces = cutting.cut(toolpath, motion, cell)
     except RefusedError as error:
         return None, None, tuple(replace(issue, severity="warning") for issue in error.issues)
+    absurd = result_limits.absurd_forces(forces, line)
+    if absurd is not None:
+        return None, None, (*forces.issues, absurd)
+    forces = replace(forces, issues=(*forces.issues, *result_limits.force_findings(forces, line, cell)))
     missing = compliance.missing_stiffness(cell)
     if missing is not None:
         return forces, None, (replace(missing, severity="note"),)
-    return forces, compliance.deflect(joints, forces, cell), ()
+    with np.errstate(all="ignore"):  # what comes out beyond all sense is a finding
+        deflection = compliance.deflect(joints, forces, cell)
+    reached = np.asarray(np.isfinite(joints.q_rad).all(axis=1))
+    absurd = result_limits.absurd_deflection(deflection, reached, line)
+    if absurd is not None:
+        return forces, None, (absurd,)
+    beyond = tuple(result_limits.deflection_findings(deflection, line, cell))
+    return forces, replace(deflection, issues=(*deflection.issues, *beyond)), ()
 
 
 def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:
@@ -161,13 +173,15 @@ def targets_and_joints(
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     program.require_geometry(toolpath, cell)
-    return checked(program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm), cell)
+    planned = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
+    warnings = program.doubtful(toolpath, cell, tolerance_mm)
+    return checked(replace(planned, issues=(*planned.issues, *warnings)), cell)
 
 
 def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
-    """Return the targets with what the robot finds in them (reach, limits, singularities), and its joints."""
+    """Return the targets with what robot (reach, limits, singularities) and table find, and the joints."""
     joints, findings = robot.follow(targets, cell, conditioning=False)
-    found = replace(targets, issues=(*targets.issues, *findings))
+    found = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
     rows = np.flatnonzero(targets.ptp)
     _PTP_KNOWN[found] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
     return found, replace(joints, issues=findings)
@@ -218,10 +232,19 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
         sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
+    issues += result_limits.motion_findings(motion, _lines(targets, motion), cell)
     planned = replace(motion, issues=tuple(issues))
     if motion in _ANGLES_KNOWN:
         _ANGLES_KNOWN[planned] = _ANGLES_KNOWN.pop(motion)
     return planned
+
+
+def _lines(targets: Targets, motion: Motion) -> NDArray[np.int32]:
+    """Return the G-code line of each sample (m,)."""
+    own = targets.move >= 0
+    line = np.zeros(int(max(targets.move.max(), motion.move.max(initial=0))) + 1, dtype=np.int32)
+    line[targets.move[own]] = targets.source_line[own]
+    return line[motion.move]
 
 
 def corner_errors(

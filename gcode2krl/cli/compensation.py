@@ -27,8 +27,8 @@ def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str |
     """
     from gcode2krl.compensate import compensate, keeping_forces
 
-    motion, forces = prediction.motion, prediction.forces
-    if motion is None or forces is None or prediction.deflection is None:
+    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
+    if motion is None or forces is None or deflection is None:
         raise RefusedError(
             Issue("error", "no-deflection", 0, "--compensate offline: there is no predicted deflection",
                   "state material, stock and stiffness in the cell; leave out --no-forces")
@@ -37,7 +37,12 @@ def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str |
     done = compensate(
         toolpath, prediction.targets, cell, keeping_forces(toolpath, prediction.targets, motion, forces, cell)
     )
-    motion, joints, forces, deflection = done.evaluated
+    motion, joints, kept, bent = done.evaluated
+    # both are those of the intended path, place by place, and so are the findings on them
+    forces, deflection = (
+        replace(kept, issues=forces.issues),
+        replace(bent, issues=deflection.issues),
+    )
     if plot is not None:
         _draw(done, motion, Path(plot), inputs)
     return replace(

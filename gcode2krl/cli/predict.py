@@ -24,6 +24,7 @@ from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.prediction import RECORD, Prediction, refuse_foreign
+from gcode2krl.result_limits import cycle_acceleration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,7 +125,8 @@ def command(
     console.findings(prediction.issues, part)
     console.say(f"{part} -> {folder}: {', '.join(file.name for file in files)}")
     console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")
-    top, steepest = motion.speed_mm_s.max(), motion.acceleration_mm_s2.max()
+    cycle_s = prediction.cell.controller.cycle_s
+    top, steepest = motion.speed_mm_s.max(), cycle_acceleration(motion, cycle_s).max()
     console.say(f"  speed up to {top:.1f} mm/s, acceleration up to {steepest:.0f} mm/s2")
     console.say(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"

@@ -13,6 +13,7 @@ from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
 from gcode2krl.cutting.raw_part import height_field_of
+from gcode2krl.cutting.stock_findings import Work, stock_findings
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.sections import Tool
 from gcode2krl.tables import Forces, Motion, Toolpath
@@ -21,6 +22,8 @@ Floats = NDArray[np.float64]
 _SAME_AXIS = 1e-9
 _ARC_COLUMNS = 6
 _SHANK_MM = 1.0
+_CDIS_OF_TOLERANCE = 2.0 * 2.0**0.5
+"""CDIS of a corner of 90° for a tolerance, d = 2·tolerance/cos(alpha/2)."""
 
 
 @dataclass(frozen=True)
@@ -74,18 +77,23 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     f_z_mm = feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth
     position = np.ascontiguousarray(motion.position_mm @ to_field.T)
     field = height_field_of(toolpath, cell, to_field, tools, len(motion))
+    before = _as_it_is(field)
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
     engaged = engage(field, position, tool, wholly_rapid, f_z_mm, [_with_shank(one) for one in tools], law)
     overlap_mm = np.array(engaged.overlap_mm, dtype=np.float64)
     flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
     overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
+    # a rapid through material is a collision, which is found, and no cut
+    force_N, moment_Nmm = (
+        np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm)
+    )
     forces = Forces(
-        force_base_N=engaged.force_N @ to_field,
-        moment_base_Nmm=engaged.moment_Nmm @ to_field,
+        force_base_N=force_N @ to_field,
+        moment_base_Nmm=moment_Nmm @ to_field,
         peak_N=_peaks(engaged.phi_rad, engaged.a_p_mm, f_z_mm, engaged.ramp_rad, tool, tools, law,
-                      np.linalg.norm(engaged.force_N, axis=1)),
-        torque_Nmm=engaged.torque_Nmm,
+                      np.linalg.norm(force_N, axis=1)),
+        torque_Nmm=np.where(rapid, 0.0, engaged.torque_Nmm),
         a_p_mm=engaged.a_p_mm,
         a_e_mm=engaged.a_e_mm,
         phi_rad=engaged.phi_rad,
@@ -101,8 +109,39 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
         cycle_s=float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0,
         centre_mm=engaged.centre_mm,
         overlap_mm=overlap_mm,
+        step_mm=np.linalg.norm(np.diff(position, axis=0, prepend=position[:1]), axis=1),
+        blend_mm=_largest_cdis(toolpath, cell),
     )
-    return Removal(replace(forces, issues=findings_of(seen, forces, cell, field.guessed)), field)
+    work = Work(
+        position_mm=position,
+        tool=tool,
+        tools=tuple(tools),
+        numbers=tuple(int(number) for number in numbers),
+        source_line=seen.source_line,
+        feed=~rapid & ~toolpath.machine[row] & (motion.move > 0),
+    )
+    met = np.isfinite(forces.phi_rad[:, 0])
+    issues = (
+        *findings_of(seen, forces, cell, field.guessed),
+        *stock_findings(work, cell.stock, before, met & work.feed),
+    )
+    ordered = tuple(sorted(issues, key=lambda issue: issue.line))
+    return Removal(replace(forces, issues=ordered), field)
+
+
+def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:
+    """Return the largest CDIS that tolerances ask for at corners of 90° and wider, or the cell's."""
+    asked = np.append(toolpath.tolerance_mm, cell.controller.tolerance_mm or 0.0)
+    return max(cell.controller.cdis_mm, _CDIS_OF_TOLERANCE * float(np.nanmax(asked)))
+
+
+def _as_it_is(field: HeightField) -> HeightField:
+    """Return the field before it is cut; a block is one number."""
+    low, high = field.height_mm.min(), field.height_mm.max()
+    if low != high:
+        return field.copy()
+    height = np.broadcast_to(low, field.height_mm.shape)
+    return HeightField(height, field.origin_mm, field.cell_mm, field.bottom_mm, field.guessed)
 
 
 def no_forces(motion: Motion) -> Forces:

@@ -18,8 +18,15 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 _CONTACT_MM = 0.01
 """Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
+_GRAZE_MM = 3.0
+"""Way, a little more than a sample takes at 0.2 m/s, within which a rapid may meet what a corner has left."""
+_THIN_MM = 0.3
+"""What is thicker is never passed over as the rest of a rounded corner."""
 _PLUNGE_RAD = 20.0 * RAD_PER_DEG
 """Descent above which a mill that does not cut at its centre cannot follow: assumed, ramps are flatter."""
+_WIDE_PLUNGE_MM = 32.0
+"""Diameter above which a mill whose cell entry does not say so is not taken to cut at its centre: assumed;
+solid end mills end there, face mills begin at 40 to 50 mm (ISO 6462) and leave a core."""
 _NEAR_MODE = 0.15
 """Share of a mode's frequency within which a spindle or tooth harmonic is noted."""
 _HARMONICS = 3
@@ -41,6 +48,10 @@ class Cut:
     """Material below the middle of a descending tool."""
     overlap_mm: Floats
     """(m, 3) how far rapid, shank and holder are in the material."""
+    step_mm: Floats
+    """Way from the sample before."""
+    blend_mm: float
+    """Largest CDIS: a rounded corner leaves material as thick as that on the rim, where the tool went in."""
 
 
 def findings_of(cut: Cut, forces: Forces, cell: Cell, guessed: bool) -> tuple[Issue, ...]:
@@ -79,10 +90,24 @@ def _collisions(
     )
     for column, (code, sentence, remedy) in enumerate(kinds):
         depth = cut.overlap_mm[:, column]
+        if column == 0:
+            depth = np.where(_grazes(cut, depth), 0.0, depth)
         for row in _starts(depth > _CONTACT_MM):
             worst = row + int(np.argmax(depth[row : _end(depth > _CONTACT_MM, row)]))
             words = sentence.format(depth=float(depth[worst]), tool=int(forces.tool[row]))
             yield Issue(severity, code, int(cut.source_line[row]), words, remedy)
+
+
+def _grazes(cut: Cut, depth: Floats) -> Bools:
+    """Return where a rapid only meets what a rounded corner left: thin, and soon over."""
+    met = depth > _CONTACT_MM
+    stretch = np.cumsum(met & ~np.concatenate([[False], met[:-1]])) * met
+    way_mm = np.bincount(stretch, cut.step_mm)
+    deepest_mm = np.zeros(len(way_mm))
+    np.maximum.at(deepest_mm, stretch, depth)
+    grazing = (way_mm <= _GRAZE_MM) & (deepest_mm <= min(cut.blend_mm, _THIN_MM) + _CONTACT_MM)
+    result: Bools = met & grazing[stretch]
+    return result
 
 
 def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) -> Iterator[Issue]:
@@ -96,13 +121,35 @@ def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) ->
 
 
 def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]) -> Iterator[Issue]:
-    unable = np.array([not cell.tool[int(number)].centre_cutting for number in _tools(forces)])
-    number = np.searchsorted(_tools(forces), forces.tool)
-    into = (cut.centre_mm > _CONTACT_MM) & unable[number] & (cut.ramp_rad > _PLUNGE_RAD)
-    for row in _starts(into):
-        sentence = f"T{forces.tool[row]} plunges into material and does not cut at its centre"
-        remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"
-        yield Issue(severity, "plunge", int(cut.source_line[row]), sentence, remedy)
+    remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"
+    for number in _tools(forces).tolist():
+        tool: Tool = cell.tool[number]
+        doubtful = _wide_and_silent(tool)
+        if tool.centre_cutting and not doubtful:
+            continue
+        own = forces.tool == number
+        into = own & (cut.centre_mm > _CONTACT_MM) & (cut.ramp_rad > _PLUNGE_RAD)
+        for row in _starts(into)[: 1 if doubtful else None]:
+            line = int(cut.source_line[row])
+            if doubtful:
+                sentence = (
+                    f"T{number}, {tool.diameter_mm:g} mm wide, plunges into material: mills that wide hardly "
+                    "ever cut at their centre"
+                )
+                yield Issue("warning", "plunge-wide", line, sentence, f"{remedy}; or state "
+                            f"tool.{number}.centre_cutting = true")  # fmt: skip
+            else:
+                sentence = f"T{number} plunges into material and does not cut at its centre"
+                yield Issue(severity, "plunge", line, sentence, remedy)
+
+
+def _wide_and_silent(tool: Tool) -> bool:
+    """Tell whether a tool is too wide to be taken as centre-cutting, and does not say that it is."""
+    return (
+        tool.kind != "drill"
+        and tool.diameter_mm > _WIDE_PLUNGE_MM
+        and "centre_cutting" not in tool.model_fields_set
+    )
 
 
 def _limits(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:

@@ -1,9 +1,4 @@
-"""The raw part as a height field: a block by numbers, a mesh, or a guess from the program.
-
-A guess is the box of the feed moves in the plane, widened by the tool's radius; its bottom is the lowest feed
-point, its top the lower of the lowest rapid that stays at its height and the highest end of a feed move; a
-program of one depth, which would have no thickness, begins where its first feed move does.
-"""
+"""The raw part as a height field: a block by numbers, a mesh, or a guess from the program (see `guess`)."""
 
 import io
 import logging
@@ -17,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
+from gcode2krl.cutting.cutter import shape_of
+from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
 from gcode2krl.errors import input_error
@@ -29,7 +26,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 MANY_SAMPLES = 200_000
 _FEW_CELLS_PER_DIAMETER = 40.0
-_FLAT_MM = 1e-9
 _METRES_MM = 1.0
 """A mesh smaller than this in every direction is taken to be in metres."""
 _LARGEST_MM = 20_000.0
@@ -68,33 +64,14 @@ def height_field_of(
         corners = np.array(np.meshgrid(*box.T)).reshape(3, -1).T @ to_field.T
         bounds = np.array([corners.min(axis=0), corners.max(axis=0)])
         return _from_mesh(_turned_box(box, to_field), _resolution(bounds, tools, own_mm, per_diameter))
-    box = guessed_box(toolpath, to_field, max(tool.diameter_mm for tool in tools) / 2.0)
+    radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
+    box = guessed_box(toolpath, to_field, radius_mm, edges_mm)
     return block(box, _resolution(box, tools, own_mm, per_diameter), guessed=True)
 
 
-def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float) -> Floats:
-    """Return the low and the high corner (2, 3) of the stock that the program seems to expect."""
-    known = toolpath.is_position()
-    position = toolpath.position_mm @ to_field.T
-    feed = known & ~toolpath.rapid & np.isfinite(toolpath.feed_mm_s) & ~toolpath.machine
-    feed[0] = False
-    ends = position[feed]
-    if not len(ends):
-        here = position[known][:1] if known.any() else np.zeros((1, 3))
-        return np.array([here[0] - radius_mm, here[0] + [radius_mm, radius_mm, 0.0]])
-    starts = position[np.flatnonzero(feed) - 1]
-    starts = starts[known[np.flatnonzero(feed) - 1]]
-    low, high = (op(np.concatenate([starts, ends])[:, :2], axis=0) for op in (np.min, np.max))
-    rise = np.diff(position[:, 2], prepend=position[:1, 2])
-    level = known & toolpath.rapid & ~toolpath.machine & (np.abs(rise) <= _FLAT_MM)
-    level[0] = False
-    moved = np.linalg.norm(np.diff(position[:, :2], axis=0, prepend=position[:1, :2]), axis=1) > _FLAT_MM
-    lowest_rapid = position[level & moved, 2].min(initial=np.inf)
-    bottom = float(ends[:, 2].min())
-    top = max(min(float(lowest_rapid), float(ends[:, 2].max())), bottom)
-    if top - bottom < _FLAT_MM and len(starts):  # one depth: from where the first feed move came
-        top = max(min(float(lowest_rapid), float(starts[:, 2].max())), bottom)
-    return np.array([[*(low - radius_mm), bottom], [*(high + radius_mm), top]])
+def _edges_mm(tool: Tool) -> float:
+    """Return how far up a tool's edges reach."""
+    return shape_of(tool).flute_mm
 
 
 def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.report import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
@@ -24,6 +26,7 @@ from gcode2krl.gcode.state import (
     WORK_OFFSETS,
     initial_state,
 )
+from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
 from gcode2krl.gcode.words import LINE_LIMIT, Words, scan
 from gcode2krl.tables import Event, Toolpath
 
@@ -114,20 +117,26 @@ def read_stream(
     offsets, offset_known = _work_offsets(cell)
     from_table = cell is not None and cell.program.tool_length == "from_table"
     options = np.array([chord_tolerance_mm, float(block_delete), float(from_table)])
+    doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
     interpreter = _Interpreter(name, options, offsets, offset_known, lengths)
     size = _size_of(stream)
     head, rest_bytes = b"", 0
+    diameters: list[NamedDiameter] = []
     for first_line, text, words in _scanned(_pieces(stream, name)):
         if not interpreter.ended:
             head = head or text[:4000].tobytes()
             interpreter.feed(words, text, first_line, size)
+            diameters += named_diameters(text.tobytes(), first_line)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    return interpreter.finish(head)
+    toolpath = interpreter.finish(head)
+    if cell is not None:
+        doubts += other_tools(diameters, toolpath, cell)
+    return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
 
 def _scanned(

@@ -180,11 +180,15 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
 
 
 def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
-    """Return what costs time: look-ahead on short moves, and how much the two laws differ."""
-    issues = []
+    """Return what costs time: look-ahead on short moves, stops, and how much the two laws differ.
+
+    Notes; together above ``[limits] lost_time_share`` warnings.
+    """
+    issues: list[Issue] = []
+    lost_whole_s = 0.0
     if cell.controller.advance != "unlimited" and len(chain.length_mm):
         free = plan(chain, cell, look_ahead=False)
-        lost_s = profile.total_s - free.total_s
+        lost_s = lost_whole_s = profile.total_s - free.total_s
         if lost_s > _WORTH_SAYING * profile.total_s:
             own, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))
             worst = int(np.argmax(own - ideal))
@@ -194,7 +198,11 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
             )
             remedy = "merge collinear moves, raise the chord tolerance, or let the CAM write longer moves"
             issues.append(Issue("note", "short-moves", int(chain.source_line[worst]), sentence, remedy))
-    issues += _stop_issues(chain, profile, cell)
+    stops_s = _lost_by_stops(chain, cell)
+    lost_whole_s += float(stops_s.sum())
+    issues += _stop_issues(chain, stops_s, profile)
+    if lost_whole_s > cell.limits.lost_time_share * profile.total_s:
+        issues = [replace(issue, severity="warning") for issue in issues]
     law = cell.controller.law
     other_law = "trapezoid" if law == "averages" else "averages"
     other_controller = cell.controller.model_copy(update={"law": other_law})
@@ -206,14 +214,19 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
     return tuple(issues)
 
 
-def _stop_issues(chain: Chain, profile: Profile, cell: Cell) -> list[Issue]:
-    """What exact stops between moves cost against passing them: k + (v1 + v2)/(2·a) and the dwell, each."""
+def _lost_by_stops(chain: Chain, cell: Cell) -> Floats:
+    """Return what exact stops between moves cost against passing them, k + (v1 + v2)/(2·a), in s each."""
     stops = np.flatnonzero(chain.stop[:-1])
     speed_mm_s = chain.speed_mm_s * chain.scale
     ramps = (speed_mm_s[stops] + speed_mm_s[stops + 1]) / (2.0 * cell.controller.acc_cp_m_s2 * MM_PER_M)
-    lost = cell.controller.k_s + ramps + chain.wait_s[stops]
+    return np.asarray(cell.controller.k_s + ramps + chain.wait_s[stops])
+
+
+def _stop_issues(chain: Chain, lost: Floats, profile: Profile) -> list[Issue]:
+    """Say what exact stops cost, dwells included."""
     if lost.sum() <= _WORTH_SAYING * profile.total_s:
         return []
+    stops = np.flatnonzero(chain.stop[:-1])
     worst = int(stops[np.argmax(lost)])
     sentence = (
         f"{len(stops)} exact stops (rapid to feed, G61, dwells, M-codes) cost about {lost.sum():.1f} s of "

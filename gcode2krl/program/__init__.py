@@ -1,12 +1,16 @@
 """Toolpath to Targets: what the KRL program will say."""
 
 from gcode2krl.program.checks import check_toolpath, require_geometry
+from gcode2krl.program.doubtful import doubtful
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
+from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
 
 __all__ = [
+    "below_table",
     "check_toolpath",
+    "doubtful",
     "plan_targets",
     "require_geometry",
     "smooth_spin",

@@ -80,9 +80,7 @@ def test_an_axis_without_a_position_is_named_with_what_lost_it(
     assert "no Z in 6 lines" in capsys.readouterr().err
     part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"])
     assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
-    assert (
-        "Z is unknown since the" in capsys.readouterr().err
-    )
+    assert "Z is unknown since the" in capsys.readouterr().err
 
 
 def test_a_terminal_is_told_how_to_learn_more(

@@ -1,0 +1,113 @@
+"""Diameters that a CAM system names in comments, against those of the cell's tools.
+
+The tool in the comment is the one that the path was made for; another in the cell gives another part, and
+forces that mean nothing. Read are the forms that posts write (`_DIAMETER`), and only where it is plain which
+tool is meant; what is not plain is passed over. A scan for a few words comes first, so that a file without
+them costs next to nothing.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gcode2krl.errors import Issue
+from gcode2krl.tables import Toolpath
+from gcode2krl.units import MM_PER_INCH
+
+if TYPE_CHECKING:  # a cell file costs its library a noticeable start
+    from gcode2krl.cell import Cell
+
+_WORDS = (b"D=", b"DIA", b"MILL")
+_NUMBER = r"(\d+(?:\.\d*)?|\.\d+|\d+/\d+)"
+_UNIT = r"""(MM|INCH(?:ES)?|IN\b|")?"""
+_MILL = r"(?:(?:FLAT|BALL|BULL|SQUARE|CARBIDE|HSS|SPIRAL|UPCUT|DOWNCUT|\dF|\d-FLUTE)[- ]*){0,3}"
+_DIAMETER = tuple(
+    re.compile(pattern)
+    for pattern in (
+        rf"\bT\s*\d+\b.*?\bD\s*=\s*{_NUMBER}\s*{_UNIT}",  # Fusion, HSM: T1 D=10. CR=0. - flat end mill
+        rf"\b(?:TOOL|CUTTER|MILL|BIT)[ _]*DIA(?:METER|M)?\b\.?\s*[-:=]*\s*{_NUMBER}\s*{_UNIT}",
+        rf"\bEND\s?MILL\s*[\[{{]\s*{_NUMBER}\s*{_UNIT}\s*[\]}}]",  # Vectric: End Mill {6 mm}
+        rf"(?<![\d./]){_NUMBER}\s*(MM|INCH|IN\b|\")[- ]*{_MILL}END\s?MILL\b",  # FreeCAD: 5mm Endmill
+        rf"(?<![\d./])(\d+\.\d*|\.\d+|\d+/\d+)()[- ]*{_MILL}END\s?MILL\b",  # Mastercam: 10. FLAT ENDMILL
+    )
+)
+_TOOL = re.compile(r"\bT(?:OOL)?\s*[-#:=]?\s*(\d+)\b(?!\s*(?:MM|IN\b|INCH|\"|[./]\d))")
+_OTHER = re.compile(r"\b(?:STOCK|HOLE|BORE|POCKET|HOLDER|SHANK|OFFSET|TAPER)\b")
+_COMMENT = re.compile(rb"\(([^)\n]*)\)|;([^\n]*)")
+_SLACK, _SLACK_MM = 0.02, 0.05
+"""Comments round; a worn or reground mill is this far off."""
+
+
+class NamedDiameter(NamedTuple):
+    """What a comment says."""
+
+    line: int
+    tool: int | None
+    value: float
+    unit: str
+    """``mm``, ``inch`` or empty."""
+
+
+def named_diameters(text: bytes, first_line: int) -> Iterator[NamedDiameter]:
+    """Yield the tool diameters that the comments of some whole lines name; the first line has this number."""
+    if b"(" not in text and b";" not in text:
+        return
+    capitals = text.upper()
+    at = -1
+    for place in sorted({match.start() for word in _WORDS for match in re.finditer(word, capitals)}):
+        if place < at:
+            continue
+        begin, at = capitals.rfind(b"\n", 0, place) + 1, capitals.find(b"\n", place)
+        at = at if at >= 0 else len(capitals)
+        for comment in _COMMENT.finditer(capitals[begin:at]):
+            said = _said((comment[1] or comment[2] or b"").decode("latin-1"))
+            if said is not None:
+                yield NamedDiameter(first_line + capitals.count(b"\n", 0, begin), *said)
+
+
+def _said(comment: str) -> tuple[int | None, float, str] | None:
+    if _OTHER.search(comment):
+        return None
+    for pattern in _DIAMETER:
+        found = pattern.search(comment)
+        if found is not None:
+            tool = _TOOL.search(comment)
+            unit = (found[2] or "").replace('"', "IN")[:2]
+            return int(tool[1]) if tool else None, _value(found[1]), {"MM": "mm", "IN": "inch"}.get(unit, "")
+    return None
+
+
+def _value(text: str) -> float:
+    above, _, below = text.partition("/")
+    return float(above) / float(below) if below and float(below) else float(above)
+
+
+def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
+    """Yield a warning for each tool whose diameter in a comment is not that of the cell.
+
+    A comment without a tool number counts where the program has one tool.
+    """
+    used = {int(number) or (cell.mounted_tool or 0) for number in np.unique(toolpath.tool[1:])}
+    used -= {0} if len(used) > 1 else set()
+    told: set[int] = set()
+    for said in named:
+        number = said.tool if said.tool is not None else next(iter(used)) if len(used) == 1 else 0
+        tool = cell.tool.get(number)
+        if number in told or number not in used or tool is None or tool.kind == "tapered":
+            continue
+        in_mm = {"mm": (1.0,), "inch": (MM_PER_INCH,), "": (1.0, MM_PER_INCH)}[said.unit]
+        slack = _SLACK * tool.diameter_mm + _SLACK_MM
+        if any(abs(said.value * factor - tool.diameter_mm) <= slack for factor in in_mm) or said.value <= 0.0:
+            continue
+        told.add(number)
+        unit = f" {said.unit}" if said.unit else ""
+        yield Issue(
+            "warning",
+            "tool-differs",
+            said.line,
+            f"the comment gives T{number} a diameter of {said.value:g}{unit}, the cell has "
+            f"{tool.diameter_mm:g} mm",
+            f"correct tool.{number}.diameter_mm in the cell, or put the right tool into the magazine",
+        )

@@ -1,0 +1,99 @@
+"""Diameters that CAM comments name, against the cell's tools."""
+
+import io
+import time
+
+import pytest
+
+from gcode2krl.cell import resolve_cell
+from gcode2krl.gcode import read_stream
+from gcode2krl.gcode.tool_comments import named_diameters
+
+CELL = resolve_cell({"based_on": "demonstration"})  # T1 is 16 mm wide, T6 10 mm
+BODY = "G21 G90 G17\nT{tool} M6\nS9000 M3\nG0 G43 H{tool} Z30\nG0 X0 Y0\nG1 Z-5 F600\nG0 Z30\nM5\nM30\n"
+
+
+def warned(comment, tool=1, more=""):
+    text = f"%\n{comment}\n" + BODY.format(tool=tool) + more
+    issues = read_stream(
+        io.BytesIO(text.replace("M30\n" + more, more + "M30\n%\n").encode()), "part.nc", CELL
+    ).issues
+    return [(issue.severity, issue.line) for issue in issues if issue.code == "tool-differs"]
+
+
+OTHERS = [
+    "(T1 D=10. CR=0. - ZMIN=-5 - flat end mill)",
+    "(T1  D=0.5 CR=0. - ZMIN=-5 - flat end mill)",
+    "(TOOL 1 - 10MM ENDMILL)",
+    "( Tool Diameter 6 mm )",
+    "(10MM FLAT ENDMILL | TOOL - 1 | DIA. OFF. - 1 | LEN. - 1 | TOOL DIA. - 10.)",
+    "( T1 | 10. FLAT ENDMILL | H1 | D1 )",
+    "(TC: 5mm Endmill)",
+    "(T1 - End Mill {6 mm})",
+    "( End Mill {0.25 inch})",
+    "(1/4 FLAT ENDMILL)",
+    "; cutter diameter = 3.175",
+]
+SAME_OR_SILENT = [
+    "(T1 D=16. CR=0. - ZMIN=-5 - flat end mill)",
+    "(T1 D=0.63 CR=0. flat end mill)",
+    "(T7 D=10. CR=0. - flat end mill)",
+    "(16MM ENDMILL)",
+    "(5/8 ENDMILL)",
+    "(STOCK DIAMETER 50)",
+    "(HOLE DIA 8 WITH ENDMILL)",
+    "(DIA. OFF. - 1)",
+    "(4 FLUTE ENDMILL)",
+    "(POCKET 12. ENDMILL)",
+    "(T1 D=10. CR=0. TAPER=45deg - chamfer mill)",
+    "(LEAD IN 2.0 CUTTER COMP ON)",
+    "(MILL 10 DEEP)",
+    "(DIAMETER 10)",
+]
+
+
+@pytest.mark.parametrize("comment", OTHERS)
+def test_another_diameter_is_a_warning_with_the_comments_line(comment):
+    assert warned(comment) == [("warning", 2)]
+
+
+@pytest.mark.parametrize("comment", SAME_OR_SILENT)
+def test_the_same_or_none_is_silent(comment):
+    assert warned(comment) == []
+
+
+def test_the_tool_that_the_comment_names_is_compared():
+    assert warned("(T6 D=10. CR=0. - flat end mill)", tool=6) == []
+    assert warned("(T6 D=12. CR=0. - flat end mill)", tool=6) == [("warning", 2)]
+
+
+def test_a_comment_without_a_number_says_nothing_where_there_are_two_tools():
+    second = "T6 M6\nS9000 M3\nG0 G43 H6 Z30\nG0 X0 Y0\nG1 Z-5 F600\nG0 Z30\nM5\n"
+    assert warned("(TOOL DIAMETER 10.)") == [("warning", 2)]
+    assert warned("(TOOL DIAMETER 10.)", more=second) == []
+
+
+def test_the_message_tells_both_and_each_tool_once():
+    text = "(T1 D=10. - flat end mill)\n" * 3 + BODY.format(tool=1)
+    issues = read_stream(io.BytesIO(text.encode()), "part.nc", CELL).issues
+    (issue,) = [issue for issue in issues if issue.code == "tool-differs"]
+    assert "diameter of 10," in issue.message
+    assert "16 mm" in issue.message
+    assert "tool.1.diameter_mm" in issue.remedy
+
+
+def test_lines_are_right_far_into_a_long_file():
+    filler = "G1 X1.234 Y5.678 Z-0.123 F600 (a)\n" * 60_000  # several pieces
+    text = BODY.format(tool=1).replace("M5\n", filler + "(T1 D=10.)\nM5\n")
+    issues = read_stream(io.BytesIO(text.encode()), "part.nc", CELL).issues
+    assert [issue.line for issue in issues if issue.code == "tool-differs"] == [7 + 60_000 + 1]
+
+
+@pytest.mark.parametrize(
+    "line", [b"G1 X1.2345 Y5.6789 Z-0.1234 F600\n", b"G1 X1.2345 (wall finish) Y5.6789\n"]
+)
+def test_a_file_without_such_words_costs_next_to_nothing(line):
+    text = line * 100_000
+    start = time.perf_counter()
+    assert not list(named_diameters(text, 1))
+    assert time.perf_counter() - start < 0.1  # 0.003 to 0.01 s; reading it takes 0.1 s
