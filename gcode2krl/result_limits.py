@@ -85,7 +85,8 @@ def force_findings(forces: Forces, line: Lines, cell: Cell) -> Iterator[Issue]:
 
 
 def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
-    rated_kg, own_kg = cell.robot.payload.mass_kg, cell.load.mass_kg
+    rated_kg = cell.robot.payload.mass_kg
+    own_kg = cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
     if rated_kg is None:
         return None
     down = -cell.base_matrix()[2, :3]  # the root's -z along the axes of $BASE
