@@ -135,7 +135,13 @@ def forces_and_deflection(
     absurd = result_limits.absurd_forces(forces, line)
     if absurd is not None:
         return None, None, (*forces.issues, absurd)
-    forces = replace(forces, issues=(*forces.issues, *result_limits.force_findings(forces, line, cell)))
+    cuts = np.zeros(len(toolpath), dtype=np.bool_)
+    cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
+    found = (
+        *result_limits.force_findings(forces, line, cell),
+        *program.feeds_per_tooth(toolpath, cell, cuts),
+    )
+    forces = replace(forces, issues=(*forces.issues, *found))
     missing = compliance.missing_stiffness(cell)
     if missing is not None:
         return forces, None, (replace(missing, severity="note"),)

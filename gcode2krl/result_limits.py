@@ -36,6 +36,7 @@ def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
 
     The law's own peak, v²·cos(alpha/2)/d, is not what drives see where a corner is passed within a cycle:
     at 0.2 m/s and d = 0.1 mm it lasts 1 ms, and the controller commands a position every ``cycle_s``.
+    Where the tool changes the tip is another point, and there is none.
     """
     result = np.zeros(len(motion))
     if len(motion) < 3:
@@ -45,6 +46,8 @@ def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
     position = motion.position_mm
     bend = position[2 * n :] - 2.0 * position[n:-n] + position[: -2 * n]
     result[n:-n] = np.sqrt(np.einsum("ij,ij->i", bend, bend)) / (n * dt_s) ** 2
+    same = motion.tool[2 * n :] == motion.tool[: -2 * n]
+    result[n:-n][~same] = 0.0
     return result
 
 

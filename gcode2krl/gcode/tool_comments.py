@@ -56,7 +56,7 @@ def named_diameters(text: bytes, first_line: int) -> Iterator[NamedDiameter]:
         return
     capitals = text.upper()
     at = -1
-    for place in sorted({match.start() for word in _WORDS for match in re.finditer(word, capitals)}):
+    for place in sorted({at for word in _WORDS for at in _places(capitals, word)}):
         if place < at:
             continue
         begin, at = capitals.rfind(b"\n", 0, place) + 1, capitals.find(b"\n", place)
@@ -65,6 +65,13 @@ def named_diameters(text: bytes, first_line: int) -> Iterator[NamedDiameter]:
             said = _said((comment[1] or comment[2] or b"").decode("latin-1"))
             if said is not None:
                 yield NamedDiameter(first_line + capitals.count(b"\n", 0, begin), *said)
+
+
+def _places(text: bytes, word: bytes) -> Iterator[int]:
+    at = text.find(word)
+    while at >= 0:
+        yield at
+        at = text.find(word, at + 1)
 
 
 def _said(comment: str) -> tuple[int | None, float, str] | None:

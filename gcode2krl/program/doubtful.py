@@ -28,7 +28,7 @@ _SHORT_MM = 1e-6
 
 
 def doubtful(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Iterator[Issue]:
-    """Yield warnings on dwells, blending, stops in the cut and feeds per tooth beyond what is usual.
+    """Yield warnings on dwells, blending and stops in the cut beyond what is usual.
 
     ``tolerance_mm`` is the blend tolerance asked for, below ``G64 P`` and above the cell's.
     """
@@ -37,7 +37,6 @@ def doubtful(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) 
     yield from _dwells(toolpath)
     yield from _blends(toolpath, cell, tolerance_mm, feed)
     yield from _stops_in_cut(toolpath, cell, feed)
-    yield from _chips(toolpath, cell, feed)
 
 
 def _dwells(toolpath: Toolpath) -> Iterator[Issue]:
@@ -150,9 +149,18 @@ def _spindle_on(toolpath: Toolpath, stop: Event) -> bool:
     return rpm != 0.0
 
 
-def _chips(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    """Feed per tooth F/(S·z) that is nothing, or more than a mill of that diameter takes."""
-    turning = feed & (toolpath.spindle_rad_s != 0.0) & (toolpath.feed_mm_s > 0.0)
+def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Issue]:
+    """Yield warnings on a feed per tooth F/(S·z) of nothing, or of more than a mill of that diameter takes.
+
+    ``cuts`` (n,) tells which moves meet material.
+    """
+    turning = (
+        cuts
+        & ~toolpath.rapid
+        & ~toolpath.machine
+        & (toolpath.spindle_rad_s != 0.0)
+        & (toolpath.feed_mm_s > 0.0)
+    )
     for number in np.unique(toolpath.tool[turning]).tolist():
         tool = cell.tool.get(number if number else cell.mounted_tool or 0)
         rows = np.flatnonzero(turning & (toolpath.tool == number))

@@ -5,7 +5,7 @@ import pytest
 from gcode2krl import load_cell, read_gcode
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.predict import set_targets
+from gcode2krl.predict import predict_toolpath, set_targets
 
 HEAD = ["G21 G90 G17", "T1 M6", "S9000 M3", "G0 G43 H1 Z30", "G0 X0 Y0", "G0 Z2", "G1 Z-5 F600"]
 TAIL = ["G0 Z30", "M5", "M30"]
@@ -15,8 +15,10 @@ def warnings(tmp_path, body, code, data=None, tolerance_mm=None, head=HEAD):
     path = tmp_path / "part.nc"
     path.write_text("\n".join([*head, *body, *TAIL]) + "\n")
     cell = resolve_cell({"based_on": "demonstration", **(data or {})})
-    targets = set_targets(read_gcode(path, cell), cell, tolerance_mm)
-    found = [issue for issue in targets.issues if issue.code == code]
+    toolpath = read_gcode(path, cell)
+    cuts = code == "feed-per-tooth"
+    source = predict_toolpath(toolpath, cell) if cuts else set_targets(toolpath, cell, tolerance_mm)
+    found = [issue for issue in source.issues if issue.code == code]
     assert {issue.severity for issue in found} <= {"warning"}
     assert all(issue.remedy for issue in found)
     return [(issue.line, issue.message) for issue in found]
@@ -88,6 +90,13 @@ def test_a_feed_per_tooth_of_nothing_or_of_a_tenth_of_the_tool(tmp_path, speed, 
     if wanted:
         f_z_mm = float(feed[1:]) / (float(speed[1:]) * 3)
         assert f"{f_z_mm:.3g} mm a tooth" in found[0][1]
+
+
+def test_a_feed_per_tooth_in_the_air_is_none(tmp_path):
+    head = [line.replace("S9000", "S90").replace("Z-5", "Z1") for line in HEAD]
+    assert not warnings(
+        tmp_path, ["X60"], "feed-per-tooth", {"stock": {"box_mm": [[-9, -9, -9], [70, 9, 0]]}}, head=head
+    )
 
 
 def test_the_examples_are_not_doubted():
