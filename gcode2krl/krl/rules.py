@@ -29,6 +29,7 @@ _KNOWN_WORDS = frozenset(
         "ENDFOR",
         "LOOP",
         "ENDLOOP",
+        "EXIT",
         "REPEAT",
         "UNTIL",
         "SWITCH",
