@@ -1,8 +1,10 @@
 """The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
 
+import copy
 import difflib
 import re
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +28,18 @@ def models_folder() -> Path:
 
 def names(kind: str) -> dict[str, Path]:
     """Return model name → file for one kind (one of `KINDS`)."""
-    files = sorted((models_folder() / kind).glob("*.toml"))
-    return {str(read_toml(file).get("model", file.stem)): file for file in files}
+    return dict(_names(models_folder() / kind))
+
+
+@lru_cache(maxsize=len(KINDS))
+def _names(folder: Path) -> dict[str, Path]:
+    return {str(read_toml(file).get("model", file.stem)): file for file in sorted(folder.glob("*.toml"))}
+
+
+@lru_cache(maxsize=256)
+def _of_library(file: Path) -> dict[str, Any]:
+    """Return a file of the library, which does not change while a command runs."""
+    return read_toml(file)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -93,7 +105,7 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
         raise input_error(
             "model-unknown", f"{kind[:-1]}.model: found {model!r}, allowed: {', '.join(known)}", remedy
         )
-    return read_toml(file)
+    return copy.deepcopy(_of_library(file))
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

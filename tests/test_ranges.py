@@ -41,7 +41,9 @@ def keys(kind, key=""):
 def test_every_physical_key_has_a_range_and_every_range_a_key():
     known = set(ranges())
     physical = {
-        key for key in keys(Cell) if key.rpartition(".")[2] not in NO_MEASURE and not key.startswith("effects")
+        key
+        for key in keys(Cell)
+        if key.rpartition(".")[2] not in NO_MEASURE and not key.startswith("effects")
     }
     assert physical == known
 
@@ -140,7 +142,10 @@ def test_angles_in_degrees_pass(axis, angle):
         ({"tool": {"1": {"diameter_mm": True, "teeth": 2}}}, "tool.1.diameter_mm"),
         ({"tool": {"1": {"diameter_mm": "120", "teeth": 2}}}, "tool.1.diameter_mm"),
         ({"tool": {"1": {"diameter_mm": 12.0, "teeth": 2.0}}}, "tool.1.teeth"),
-        ({"tool": {"1": {"diameter_mm": 12.0, "teeth": 2, "centre_cutting": "yes"}}}, "tool.1.centre_cutting"),
+        (
+            {"tool": {"1": {"diameter_mm": 12.0, "teeth": 2, "centre_cutting": "yes"}}},
+            "tool.1.centre_cutting",
+        ),
         ({"load": {"mass_kg": "120"}}, "load.mass_kg"),
         ({"home": {"q_deg": [0, "-90", 90, 0, 0, 0]}}, "home.q_deg"),
         ({"frames": {"base": {**FRAME, "x_mm": True}}}, "frames.base.x_mm"),
