@@ -26,14 +26,18 @@ from gcode2krl.krl.statements import render
 SLOW_S = 5.0
 MOST_BYTES = 1_000_000_000
 VALUES = (
-    0, 1, -1, 3, 5.0, 0.12, 200, 1e9, 1e300, -1e-300, 2**63, 10**40, float("inf"), float("nan"), True, False, "",
-    "120", "none", "auto", "x\n$BASE=$NULLFRAME", "\x00", "é", "a" * 5000, "KRC4", "KR 300 R2500 ultra", "../x.toml",
-    "demonstration", [], {}, [1, 2, 3], [[0, 0], [1, 1]], {"x_mm": 1.0}, [[[[1]]]], {"a": {"b": {}}},
+    0, 1, -1, 3, 5.0, 0.12, 200, 1e9, 1e300, -1e-300, 2**63, 10**40, float("inf"), float("nan"), True, False,
+    "", "120", "none", "auto", "x\n$BASE=$NULLFRAME", "\x00", "é", "a" * 5000, "KRC4",
+    "KR 300 R2500 ultra",
+    "../x.toml", "demonstration", [], {}, [1, 2, 3], [[0, 0], [1, 1]],
+    {"x_mm": 1.0}, [[[[1]]]], {"a": {"b": {}}},
 )  # fmt: skip
 TEMPLATES = (
-    "", "HALT", "$OUT[1]=TRUE", "$OUT[{{ spindle.run_cw_output }}]=TRUE", "$BASE=$NULLFRAME", "PTP HOME", "{{ cell }}",
-    "{{ cell.m_code.update({}) }}", "{{ 'x' * 3000000000 }}", "{% for i in range(999999999) %}x{% endfor %}",
-    "{{ '%999999999d' % 1 }}", "{{ " + "(" * 900 + "1" + ")" * 900 + " }}", "{% if %}", "{{", "IF X THEN", "GOTO A",
+    "", "HALT", "$OUT[1]=TRUE", "$OUT[{{ spindle.run_cw_output }}]=TRUE", "$BASE=$NULLFRAME", "PTP HOME",
+    "{{ cell }}",    "{{ cell.m_code.update({}) }}", "{{ 'x' * 3000000000 }}",
+    "{% for i in range(999999999) %}x{% endfor %}",
+    "{{ '%999999999d' % 1 }}", "{{ " + "(" * 900 + "1" + ")" * 900 + " }}", "{% if %}", "{{", "IF X THEN",
+    "GOTO A",
     "{{ cell.tool[1].teeth }}", "{{ 9**9**9 }}", "{{ rpm | round | int }}", "\r\x0b", "{{ self }}", "{{ p }}",
 )  # fmt: skip
 
@@ -106,7 +110,7 @@ def check(error: Gcode2KrlError) -> None:
 
 
 def text_of(whole: dict, rng: random.Random) -> bytes:
-    """Return the bytes of a cell file: the demonstration's keys, some left out, some changed, some damaged."""
+    """Return the bytes of a cell file: the demonstration's keys, some left out, changed or damaged."""
     data = {key: value for key, value in whole.items() if rng.random() < 0.8}
     data = dict(rng.sample(list(data.items()), len(data)))
     if "tool" in data:

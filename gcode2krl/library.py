@@ -49,7 +49,9 @@ def read_toml(path: Path) -> dict[str, Any]:
             data = file.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise input_error("file-unreadable", f"cannot read: {why}", source=str(path)) from None
+        raise input_error(
+            "file-unreadable", f"cannot read: {why}", "name a file that is there", source=str(path)
+        ) from None
     if len(data) > MOST_BYTES:
         raise input_error(
             "file-too-large", f"more than {MOST_BYTES // 1_000_000} MB is no model or cell file",
@@ -58,7 +60,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return parse_toml(data.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
-        raise input_error("not-utf8", f"byte {error.start} is not UTF-8", source=str(path)) from None
+        raise input_error(
+            "not-utf8", f"byte {error.start} is not UTF-8", "save it as UTF-8", source=str(path)
+        ) from None
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:

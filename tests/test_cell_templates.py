@@ -66,7 +66,8 @@ KRL = [
     "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $BASE=$NULLFRAME", "MOVE_HOME()", "X=MOVE_HOME()",
     "$OUT[5]=MOVE( )", "WAIT FOR MOVE( )", "PULSE($BASE,TRUE,1)", "RSI_OFF()", "$SEN_PINT[1]=3",
     "{{ '$OUT[5]=TRUE\r$BASE=$NULLFRAME' }}", "$OUT[5]=TRUE{{ '\x0b' }}$BASE=$NULLFRAME", ";FOLD x", "é",
-    "$out[5]=true\n$base = $nullframe", "  $BASE  =$NULLFRAME", "PTP{A1 0}", "$OUT[5]=TRUE$ADVANCE=0", "WAIT SEC 1$BASE=$NULLFRAME", "$OUT[I]=TRUE",
+    "$out[5]=true\n$base = $nullframe", "  $BASE  =$NULLFRAME", "PTP{A1 0}", "$OUT[5]=TRUE$ADVANCE=0",
+    "WAIT SEC 1$BASE=$NULLFRAME", "$OUT[I]=TRUE",
 ]  # fmt: skip
 GOOD = [
     "$OUT[5]=TRUE", "$ANOUT[1]=0.5", "PULSE ($OUT[5],TRUE,0.5)", "WAIT SEC 1.0", "WAIT FOR $IN[5]", "HALT",
@@ -81,7 +82,8 @@ def cell_with(tmp_path, template, code="M8"):
     path = tmp_path / "cell.toml"
     body = template.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
     body = body.replace("\x0b", "\\u000b")
-    pair = f'M9 = "$OUT[3]=FALSE\\n$OUT[4]=FALSE\\n$OUT[5]=FALSE\\n$OUT[6]=FALSE\\nMY_FLAG=FALSE\\nVACUUM(FALSE)"\n'
+    off = [f"$OUT[{n}]=FALSE" for n in (3, 4, 5, 6)] + ["MY_FLAG=FALSE", "VACUUM(FALSE)"]
+    pair = 'M9 = "' + "\\n".join(off) + '"\n'
     externals = 'externals = ["VACUUM(BOOL :IN)"]\n'
     text = f'based_on = "demonstration"\n[program]\n{externals}[m_code]\n{code} = "{body}"\n'
     path.write_text(text + (pair if code == "M8" else ""), encoding="utf-8")
@@ -197,7 +199,8 @@ def test_the_default_cell_says_nothing_forbidden():
 
 
 def test_outputs_are_read_back():
-    text = "$OUT[1]=TRUE\n$OUT[2]=TRUE\n$OUT[2]=FALSE\nIF $IN[1] THEN\n$OUT[1]=FALSE\n$OUT[3]=TRUE\nENDIF\nX=FALSE"
+    text = "$OUT[1]=TRUE\n$OUT[2]=TRUE\n$OUT[2]=FALSE\n"
+    text += "IF $IN[1] THEN\n$OUT[1]=FALSE\n$OUT[3]=TRUE\nENDIF\nX=FALSE"
     assert may_be_on(text) == {"$OUT[1]", "$OUT[3]"}
     assert surely_off(text) == {"$OUT[2]", "X"}
 

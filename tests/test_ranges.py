@@ -175,10 +175,12 @@ def test_types_are_strict_and_a_wrong_one_names_its_key(data, key, base):
 
 @pytest.mark.parametrize(
     "text",
-    ["a = " + "[" * 100_000, "a." * 100_000 + "a = 1", '"a".' * 100_000 + "a = 1", "[" + "a." * 100_000 + "a]",
+    ["a = " + "[" * 100_000, "a." * 100_000 + "a = 1", '"a".' * 100_000 + "a = 1", 
+     "[" + "a." * 100_000 + "a]",
      "a = {" + "a." * 100_000 + "a = 1}", "a = " + "{a = " * 5000, "a = " + "1" * 10_000, "x = 1\n" * 2,
      "\0", "a = " + "[" * 40 + "]" * 40, "#" + "x" * 5_000_000],
-    ids=["brackets", "dots", "quoted", "header", "inline", "tables", "digits", "twice", "nul", "lists", "size"],
+    ids=["brackets", "dots", "quoted", "header", "inline", "tables", "digits", "twice", "nul", "lists",
+         "size"],
 )  # fmt: skip
 def test_a_hostile_file_is_one_line_at_once(tmp_path, text):
     import time
