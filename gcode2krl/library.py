@@ -107,7 +107,7 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
             f"did you mean {read_toml(by_folded_name[near[0]])['model']!r}?" if near else "see the library"
         )
         raise input_error(
-            "model-unknown", f"{kind[:-1]}.model: found {model!r}, allowed: {', '.join(known)}", remedy
+            "model-unknown", f"{kind[:-1]}.model: found {model[:60]!r}, allowed: {', '.join(known)}", remedy
         )
     return copy.deepcopy(_of_library(file))
 
