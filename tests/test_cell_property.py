@@ -75,7 +75,7 @@ def test_every_value_of_the_program_was_stated(made):
             program = Made(Path(folder), PART.format(number), data=data)
         except Gcode2KrlError as error:
             assert dropped  # a complete cell is never refused
-            assert all(issue.remedy for issue in error.issues if issue.severity == "error")
+            check_remedies(error)
             assert not list(Path(folder).glob("*.src"))
             return
         text = program.src.read_text("ascii").replace("\r", "")
@@ -103,6 +103,10 @@ def test_every_value_of_the_program_was_stated(made):
         turned = fr.rotation_from_abc([0.0, -3.141592653589793 / 2, 0.0])
         assert abs(tip["X"] - (tool["x_mm"] - longer * turned[0, 2])) < 0.002
         assert tip["Y"] == tool["y_mm"]
+
+
+def check_remedies(error: Gcode2KrlError) -> None:
+    assert all(issue.remedy for issue in error.issues if issue.severity == "error")
 
 
 def stated(data, section, key) -> bool:

@@ -15,8 +15,8 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.sections import (
     VIRTUAL_JOINTS,
     Finite,
-    Place,
     NotNegative,
+    Place,
     Section,
     SixFloats,
     VirtualJoint,
