@@ -72,8 +72,12 @@ class Frame(Place):
     def _all_six(cls, given: Any) -> Any:
         if isinstance(given, dict):
             lacking = [name for name in cls.model_fields if name not in given]
+            unknown = [str(name)[:40] for name in given if name not in cls.model_fields][:6]
+            words = f" (there is no such key: {', '.join(unknown)})" if unknown else ""
             if lacking:
-                raise ValueError(f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg")
+                raise ValueError(
+                    f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg{words}"
+                )
         return given
 
 
