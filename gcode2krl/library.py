@@ -1,8 +1,10 @@
 """The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
 
+import copy
 import difflib
 import re
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +28,18 @@ def models_folder() -> Path:
 
 def names(kind: str) -> dict[str, Path]:
     """Return model name → file for one kind (one of `KINDS`)."""
-    files = sorted((models_folder() / kind).glob("*.toml"))
-    return {str(read_toml(file).get("model", file.stem)): file for file in files}
+    return dict(_names(models_folder() / kind))
+
+
+@lru_cache(maxsize=len(KINDS))
+def _names(folder: Path) -> dict[str, Path]:
+    return {str(read_toml(file).get("model", file.stem)): file for file in sorted(folder.glob("*.toml"))}
+
+
+@lru_cache(maxsize=256)
+def _of_library(file: Path) -> dict[str, Any]:
+    """Return a file of the library, which does not change while a command runs."""
+    return read_toml(file)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -37,7 +49,9 @@ def read_toml(path: Path) -> dict[str, Any]:
             data = file.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise input_error("file-unreadable", f"cannot read: {why}", source=str(path)) from None
+        raise input_error(
+            "file-unreadable", f"cannot read: {why}", "name a file that is there", source=str(path)
+        ) from None
     if len(data) > MOST_BYTES:
         raise input_error(
             "file-too-large", f"more than {MOST_BYTES // 1_000_000} MB is no model or cell file",
@@ -46,7 +60,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return parse_toml(data.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
-        raise input_error("not-utf8", f"byte {error.start} is not UTF-8", source=str(path)) from None
+        raise input_error(
+            "not-utf8", f"byte {error.start} is not UTF-8", "save it as UTF-8", source=str(path)
+        ) from None
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -91,9 +107,9 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
             f"did you mean {read_toml(by_folded_name[near[0]])['model']!r}?" if near else "see the library"
         )
         raise input_error(
-            "model-unknown", f"{kind[:-1]}.model: found {model!r}, allowed: {', '.join(known)}", remedy
+            "model-unknown", f"{kind[:-1]}.model: found {model[:60]!r}, allowed: {', '.join(known)}", remedy
         )
-    return read_toml(file)
+    return copy.deepcopy(_of_library(file))
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

@@ -48,29 +48,37 @@ class Provenance(Section):
     sure: Sure = "assumption"
 
 
-class Frame(Section):
-    """A KUKA frame, whole: position in mm and A, B, C in degrees (Rz·Ry·Rx)."""
+class Place(Section):
+    """A place: position in mm and A, B, C in degrees (Rz·Ry·Rx); what is left out is 0."""
 
-    x_mm: Finite
-    y_mm: Finite
-    z_mm: Finite
-    a_deg: Finite
-    b_deg: Finite
-    c_deg: Finite
+    x_mm: Finite = 0.0
+    y_mm: Finite = 0.0
+    z_mm: Finite = 0.0
+    a_deg: Finite = 0.0
+    b_deg: Finite = 0.0
+    c_deg: Finite = 0.0
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Return the homogeneous transform (4, 4)."""
+        abc = np.array([self.a_deg, self.b_deg, self.c_deg]) * RAD_PER_DEG
+        return fr.transform([self.x_mm, self.y_mm, self.z_mm], fr.rotation_from_abc(abc))
+
+
+class Frame(Place):
+    """A KUKA frame of the cell, whole: a part of one would be completed by somebody else's."""
 
     @model_validator(mode="before")
     @classmethod
     def _all_six(cls, given: Any) -> Any:
         if isinstance(given, dict):
             lacking = [name for name in cls.model_fields if name not in given]
+            unknown = [str(name)[:40] for name in given if name not in cls.model_fields][:6]
+            words = f" (there is no such key: {', '.join(unknown)})" if unknown else ""
             if lacking:
-                raise ValueError(f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg")
+                raise ValueError(
+                    f"{', '.join(lacking)} missing: a frame states all six of x_mm to c_deg{words}"
+                )
         return given
-
-    def matrix(self) -> NDArray[np.float64]:
-        """Return the homogeneous transform (4, 4)."""
-        abc = np.array([self.a_deg, self.b_deg, self.c_deg]) * RAD_PER_DEG
-        return fr.transform([self.x_mm, self.y_mm, self.z_mm], fr.rotation_from_abc(abc))
 
 
 _LENGTHS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")

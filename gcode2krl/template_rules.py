@@ -128,14 +128,17 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
     for name in _called(statement):
         if name not in callable_names and name not in _FUNCTIONS:
             return f"calls {name}, which program.externals does not declare"
+    if _assignments(statement) > 1:
+        return "assigns twice in a line"
     if word == "PULSE":
         return "" if _is_switchable_pulse(statement) else "pulses something other than an output"
     if word in _CONDITIONS:
-        return "" if not _assigns(statement) or word == "FOR" else "assigns in a condition"
+        return "" if _assignments(statement) == 0 or word == "FOR" else "assigns in a condition"
     if word in ("HALT", "CONTINUE", "EXIT") and statement == word:
         return ""
     if word == "WAIT":
-        return "" if re.match(r"WAIT (SEC|FOR)\b", statement) else "is no WAIT SEC or WAIT FOR"
+        waits = re.match(r"WAIT (SEC|FOR)\b", statement) and _assignments(statement) == 0
+        return "" if waits else "is no WAIT SEC or WAIT FOR"
     assigned = _ASSIGNED.match(statement)
     if assigned:
         return _wrong_assignment(assigned)
@@ -156,8 +159,8 @@ def _called(statement: str) -> Iterator[str]:
     return (match[1] for match in re.finditer(r"(?<![$\w.])([A-Z_][A-Z0-9_]*) ?\(", bare))
 
 
-def _assigns(statement: str) -> bool:
-    return re.search(r"(?<![<>=])=(?!=)", re.sub(r'"[^"]*"', "", statement)) is not None
+def _assignments(statement: str) -> int:
+    return len(re.findall(r"(?<![<>=])=(?!=)", re.sub(r'"[^"]*"', "", statement)))
 
 
 def _wrong_assignment(assigned: re.Match[str]) -> str:

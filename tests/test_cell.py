@@ -17,8 +17,10 @@ def _write(tmp_path, text):
     return path
 
 
-def test_a_partial_file_keeps_the_default_cell(tmp_path, cell):
-    own = load_cell(_write(tmp_path, "[controller]\nk_s = 0.12\n[frames]\nspin = 30\n"))
+def test_a_file_keeps_what_it_is_based_on(tmp_path, cell):
+    own = load_cell(
+        _write(tmp_path, "based_on = 'demonstration'\n[controller]\nk_s = 0.12\n[frames]\nspin = 30\n")
+    )
     assert own.controller.k_s == 0.12
     assert own.frames.spin == 30
     assert own.controller.advance == cell.controller.advance == 3
@@ -53,12 +55,12 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
     [
         ("[controller]\nk_s = -1", ("controller.k_s", "-1", "greater than or equal to 0")),
         ("[controller]\nadvance = 7", ("controller.advance", "7")),
-        ("[frames]\nbase = { x_m = 1 }", ("frames.base.x_m", "no such key")),
+        ("[frames]\nbase = { x_m = 1 }", ("frames.base", "x_mm", "missing")),
         ("[robot]\nmodel = 'KR 9000'", ("robot.model", "KR 9000", "KR 300 R2500 ultra")),
         ("[tool.30]\nteeth = 3", ("tool.30.diameter_mm", "missing")),
         ("[tool.1]\ndiameter_mm = -4", ("tool.1.diameter_mm", "-4", "greater than 0")),
-        ("[tool.1]\ntool_data = 3", ("tool.1", "axis is required")),
-        ("[tool.1]\ncorner_radius_mm = 9", ("tool.1", "half the diameter")),
+        ("[tool.1]\ndiameter_mm = 9\nteeth = 2\ntool_data = 3", ("tool.1", "axis is required")),
+        ("based_on = 'demonstration'\n[tool.1]\ncorner_radius_mm = 9", ("tool.1", "half the diameter")),
         ("[frames]\nbase_data = 40", ("frames.base_data", "40", "32")),
         ("[home]\nq_deg = [0, 0]", ("home.q_deg",)),
         ("[robot.limits]\nq_deg = [[1,0],[0,1],[0,1],[0,1],[0,1],[0,1]]", ("robot.limits.q_deg", "A1")),
@@ -83,7 +85,7 @@ def test_a_missing_file_is_one_line():
 
 
 def test_a_longer_tool_moves_the_tip_along_its_axis(tmp_path, cell):
-    own = load_cell(_write(tmp_path, "[tool.1]\nlength_mm = 130.0\n"))
+    own = load_cell(_write(tmp_path, "based_on = 'demonstration'\n[tool.1]\nlength_mm = 130.0\n"))
     shift = np.linalg.inv(cell.tool_matrix(1)) @ own.tool_matrix(1)
     np.testing.assert_allclose(shift[:3, 3], [0, 0, -30.0], atol=1e-9)
     np.testing.assert_allclose(shift[:3, :3], np.eye(3), atol=1e-12)
@@ -127,7 +129,7 @@ def test_a_robot_of_ones_own_beside_the_cell(tmp_path):
 
 def test_the_schema_knows_every_key_and_requires_none():
     schema = cell_schema()
-    assert set(schema["properties"]) == set(Cell.model_fields)
+    assert set(schema["properties"]) == set(Cell.model_fields) - {"taken_over", "defaults"}
     assert '"required"' not in json.dumps(schema)
 
 

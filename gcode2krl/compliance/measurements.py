@@ -15,8 +15,8 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.sections import (
     VIRTUAL_JOINTS,
     Finite,
-    Frame,
     NotNegative,
+    Place,
     Section,
     SixFloats,
     VirtualJoint,
@@ -76,7 +76,7 @@ class Tracker(Section):
     q_deg: SixFloats
 
 
-class Cube(Frame):
+class Cube(Place):
     """A measuring cube: the pose of its centre in the robot root, and what it is fixed to."""
 
     body: Literal["root", VirtualJointName]

@@ -9,6 +9,7 @@ from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.rsi_rules import rsi_issues
+from gcode2krl.krl.statements import frame_text, written_tool
 from gcode2krl.units import MM_PER_M
 
 _FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
@@ -27,6 +28,7 @@ _KNOWN_WORDS = frozenset(
         "ENDFOR",
         "LOOP",
         "ENDLOOP",
+        "EXIT",
         "REPEAT",
         "UNTIL",
         "SWITCH",
@@ -43,6 +45,12 @@ _KNOWN_WORDS = frozenset(
 )
 _WITHOUT_STOP = re.compile(r"(TRIGGER\b|CONTINUE\b|\$(VEL|ACC|APO|ORI_TYPE)\b)", re.IGNORECASE)
 """Statements known to leave the advance run alone."""
+_SETTING = re.compile(
+    r"(\$(?:BASE|TOOL|LOAD\w*|ADVANCE|IPO_MODE|ACC\w*|ORI_TYPE|OV_\w+|ACT_\w+|VEL_\w+|RED_\w+)|(?:BASE|TOOL|LOAD)_DATA)"
+    r"[\[\].A-Z0-9_]*=(?!=)|BAS\(#(?!TOOL)"
+)
+_SET_WITH_THE_TOOL = frozenset(["$LOAD", "$ACT_TOOL", "$ACT_BASE"])
+_JUMP = re.compile(r"(GOTO|RESUME|ASYPTP)")
 _MOTION_WORDS = frozenset(
     ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
 )
@@ -81,8 +89,38 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
             )
         )
     issues += _statement_rules(program, cell)
+    issues += _setting_issues(program, cell)
     issues += rsi_issues(program, cell)
     return [*issues, *_blend_issues(program)]
+
+
+def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
+    """Behind the first motion only speeds and the tool of a tool change are set, and nothing jumps."""
+    tools = {_squeezed(f"$TOOL={frame_text(written_tool(cell, number))}") for number in _tools(cell)}
+    issues = []
+    for statement in program.statements:
+        text = _squeezed(statement.text)
+        set_here = _SETTING.match(text)
+        own = set_here is not None and (set_here[1] in _SET_WITH_THE_TOOL or text in tools)
+        if statement.motion > 0 and (_JUMP.match(text) or (set_here is not None and not own)):
+            issues.append(
+                Issue(
+                    "error",
+                    "krl-setting-changed",
+                    statement.line,
+                    in_file(program, statement.file) + f"{statement.text[:50]!r} behind the first motion",
+                    "take it out of the template in the cell (m_code, tool_change, program.epilogue)",
+                )
+            )
+    return issues[:_MOST_PER_CHECK]
+
+
+def _tools(cell: Cell) -> list[int]:
+    return [number for number in cell.tool if not cell.missing_of_tool(number)]
+
+
+def _squeezed(text: str) -> str:
+    return re.sub(r"\s+", "", text).upper()
 
 
 def _blend_issues(program: KrlProgram) -> list[Issue]:

@@ -41,7 +41,10 @@ def _name(case):
 def _cell(offsets):
     """Return a cell that has nothing but work offsets."""
     origins = {system: offsets.get(system, (0.0, 0.0, 0.0)) for system in SYSTEMS}
-    frames = {system: Frame(x_mm=x, y_mm=y, z_mm=z) for system, (x, y, z) in origins.items()}
+    frames = {
+        system: Frame(x_mm=x, y_mm=y, z_mm=z, a_deg=0.0, b_deg=0.0, c_deg=0.0)
+        for system, (x, y, z) in origins.items()
+    }
     return Cell.model_construct(tool={}, work_offsets=frames)
 
 
