@@ -39,7 +39,7 @@ def fire(path, targets, cell):
     controller = cell.controller
     advance = math.inf if controller.advance == "unlimited" else controller.advance
     ends = np.flatnonzero(targets.move >= 0)[[0, -1]]
-    if targets.ptp[ends[0] + 1 : ends[1]].any():
+    if targets.ptp[ends[0] + 1 : ends[1] + 1].any():
         return _fire_along_motion(path, targets, cell)
     more = len(read_program(path).motions) - len(targets)  # pieces lie between the two ends
     fired = replay(path, int(ends[0]), int(ends[1]) + more, Law(controller.k_s, advance)).fired
