@@ -52,10 +52,21 @@ def fire(path, targets, cell):
     )
 
 
-def most_waiting(motion, in_view):
-    """Largest number of triggers in so many motions that follow each other."""
+def most_waiting(motion, in_view, halts=()):
+    """Largest number of triggers in so many motions that follow each other.
+
+    Nothing behind a wait or halt is read before it is over: it stands before the motions ``halts``.
+    """
     count = np.bincount(motion, minlength=1)
-    return max(count[row : row + in_view].sum() for row in range(len(count)))
+    ends = [*sorted(halts), len(count)]
+    until = [min(row + in_view, next(end for end in ends if end > row)) for row in range(len(count))]
+    return max(count[row:end].sum() for row, end in enumerate(until))
+
+
+def halts_of(path):
+    """Motions before which the advance run waits."""
+    motions = read_program(path).motions
+    return [row for row, m in enumerate(motions) if any(re.match("WAIT|HALT", s) for s in m.before)]
 
 
 def breaks_of_blending(path):
