@@ -39,7 +39,7 @@ def fire(path, targets, cell):
     controller = cell.controller
     advance = math.inf if controller.advance == "unlimited" else controller.advance
     ends = np.flatnonzero(targets.move >= 0)[[0, -1]]
-    if targets.ptp[ends[0] + 1 : ends[1]].any():
+    if targets.ptp[ends[0] + 1 : ends[1] + 1].any():
         return _fire_along_motion(path, targets, cell)
     more = len(read_program(path).motions) - len(targets)  # pieces lie between the two ends
     fired = replay(path, int(ends[0]), int(ends[1]) + more, Law(controller.k_s, advance)).fired
@@ -52,10 +52,21 @@ def fire(path, targets, cell):
     )
 
 
-def most_waiting(motion, in_view):
-    """Largest number of triggers in so many motions that follow each other."""
+def most_waiting(motion, in_view, halts=()):
+    """Largest number of triggers in so many motions that follow each other.
+
+    Nothing behind a wait or halt is read before it is over: it stands before the motions ``halts``.
+    """
     count = np.bincount(motion, minlength=1)
-    return max(count[row : row + in_view].sum() for row in range(len(count)))
+    ends = [*sorted(halts), len(count)]
+    until = [min(row + in_view, next(end for end in ends if end > row)) for row in range(len(count))]
+    return max(count[row:end].sum() for row, end in enumerate(until))
+
+
+def halts_of(path):
+    """Motions before which the advance run waits."""
+    motions = read_program(path).motions
+    return [row for row, m in enumerate(motions) if any(re.match("WAIT|HALT", s) for s in m.before)]
 
 
 def breaks_of_blending(path):

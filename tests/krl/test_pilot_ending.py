@@ -170,12 +170,15 @@ def test_triggers_behind_a_wait_are_not_read_before_it(tmp_path, dwell):
     prediction = moved(read(HEAD + body + FOOT, cell), cell)
     motion = prediction.motion
     force = np.zeros((len(motion), 3))
-    zigzag = 300.0 + 150.0 * (np.arange(len(motion)) // 4 % 2)
+    zigzag = 300.0 + 150.0 * (np.arange(len(motion)) // 6 % 2)
     x = motion.position_mm[:, 0]
     cut = ((x > 4) & (x < 8)) | ((x > 12) & (x < 16))
     force[cut, 0] = zigzag[cut]
     program = write_krl(with_forces(prediction, force), tmp_path / "part.src", pilot="index")
-    assert program.pilot.knots >= 12
+    assert program.pilot.knots > 8
+    assert len(program.targets) == len(prediction.targets)  # no motion had to be cut for them
+    assert "pilot-tolerance" not in {issue.code for issue in program.issues}
+    assert (read_pilot(tmp_path / "part.pilot.csv")[0].lead_s < 0.1).all()  # nor was one told early
     assert program.pilot.max_active <= 8
     report = verify_krl(tmp_path / "part.src", prediction.toolpath, cell)
     assert report.ok, [issue.text() for issue in report.issues]

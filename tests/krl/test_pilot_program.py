@@ -13,7 +13,7 @@ from gcode2krl.errors import RefusedError
 from gcode2krl.pilot import force_at, read_pilot
 from tests.krl.conftest import read
 from tests.krl.forces import cutting_below, moved, with_forces
-from tests.krl.pilot_replay import breaks_of_blending, fire, most_waiting
+from tests.krl.pilot_replay import breaks_of_blending, fire, halts_of, most_waiting
 from tests.krl.replay import read_program
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
@@ -71,7 +71,7 @@ def check(made, in_view=IN_VIEW):
     assert (fired.time_s <= fired.end_s + REPLAY_S).all()
     assert (np.diff(fired.time_s) >= CYCLE_S - REPLAY_S).all()
     assert (np.diff(knots.time_s) >= CYCLE_S - 2e-6).all()
-    assert most_waiting(fired.motion, in_view) <= 8
+    assert most_waiting(fired.motion, in_view, halts_of(made.src)) <= 8
     assert pilot.max_active <= 8
     assert pilot.min_lead_s == pytest.approx(made.lead_s.min(), abs=REPLAY_S)
     assert breaks_of_blending(made.src) == []
@@ -315,7 +315,7 @@ def test_fewer_active_triggers_on_request(make):
     made = make(prediction, sawtooth(prediction, 0.24, 2.4))
     check(made)
     assert made.program.pilot.max_active <= 3
-    assert most_waiting(made.fired.motion, IN_VIEW) <= 3
+    assert most_waiting(made.fired.motion, IN_VIEW, halts_of(made.src)) <= 3
 
 
 def test_without_look_ahead_every_end_is_a_stop_and_nothing_is_cut(make):
