@@ -112,7 +112,7 @@ def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
                     "take it out of the template in the cell (m_code, tool_change, program.epilogue)",
                 )
             )
-    return issues[:_MOST_PER_CHECK]
+    return issues[:MOST_PLACES]
 
 
 def _tools(cell: Cell) -> list[int]:
