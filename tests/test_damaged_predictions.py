@@ -154,8 +154,8 @@ def test_a_whole_table_with_wrong_values(folder, change):
     [
         ('severity = "note"', 'severity = "rumour"', "issues.0.severity"),
         ('severity = "note"', 'severity = "note"\nother = 1', "issues.0.other"),
-        ("line = 0", 'line = "0"', "issues.0.line"),
-        ("line = 0", "line = -7", "issues.0.line"),
+        ("line = 0", 'line = "0"', ".line"),
+        ("line = 0", "line = -7", ".line"),
         ("row = 0,", "row = 99999999,", "99999999"),
         ("row = 0,", "row = 99999999999,", "events.0.row"),
         ("tool = 1,", "", "without tool"),

@@ -79,7 +79,9 @@ def test_a_part_may_be_called_much_like_a_command(
     monkeypatch.chdir(tmp_path)
     Path("predct").write_text("G1 X5\nM30\n")
     assert _run("predct", "-o", "part.src") == 2
-    assert "predct:1: error: feed move without a feed [no-feed]" in capsys.readouterr().err
+    assert (
+        "predct:1: error: feed move without a feed: no F above 0 since the start" in capsys.readouterr().err
+    )
     assert _run("predct.nc", "-o", "part.src") == 2
     assert "predct.nc: error: cannot read" in capsys.readouterr().err
     assert _run("-o", "part.src", "predct") == 2

@@ -33,7 +33,10 @@ def test_a_spindle_that_never_runs_is_one_line(tmp_path: Path, capsys: pytest.Ca
     lines = capsys.readouterr().err.splitlines()
     errors = [line for line in lines if ": error:" in line]
     assert len(errors) == 1
-    assert ":7: error: feed move with the spindle off (also in lines 11, 15, 19 and 56 more)" in errors[0]
+    assert (
+        ":7: error: feed move with the spindle off: no M3 comes before it (also in lines 11, 15, 19 and 56 more)"
+        in errors[0]
+    )
 
 
 def test_json_lists_every_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,8 +63,8 @@ def test_what_follows_from_an_unread_line_is_counted(
     ("lines", "said"),
     [
         (["M3"], "M3 without S in line 4"),
-        (["S8000 M3", "M5"], "stopped by M5 in line 5"),
-        (["S8000 M3", "T2 M6", "G43 H2"], "stopped by M6 in line 5"),
+        (["S8000 M3", "M5"], "it was stopped by M5 in line 5"),
+        (["S8000 M3", "T2 M6", "G43 H2"], "it was stopped by M6 in line 5"),
     ],
 )
 def test_what_left_the_spindle_off_is_named(
@@ -77,7 +80,7 @@ def test_an_axis_without_a_position_is_named_with_what_lost_it(
 ) -> None:
     part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0", "G1 X110 F500"])
     assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 2
-    assert "no Z in 6 lines" in capsys.readouterr().err
+    assert "Z is given no absolute position in 6 lines" in capsys.readouterr().err
     part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"])
     assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
     assert "Z is unknown since the" in capsys.readouterr().err

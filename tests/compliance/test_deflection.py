@@ -64,7 +64,10 @@ class TestDeflection:
     def test_turning_base_changes_no_physics(self, cell, q, force, feed, abc):
         degrees = dict(zip(("a_deg", "b_deg", "c_deg"), 180 * np.array(abc), strict=True))
         turned_cell = resolve_cell(
-            {"based_on": "demonstration", "frames": {"base": {"x_mm": 100.0, **degrees}}}
+            {
+                "based_on": "demonstration",
+                "frames": {"base": {"x_mm": 100.0, "y_mm": 0.0, "z_mm": 0.0, **degrees}},
+            }
         )
         turn = turned_cell.base_matrix()[:3, :3]
         force, feed = 1000 * np.array([force]), np.round([feed], 3)

@@ -114,11 +114,11 @@ def test_the_cell_decides_the_form(made, tmp_path):
 
 
 def test_names_of_the_cell(made, tmp_path):
-    data = {"pilot": {"index_variable": "GK_KNOT", "hash_variable": "GK_SUM"}}
+    data = {"pilot": {"index_variable": "KNOT", "hash_variable": "CHECKSUM"}}
     prediction, _, src = made(part(data))
     text = src.read_text("ascii")
-    assert re.search(r"DO GK_KNOT=0$", text, re.M)
-    assert re.search(r"^GK_SUM=\d+$", text, re.M)
+    assert re.search(r"DO KNOT=0$", text, re.M)
+    assert re.search(r"^CHECKSUM=\d+$", text, re.M)
     assert "SEN_PINT" not in text
     assert verify_krl(src, prediction.toolpath, prediction.cell).ok
 

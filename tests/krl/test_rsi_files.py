@@ -102,7 +102,7 @@ def test_both_files_say_what_the_cell_says():
     ("pilot", "form"),
     [
         ({"index_variable": "KNOT"}, "index"),
-        ({"hash_variable": "$SEN_PREA[2]"}, "index"),
+        ({"hash_variable": "SUM"}, "index"),
         ({"hash_variable": "SUM"}, "values"),
         ({"value_variable": "FORCE"}, "values"),
     ],

@@ -32,8 +32,9 @@ def solve(text, **data):
 
 
 def base(**values):
+    place = dict.fromkeys("xyzabc", 0.0) | values
     return {
-        "base": {f"{key}_{'mm' if key in 'xyz' else 'deg'}": float(value) for key, value in values.items()}
+        "base": {f"{key}_{'mm' if key in 'xyz' else 'deg'}": float(value) for key, value in place.items()}
     }
 
 

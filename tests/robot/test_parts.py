@@ -53,7 +53,10 @@ def wave(count=60, size=300.0):
 @pytest.mark.parametrize("rows", [1, 2, 7, 64])
 @pytest.mark.parametrize("x_mm", [1500.0, 2600.0], ids=["in reach", "partly out of reach"])
 def test_targets(rows_in_a_part, rows, x_mm):
-    targets, cell = program(wave(), frames={"base": {"x_mm": x_mm, "z_mm": 900.0}})
+    targets, cell = program(
+        wave(),
+        frames={"base": {"x_mm": x_mm, "y_mm": 0.0, "z_mm": 900.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}},
+    )
     rows_in_a_part(10**6)
     whole, whole_findings = follow(targets, cell)
     assert np.isnan(whole.q_rad).any() == (x_mm > 2000)
@@ -131,7 +134,10 @@ def test_only_a_home_position():
 
 
 SLOW = [2.0, 3.0, 3.0, 4.0, 5.0, 5.0]
-FAR, HIGH = {"x_mm": 2700.0, "z_mm": 900.0}, {"x_mm": 1150.0, "z_mm": 1400.0}
+FAR, HIGH = (
+    {"x_mm": 2700.0, "y_mm": 0.0, "z_mm": 900.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0},
+    {"x_mm": 1150.0, "y_mm": 0.0, "z_mm": 1400.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0},
+)
 LONG_MOVES = wave(120, 200.0)
 SHORT_MOVES = np.delete(wave(900, 200.0), [*range(200, 210), *range(400, 410), 600, *range(700, 715)], axis=0)
 
