@@ -10,6 +10,8 @@ from gcode2krl.krl.statements import ascii_text
 _WIDTH = 100
 _MOST_OF_A_VALUE = 80
 _BRACKETS = str.maketrans('{}"', "()'")
+_KEPT = "\x00"
+"""Stands for a space at which no line may end."""
 _WITHOUT_WORD = frozenset(
     ["program.memory_moves", "program.warn_size_mb", "program.tool_length", "pilot.form"]
 )
@@ -68,4 +70,7 @@ def _comment(value: str) -> str:
 
 
 def _wrapped(words: "Iterator[str] | list[str]") -> list[str]:
-    return [f"  {line}" for line in textwrap.wrap("; ".join(words), _WIDTH, break_long_words=True)]
+    """Return lines of whole words ``key = value``, where they fit on one."""
+    text = "; ".join(word.replace(" ", _KEPT) for word in words)
+    lines = textwrap.wrap(text, _WIDTH, break_long_words=True, break_on_hyphens=False)
+    return [f"  {line.replace(_KEPT, ' ')}" for line in lines]
