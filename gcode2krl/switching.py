@@ -34,13 +34,9 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
 def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
     """Return key → KRL at several speeds of the spindle, and with what a block may say and leave out."""
     found: dict[str, list[str]] = {}
-    others = [{"rpm": rpm} for rpm in _OTHER_SPEEDS] + [
-        {"p": None},
-        {"text": ""},
-        {"line": 0},
-        {"line": 10**6},
-    ]
-    for other in [{}, *others]:
+    others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
+    others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
+    for other in others:
         for key, text in rendered(templates, {**view, **other}).items():
             found.setdefault(key, []).append(text)
     return found

@@ -30,11 +30,11 @@ _OUTPUT = re.compile(r"(\$OUT\[ ?\d+ ?\]|[A-Z_][A-Z0-9_]*(?:\[\d+\])?) ?= ?(.+)$
 _INTERRUPT = re.compile(r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
                         r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$")  # fmt: skip
 _OF_CONTROLLER = re.compile(
-    r"(BAS|IR_STOPM|SPS|GK_.*|RSI_.*|SETVAR|CWRITE|SYNCCMD|EB.*|[A-Z]*_KRLMSG|[A-Z]*_KRLDLG)"
+    r"(BAS|IR_STOPM|SPS|GK_.*|RSI_.*|SETVAR|CWRITE|SYNCCMD|[A-Z]*_KRLMSG|[A-Z]*_KRLDLG)"
 )
 """Subprograms of the controller that move, set frames, or belong to the program itself."""
-_INSIDE = re.compile(r"(?<![$.#\w])(?:" + "|".join(sorted(_MOTIONS | _JUMPS | {"DO", "TRIGGER", "BAS"})) + r")(?![\w])"
-                     r"|(?<![$.#\w])C_(?:DIS|PTP|ORI|VEL|SPL)\b")  # fmt: skip
+_WORDS_INSIDE = [*_MOTIONS, *_JUMPS, "DO", "TRIGGER", "BAS", "C_DIS", "C_PTP", "C_ORI", "C_VEL", "C_SPL"]
+_INSIDE = re.compile(rf"(?<![$.#\w])(?:{'|'.join(_WORDS_INSIDE)})(?!\w)")
 """Words that move or jump; a controller may read a line on behind a whole statement."""
 _ALONE = frozenset(
     ["ENDIF", "ENDWHILE", "ENDFOR", "LOOP", "ENDLOOP", "REPEAT", "ENDSWITCH", "ELSE", "DEFAULT"]
@@ -107,11 +107,6 @@ def switched(text: str) -> list[Switched]:
                 name = match[1].replace(" ", "")
                 found.append(Switched(name, match[2] != "FALSE", known and depth == 0))
     return found
-
-
-def touched(text: str) -> frozenset[str]:
-    """Return the signals that KRL text sets or pulses, whatever becomes of them."""
-    return frozenset(one.name for one in switched(text))
 
 
 def pulses(text: str) -> list[str]:

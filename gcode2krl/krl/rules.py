@@ -51,7 +51,7 @@ _SETTING = re.compile(
 )
 _SET_WITH_THE_TOOL = frozenset(["$LOAD", "$ACT_TOOL", "$ACT_BASE"])
 _REMEDY = "take it out of the template in the cell (m_code, tool_change, program.epilogue)"
-_REMEDY_OF_TOOL = "translate again, with the cell it was made with: this is the frame of none of its tools"
+_REMEDY_OF_TOOL = f"translate again, with the cell it was made with; or {_REMEDY}"
 _JUMP = re.compile(r"(GOTO|RESUME|ASYPTP)")
 _MOTION_WORDS = frozenset(
     ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
