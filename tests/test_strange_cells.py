@@ -116,9 +116,9 @@ def m_codes(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        ("M8 = '{% if rpm > 5000 %}$OUT[7]=TRUE{% endif %}'\nM9 = '$OUT[8]=FALSE'", "M9"),
+        ("M8 = '{% if rpm > 5000 %}$OUT[7]=TRUE{% endif %}'\nM9 = \"$OUT[3]=FALSE\\n$OUT[4]=FALSE\"", "M9"),
         ("M5 = '{% if rpm %}$OUT[1]=FALSE{% endif %}'\nM4 = ''", "M5"),
-        ("M8 = 'PULSE($OUT[7],FALSE,1)'\nM9 = '$OUT[8]=FALSE'", "M9"),
+        ("M8 = 'PULSE($OUT[7],FALSE,1)'\nM9 = \"$OUT[3]=FALSE\\n$OUT[4]=FALSE\"", "M9"),
     ],
 )
 def test_pairs_hold_at_every_speed_and_for_pulses(tmp_path, text, key):
