@@ -6,7 +6,6 @@ accepted is also used: its templates are rendered, and what is missing and doubt
 
 import argparse
 import random
-import resource
 import sys
 import tempfile
 import time
@@ -15,6 +14,7 @@ from collections import Counter
 from pathlib import Path
 
 import tomli_w
+from fuzz_common import MOST_MB, peak_mb
 
 from gcode2krl import load_cell
 from gcode2krl.cell import as_toml, cell_from_resolved
@@ -24,7 +24,6 @@ from gcode2krl.krl.provenance import provenance_lines
 from gcode2krl.krl.statements import render
 
 SLOW_S = 5.0
-MOST_BYTES = 1_000_000_000
 VALUES = (
     0, 1, -1, 3, 5.0, 0.12, 200, 1e9, 1e300, -1e-300, 2**63, 10**40, float("inf"), float("nan"), True, False,
     "", "120", "none", "auto", "x\n$BASE=$NULLFRAME", "\x00", "é", "a" * 5000, "KRC4",
@@ -66,14 +65,14 @@ def main(argv: list[str] | None = None) -> int:
             spent = time.perf_counter() - started
             worst_s = max(worst_s, spent)
             outcome["slow"] += spent > SLOW_S
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    peak = peak_mb()
     print(
         f"cells: {chosen.count}, accepted {outcome['accepted']}, refused {outcome['refused']}, "
-        f"worst {worst_s:.2f} s, peak {peak / 1e6:.0f} MB, tracebacks {len(broken)}"
+        f"worst {worst_s:.2f} s, peak {peak:.0f} MB, tracebacks {len(broken)}"
     )
     for number, text in broken[:5]:
         print(f"cell {number}:\n{text}")
-    return int(bool(broken) or outcome["slow"] > 0 or peak > MOST_BYTES)
+    return int(bool(broken) or outcome["slow"] > 0 or peak > MOST_MB)
 
 
 def use(path: Path) -> bool:

@@ -112,7 +112,7 @@ def _work(
     os.dup2(errors, 2)
     os.dup2(errors, 1)
     attempt = prepare(place)
-    tally, said = Tally(start_mb=_peak_mb()), os.fstat(errors).st_size
+    tally, said = Tally(start_mb=peak_mb()), os.fstat(errors).st_size
     for number in range(start, count):
         shared[0], shared[1] = number, time.monotonic()
         _one(attempt, seed, number, place, tally)
@@ -121,7 +121,7 @@ def _work(
             words = os.pread(errors, 300, said).decode("utf-8", "replace").replace("\n", " | ")
             tally.failures.append(f"case {number}: on standard error: {words}")
             said = now
-        peak = _peak_mb()
+        peak = peak_mb()
         if peak > max(MOST_MB, tally.peak_mb):
             tally.failures.append(f"case {number}: {peak:.0f} MB")
         tally.peak_mb = max(tally.peak_mb, peak)
@@ -154,8 +154,13 @@ def _one(attempt: Try, seed: int, number: int, place: Path, tally: Tally) -> Non
         tally.slowest_s, tally.slowest = took_s, f"case {number} ({what})"
 
 
-def _peak_mb() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+def peak_mb() -> float:
+    """Return the largest memory of this program; `getrusage` keeps that of the parent, over fork and exec."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:  # not Linux: the parent's counts
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) / 1024.0
 
 
 def mutated(rng: np.random.Generator, data: bytes, other: bytes = b"") -> bytes:

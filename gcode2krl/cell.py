@@ -107,8 +107,8 @@ class Cell(Section):
 
     @property
     def is_confirmed(self) -> bool:
-        """True where a person confirmed every stated value: ``verified`` covers its own file alone."""
-        return self.verified is not None and all(taken.verified for taken in self.taken_over)
+        """True where a person confirmed every value: ``verified`` never covers what is taken over."""
+        return self.verified is not None and not self.taken_over
 
     @property
     def clearance_z_mm(self) -> float | None:
@@ -258,9 +258,7 @@ def cell_schema() -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _default_cell() -> Cell:
-    data = library.read_model("cells", DEMONSTRATION)
-    own = {key: value for key, value in data.items() if key != "model"}
-    return resolve_cell(own, source="the demonstration cell")
+    return resolve_cell(library.read_model("cells", DEMONSTRATION), source="the demonstration cell")
 
 
 def _fill_in(section: Any, kind: str) -> Any:
@@ -311,7 +309,7 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
     texts = switching.rendered(templates, view)
-    yield from (issue for issue in switching.pair_issues(templates, texts) if issue.severity == "error")
+    yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
 
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Any
 
 import jinja2
-from jinja2 import nodes
+from jinja2 import filters, nodes
 from jinja2.exceptions import SecurityError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
@@ -20,8 +20,12 @@ MOST_CHARACTERS = 16_384
 MOST_OUTPUT = 4 * MOST_CHARACTERS
 MOST_ROUNDS = 1000
 """Of a loop."""
+MOST_TEXT = 1000
+"""Characters of a text of the cell: a template may say it a thousand times in one expression."""
 _MOST_NUMBER = 1e15
-_FILTERS = ("abs", "round", "int", "float", "upper", "lower", "trim", "default", "d", "length")
+_MOST_DECIMALS = 9
+_FILTERS = ("abs", "int", "float", "upper", "lower", "trim", "default", "d", "length")
+_ROUNDS = "_rounds"
 _TESTS = ("defined", "undefined", "none", "number", "string", "odd", "even", "eq", "ne", "lt", "le", "gt",
           "ge", "in", "==", "!=", "<", "<=", ">", ">=")  # fmt: skip
 _NODES = (
@@ -105,7 +109,9 @@ class _Environment(ImmutableSandboxedEnvironment):
             value = obj[str(key)]
             if isinstance(value, Mapping):
                 return _Table(value, name)
-            return _Missing(name=name, exc=jinja2.UndefinedError) if value is None else value
+            if value is None:
+                return _Missing(name=name, exc=jinja2.UndefinedError)
+            return _short(name, value) if isinstance(value, str) else value
         if isinstance(obj, tuple) and isinstance(key, int) and -len(obj) <= key < len(obj):
             return obj[key]
         raise SecurityError(f"no {str(key)[:40]!r} of a plain value")
@@ -168,9 +174,17 @@ def _plain(name: str, value: Any) -> Any:
         return _Table(value, name)
     if value is None:
         return _Missing(name=name)
-    if isinstance(value, str | int | float):
+    if isinstance(value, str):
+        return _short(name, value)
+    if isinstance(value, int | float):
         return value
     raise TemplateError(f"{name} is no plain value")
+
+
+def _short(name: str, value: str) -> str:
+    if len(value) > MOST_TEXT:
+        raise TemplateError(f"{name[:80]} is longer than {MOST_TEXT} characters")
+    return value
 
 
 def _is_number(value: Any) -> bool:
@@ -187,11 +201,18 @@ def _formatted(pattern: str, values: Any) -> str:
     return pattern % given
 
 
-def _range(*bounds: int) -> range:
-    found = range(*bounds)
-    if len(found) > MOST_ROUNDS:
+def _rounds(values: Any) -> Any:
+    """Return what a loop runs over, if it is short enough; each loop is made to ask."""
+    if isinstance(values, range | tuple | list | str | _Table) and len(values) > MOST_ROUNDS:
         raise TemplateError(f"a loop of more than {MOST_ROUNDS} rounds")
-    return found
+    return values
+
+
+def _round(value: Any, precision: Any = 0, method: Any = "common") -> Any:
+    """Round as Jinja2 does; it would compute 10 to the power of any precision."""
+    if not (isinstance(precision, int) and abs(precision) <= _MOST_DECIMALS):
+        raise TemplateError(f"round: allowed -{_MOST_DECIMALS} to {_MOST_DECIMALS} decimals")
+    return filters.do_round(value, precision, method)
 
 
 @lru_cache(maxsize=256)
@@ -201,6 +222,8 @@ def _compiled(text: str) -> jinja2.Template:
     environment = _environment()
     tree = environment.parse(text)
     _refuse_more(tree, 0)
+    for loop in list(tree.find_all(nodes.For)):
+        loop.iter = nodes.Filter(loop.iter, _ROUNDS, [], [], None, None)
     return environment.from_string(tree)
 
 
@@ -210,9 +233,9 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False,
         optimized=False, finalize=_final,
     )  # fmt: skip
-    made.globals = {"range": _range}
+    made.globals = {"range": range}
     made.filters = {name: made.filters[name] for name in _FILTERS}
-    made.filters["decimals"] = _decimals
+    made.filters |= {"decimals": _decimals, "round": _round, _ROUNDS: _rounds}
     made.tests = {name: made.tests[name] for name in _TESTS}
     made.tests["none"] = lambda value: value is None or isinstance(value, _Missing)
     return made
@@ -232,8 +255,8 @@ def _final(value: Any) -> Any:
 
 
 def _decimals(value: float, count: int) -> str:
-    if not 0 <= count <= 9:
-        raise TemplateError("decimals: allowed 0 to 9")
+    if not 0 <= count <= _MOST_DECIMALS:
+        raise TemplateError(f"decimals: allowed 0 to {_MOST_DECIMALS}")
     return f"{float(value):.{int(count)}f}"
 
 

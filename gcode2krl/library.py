@@ -103,9 +103,8 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
     file = by_folded_name.get(_fold(model))
     if file is None:
         near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
-        remedy = (
-            f"did you mean {read_toml(by_folded_name[near[0]])['model']!r}?" if near else "see the library"
-        )
+        meant = [name for name in known if _fold(name) in near]
+        remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"
         raise input_error(
             "model-unknown", f"{kind[:-1]}.model: found {model[:60]!r}, allowed: {', '.join(known)}", remedy
         )

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from gcode2krl import frames as fr
 from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.template_rules import external_problem
 from gcode2krl.units import RAD_PER_DEG
 
 Sure = Literal["verified", "checked", "memory", "assumption", "unknown"]
@@ -479,6 +480,13 @@ class Program(Section):
     """KRL (Jinja2) after the last motion."""
     memory_moves: Annotated[int, Field(strict=True, ge=1)] = 30000
     """LIN lines a controller surely holds."""
+
+    @field_validator("externals")
+    @classmethod
+    def _subprograms(cls, externals: tuple[str, ...]) -> tuple[str, ...]:
+        for problem in filter(None, map(external_problem, externals)):
+            raise ValueError(problem)
+        return externals
 
 
 class Verified(Section):

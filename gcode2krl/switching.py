@@ -7,6 +7,8 @@ from gcode2krl import template_rules as rules
 from gcode2krl.cell_templates import MissingValueError, TemplateError, render
 from gcode2krl.errors import Issue, Severity
 
+_OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
+"""Of the spindle, in rpm: a template may switch by it."""
 SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """Which M-code switches off what another switches on."""
@@ -29,6 +31,17 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
     return texts
 
 
+def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return key → KRL at several speeds of the spindle, and with what a block may say and leave out."""
+    found: dict[str, list[str]] = {}
+    others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
+    others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
+    for other in others:
+        for key, text in rendered(templates, {**view, **other}).items():
+            found.setdefault(key, []).append(text)
+    return found
+
+
 def template_issues(
     templates: Mapping[str, str], view: Mapping[str, Any], externals: tuple[str, ...]
 ) -> Iterator[Issue]:
@@ -44,23 +57,26 @@ def template_issues(
             yield template_issue(key, what)
 
 
-def pair_issues(templates: Mapping[str, str], texts: Mapping[str, str]) -> Iterator[Issue]:
+def pair_issues(templates: Mapping[str, str], view: Mapping[str, Any]) -> Iterator[Issue]:
     """Yield the halves of pairs: what switches on without its partner that switches off.
 
-    A warning where the partner calls a subprogram, whose effect is not read.
+    A warning where the partner calls a subprogram, whose effect is not read. What switches by a condition of
+    its template counts as it is worst.
     """
+    texts = rendered_widely(templates, view) if any(f"m_code.{on}" in templates for on in _OFF) else {}
     for on, off in _OFF.items():
         on_key, off_key = f"m_code.{on}", f"m_code.{off}"
         if on_key not in templates:
             continue
         if off_key not in templates:
             yield _pair(off_key, f"{on_key} without {off_key}: nothing switches off what {on} switches on")
-        elif off_key in texts and not rules.statements(texts[off_key]):
+        elif off_key in texts and not all(map(rules.statements, texts[off_key])):
             yield _pair(off_key, f"{off_key} is empty: nothing switches off what {on} switches on")
         elif on_key in texts and off_key in texts:
-            left = rules.may_be_on(texts[on_key]) - rules.surely_off(texts[off_key])
+            switched_on = frozenset().union(*map(rules.may_be_on, texts[on_key]))
+            left = switched_on - frozenset.intersection(*map(rules.surely_off, texts[off_key]))
             if left:
-                names, called = ", ".join(sorted(left)), rules.calls(texts[off_key])
+                names, called = ", ".join(sorted(left)), rules.calls(texts[off_key][0])
                 text = f"{on_key} switches on {names}, which {off_key} does not switch off"
                 if called:
                     text += f", unless {called[0]} does"
@@ -87,7 +103,7 @@ def _meanings(
 ) -> Iterator[Issue]:
     yield from _same_number(named, "$OUT", _may_share)
     yield from _same_number(inputs, "$IN", lambda a, b: False)
-    on = {key: rules.may_be_on(text) for key, text in texts.items()}
+    on = {key: rules.may_be_on(text) | frozenset(rules.pulses(text)) for key, text in texts.items()}
     spindle = _union(on, _SPINDLE)
     coolant = _union(on, _COOLANT)
     for signal in sorted(spindle | coolant):
@@ -115,10 +131,16 @@ def _meanings(
 def signals_text(texts: Mapping[str, str], key: str) -> str:
     """Return what a template switches as a person reads it: ``$OUT[1] on, $OUT[2] off``."""
     found = {one.name: one for one in rules.switched(texts.get(key, ""))}
-    words = (
+    text = texts.get(key, "")
+    pulsed = rules.pulses(text)
+    words = [
         f"{one.name} {'on' if one.value else 'off'}{'' if one.sure else ' (perhaps)'}"
         for one in found.values()
-    )
+        if one.name not in pulsed
+    ]
+    words += [f"{name} pulsed" for name in pulsed]
+    words += [line for line in rules.statements(text) if line.startswith("$ANOUT")]
+    words += [f"calls {name}" for name in rules.calls(text)]
     return ", ".join(words)
 
 

@@ -25,10 +25,22 @@ _MOTIONS = frozenset(["PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL", "SPL
 _JUMPS = frozenset(["GOTO", "RETURN", "RESUME", "BRAKE"])
 _ASSIGNED = re.compile(r"(\$?)([A-Z_][A-Z0-9_]*)((?:\.[A-Z0-9_]+|\[[^\]=]*\])*) ?=(?!=)")
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*) ?\(")
-_PULSE = re.compile(r"PULSE ?\( ?\$?([A-Z_][A-Z0-9_]*)(\[[^\]=]*\])? ?,[^()]*\)$")
+_PULSE = re.compile(r"PULSE ?\( ?(\$OUT\[ ?\d+ ?\]) ?, ?(TRUE|FALSE) ?,[^()]*\)$")
 _OUTPUT = re.compile(r"(\$OUT\[ ?\d+ ?\]|[A-Z_][A-Z0-9_]*(?:\[\d+\])?) ?= ?(.+)$")
 _INTERRUPT = re.compile(r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
                         r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$")  # fmt: skip
+_OF_CONTROLLER = re.compile(
+    r"(BAS|IR_STOPM|SPS|GK_.*|RSI_.*|SETVAR|CWRITE|SYNCCMD|[A-Z]*_KRLMSG|[A-Z]*_KRLDLG)"
+)
+"""Subprograms of the controller that move, set frames, or belong to the program itself."""
+_WORDS_INSIDE = [*_MOTIONS, *_JUMPS, "DO", "TRIGGER", "BAS", "C_DIS", "C_PTP", "C_ORI", "C_VEL", "C_SPL"]
+_INSIDE = re.compile(rf"(?<![$.#\w])(?:{'|'.join(_WORDS_INSIDE)})(?!\w)")
+"""Words that move or jump; a controller may read a line on behind a whole statement."""
+_ALONE = frozenset(
+    ["ENDIF", "ENDWHILE", "ENDFOR", "LOOP", "ENDLOOP", "REPEAT", "ENDSWITCH", "ELSE", "DEFAULT"]
+)
+_COUNTS = re.compile(r"FOR (?!\$)([A-Z_][A-Z0-9_]*) ?= ?[^=]+ TO ")
+_HIGHEST_OUTPUT = 8192
 _CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
 
 
@@ -64,6 +76,21 @@ def problem(text: str, externals: Iterable[str] = ()) -> str:
     return _unbalanced(text)
 
 
+def external_problem(external: str) -> str:
+    """Return why a subprogram may not be declared for templates, empty where it may."""
+    name = external.split("(")[0].strip().upper()
+    own = name in _MOTIONS | _JUMPS | _CONDITIONS | _FUNCTIONS | {
+        "DO",
+        "TRIGGER",
+        "HALT",
+        "WAIT",
+        "INTERRUPT",
+    }
+    if own or _OF_CONTROLLER.fullmatch(name):
+        return f"{name} is of the controller or of KRL, no subprogram that a template may call"
+    return ""
+
+
 def switched(text: str) -> list[Switched]:
     """Return the digital outputs that KRL text sets, in order."""
     depth, found = 0, []
@@ -71,12 +98,20 @@ def switched(text: str) -> list[Switched]:
         word = _first(statement)
         depth += (word in _OPEN) - (word in _CLOSE)
         match = _OUTPUT.match(statement)
-        if match:
+        pulse = _PULSE.match(statement)
+        if pulse:  # it ends by itself in the other state
+            found.append(Switched(pulse[1].replace(" ", ""), pulse[2] != "TRUE", depth == 0))
+        elif match:
             known = match[2] in ("TRUE", "FALSE")
             if known or match[1].startswith("$"):
                 name = match[1].replace(" ", "")
                 found.append(Switched(name, match[2] != "FALSE", known and depth == 0))
     return found
+
+
+def pulses(text: str) -> list[str]:
+    """Return the outputs that KRL text pulses."""
+    return [match[1].replace(" ", "") for match in map(_PULSE.match, statements(text)) if match]
 
 
 def calls(text: str) -> list[str]:
@@ -123,6 +158,13 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
         return "moves the robot"
     if word in _JUMPS or re.match(r"[A-Z_][A-Z0-9_]* ?:", statement):
         return "leaves the order of the program"
+    bare = re.sub(r'"[^"]*"', '""', statement)
+    inside = _INSIDE.search(bare if word not in ("INTERRUPT", "GLOBAL") else bare.partition(" DO ")[0])
+    if inside:
+        return f"has {inside[0]} in it, which moves the robot or leaves the order of the program"
+    outputs = re.findall(r"\$OUT\[ ?(\d+) ?\]", bare)
+    if not all(1 <= int(number[:6]) <= _HIGHEST_OUTPUT for number in outputs):
+        return f"names an output that no controller has: 1 to {_HIGHEST_OUTPUT}"
     if word in ("INTERRUPT", "GLOBAL"):
         return _wrong_interrupt(statement, callable_names)
     for name in _called(statement):
@@ -131,9 +173,16 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
     if _assignments(statement) > 1:
         return "assigns twice in a line"
     if word == "PULSE":
-        return "" if _is_switchable_pulse(statement) else "pulses something other than an output"
+        return "" if _PULSE.match(statement) else "is no pulse of an output whose number is written"
+    if word in _ALONE and statement != word:
+        return f"says more than {word}"
+    if word == "FOR":
+        counts = _COUNTS.match(statement)
+        return (
+            "" if counts and not _PLANNER_DATA.match(counts[1]) else "counts in a variable of the controller"
+        )
     if word in _CONDITIONS:
-        return "" if _assignments(statement) == 0 or word == "FOR" else "assigns in a condition"
+        return "" if _assignments(statement) == 0 else "assigns in a condition"
     if word in ("HALT", "CONTINUE", "EXIT") and statement == word:
         return ""
     if word == "WAIT":
@@ -143,7 +192,7 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
     if assigned:
         return _wrong_assignment(assigned)
     if _CALL.match(statement) and statement.endswith(")") and _first(statement) in callable_names:
-        return ""
+        return "" if _assignments(statement) == 0 else "assigns in a call"
     return "is not a statement that templates may use"
 
 
@@ -172,11 +221,6 @@ def _wrong_assignment(assigned: re.Match[str]) -> str:
     if not system and _PLANNER_DATA.match(name):
         return f"changes {name}, which the controller or the program uses"
     return ""
-
-
-def _is_switchable_pulse(statement: str) -> bool:
-    match = _PULSE.match(statement)
-    return match is not None and match[1] == "OUT"
 
 
 def _wrong_interrupt(statement: str, callable_names: set[str]) -> str:

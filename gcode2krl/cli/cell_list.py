@@ -69,7 +69,7 @@ def findings(cell: Cell) -> list[Issue]:
     """Return what is doubtful in the cell, and what its templates must not say."""
     templates = cell.templates()
     wrong = switching.template_issues(templates, _view(cell), cell.program.externals)
-    pairs = switching.pair_issues(templates, switching.rendered(templates, _view(cell)))
+    pairs = switching.pair_issues(templates, _view(cell))
     return [*wrong, *pairs, *range_issues(cell)]
 
 

@@ -50,6 +50,8 @@ _SETTING = re.compile(
     r"[\[\].A-Z0-9_]*=(?!=)|BAS\(#(?!TOOL)"
 )
 _SET_WITH_THE_TOOL = frozenset(["$LOAD", "$ACT_TOOL", "$ACT_BASE"])
+_REMEDY = "take it out of the template in the cell (m_code, tool_change, program.epilogue)"
+_REMEDY_OF_TOOL = f"translate again, with the cell it was made with; or {_REMEDY}"
 _JUMP = re.compile(r"(GOTO|RESUME|ASYPTP)")
 _MOTION_WORDS = frozenset(
     ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
@@ -109,7 +111,7 @@ def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
                     "krl-setting-changed",
                     statement.line,
                     in_file(program, statement.file) + f"{statement.text[:50]!r} behind the first motion",
-                    "take it out of the template in the cell (m_code, tool_change, program.epilogue)",
+                    _REMEDY_OF_TOOL if set_here and set_here[1] == "$TOOL" else _REMEDY,
                 )
             )
     return issues[:MOST_PLACES]

@@ -55,7 +55,7 @@ def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
         yield f"tool.{numbers[0] if numbers else 1}", "the cell has no tool"
     for number in used or sorted(cell.tool)[:1]:
         for key in cell.missing_of_tool(number):
-            yield key, f"where the tip of T{number} is is not known"
+            yield key, f"the tip of T{number} is not known"
 
 
 def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
@@ -87,7 +87,7 @@ def _unread_pairs(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
     used = _used_templates(toolpath, templates)
-    for issue in switching.pair_issues(templates, switching.rendered(templates, view)):
+    for issue in switching.pair_issues(templates, view):
         if issue.message.split()[0] in used:
             yield issue
 
