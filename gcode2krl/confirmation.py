@@ -13,7 +13,7 @@ _TIME_ZONES = datetime.timedelta(days=1)
 
 
 def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple[Issue, ...]:
-    """Return a warning where ``verified`` names a day that has not come; ``today`` is by default the clock's."""
+    """Return a warning where ``verified`` names a day to come; ``today`` is by default that of the clock."""
     if cell.verified is None:
         return ()
     today = today if today is not None else datetime.datetime.now(datetime.UTC).date()

@@ -83,7 +83,7 @@ class Frame(Place):
 
 
 _ROUNDED_SHARE = 0.005
-"""Share of the diameter by which the radius of a ball may be rounded: 1.6 for a ball of 3.175 mm."""
+"""Share of the diameter by which the radius of a ball may be rounded: 1.58 for a ball of 3.175 mm."""
 _LENGTHS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
 
 

@@ -126,9 +126,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     issues = (
         *findings_of(seen, forces, cell, field.guessed),
         *stock_findings(work, cell.stock, before, met & work.feed),
-        *uses(
-            seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell
-        ),
+        *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))
     return Removal(replace(forces, issues=ordered), field)

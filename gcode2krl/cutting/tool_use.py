@@ -64,7 +64,7 @@ def _sideways(number: int, line: int) -> Issue:
 
 def _fast_plunge(number: int, tool: Tool, down_mm: float, most_mm: float, line: int) -> Issue:
     sentence = (
-        f"T{number} plunges into material with a feed of {down_mm:.2g} mm a tooth, more than {most_mm:.2g} mm "
-        f"for a mill of {tool.diameter_mm:g} mm"
+        f"T{number} plunges into material with a feed of {down_mm:.2g} mm a tooth, more than "
+        f"{most_mm:.2g} mm for a mill of {tool.diameter_mm:g} mm"
     )
     return Issue("warning", "plunge-fast", line, sentence, "lower F for the plunge, or ramp down")

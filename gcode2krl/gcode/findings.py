@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from gcode2krl.errors import Issue, Severity
 
-
 FIRST_FOREIGN = 128
 """Characters from here on are not those of the keyboard's ASCII."""
 
@@ -398,7 +397,7 @@ def _printable(code: int) -> str:
 def _replacement(code: int) -> str:
     """Return what to write instead of a character; a document turns - into its own minus signs and dashes."""
     character = _foreign(code) if code >= FIRST_FOREIGN else ""
-    if character and unicodedata.category(character) == "Pd" or character == "\u2212":
+    if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
         return "write - (the minus sign of the keyboard)"
     return "remove it, or put it in a comment ( )"
 

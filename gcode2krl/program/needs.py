@@ -10,7 +10,6 @@ from gcode2krl.errors import Issue
 from gcode2krl.sections import missing_key
 from gcode2krl.tables import Event, Toolpath
 
-
 _LEAST_WAIT_S = 0.5
 """Assumed: motor spindles start and stop in 1 to 15 s, the smallest in half a second."""
 _LEAST_HELIX_DEG = 5.0
