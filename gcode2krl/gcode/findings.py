@@ -341,14 +341,15 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     if number in (UNSUPPORTED_G, UNSUPPORTED_M):
         reasons = UNSUPPORTED_G_REASONS if number == UNSUPPORTED_G else UNSUPPORTED_M_REASONS
         reason, remedy = _nearest_below(reasons, int(a))
+    character = int(a) if number == BAD_CHARACTER else 0
     values = {
         "a": a,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < 128 else "?",
         "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
-        "char": _printable(int(a)),
-        "replacement": _replacement(int(a)),
+        "char": _printable(character),
+        "replacement": _replacement(character),
         "g": f"{a / 10:g}",
         "h": f"{b / 10:g}",
         "difference": abs(a - b),
