@@ -11,7 +11,9 @@ OWN_CELL = CELL_HEAD.replace('based_on = "demonstration"\n', "")
 """A cell that is based on nothing."""
 FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
 AFTER_T7 = 6
-TWO_RAPIDS = {14: "@N110 G0 X60. Y40."}
+TWO_RAPIDS = {14: "@N110 G0 X60. Y40.", 15: "N120 G1 X110. Y80."}
+"""A rapid at cutting depth; the move behind it leads to where the next arc begins."""
+T9 = {6: "N30 T9 M6", 10: "N70 G43 Z25. H9"}
 BIG_STOCK = "[stock]\nbox_mm = [[-30.0, -30.0, -20.0], [150.0, 110.0, 0.0]]\n"
 
 
@@ -41,7 +43,7 @@ REPORTED = (
     Mistake(
         "template that changes $BASE",
         r"BASE",
-        cell='[m_code]\nM8 = "$BASE=$NULLFRAME"\nM9 = "$OUT[3]=FALSE"\n',
+        cell='[m_code]\nM8 = "$BASE=$NULLFRAME"\nM9 = """\n$OUT[3]=FALSE\n$OUT[4]=FALSE"""\n',
     ),
     Mistake("template that moves", r"(?i)LIN|move", cell='tool_change = "LIN_REL {Z 300}"\n'),
     Mistake(
@@ -67,7 +69,7 @@ REPORTED = (
     Mistake(
         "the stated stock is never touched",
         r"(?i)stock",
-        {5: "G55"},
+        {5: "G55", 12: "@"},
         or_whole=True,
         severity="warning",
         cell=STOCK + "[work_offsets.G55]\nx_mm = 0.0\ny_mm = 0.0\nz_mm = 60.0\n"
@@ -177,13 +179,13 @@ FURTHER = (
     Mistake("F in mm/s", r"(?i)chip|feed|F", {13: "@N100 Y70. F20.", 12: "@", 15: "@"}, severity="warning"),
     Mistake(
         "F with a zero too many",
-        r"(?i)chip|force",
+        r"(?i)chip|force|tooth",
         {12: "@", 13: "@N100 Y70. F12000.", 14: "@", 15: "@", 16: "@"},
         severity="warning",
     ),
     Mistake(
         "S in revolutions a second",
-        r"(?i)chip|force",
+        r"(?i)chip|force|tooth",
         {7: "@N40 S133 M3", 12: "@", 13: "@", 14: "@", 15: "@"},
         severity="warning",
     ),
@@ -217,6 +219,7 @@ FURTHER = (
         "file saved as UTF-16",
         r"(?i)UTF|text|binary|character",
         data="G21 G90\nG0 X0 Y0\n".encode("utf-16"),
+        expected=(1,),
         or_whole=True,
     ),
     Mistake(
@@ -260,6 +263,7 @@ FURTHER = (
     Mistake(
         "flat mill with a corner radius",
         r"corner_radius_mm",
+        T9,
         cell='[tool.9]\nkind = "flat"\ndiameter_mm = 10.0\n'
         "teeth = 2\ncorner_radius_mm = 5.0\nlength_mm = 100.0\n",
         or_whole=True,
@@ -419,7 +423,8 @@ FURTHER = (
     Mistake(
         "helix in radians",
         r"(?i)helix",
-        cell="[tool.9]\ndiameter_mm = 10.0\nteeth = 2\nhelix_deg = 0.52\n",
+        T9,
+        cell="[tool.9]\ndiameter_mm = 10.0\nteeth = 2\nhelix_deg = 0.52\nlength_mm = 100.0\n",
         severity="warning",
         or_whole=True,
     ),

@@ -18,7 +18,7 @@ from pydantic import Field, ValidationError
 
 from gcode2krl import frames as fr
 from gcode2krl import library
-from gcode2krl.cell_base import DEMONSTRATION, Taken, lay_over_base, stated_keys
+from gcode2krl.cell_base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.online_section import Online
 from gcode2krl.sections import (
@@ -218,7 +218,7 @@ def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str =
         raise NotUnderstoodError(error.issues, error.source or source) from None
     except ValidationError as error:
         raise NotUnderstoodError(_validation_issues(error), source) from None
-    wrong = tuple(_contradictions(cell, known))
+    wrong = (*_split_pairs(stated), *_contradictions(cell, known))
     if wrong:
         raise NotUnderstoodError(wrong, source)
     return cell.model_copy(update={"defaults": tuple(_defaults(cell, known))})
@@ -311,6 +311,19 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     texts = switching.rendered(templates, view)
     yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
+
+
+def _split_pairs(stated: StatedCell) -> Iterator[Issue]:
+    whose = {taken.key: taken.source for taken in stated.taken}
+    for number, frame in split_pairs(stated):
+        own, other = (number, frame) if number not in whose else (frame, number)
+        yield Issue(
+            "error",
+            "frame-split",
+            0,
+            f"{own} is stated here, and {other}, which belongs to it, comes from {whose[other]!r}",
+            f"state {number} and {frame} in one file, as the controller has them",
+        )
 
 
 def _named_outputs(cell: Cell, stated: frozenset[str]) -> dict[str, int | None]:

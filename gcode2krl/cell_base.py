@@ -3,6 +3,7 @@
 Nothing is taken over that the file does not ask for by name, and each value taken over is recorded.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ _SHAPE_KEYS = frozenset(["box_mm", "mesh"])
 _JOINTS_OF_END_EFFECTOR = ("sensor", "spindle")
 _FILES = (("robot", "model"), ("controller", "model"), ("material", "model"), ("stock", "mesh"),
           ("online", "calibration"))  # fmt: skip
+_NUMBER_OF_FRAME = re.compile(r"frames\.base_data|tool\.\d+\.tool_data")
+"""Numbers of the controller's table; the frame beside each is compared with the controller's own."""
 Table = dict[str, Any]
 
 
@@ -65,6 +68,19 @@ def lay_over_base(data: Table, beside: Path | None, source: str, seen: tuple[Pat
         if key not in stated and key.rpartition(".")[2] not in _NO_VALUES
     )
     return StatedCell(merged, taken)
+
+
+def split_pairs(stated: StatedCell) -> Iterator[tuple[str, str]]:
+    """Yield (number, frame), dotted keys of a pair whose halves come from different files.
+
+    A number of ``BASE_DATA`` or ``TOOL_DATA`` beside a frame of somebody else's names two different places.
+    """
+    whose = {taken.key: taken.source for taken in stated.taken}
+    known = stated_keys(stated.data)
+    for number in sorted(filter(_NUMBER_OF_FRAME.fullmatch, known)):
+        frame = "frames.base" if number == "frames.base_data" else number.removesuffix("tool_data") + "frame"
+        if frame in known and whose.get(number) != whose.get(frame):
+            yield number, frame
 
 
 def is_demonstration(name: str) -> bool:

@@ -70,7 +70,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     remedy = "see docs/cell.md for the format"
     for number, line in enumerate(text.split("\n"), start=1):
         if _MANY_DOTS.search(line):
-            sentence = f"line {number}: a key of more than {MOST_LEVELS} parts"
+            sentence = f"line {number}: a key of more than {MOST_LEVELS} parts: nested too deeply"
             raise input_error("not-toml", sentence, remedy, source=source)
     try:
         found = tomllib.loads(text)

@@ -17,7 +17,9 @@ from pydantic import BaseModel
 
 from gcode2krl.errors import Issue
 
-_ANGLES = re.compile(r"((?:frames\.(?:base|tool)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg")
+_ANGLES = re.compile(
+    r"((?:frames\.(?:base|tool)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
+)
 _EIGHTH_TURN_RAD = math.pi / 4
 _NEAR_RAD = 2e-4
 _FULL_TURN = 8.01

@@ -1,5 +1,6 @@
 """The sections of a cell file: what each table holds, in which unit, and what is allowed."""
 
+import datetime
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -82,6 +83,8 @@ class Frame(Place):
         return given
 
 
+_ROUNDED_SHARE = 0.005
+"""Share of the diameter by which the radius of a ball may be rounded: 1.58 for a ball of 3.175 mm."""
 _LENGTHS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
 
 
@@ -235,6 +238,17 @@ class Tool(Provenance):
             raise ValueError(
                 f"length_mm {self.length_mm:g} is shorter than the flutes, {self.flute_length_mm:g} mm"
             )
+        stick_out_mm = self.stick_out_mm or 0.0
+        if self.length_mm is not None and stick_out_mm > self.length_mm:
+            raise ValueError(
+                f"stick_out_mm {stick_out_mm:g} is more than length_mm {self.length_mm:g}, which counts from "
+                "the spindle's gauge line to the tip"
+            )
+        if self.kind == "ball" and self.corner_radius_mm and not self._is_half_of_diameter():
+            raise ValueError(
+                f"corner_radius_mm {self.corner_radius_mm:g} of a ball is half its diameter, "
+                f"{self.diameter_mm / 2:g}: correct it or leave it out"
+            )
         if self.tool_data is not None and self.axis is None:
             raise ValueError('axis is required with tool_data: "+x", "-x", "+y", "-y", "+z" or "-z"')
         if self.tool_data is not None and self.frame is None:
@@ -244,6 +258,9 @@ class Tool(Provenance):
         if self.axis not in (None, "+z") and self.frame is None:
             raise ValueError("axis other than +z needs frame, the TCP as the controller has it")
         return self
+
+    def _is_half_of_diameter(self) -> bool:
+        return abs(self.corner_radius_mm - self.diameter_mm / 2) <= _ROUNDED_SHARE * self.diameter_mm
 
 
 class Frames(Provenance):
@@ -344,6 +361,10 @@ class Kienzle(Section):
     axial_ratio: Finite = 0.2
 
 
+_SOFT_N_MM2 = 150.0
+"""Between hardwood, 53 N/mm², and the softest metal of the library, 244."""
+
+
 class Material(Provenance):
     """What is cut, and its force law: one of `linear_edge` and `kienzle`."""
 
@@ -360,6 +381,15 @@ class Material(Provenance):
         if self.linear_edge is not None and self.kienzle is not None:
             raise ValueError("give linear_edge or kienzle, not both")
         return self
+
+    @property
+    def is_soft(self) -> bool:
+        """True for wood, foam and plastics, by the specific cutting force."""
+        stated = (
+            self.linear_edge.Ktc if self.linear_edge else None,
+            self.kienzle.kc11 if self.kienzle else None,
+        )
+        return any(value is not None and value < _SOFT_N_MM2 for value in stated)
 
 
 class Stock(Section):
@@ -493,7 +523,16 @@ class Verified(Section):
     """Who confirmed that the cell file matches the real cell."""
 
     by: Annotated[OneLine, Field(min_length=1, max_length=100)]
-    date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+    date: Annotated[str, Field(pattern=r"^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
+
+    @field_validator("date")
+    @classmethod
+    def _day(cls, given: str) -> str:
+        try:
+            datetime.date.fromisoformat(given)
+        except ValueError:
+            raise ValueError(f"{given} is no day of the calendar (year-month-day)") from None
+        return given
 
 
 ToolNumber = Annotated[int, Field(ge=1, le=99999)]

@@ -5,6 +5,7 @@ from typing import Any
 
 from gcode2krl import switching
 from gcode2krl.cell import Cell, plain_view
+from gcode2krl.confirmation import future_confirmation
 from gcode2krl.errors import Issue
 from gcode2krl.ranges import range_issues
 from gcode2krl.sections import Frame
@@ -70,7 +71,7 @@ def findings(cell: Cell) -> list[Issue]:
     templates = cell.templates()
     wrong = switching.template_issues(templates, _view(cell), cell.program.externals)
     pairs = switching.pair_issues(templates, _view(cell))
-    return [*wrong, *pairs, *range_issues(cell)]
+    return [*wrong, *pairs, *range_issues(cell), *future_confirmation(cell)]
 
 
 def _tools(cell: Cell) -> Iterator[Row]:

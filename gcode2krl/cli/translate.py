@@ -25,6 +25,7 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.cli.loads import largest
 from gcode2krl.cli.standard_files import write_bytes
+from gcode2krl.confirmation import future_confirmation
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
@@ -127,7 +128,8 @@ def command(
         with console.progress("planning, writing, verifying", None):
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
-            targets = replace(targets, issues=(*targets.issues, *corner_issues))
+            dated = future_confirmation(cell)
+            targets = replace(targets, issues=(*targets.issues, *corner_issues, *dated))
             _refuse_early(targets, cell, allow, online)
             prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
             if compensate == "offline":

@@ -14,6 +14,7 @@ from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
 from gcode2krl.cutting.raw_part import height_field_of
 from gcode2krl.cutting.stock_findings import Work, stock_findings
+from gcode2krl.cutting.tool_use import uses
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.sections import Tool
 from gcode2krl.tables import Forces, Motion, Toolpath
@@ -75,6 +76,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     rapid = toolpath.rapid[row]
     teeth = np.array([one.teeth for one in tools])[tool]
     f_z_mm = feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth
+    programmed_f_z_mm = feed_per_tooth(np.where(rapid, 0.0, toolpath.feed_mm_s[row]), spindle, 1) / teeth
     position = np.ascontiguousarray(motion.position_mm @ to_field.T)
     field = height_field_of(toolpath, cell, to_field, tools, len(motion))
     before = _as_it_is(field)
@@ -124,6 +126,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     issues = (
         *findings_of(seen, forces, cell, field.guessed),
         *stock_findings(work, cell.stock, before, met & work.feed),
+        *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))
     return Removal(replace(forces, issues=ordered), field)

@@ -50,7 +50,7 @@ def _place(text: str, number: int, a: float, b: float) -> int:
 def _pattern(number: int, a: float, b: float) -> str:
     letter = re.escape(chr(int(a))) if 0 <= a < 256 else "?"
     if number == f.BAD_CHARACTER:
-        return letter
+        return letter if a < f.FIRST_FOREIGN else r"[^\x00-\x7f]"
     if number == f.NO_NUMBER:
         return letter + r"(?!\s*[-+]?\s*\.?\s*\d)"
     if number == f.REPEATED_WORD:

@@ -7,9 +7,13 @@ letters whose bits are set in ``a``, ``{g}`` and ``{h}`` are G or M numbers give
 """
 
 import math
+import unicodedata
 from typing import NamedTuple
 
 from gcode2krl.errors import Issue, Severity
+
+FIRST_FOREIGN = 128
+"""Characters from here on are not those of the keyboard's ASCII."""
 
 
 class Finding(NamedTuple):
@@ -80,7 +84,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "bad-character",
         "character {char} has no meaning here",
-        "remove it, or put it in a comment ( )",
+        "{replacement}",
     ),
     NO_NUMBER: Finding(
         "error", "no-number", "{word} is not followed by a number", "write the number, or remove the letter"
@@ -337,13 +341,15 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     if number in (UNSUPPORTED_G, UNSUPPORTED_M):
         reasons = UNSUPPORTED_G_REASONS if number == UNSUPPORTED_G else UNSUPPORTED_M_REASONS
         reason, remedy = _nearest_below(reasons, int(a))
+    character = int(a) if number == BAD_CHARACTER else 0
     values = {
         "a": a,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < 128 else "?",
         "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
-        "char": _printable(int(a)) if 0 <= a < 256 else "?",
+        "char": _printable(character),
+        "replacement": _replacement(character),
         "g": f"{a / 10:g}",
         "h": f"{b / 10:g}",
         "difference": abs(a - b),
@@ -382,4 +388,21 @@ def _nearest_below(reasons: dict[int, tuple[str, str]], number: int) -> tuple[st
 
 
 def _printable(code: int) -> str:
-    return f"'{chr(code)}'" if 32 < code < 127 else f"0x{code:02x}"
+    if code < FIRST_FOREIGN:
+        return f"'{chr(code)}'" if 32 < code < 127 else f"0x{max(code, 0):02x}"
+    character = _foreign(code)
+    name = unicodedata.name(character, "") if character else ""
+    return f"U+{ord(character):04X} {name}" if name else f"0x{code:02x}"
+
+
+def _replacement(code: int) -> str:
+    """Return what to write instead of a character; a document turns - into its own minus signs and dashes."""
+    character = _foreign(code) if code >= FIRST_FOREIGN else ""
+    if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
+        return "write - (the minus sign of the keyboard)"
+    return "remove it, or put it in a comment ( )"
+
+
+def _foreign(code: int) -> str:
+    """Return the character of a code point, empty for none; below 0xA0 it is a byte of code page 1252."""
+    return bytes([code]).decode("cp1252", "ignore") if code < 0xA0 else chr(code)

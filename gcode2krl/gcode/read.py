@@ -209,6 +209,9 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
 
 def _reject_binary(block: bytes, name: str) -> None:
     place = block[:65536].find(b"\x00")
+    if place >= 0 and block[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        what = "this file is text in UTF-16, two bytes a character"
+        raise input_error("binary-file", what, "save it as UTF-8 or ASCII", line=1, source=name)
     if place >= 0:
         remedy = (
             "unpack or export the program as text"

@@ -147,7 +147,24 @@ def _without_number(text, i, letter):
         return f.BAD_LINE_NUMBER, 0, i
     if i < len(text) and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
         return f.EXPRESSION, letter, _after_value(text, i, _line_end(text, i))
+    if i < len(text) and text[i] >= f.FIRST_FOREIGN:
+        return f.BAD_CHARACTER, letter, i
     return f.NO_NUMBER, letter, i
+
+
+@njit(cache=True)
+def _character(text, i):
+    """Return the code point of the UTF-8 character at ``i``, the byte itself where it is none."""
+    first = text[i]
+    more = 1 if first >= 0xC2 and first < 0xE0 else 2 if first >= 0xE0 and first < 0xF0 else 3
+    if first < 0xC2 or first > 0xF4 or i + more >= len(text):
+        return int(first)
+    code = int(first) & (0x3F >> more)
+    for k in range(i + 1, i + 1 + more):
+        if text[k] & 0xC0 != 0x80:
+            return int(first)
+        code = (code << 6) | (int(text[k]) & 0x3F)
+    return code
 
 
 @njit(cache=True)
@@ -268,6 +285,8 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             if digits == 0:
                 found = float(upper)
                 error, lost, i = _without_number(text, i, upper)
+                if error == f.BAD_CHARACTER:
+                    found = float(_character(text, i))
             elif error != 0:
                 found = float(upper)
                 lost = upper
@@ -307,6 +326,7 @@ def _scan(text, first_line, letters, values, lines, extras, spans):
             i += 1
         else:
             error = f.BAD_CHARACTER
+            found = float(_character(text, i))
             lost = _previous_letter(letters, lines, count, line)
             i += 1
         words_in_line += 1

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.sections import Material, Tool
 from gcode2krl.source_text import line_with
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MS_PER_S, RAD_PER_REV, S_PER_MIN
@@ -21,8 +22,9 @@ WIDE_CORNER_MM = 3.0
 `identify controller` rounds by 2.4 mm on purpose)."""
 RUBBING_MM = 0.001
 """Feed per tooth below which nothing comes off: a fifth of the edge radius of the sharpest carbide, 5 µm."""
-THICK_MM, THICK_OF_DIAMETER = 0.2, 0.1
-"""Feed per tooth above which no mill of that diameter cuts: usual are 0.002 to 0.02 of it, 0.05 in wood."""
+THICK_MM, THICK_OF_DIAMETER, THICK_OF_FLAT_IN_METAL = 0.2, 0.1, 0.03
+"""Feed per tooth above which no mill of that diameter cuts: usual are 0.002 to 0.02 of it, 0.05 in wood; at
+small depth a ball or a corner radius makes the chip thinner than the feed."""
 _DOWN_MM = 0.01
 _SHORT_MM = 1e-6
 
@@ -149,6 +151,12 @@ def _spindle_on(toolpath: Toolpath, stop: Event) -> bool:
     return rpm != 0.0
 
 
+def _thick_share(tool: Tool, material: Material | None) -> float:
+    flat = tool.kind in ("flat", "drill") and tool.corner_radius_mm == 0.0
+    in_metal = material is not None and not material.is_soft
+    return THICK_OF_FLAT_IN_METAL if flat and in_metal else THICK_OF_DIAMETER
+
+
 def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Issue]:
     """Yield warnings on a feed per tooth F/(S·z) of nothing, or of more than a mill of that diameter takes.
 
@@ -168,7 +176,7 @@ def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Iss
         if tool is None or not len(rows):
             continue
         f_z_mm = RAD_PER_REV * toolpath.feed_mm_s[rows] / (np.abs(toolpath.spindle_rad_s[rows]) * tool.teeth)
-        most_mm = max(THICK_MM, THICK_OF_DIAMETER * tool.diameter_mm)
+        most_mm = max(THICK_MM, _thick_share(tool, cell.material) * tool.diameter_mm)
         for wrong, words in (
             (f_z_mm < RUBBING_MM, f"less than {RUBBING_MM:g} mm: edges rub and nothing comes off"),
             (f_z_mm > most_mm, f"more than {most_mm:g} mm, for a tool of {tool.diameter_mm:g} mm"),
@@ -180,7 +188,7 @@ def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Iss
                     "warning",
                     "feed-per-tooth",
                     int(toolpath.source_line[row]),
-                    f"F{toolpath.feed_mm_s[row] * S_PER_MIN:.4g} at S{rpm:.4g} with {tool.teeth} teeth are "
+                    f"F{toolpath.feed_mm_s[row] * S_PER_MIN:.6g} at S{rpm:.6g} with {tool.teeth} teeth are "
                     f"{f_z_mm[np.argmax(wrong)]:.3g} mm a tooth, {words}",
                     "check F, S and the unit, and the tool's teeth in the cell",
                 )

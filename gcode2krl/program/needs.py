@@ -10,6 +10,11 @@ from gcode2krl.errors import Issue
 from gcode2krl.sections import missing_key
 from gcode2krl.tables import Event, Toolpath
 
+_LEAST_WAIT_S = 0.5
+"""Assumed: motor spindles start and stop in 1 to 15 s, the smallest in half a second."""
+_LEAST_HELIX_DEG = 5.0
+"""Catalogues: straight edges, or 10 to 60 degrees; 0.17 to 1.05 are these in radians."""
+
 
 def lacks_geometry(toolpath: Toolpath, cell: Cell) -> bool:
     """Tell whether the cell does not say where the arm, the work or a tool is: nothing can be planned."""
@@ -26,6 +31,8 @@ def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield warnings on stated values: beyond their usual range, or left at a default that matters."""
     used = set(_used_tools(toolpath))
     yield from ranges.range_issues(cell, used)
+    yield from _doubtful_cutters(used, cell)
+    yield from _short_waits(toolpath, cell)
     yield from _unread_pairs(toolpath, cell)
     centre = [f"load.{axis}_mm" for axis in "xyz"]
     if cell.load.mass_kg is not None and all(key in cell.defaults for key in centre):
@@ -39,6 +46,37 @@ def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
         yield Issue(
             "warning", "tool-length-library", 0, text, f"measure it, and give tool.{number}.length_mm"
         )
+
+
+def _doubtful_cutters(used: set[int], cell: Cell) -> Iterator[Issue]:
+    for number, tool in cell.tool.items():
+        if number not in used:
+            continue
+        key = f"tool.{number}"
+        if tool.kind == "flat" and tool.corner_radius_mm > 0.0:
+            text = f"{key} is flat and has corner_radius_mm = {tool.corner_radius_mm:g}: it is taken as round"
+            remedy = f'write {key}.kind = "bull-nose" (or "ball"), or leave corner_radius_mm out'
+            yield Issue("warning", "cell-doubtful", 0, text, remedy)
+        if 0.0 < tool.helix_deg < _LEAST_HELIX_DEG:
+            text = f"{key}.helix_deg = {tool.helix_deg:g} is not usual: 0 for straight edges, or 10 to 60"
+            remedy = f"correct {key}.helix_deg: it counts degrees, not radians"
+            yield Issue("warning", "cell-doubtful", 0, text, remedy)
+
+
+def _short_waits(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the waits for the spindle that the program's own templates use and no spindle can keep."""
+    templates = cell.templates()
+    used = [templates[key] for key in _used_templates(toolpath, templates)]
+    waits = {"start_s": cell.spindle.start_s, "stop_s": cell.spindle.stop_s}
+    if cell.spindle.at_speed_input is not None:
+        del waits["start_s"]  # the program waits for the input
+    for key, wait_s in waits.items():
+        if wait_s < _LEAST_WAIT_S and any(f"spindle.{key}" in text for text in used):
+            text = f"spindle.{key} = {wait_s:g} s: the program does not wait for the spindle"
+            remedy = f"give the measured time in spindle.{key}" + (
+                ", or spindle.at_speed_input" if key == "start_s" else ""
+            )
+            yield Issue("warning", "spindle-wait", 0, text, remedy)
 
 
 def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:

@@ -108,6 +108,7 @@ class _Plan:
                 "no-motion",
                 "the program has no move to a programmed position" + (f": {nowhere}" if nowhere else ""),
                 "program X, Y and Z",
+                line=_first_move_line(toolpath) if nowhere else 0,
                 source=toolpath.source,
             )
         changes = [(event.row, index) for index, event in enumerate(toolpath.events) if event.kind == "tool"]
@@ -434,6 +435,15 @@ def _as_slice(chosen: NDArray[np.bool_]) -> slice | NDArray[np.int64]:
 
 def _without_dwell(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key != "dwell_s"}
+
+
+def _first_move_line(toolpath: Toolpath) -> int:
+    """Return the G-code line of the first feed move, of the first move where there is none, 0 without any."""
+    moves = ~toolpath.machine
+    moves[:1] = False
+    feed = moves & ~toolpath.rapid
+    rows = np.flatnonzero(feed if feed.any() else moves)
+    return int(toolpath.source_line[rows[0]]) if len(rows) else 0
 
 
 def _rows(values: Floats, chosen: Any) -> Floats:
