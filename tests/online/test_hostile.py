@@ -88,7 +88,7 @@ def test_a_controller_that_contradicts_itself(cell, device, settings):
     check(log, settings)
 
 
-@pytest.mark.parametrize("far", [10**17, -999, -1001, 4])
+@pytest.mark.parametrize("far", [10**17, -900, -1100, 4])
 def test_a_clock_that_lies(cell, device, settings, far):
     """IPOC goes on, and in between it is somewhere else for a telegram."""
     session, log = proven(device, krc := Krc(cell, stands_s=0.4))
@@ -98,12 +98,12 @@ def test_a_clock_that_lies(cell, device, settings, far):
 
     session = drive(device, session, log, krc, 200, changed, steep)
     check(log, settings)
-    if far in (10**17, -1001):
+    if far in (10**17, -1100):
         assert session.phase in (Phase.HELD, Phase.CLOSED)
 
 
 def test_everything_that_a_wild_controller_can_say(cell, device, settings):
-    """Each number of each telegram is replaced now and then, in every phase, by anything that can be parsed."""
+    """Now and then any number of a telegram is anything that can be parsed, in every phase."""
     rng = np.random.default_rng(7)
     names = ("position_mm", "command_mm", "q_rad", "q_command_rad", "monitor_mm", "load", "values")
     numbers = ("late", "knot", "checksum", "override_percent", "t1")
