@@ -119,9 +119,8 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     for offset in sorted(offsets):
         place = f"x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, {NOT_TURNED}"
         yield "work-offset-unknown", f'[work_offsets]\n"{offset}" = {{ {place} }}\n', ()
-    heights = [float(m) for text in messages.get("above-clearance", ())
-               for m in re.findall(r"feed at Z ([-\d.]+)", text)]  # fmt: skip
-    if heights:
+    heights = [float(m) for m in re.findall(r"raise \[clearance\] z_mm to ([-\d.]+)", first.printed)]
+    if heights and "above-clearance" in codes:
         yield "above-clearance", f"[clearance]\nz_mm = {max(heights) + 5.0:.1f}\n", ()
     for code in ("unit-doubtful", "cut-off", "h-differs"):
         if code in codes:
