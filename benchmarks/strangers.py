@@ -114,9 +114,44 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
                for t in re.findall(r"\bT(\d+)\b|tool (\d+)", text)}  # fmt: skip
     for number in sorted({int(a or b) for a, b in unknown}):
         yield "tool-unknown", f"[tool.{number}]\ndiameter_mm = 6.0\nteeth = 2\nlength_mm = 100.0\n", ()
+    offsets = {m for text in messages.get("work-offset-unknown", ())
+               for m in re.findall(r"\bG5[4-9](?:\.[123])?(?![\d.])", text)}  # fmt: skip
+    for offset in sorted(offsets):
+        place = f"x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, {NOT_TURNED}"
+        yield "work-offset-unknown", f'[work_offsets]\n"{offset}" = {{ {place} }}\n', ()
+    heights = [float(m) for m in re.findall(r"raise \[clearance\] z_mm to ([-\d.]+)", first.printed)]
+    if heights and "above-clearance" in codes:
+        yield "above-clearance", f"[clearance]\nz_mm = {max(heights) + 5.0:.1f}\n", ()
     for code in ("unit-doubtful", "cut-off", "h-differs"):
         if code in codes:
             yield code, "", ("--allow", code)
+
+
+def mended(text: bytes, first: Attempt) -> tuple[bytes, tuple[str, ...]]:
+    """Return the program after the remedies that change its text, and the codes of their findings."""
+    codes = {code for code, _ in first.errors}
+    done = []
+    if "comment-nested" in codes:
+        text = b"\n".join(map(_without_inner_comments, text.split(b"\n")))
+        done.append("comment-nested")
+    if "line-ends" in codes:
+        text = text.replace(b"\r", b"\n")
+        done.append("line-ends")
+    if any(code == "bad-character" and "'*'" in message for code, message in first.errors):
+        text = re.sub(rb"\*\d+[ \t]*(?=\r?$)", b"", text, flags=re.MULTILINE)
+        done.append("bad-character")
+    return text, tuple(done)
+
+
+def _without_inner_comments(line: bytes) -> bytes:
+    """Return a line whose comments hold no ( and )."""
+    depth, kept = 0, bytearray()
+    for byte in line:
+        depth += (byte == ord("(")) - (byte == ord(")"))
+        inner = (byte == ord("(") and depth > 1) or (byte == ord(")") and depth > 0)
+        if not inner:
+            kept.append(byte)
+    return bytes(kept)
 
 
 def try_program(part: Path, limit_s: float) -> Result:
@@ -131,18 +166,23 @@ def try_program(part: Path, limit_s: float) -> Result:
         if first.exit_code == 0:
             return Result(part.name, "at once", first.warnings, (), first.seconds, first.longest_list, ())
         followed = list(remedies(first, _into_reach(part)))
-        if followed:
+        text, changed = mended(part.read_bytes(), first)
+        if followed or changed:
+            again = folder / part.name
+            again.write_bytes(text)
             cell = folder / "cell.toml"
             cell.write_text(
                 'based_on = "demonstration"\n' + _joined(text for _, text, _ in followed), "utf-8"
             )
             options = tuple(word for _, _, words in followed for word in words)
-            second = attempt(part, folder, ("--cell", str(cell), *options), limit_s)
-            names = tuple(code for code, _, _ in followed)
+            second = attempt(again, folder, ("--cell", str(cell), *options), limit_s)
+            names = tuple(dict.fromkeys((*(code for code, _, _ in followed), *changed)))
             if second.exit_code == 0:
                 return Result(
                     part.name, "after remedies", codes, names, first.seconds, first.longest_list, ()
                 )
+            if second.exit_code is None:
+                return Result(part.name, "time", codes, names, second.seconds, first.longest_list, last_words)
             last_words = tuple(message[:110] for _, message in second.errors[:3]) or last_words
             codes = tuple(sorted({code for code, _ in second.errors})) or codes
         verdict = "language" if set(codes) & LANGUAGE else "refused"

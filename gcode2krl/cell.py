@@ -19,6 +19,7 @@ from pydantic import Field, ValidationError
 from gcode2krl import frames as fr
 from gcode2krl import library
 from gcode2krl.cell_base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
+from gcode2krl.cell_keys import meant_key
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.online_section import Online
 from gcode2krl.sections import (
@@ -382,21 +383,32 @@ def _validation_issues(error: ValidationError) -> Iterator[Issue]:
     """Turn pydantic's findings into lines that name the key, what was found and what is allowed."""
     not_keys = ("literal[", "constrained-", "function-", "float", "int", "tuple", "[key]")
     for detail in error.errors(include_url=False)[:_MOST_ISSUES]:
-        key = ".".join(str(step)[:80] for step in detail["loc"] if not str(step).startswith(not_keys))
+        place = [step for step in detail["loc"] if not str(step).startswith(not_keys)]
+        key = ".".join(str(step)[:80] for step in place)
+        remedy = ""
         message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
         if detail["type"] == "missing":
             text = f"{key}: missing"
         elif detail["type"] == "extra_forbidden":
             text = f"{key}: there is no such key"
+            remedy = _did_you_mean(place)
         elif detail["type"] == "value_error":
             text = f"{key}: {message}"
         else:
             text = f"{key}: found {_brief(detail['input'])}, allowed: {message}"
-        yield _key_issue(text)
+        yield _key_issue(text, remedy)
 
 
-def _key_issue(text: str) -> Issue:
-    return Issue("error", "cell-key", 0, text, "docs/cell.md and `gcode2krl models schema` list the keys")
+def _did_you_mean(place: list[str | int]) -> str:
+    near = meant_key(Cell, place) if place else ""
+    return f"did you mean {near}? {_KEYS_LISTED}" if near else ""
+
+
+_KEYS_LISTED = "docs/cell.md and `gcode2krl models schema` list the keys"
+
+
+def _key_issue(text: str, remedy: str = "") -> Issue:
+    return Issue("error", "cell-key", 0, text, remedy or _KEYS_LISTED)
 
 
 def _brief(value: Any) -> str:

@@ -10,7 +10,7 @@ _FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
 _ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
 _OF_LETTER_A = {f.NUMBER_TOO_LONG, f.UNKNOWN_LETTER, f.ROTARY_WORD, f.BAD_INTEGER, f.ARC_WRONG_OFFSET}
 _FIXED = {
-    f.COMMENT_OPEN: r"\((?!.*\))", f.COMMENT_NESTED: r"(?<=[^(])\((?=[^()]*\))|\(", f.O_WORD: "O",
+    f.COMMENT_OPEN: r"\((?!.*\))", f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()", f.O_WORD: "O",
     f.EXPRESSION: r"[A-Z]?\s*[-+]?\s*[#\[\]=]|[A-Z](?=[A-Z]+\[)",
     f.NEGATIVE_FEED: "F", f.NEGATIVE_SPEED: "S", f.DWELL_NEGATIVE: "P", f.NEGATIVE_TOLERANCE: "P",
     f.ARC_TURNS: "P", f.NO_FEED: _FEED_WORD, f.NO_INVERSE_TIME: _FEED_WORD,
@@ -44,6 +44,8 @@ def _place(text: str, number: int, a: float, b: float) -> int:
     if number not in (f.COMMENT_OPEN, f.COMMENT_NESTED):
         code = _COMMENT.sub(lambda comment: " " * len(comment[0]), code)
     found = re.search(_pattern(number, a, b), code) or re.search(r"[^\s/]", code)
+    if found and "culprit" in found.re.groupindex:
+        return found.start("culprit")
     return found.start() if found else 0
 
 

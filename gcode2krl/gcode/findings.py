@@ -93,7 +93,9 @@ FINDINGS: dict[int, Finding] = {
         "error", "number-too-long", "the number after {word} has too many digits", "write at most 15 digits"
     ),
     COMMENT_OPEN: Finding("error", "comment-open", "the comment is not closed", "add )"),
-    COMMENT_NESTED: Finding("error", "comment-nested", "a comment inside a comment", "remove the inner ("),
+    COMMENT_NESTED: Finding(
+        "error", "comment-nested", "a comment in a comment", "write it without the inner ( and )"
+    ),
     EXPRESSION: Finding(
         "error",
         "expression",
@@ -283,6 +285,14 @@ FINDINGS: dict[int, Finding] = {
     ),
 }
 
+_OF_CHARACTER = {
+    "*": "let the post write no checksums (*57)",
+    ":": "write a program number as O1000, or remove the line",
+    "%": "write % alone on its line, and nothing behind it",
+    ",": "write a decimal point for a decimal comma, and no commas between words",
+    ")": "write ( before the comment, or remove the )",
+}
+"""What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     50: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
@@ -362,10 +372,25 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         finding.severity,
         finding.code,
         line,
-        finding.sentence.format(**values),
-        finding.remedy.format(**values),
+        _sentence(finding, number, a, b).format(**values),
+        _remedy(finding, number, a, b).format(**values),
         excerpt,
     )
+
+
+def _sentence(finding: Finding, number: int, a: float, b: float) -> str:
+    """Return the sentence of a finding; a code does not exclude itself, it stands twice."""
+    twice = {SAME_GROUP_G: "G{g} stands twice in the block", SAME_GROUP_M: "M{g} stands twice in the block"}
+    return twice[number] if a == b and number in twice else finding.sentence
+
+
+def _remedy(finding: Finding, number: int, a: float, b: float) -> str:
+    """Return the remedy of a finding, where it depends on what was found."""
+    if number == BAD_CHARACTER and 0 < a < 128:
+        return _OF_CHARACTER.get(chr(int(a)), finding.remedy)
+    if number in (SAME_GROUP_G, SAME_GROUP_M) and a == b:
+        return "keep one"
+    return finding.remedy
 
 
 def _state(number: int, line: int, a: float, b: float, c: float) -> str:

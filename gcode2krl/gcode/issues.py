@@ -67,7 +67,9 @@ def found_issues(
     if counts[DROPPED]:
         issues.append(Issue(severity, "more", 0, f"{int(counts[DROPPED])} more findings", "mend these first"))
     if counts[CONSEQUENCES]:
-        sentence = f"{int(counts[CONSEQUENCES])} more findings rest on the errors above and are not listed"
+        count = int(counts[CONSEQUENCES])
+        rest = "1 more finding rests" if count == 1 else f"{count} more findings rest"
+        sentence = f"{rest} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
         issues.append(Issue("note", "consequences", 0, sentence, "mend the errors, then read again"))
     return issues
 

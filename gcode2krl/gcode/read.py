@@ -186,6 +186,7 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
             if len(block) < _PIECE_BYTES and not block.strip():
                 raise input_error("empty", "the file is empty", "export the program again", source=name)
             _reject_binary(block, name)
+            _reject_lone_returns(block, name)
         at_end = not block
         text = rest + (block if not at_end or not rest else b"\n")
         end = text.rfind(b"\n") + 1
@@ -221,6 +222,18 @@ def _reject_binary(block: bytes, name: str) -> None:
         line = 1 + block.count(b"\n", 0, place)
         what = f"this is not a text file: byte {place + 1} is NUL"
         raise input_error("binary-file", what, remedy, line=line, source=name)
+
+
+def _reject_lone_returns(block: bytes, name: str) -> None:
+    """Refuse line ends of one CR: the whole program would be one block."""
+    if b"\n" not in block and block.rstrip().count(b"\r"):
+        raise input_error(
+            "line-ends",
+            "the lines end in CR alone, so the whole file is one line",
+            "save the program with line ends LF or CRLF",
+            line=1,
+            source=name,
+        )
 
 
 class _Interpreter:

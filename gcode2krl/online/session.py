@@ -90,6 +90,10 @@ class Session:
     """The knot that the values of the form ``values`` mean."""
     lost: int = 0
     """Telegrams that never came."""
+    late: float = np.nan
+    """Answers that the controller has missed so far, as it says; NaN where it does not."""
+    has_missed: bool = False
+    """True: the controller says that it missed an answer since the telegram before."""
     ignored: int = 0
     """Telegrams that came twice or too late."""
 
@@ -115,6 +119,7 @@ def exchange(
     session, is_new = _counted(session, telegram.ipoc, device.settings)
     if session.phase is Phase.CLOSED or not is_new:
         return session, None
+    session = replace(session, late=telegram.late, has_missed=bool(telegram.late > session.late))
     if session.phase is Phase.WAITING:
         session = _enter(session, Phase.RESTING, "", rest_mm=telegram.position_mm)
     if _silent_too_long(before, session, device.settings) and _has_lost_it(session, telegram, device):
@@ -218,7 +223,10 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
 
 
 def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Compensate, as long as the robot is where it should be and the sensor is there."""
+    """Compensate, as long as the robot is where it should be and the sensor is there.
+
+    A correction that the controller did not get is not gone on from: the next one it gets would be a step.
+    """
     session = _watched(session, telegram)
     if session.away >= RUNAWAY_CYCLES:
         most_mm = _away_mm(session, telegram) + RUNAWAY_MM
@@ -226,7 +234,10 @@ def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator
     knot = knot_of(telegram.values, session.knot, device)
     told = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
     state, out = step(device, session.device, sample_of(told, load))
-    after = replace(session, device=state, sent=out.correction[0], gate=int(out.gate[0]), knot=knot)
+    sent = out.correction[0]
+    if session.has_missed:
+        state, sent = state._replace(limit=session.device.limit), session.sent
+    after = replace(session, device=state, sent=sent, gate=int(out.gate[0]), knot=knot)
     return _enter(after, Phase.HELD, "sensor") if out.sensor_lost[0] else after
 
 

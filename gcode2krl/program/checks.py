@@ -219,13 +219,14 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Itera
             "give [clearance] z_mm in the cell",
         )
         return
+    highest = toolpath.position_mm[feed, 2].max(initial=clearance)
     for row in _stretches(feed & (toolpath.position_mm[:, 2] > clearance)):
         yield Issue(
             "error",
             "above-clearance",
             int(toolpath.source_line[row]),
             f"feed at Z {toolpath.position_mm[row, 2]:.3f}, above the clearance plane at {clearance:.3f}",
-            "raise [clearance] z_mm, or check the zero point and the unit",
+            f"raise [clearance] z_mm to {highest:.3f} or more, or check the zero point and the unit",
         )
 
 

@@ -1,0 +1,79 @@
+"""Each remedy of a finding about characters, comments and line ends works when it is followed literally."""
+
+import io
+
+import pytest
+
+from gcode2krl import Gcode2KrlError
+from gcode2krl.gcode.read import read_stream
+
+HEAD, END = "G21\nG0 X0 Y0 Z5\n", "G0 X1\nM2\n"
+
+
+def errors(text):
+    """Return the errors of a program, as found."""
+    try:
+        read_stream(io.BytesIO(text.encode()), "part.nc")
+    except Gcode2KrlError as error:
+        return [issue for issue in error.issues if issue.severity != "warning"]
+    return []
+
+
+@pytest.mark.parametrize(
+    ("line", "remedy", "mended"),
+    [
+        ("( hole at (0, 0) )", "without the inner ( and )", "( hole at 0, 0 )"),
+        ("G1 X5 F100 *57", "no checksums", "G1 X5 F100"),
+        (":1000", "O1000", "O1000"),
+        ("% part", "% alone", "%"),
+        ("G1 X5,5 F100", "decimal point", "G1 X5.5 F100"),
+        ("G1 X5 F100 )", "remove the )", "G1 X5 F100"),
+        ("G1 G1 X5 F100", "keep one", "G1 X5 F100"),
+        ("M5 M5", "keep one", "M5"),
+    ],
+)
+def test_the_remedy_names_what_helps_and_it_helps(line, remedy, mended):
+    found = errors(f"{HEAD}{line}\n{END}")
+    assert any(issue.line == 3 and remedy in issue.remedy for issue in found)
+    assert not errors(f"{HEAD}{mended}\n{END}")
+
+
+def test_the_caret_stands_before_the_inner_comment():
+    (found,) = errors(f"{HEAD}(ok) (hole at (0, 0) )\n{END}")
+    assert "(hole at ^(0, 0) )" in found.excerpt
+
+
+def test_a_code_that_stands_twice_is_not_said_to_exclude_itself():
+    (found,) = errors(f"{HEAD}G1 G1 X5 F100\n{END}")
+    assert "G1 stands twice" in found.message
+
+
+def test_lines_that_end_in_cr_alone_are_one_finding_that_says_so():
+    (found,) = errors((HEAD + END).replace("\n", "\r"))
+    assert (found.code, found.line) == ("line-ends", 1)
+    assert "LF" in found.remedy
+
+
+def test_one_consequence_is_one():
+    found = errors(f"{HEAD}G1 A3 F100\nG1 A4\n{END}")
+    (counted,) = [issue for issue in found if issue.code == "consequences"]
+    assert counted.message == "1 more finding rests on the errors above and is not listed"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "%\nO0001\n" + HEAD + END + "%\n",
+        "%\nO0001 (PART)\n" + HEAD + END,
+        "O1000\n" + HEAD + END,
+        HEAD + "(45° Ø6 – „gut“)\nG1 X4 F100 ; 90°\n" + END,
+        HEAD + END + "\x1a",
+        (HEAD + END).replace(" ", "\t"),
+        "\n \n\t\n" + HEAD + END,
+        HEAD + "G1 X4 F100" + " " * 400 + "Y1\n" + END,
+        "N100000 G21\nN9999999999 G0 X0 Y0 Z5\nG0Z5\n" + END,
+        HEAD + "M06 T01\nS1000 M3 G4 P3\nG1 F1000\n" + END,
+    ],
+)
+def test_what_posts_write_is_read(text):
+    assert not errors(text)
