@@ -268,7 +268,8 @@ def lasting(later_s: Floats) -> Floats:
     for the motions after it. Such an end alone is no time lost.
     """
     moved_s = np.abs(later_s)
-    return np.minimum(moved_s, np.append(moved_s[1:], moved_s[-1:]))
+    result: Floats = np.minimum(moved_s, np.append(moved_s[1:], moved_s[-1:]))
+    return result
 
 
 def _refusal(code: str, line: int, sentence: str) -> Issue:
