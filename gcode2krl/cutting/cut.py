@@ -102,6 +102,7 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
         tool=motion.tool,
         relative_band=cell.material.relative_band,
     )  # fmt: skip
+    steps = np.diff(position, axis=0, prepend=position[:1])
     seen = Cut(
         source_line=toolpath.source_line[row],
         rapid=rapid,
@@ -111,7 +112,8 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
         cycle_s=float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0,
         centre_mm=engaged.centre_mm,
         overlap_mm=overlap_mm,
-        step_mm=np.linalg.norm(np.diff(position, axis=0, prepend=position[:1]), axis=1),
+        step_mm=np.linalg.norm(steps, axis=1),
+        descent_mm=np.maximum(-steps[:, 2], 0.0),
         blend_mm=_largest_cdis(toolpath, cell),
     )
     work = Work(

@@ -84,7 +84,8 @@ def engage(
         begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
         own_begin, own_end = field.cells(axis, low, high)
         grid, rapid_mm = field.grid(axis, begin, end), np.zeros(count)
-        reach_mm = halo_mm + float(path.outlines[:, 0].max())
+        # one cell more: the grid begins with a whole one, and a sweep takes the disc at its start as cut
+        reach_mm = halo_mm + float(path.outlines[:, 0].max()) + cell_mm
         cut_strip(
             grid,
             path,

@@ -50,6 +50,8 @@ class Cut:
     """(m, 3) how far rapid, shank and holder are in the material."""
     step_mm: Floats
     """Way from the sample before."""
+    descent_mm: Floats
+    """(m,) part of it down the tool axis, 0 where the tool rises."""
     blend_mm: float
     """Largest CDIS: a rounded corner leaves material as thick as that on the rim, where the tool went in."""
 
@@ -91,11 +93,25 @@ def _collisions(
     for column, (code, sentence, remedy) in enumerate(kinds):
         depth = cut.overlap_mm[:, column]
         if column == 0:
+            depth = _below_surface(cut, depth)
             depth = np.where(_grazes(cut, depth), 0.0, depth)
         for row in _starts(depth > _CONTACT_MM):
             worst = row + int(np.argmax(depth[row : _end(depth > _CONTACT_MM, row)]))
             words = sentence.format(depth=float(depth[worst]), tool=int(forces.tool[row]))
             yield Issue(severity, code, int(cut.source_line[row]), words, remedy)
+
+
+def _below_surface(cut: Cut, depth: Floats) -> Floats:
+    """Return how far (m,) rapids are below the surface that they met.
+
+    What one sample cuts off, the next does not find any more: its descent is added.
+    """
+    met = depth > _CONTACT_MM
+    begins = met & ~np.concatenate([[False], met[:-1]])
+    first = np.maximum.accumulate(np.where(begins, np.arange(len(met)), 0))
+    down_mm = np.cumsum(cut.descent_mm)
+    result: Floats = np.where(met, np.maximum(depth, depth[first] + down_mm - down_mm[first]), depth)
+    return result
 
 
 def _grazes(cut: Cut, depth: Floats) -> Bools:

@@ -167,8 +167,8 @@ class Planner:
         chain = krc4.build_chain(targets, self.cell)
         first, count = self.chain.first, len(self.chain.length_mm)
         rows = own[first + 1 : first + 1 + count] - first - 1
-        later_s = krc4.plan(chain, self.cell).move_end_s[rows] - self._move_end_s
-        slow = np.flatnonzero(np.abs(later_s) > _SAME_TIME * self.cell.controller.cycle_s)
+        later_s = lasting(krc4.plan(chain, self.cell).move_end_s[rows] - self._move_end_s)
+        slow = np.flatnonzero(later_s > _SAME_TIME * self.cell.controller.cycle_s)
         windows = windows_of(targets, chain, self.motion, self.cell)
         row = first + 1 + int(slow[0]) if len(slow) else None
         return Layout(windows, targets, joints), row, later_s
@@ -259,6 +259,17 @@ class Planner:
             f"{self.cell.pilot.max_active} can, and the motions are too short to be cut"
         )
         return _refusal("pilot-dense", int(knots.line[worst]), sentence)
+
+
+def lasting(later_s: Floats) -> Floats:
+    """Return by how much (n,) the ends of motions are moved for good, from how they are moved (n,).
+
+    A motion that ends where the robot rests ends when it comes to rest or when it is left: the same instants
+    for the motions after it. Such an end alone is no time lost.
+    """
+    moved_s = np.abs(later_s)
+    result: Floats = np.minimum(moved_s, np.append(moved_s[1:], moved_s[-1:]))
+    return result
 
 
 def _refusal(code: str, line: int, sentence: str) -> Issue:

@@ -14,6 +14,9 @@ from gcode2krl.units import MS_PER_S
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 _BEYOND = np.iinfo(np.int64).max // 2
+_BETWEEN_S = 0.003
+"""Added to the cycle between triggers of different motions: each motion's start, read from the samples of a
+Motion, may be off by half of it. Delays within one motion are exact."""
 
 
 @dataclass(frozen=True)
@@ -64,24 +67,27 @@ def _place(
     in_view: int, window: Rows, delay: Rows,
 ) -> None:  # fmt: skip
     count = len(deadline)
-    limit = np.inf
+    limit, behind = np.inf, -1
     for j in range(count - 1, -1, -1):  # the latest that can be reached
         latest = min(deadline[j], limit)
         w = np.searchsorted(begin, latest + 1e-9, side="right") - 1
+        if w != behind:
+            latest = min(latest, limit - _BETWEEN_S)
+            w = np.searchsorted(begin, latest + 1e-9, side="right") - 1
         other = window[j + most] if in_view > 0 and j + most < count else -1
         if other >= 0:  # they must not be in view at the same time
             w = min(w, np.searchsorted(row, row[other] - in_view, side="right") - 1)
-            latest = min(latest, end[w]) if w >= 0 else -np.inf
+            latest = min(latest, end[w], limit - (_BETWEEN_S if w != behind else 0.0)) if w >= 0 else -np.inf
         if w < 0 or latest < earliest[j] - 1e-9:
-            limit = min(latest, earliest[j]) - cycle
+            limit, behind = min(latest, earliest[j]) - cycle, -1
             continue
         ms = max(0, int(np.floor((min(latest, end[w]) - begin[w]) * MS_PER_S + 1e-6)))
         fire = begin[w] + ms / MS_PER_S
         if fire < earliest[j] - 1e-9:
-            limit = earliest[j] - cycle
+            limit, behind = earliest[j] - cycle, -1
             continue
         window[j], delay[j] = w, ms
-        limit = fire - cycle
+        limit, behind = fire - cycle, w
     last = -np.inf
     for j in range(count):  # at the start of a section: one after the other
         fire = begin[window[j]] + delay[j] / MS_PER_S if window[j] >= 0 else -np.inf
