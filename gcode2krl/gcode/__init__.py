@@ -9,4 +9,14 @@ __all__ = ["CHORD_TOLERANCE_MM", "read_gcode", "read_stream"]
 
 load_numba()  # what the first kernel needs
 # compiled kernels are looked up when they are first called
-drop_stale(Path(__file__).parent, "arcs.py", "findings.py", "gather.py", "motion.py", "report.py", "rows.py", "settings.py", "state.py")
+drop_stale(
+    Path(__file__).parent,
+    "arcs.py",
+    "findings.py",
+    "gather.py",
+    "motion.py",
+    "report.py",
+    "rows.py",
+    "settings.py",
+    "state.py",
+)
