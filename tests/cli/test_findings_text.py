@@ -34,8 +34,8 @@ def test_a_spindle_that_never_runs_is_one_line(tmp_path: Path, capsys: pytest.Ca
     errors = [line for line in lines if ": error:" in line]
     assert len(errors) == 1
     assert (
-        ":7: error: feed move with the spindle off: no M3 comes before it (also in lines 11, 15, 19 and 56 more)"
-        in errors[0]
+        ":7: error: feed move with the spindle off: no M3 comes before it (also in lines 11, 15, 19 and 56"
+        " more)" in errors[0]
     )
 
 
