@@ -34,7 +34,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
 
         def replaced(match: re.Match[str]) -> str:
-            lines = output_of(match["command"], folder).splitlines()
+            printed = output_of(match["command"], folder).splitlines()
+            lines = [line for line in printed if not line.startswith("first run on this machine")]
             if match["first"]:
                 lines = lines[int(match["first"]) - 1 : int(match["last"])]
             return match[1] + "```text\n" + "\n".join(line.rstrip() for line in lines) + "\n```"

@@ -99,7 +99,8 @@ def _issue(
     severity: str, code: str, key: str, value: float, allowed: tuple[float, float], source: str
 ) -> Issue:
     word = "possible" if severity == "error" else "usual"
-    text = f"{key} = {value:g} is not {word}: {allowed[0]:g} to {allowed[1]:g} ({source})"
+    bounds = f"{allowed[0]:g} and more" if allowed[1] == math.inf else f"{allowed[0]:g} to {allowed[1]:g}"
+    text = f"{key} = {value:g} is not {word}: {bounds} ({source})"
     return Issue(
         "error" if severity == "error" else "warning",
         code,

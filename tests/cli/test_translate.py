@@ -95,7 +95,7 @@ def test_two_claims_to_standard_output_are_refused(run, part):
         (b"G21\nS900 M3\nG0 X0 Y0 Z9\nG1 X1\nM30\n", 2, (":4:", "without a feed")),
         (b"G21\nS900 M3\nG0 X0 Y0 Z9\nG1 X9000 F900\nM30\n", 1, (":4:", "out of reach")),
         (b"G21\nG0 X0 Y0 Z9\nM3 S900\nG2 X5 F100\nM30\n", 2, (":4:", "without I, J, K or R")),
-        ("G21\nG0 X0 Y0 Z9 ß\nM30\n".encode("latin-1"), 2, (":2:", "0xdf")),
+        ("G21\nG0 X0 Y0 Z9 ß\nM30\n".encode("latin-1"), 2, (":2:", "U+00DF")),
         (b"G21\nG0 X1.2.3\nM30\n", 2, (":2:",)),
         (b"G21\nG0 X99999999999999999999\nM30\n", 2, (":2:", "too many digits")),
     ],
