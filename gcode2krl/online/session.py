@@ -309,12 +309,15 @@ def _silent_too_long(before: Session, after: Session, settings: Online) -> bool:
 def _has_lost_it(session: Session, telegram: Telegram, device: Compensator) -> bool:
     """Tell whether sending on what was sent would be a jump: more than a step, and the robot has it no more.
 
-    RSI begins anew at zero; its program waits for `ready` then, but corrections count at once.
+    RSI begins anew at zero; its program waits for `ready` then, but corrections count at once. A position
+    that cannot be the robot's says nothing of it, so it does not count as still having the correction.
     """
     sent, step = session.sent, device.bounds.step
     largest = np.linalg.norm(sent / step) if device.bounds.is_vector else np.abs(sent / step).max()
     if largest <= 1.0:
         return False
+    if _away_mm(session, telegram) > session.furthest_mm:
+        return True
     wanted_mm = sent
     if len(sent) == 6:
         both = np.stack([telegram.q_command_rad, telegram.q_command_rad + sent])
