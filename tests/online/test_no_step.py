@@ -93,6 +93,22 @@ def test_a_robot_that_was_started_anew_is_not_sent_the_old_correction(cell, axis
     assert not krc.applied.any()
 
 
+@pytest.mark.parametrize("mm", [6.0, 1e9])
+def test_a_position_that_cannot_be_hides_no_restart(cell, device, mm):
+    """RIst jumps the way of the correction, so it looks as if the robot still had it."""
+    krc = Krc(cell, stands_s=0.3)
+    session, _ = talk(device, krc, 300, load=ramp)
+    sent = session.sent
+    assert np.linalg.norm(sent) > device.bounds.step[0]
+    for _ in range(10):
+        krc.take(None)
+    telegram = parse(krc.telegram())
+    there_mm = telegram.command_mm + mm * sent / np.linalg.norm(sent)
+    session, answer = exchange(session, replace(telegram, position_mm=there_mm), ramp(300), device)
+    assert (session.phase, session.reason) == (Phase.CLOSED, "restarted")
+    assert answer is None
+
+
 def test_a_lost_link_alone_is_no_restart(cell, device):
     session, log = talk(device, Krc(cell, stands_s=0.3), 400, load=ramp, lose=set(range(300, 340)))
     assert (session.phase, session.reason) == (Phase.HELD, "telegrams-lost")
