@@ -8,6 +8,8 @@ from pydantic import Field, field_validator, model_validator
 
 from gcode2krl.sections import Finite, NotNegative, Positive, Section, SignalNumber, SixFloats
 
+AddressText = Annotated[str, Field(max_length=40)]
+"""Longer than any address, so that a finding that quotes it stays one line."""
 PortNumber = Annotated[int, Field(strict=True, ge=1, le=65535)]
 CYCLES_S = (0.004, 0.012)
 _BROADCAST = IPv4Address("255.255.255.255")
@@ -26,9 +28,9 @@ class Gains(Section):
 class RobotLink(Section):
     """Where the telegrams go, and what ends a session."""
 
-    address: str = "127.0.0.1"
+    address: AddressText = "127.0.0.1"
     """Where the server listens, and where the controller looks for it; loopback unless stated."""
-    robot_address: str | None = None
+    robot_address: AddressText | None = None
     """The controller's address: only its datagrams are read. None: the first that sends a telegram is the
     controller; not allowed where the server listens on every network (``0.0.0.0``)."""
     port: PortNumber = 49152

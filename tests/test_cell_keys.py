@@ -3,7 +3,7 @@
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.cell import Cell
+from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cell_keys import meant_key
 from gcode2krl.errors import NotUnderstoodError
 
@@ -33,3 +33,9 @@ def test_the_remedy_names_the_nearest_key(tmp_path, text, meant):
 @pytest.mark.parametrize("place", [("xyzzy",), ("defaultss",), ("tool", "1", "qqqqqq"), ("a", "b", "c")])
 def test_what_is_near_to_nothing_is_answered_with_nothing(place):
     assert meant_key(Cell, place) == ""
+
+
+def test_a_long_text_is_not_quoted_whole():
+    with pytest.raises(NotUnderstoodError) as error:
+        resolve_cell({"online": {"link": {"address": "a" * 5000}}})
+    assert len(str(error.value)) < 300
