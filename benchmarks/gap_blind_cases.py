@@ -215,7 +215,7 @@ def _beside(case: Case, place: Path, how: How, record: dict[str, Any]) -> None:
 @contextlib.contextmanager
 def removed(effects: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Yield what `diagnose` is called with so that these effects are not in its library."""
-    module = importlib.import_module("gcode2krl.gap.diagnose")
+    module = importlib.import_module("gcode2krl.gap.diagnosis")
     if not effects:
         yield {}
     elif "exclude" in inspect.signature(module.diagnose).parameters:

@@ -67,8 +67,8 @@ def _parts(link: str, place: Path, names: Sequence[str]) -> list[Any]:
     """Return the measured signal of a link beside its model, run by run."""
     from gap_blind_cases import loaded
 
-    module = importlib.import_module("gcode2krl.gap.diagnose")
-    links = importlib.import_module("gcode2krl.gap.links")
+    module = importlib.import_module("gcode2krl.gap.diagnosis")
+    links = importlib.import_module("gcode2krl.gap.beside.links")
     runs, predictions = loaded(place, names)
     sides = list(module._sides(predictions[0], runs))
     return links.parts_of(link, sides)

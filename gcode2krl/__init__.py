@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from gcode2krl.compliance.deflect import deflect
     from gcode2krl.cutting.cut import cut
     from gcode2krl.errors import Gcode2KrlError, Issue
-    from gcode2krl.gap.diagnose import diagnose
+    from gcode2krl.gap.diagnosis import diagnose
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
     from gcode2krl.predict import plan_motion, predict, set_targets, solve_joints

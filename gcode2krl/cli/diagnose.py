@@ -93,6 +93,6 @@ def _cell(path: str | None) -> Any:
 def _apply(gap: Any, apply_to: str | None, cell_path: str | None, sources: list[str]) -> int:
     if apply_to is None:
         return 0
-    from gcode2krl.gap.apply import apply_to_cell
+    from gcode2krl.gap.tell.cell_effects import apply_to_cell
 
     return int(apply_to_cell(gap, Path(apply_to), Path(cell_path) if cell_path else None, sources))

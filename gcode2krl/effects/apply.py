@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import compliance, krc4, robot
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.effects.chain import simulate
 from gcode2krl.effects.effect import Applied
@@ -18,8 +18,6 @@ from gcode2krl.effects.signals import Signals
 from gcode2krl.errors import input_error
 from gcode2krl.prediction import Prediction, column_names
 from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets
-
-Floats = NDArray[np.float64]
 
 
 def inputs_of(

@@ -3,28 +3,26 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import robot
+from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compliance import chain, missing_stiffness, model
 from gcode2krl.frames import invert
 from gcode2krl.robot.kinematics import flange_pose
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Rows = slice | NDArray[np.int64]
+Rows = slice | Ints
 
 
-def tool_rows(tool: Ints) -> Iterator[tuple[int, Rows]]:
+def tool_rows(tool: Ints32) -> Iterator[tuple[int, Rows]]:
     """Yield each tool number and its rows."""
     numbers = np.unique(tool)
     for number in numbers:
         yield int(number), slice(None) if len(numbers) == 1 else np.flatnonzero(tool == number)
 
 
-def tip_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell, tool: Ints) -> Floats:
+def tip_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell, tool: Ints32) -> Floats:
     """Return the tips (m, 3) in mm in ``$BASE`` of an arm of these lengths (6,)."""
     flange_mm, rotation = flange_pose(q_rad, lengths_mm)
     root = np.empty_like(flange_mm)
@@ -35,7 +33,7 @@ def tip_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell, tool: Ints) -> Floats:
     return tips
 
 
-def tool_rotation(q_rad: Floats, cell: Cell, tool: Ints) -> Floats:
+def tool_rotation(q_rad: Floats, cell: Cell, tool: Ints32) -> Floats:
     """Return the rotations (m, 3, 3) of the tool frame in ``$BASE``."""
     _, rotation = flange_pose(q_rad, cell.robot.geometry.array())
     turned = cell.base_matrix()[:3, :3].T @ rotation
@@ -44,7 +42,7 @@ def tool_rotation(q_rad: Floats, cell: Cell, tool: Ints) -> Floats:
     return turned
 
 
-def jacobian_base(q_rad: Floats, cell: Cell, tool: Ints) -> Floats:
+def jacobian_base(q_rad: Floats, cell: Cell, tool: Ints32) -> Floats:
     """Return the Jacobian (m, 6, 6) of the tip along ``$BASE``: mm/rad over rad/rad."""
     found = np.empty((len(q_rad), 6, 6))
     for number, rows in tool_rows(tool):
@@ -74,7 +72,7 @@ def bend(
     moment_Nmm: Floats,
     softness: Floats | None,
     cell: Cell,
-    tool: Ints,
+    tool: Ints32,
     turned: bool = False,
 ) -> tuple[Floats, Floats]:
     """Return how far the tip moves and turns under a load along ``$BASE``, eq. 1-9 of Haehn & Weigold 2020.

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats
 from gcode2krl.effects import arm
 from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.signals import Signals
-
-Floats = NDArray[np.float64]
 
 
 def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool = False) -> Signals:

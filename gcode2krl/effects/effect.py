@@ -13,8 +13,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.sections import VIRTUAL_JOINTS
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from gcode2krl.effects.inputs import Inputs
     from gcode2krl.effects.signals import Signals
 
-Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 Target = str | None
 Load = tuple[Floats, Floats]

@@ -1,6 +1,7 @@
 """What the effects that move or turn a whole frame share."""
 
-from gcode2krl.effects.effect import Applied, Floats, Parameter
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Applied, Parameter
 from gcode2krl.sections import Frame
 
 FRAME_NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")

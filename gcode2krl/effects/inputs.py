@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.effects import arm
 from gcode2krl.effects.effect import Load
@@ -16,8 +16,6 @@ from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.tables import Forces, Motion, Targets, Toolpath
 from gcode2krl.units import S_PER_MIN
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 Cut = Callable[[Motion, Cell], Forces]
 Plan = Callable[[Targets, Cell], Motion]
 _S_PER_H = 60.0 * S_PER_MIN
@@ -29,10 +27,10 @@ class Inputs:
 
     cell: Cell
     time_s: Floats
-    move: Ints
-    source_line: Ints
+    move: Ints32
+    source_line: Ints32
     path_mm: Floats
-    tool: Ints
+    tool: Ints32
     spindle_rad_s: Floats
     q_cmd_rad: Floats
     """(m, 6) commanded joints."""

@@ -4,9 +4,9 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcode2krl.arrays import Floats
+
 _REVERSAL_RAD = 1e-5
 """An angle that goes back by less is no reversal: it lies within the noise and rounding of an encoder."""
 _PLATEAU_RAD = 1e-7

@@ -4,12 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gcode2krl.arrays import Floats
 from gcode2krl.effects.inputs import Inputs, resampled
-
-Floats = NDArray[np.float64]
 
 
 class Clock(NamedTuple):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from gcode2krl.effects.effect import Floats, Load
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Load
 from gcode2krl.effects.inputs import Inputs
 
 GRAVITY_M_S2 = 9.80665

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap import Gap, diagnose, text_report
-from gcode2krl.gap.result import SCHEMA
+from gcode2krl.gap.tell.result import SCHEMA
 from gcode2krl.runs import RunHead
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 

@@ -4,35 +4,35 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gcode2krl.gap.fold import folds_of
-from gcode2krl.gap.part import Part
+from gcode2krl.gap.beside.holdout import folds_of
+from gcode2krl.gap.beside.trace import Trace
 
 COUNT, STEP_S = 2000, 0.01
 
 
-def _part(number: int) -> Part:
+def _part(number: int) -> Trace:
     time_s = STEP_S * np.arange(COUNT)
-    return Part(
-        link="servo", run=f"run-{number}", side=number, signal="joint_actual", unit="deg", factor=1.0,
+    return Trace(
+        link="servo", run=f"run-{number}", run_number=number, signal="joint_actual", unit="deg", factor=1.0,
         components=("A1",), columns=(0,), plus="q_act_rad", inputs=SimpleNamespace(time_s=time_s),
         time_s=time_s, measured=np.zeros((COUNT, 1)), segments=np.array([[0, COUNT]], dtype=np.int64),
     )  # fmt: skip
 
 
 def test_whole_runs_are_held_out_by_turns():
-    parts = [_part(0), _part(1), _part(2)]
-    pairs = folds_of(parts, [np.ones(COUNT)] * 3)
-    assert [[part.run for part in held] for _, held in pairs] == [["run-0"], ["run-1"], ["run-2"]]
+    traces = [_part(0), _part(1), _part(2)]
+    pairs = folds_of(traces, [np.ones(COUNT)] * 3)
+    assert [[trace.run for trace in held] for _, held in pairs] == [["run-0"], ["run-1"], ["run-2"]]
     assert all(held[0] not in kept for kept, held in pairs)
 
 
 def test_where_one_run_has_the_power_its_quarters_are_held_out_with_guards():
-    parts = [_part(0), _part(1)]
-    pairs = folds_of(parts, [np.ones(COUNT), np.zeros(COUNT)])
+    traces = [_part(0), _part(1)]
+    pairs = folds_of(traces, [np.ones(COUNT), np.zeros(COUNT)])
     assert len(pairs) == 4
     for kept, held in pairs:
         first, last = held[0].time_s[[0, -1]]
-        own = next(part for part in kept if part.run == "run-0")
+        own = next(trace for trace in kept if trace.run == "run-0")
         away = np.minimum(np.abs(own.time_s - first), np.abs(own.time_s - last))
         assert away[(own.time_s < first) | (own.time_s > last)].min() > 1.0
         assert not np.any((own.time_s >= first) & (own.time_s <= last))

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap import intervals
-from gcode2krl.gap.slope import stretches_of_all
+from gcode2krl.gap.choose import intervals
+from gcode2krl.gap.fit.sensitivity import stretches_of_all
 
 
 def run_of(seconds, components=2, begins_s=0.0, rate_hz=4.0):
@@ -41,7 +41,7 @@ class LongRuns:
     """As much of an examination as the covariance needs: long runs, one parameter, scores that cancel."""
 
     def __init__(self, seconds):
-        self.parts = [run_of(seconds, 1, rate_hz=1.0), run_of(seconds, 1, rate_hz=1.0)]
+        self.traces = [run_of(seconds, 1, rate_hz=1.0), run_of(seconds, 1, rate_hz=1.0)]
         self.applied = ()
         self.fitted = SimpleNamespace(free=[SimpleNamespace(scale=np.ones(1))])
         # what one run pulls up in its late seconds, the next one pulls down in its early ones

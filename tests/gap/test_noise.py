@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.noise import Noise, at_most, drawn_noise, fit, unbiased, white
+from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, unbiased, white
 
 
 def _segments(count):

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.bounds import Mismatch
-from gcode2krl.gap.diagnose import known_effects
-from gcode2krl.gap.scan import examine_scans
+from gcode2krl.gap.beside.scan import examine_scans
+from gcode2krl.gap.diagnosis import known_effects
+from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.runs.scan import Scan
 from tests.gap.synthetic import prediction, runs
 
@@ -19,8 +19,8 @@ def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
     """Return a run whose scan is that of walls and floors of the nominal motion with another diameter."""
     generator = np.random.default_rng(seed)
     some = runs([], 1, 5, controller=False, tracker=False, normal=False)
-    (side,) = sys.modules["gcode2krl.gap.diagnose"]._sides(prediction(), some)
-    inputs = side.inputs
+    (pair,) = sys.modules["gcode2krl.gap.diagnosis"]._pairs(prediction(), some)
+    inputs = pair.inputs
     tip = inputs.position_mm + inputs.deflection_mm
     radius = prediction().cell.tool[1].diameter_mm / 2.0 + larger_mm / 2.0
     feed = np.gradient(tip, axis=0)
@@ -35,7 +35,7 @@ def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
     ]
     cloud = np.concatenate([tip[rows], *points]) + SHIFT_MM
     cloud = cloud + generator.normal(0.0, noise_mm, cloud.shape)
-    return replace(side, run=replace(side.run, scan=Scan(cloud)))
+    return replace(pair, run=replace(pair.run, scan=Scan(cloud)))
 
 
 @pytest.mark.parametrize("larger_mm", [0.12, -0.2])
@@ -58,9 +58,9 @@ def test_a_right_cutter_is_no_finding(seed):
 
 
 def test_without_scan_or_library_nothing_is_said():
-    side = _side()
+    pair = _side()
     assert (
-        examine_scans([replace(side, run=replace(side.run, scan=None))], (), known_effects([]), Mismatch())
+        examine_scans([replace(pair, run=replace(pair.run, scan=None))], (), known_effects([]), Mismatch())
         is None
     )
-    assert examine_scans([side], (), {}, Mismatch()) is None
+    assert examine_scans([pair], (), {}, Mismatch()) is None

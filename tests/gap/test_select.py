@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.evidence import Ledger, Rows
-from gcode2krl.gap.noise import white
-from gcode2krl.gap.select import Column, scores, surprise, threshold
+from gcode2krl.gap.choose.scoring import Column, scores, surprise, threshold
+from gcode2krl.gap.fit.gram import Ledger, Rows
+from gcode2krl.gap.fit.noise import white
 
 COUNT, BLOCKS, STRETCHES = 2400, 25, 48
 
@@ -17,9 +17,9 @@ def _ledger(generator: np.random.Generator, nuisance: int = 2) -> tuple[Ledger, 
     t = np.arange(COUNT) / COUNT
     hz = generator.uniform(1.0, 60.0, BLOCKS + nuisance)
     columns = np.sin(2.0 * np.pi * (hz * t[:, None] + generator.uniform(0.0, 1.0, BLOCKS + nuisance)))
-    part = SimpleNamespace(segments=np.array([[0, COUNT]], dtype=np.int64))
+    trace = SimpleNamespace(segments=np.array([[0, COUNT]], dtype=np.int64))
     stretch = np.repeat(np.arange(STRETCHES), COUNT // STRETCHES)
-    rows = Rows(part, columns, stretch, (white(1.0),), BLOCKS, nuisance)
+    rows = Rows(trace, columns, stretch, (white(1.0),), BLOCKS, nuisance)
     return Ledger([rows]), columns
 
 

@@ -7,11 +7,11 @@ import pytest
 
 from gcode2krl.effects import inputs_of, simulate
 from gcode2krl.effects.frame_effect import frame_of
-from gcode2krl.gap.commanded_path import commanded_path, on_the_curve
-from gcode2krl.gap.other_program import other_program
-from gcode2krl.gap.part import cubic
-from gcode2krl.gap.side import Side
-from gcode2krl.gap.slips import slips_of
+from gcode2krl.gap.beside.commanded import commanded_path, on_the_curve
+from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.trace import cubic
+from gcode2krl.gap.slips.program import other_program
+from gcode2krl.gap.slips.set_up import slips_of
 from gcode2krl.runs import Controller, Run
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
@@ -20,11 +20,11 @@ SHIFTED = f"{FIRST}G0 X140 Y42\n{SECOND.replace('Y60 F2400', 'Y62 F2400').replac
 SLOW = PROGRAM.replace("F3000", "F1800").replace("F2400", "F1440").replace("F6000", "F3600")
 
 
-def _side(effects: list, program: str = PROGRAM) -> Side:
+def _side(effects: list, program: str = PROGRAM) -> Pair:
     made = runs(
         effects, 1, 3, base=prediction(program, TRUE_STEP_S), normal=False, tracker=False, force=False
     )
-    return Side(run=made[0], number=0, inputs=inputs_of(prediction(dt_s=TRUE_STEP_S)))
+    return Pair(run=made[0], number=0, inputs=inputs_of(prediction(dt_s=TRUE_STEP_S)))
 
 
 def test_a_path_shifted_from_a_move_on_is_another_program():
@@ -43,9 +43,9 @@ def test_it_is_said_before_everything_else_and_ends_the_comparison():
 
 @pytest.mark.parametrize("cdis_mm", [3, 20, 50])
 def test_corners_alone_are_the_same_program(cdis_mm):
-    side = _side(applied(f"corner:cdis_mm={cdis_mm}"))
-    assert commanded_path(side).apart_mm.max() > 0.15 * cdis_mm
-    assert other_program([side]) is None
+    pair = _side(applied(f"corner:cdis_mm={cdis_mm}"))
+    assert commanded_path(pair).apart_mm.max() > 0.15 * cdis_mm
+    assert other_program([pair]) is None
 
 
 @pytest.mark.parametrize(
@@ -57,14 +57,14 @@ def test_corners_alone_are_the_same_program(cdis_mm):
     ],
 )
 def test_what_is_off_everywhere_is_the_same_program(text):
-    side = _side(applied(text))
-    assert commanded_path(side).apart_mm.max() > 0.3
-    assert other_program([side]) is None
+    pair = _side(applied(text))
+    assert commanded_path(pair).apart_mm.max() > 0.3
+    assert other_program([pair]) is None
 
 
 def test_the_way_to_the_start_and_from_the_end_is_no_program():
-    side = _side([])
-    table = side.run.controller
+    pair = _side([])
+    table = pair.run.controller
     away = table.q_cmd_rad[[0, -1]] + [[0.2, 0, 0, 0, 0, 0]]
     share = np.linspace(1.0, 0.0, 100, endpoint=False)[:, None]
     q = np.concatenate([
@@ -75,8 +75,8 @@ def test_the_way_to_the_start_and_from_the_end_is_no_program():
     longer = Controller(
         time_s=time_s, row=np.arange(len(q)) + 2, segments=np.array([[0, len(q)]]), q_cmd_rad=q
     )
-    run = Run(side.run.name, side.run.folder, side.run.head, controller=longer)
-    assert other_program([replace(side, run=run)]) is None
+    run = Run(pair.run.name, pair.run.folder, pair.run.head, controller=longer)
+    assert other_program([replace(pair, run=run)]) is None
 
 
 def test_slower_feeds_beside_rapid_moves_as_planned_are_another_program():
@@ -86,16 +86,16 @@ def test_slower_feeds_beside_rapid_moves_as_planned_are_another_program():
 
 
 def test_an_override_is_no_other_program():
-    side = _side(applied("override:percent=60"))
-    assert other_program([side]) is None
-    slips, _ = slips_of([side], LIBRARY)
+    pair = _side(applied("override:percent=60"))
+    assert other_program([pair]) is None
+    slips, _ = slips_of([pair], LIBRARY)
     assert [slip.applied.effect.name for slip in slips] == ["override"]
     assert slips[0].applied["percent"] == pytest.approx(60.0, abs=0.1)
 
 
 def test_slower_rapid_moves_alone_are_no_other_program():
-    side = _side([])
-    inputs = side.inputs
+    pair = _side([])
+    inputs = pair.inputs
     held = inputs.targets.speed_mm_s.copy()
     held[held > 120.0] = 120.0
     slow = inputs.replanned(replace(inputs.targets, speed_mm_s=held), inputs.cell)
@@ -105,8 +105,8 @@ def test_slower_rapid_moves_alone_are_no_other_program():
         time_s=time_s, row=np.arange(len(time_s)) + 2, segments=np.array([[0, len(time_s)]]),
         q_cmd_rad=cubic(time_s, slow.time_s, slow.q_cmd_rad),
     )  # fmt: skip
-    run = Run(side.run.name, side.run.folder, side.run.head, controller=table)
-    assert other_program([replace(side, run=run)]) is None
+    run = Run(pair.run.name, pair.run.folder, pair.run.head, controller=table)
+    assert other_program([replace(pair, run=run)]) is None
 
 
 @pytest.mark.parametrize(
@@ -119,20 +119,20 @@ def test_a_mere_shift_may_be_a_tool_as_well(text, alike):
 
 
 def test_a_model_of_the_controllers_own_is_no_other_base():
-    side = _with_own_model(_side([]))
-    slips, _ = slips_of([side], LIBRARY)
+    pair = _with_own_model(_side([]))
+    slips, _ = slips_of([pair], LIBRARY)
     assert slips == []
     moved = applied("base_number:x_mm=30,a_deg=2")[0]
     assert on_the_curve(_side([moved]), frame_of(moved))
-    assert not on_the_curve(side, frame_of(moved))
+    assert not on_the_curve(pair, frame_of(moved))
 
 
 def test_the_controllers_joints_come_back_to_the_plan_and_its_drives_stay():
-    side = _with_own_model(
+    pair = _with_own_model(
         _side(applied("servo_lag:target=A1,tau_s=0.01", "clock:target=controller,offset_s=0.003"))
     )
-    before, planned = side.run.controller, side.inputs
-    on_time = side.with_own_model()
+    before, planned = pair.run.controller, pair.inputs
+    on_time = pair.with_own_model()
     assert on_time.clock_s["controller"] == pytest.approx(0.003, abs=2e-5)
     nominal = replace(on_time, inputs=planned).with_nominal_joints()
     after = nominal.run.controller
@@ -143,14 +143,14 @@ def test_the_controllers_joints_come_back_to_the_plan_and_its_drives_stay():
     np.testing.assert_allclose(after.q_act_rad - after.q_cmd_rad, lag, atol=1e-12)
 
 
-def _with_own_model(side: Side) -> Side:
+def _with_own_model(pair: Pair) -> Pair:
     """Return a side whose controller's joints differ with the pose, by millimetres at the tip."""
-    q = side.run.controller.q_cmd_rad
+    q = pair.run.controller.q_cmd_rad
     added = 2e-3 * np.sin(3.0 * q[:, [1, 0, 1, 0, 2, 1]] + np.arange(6)) + 1e-3
     controller = replace(
-        side.run.controller, q_cmd_rad=q + added, q_act_rad=side.run.controller.q_act_rad + added
+        pair.run.controller, q_cmd_rad=q + added, q_act_rad=pair.run.controller.q_act_rad + added
     )
-    return replace(side, run=replace(side.run, controller=controller))
+    return replace(pair, run=replace(pair.run, controller=controller))
 
 
 def test_load_data_of_another_tool_differ_in_mass_and_centre():

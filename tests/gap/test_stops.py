@@ -5,27 +5,27 @@ import sys
 import numpy as np
 import pytest
 
-from gcode2krl.gap.diagnose import known_effects
-from gcode2krl.gap.place_time import gone
-from gcode2krl.gap.stops import unplanned_stops
+from gcode2krl.gap.diagnosis import known_effects
+from gcode2krl.gap.fit.place_times import gone
+from gcode2krl.gap.slips.stops import unplanned_stops
 from tests.gap.synthetic import applied, prediction, runs
 
 SERVO = {"tracker": False, "force": False}
 
 
-def _sides(some):
-    return list(sys.modules["gcode2krl.gap.diagnose"]._sides(prediction(), some))
+def _pairs(some):
+    return list(sys.modules["gcode2krl.gap.diagnosis"]._pairs(prediction(), some))
 
 
 def test_stops_are_found_with_their_hold():
     some = runs(applied("advance_stop:count=2,hold_s=0.08"), 2, 5, **SERVO)
-    (slip,), stopped = unplanned_stops(_sides(some), known_effects([]))
+    (slip,), stopped = unplanned_stops(_pairs(some), known_effects([]))
     assert slip.applied.values["count"] == 2.0
     assert slip.applied.values["hold_s"] == pytest.approx(0.08, abs=0.005)
     assert slip.rms_after is not None
     assert slip.rms_after < 0.05 * slip.rms_before
     assert "stopped exactly" in slip.words
-    assert len(stopped[0].inputs.time_s) > len(_sides(some)[0].inputs.time_s)
+    assert len(stopped[0].inputs.time_s) > len(_pairs(some)[0].inputs.time_s)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_stops_are_found_with_their_hold():
 )
 def test_another_law_or_clock_is_no_stop(text):
     some = runs(applied(text) if text else [], 2, 5, **SERVO)
-    assert unplanned_stops(_sides(some), known_effects([]))[0] == []
+    assert unplanned_stops(_pairs(some), known_effects([]))[0] == []
 
 
 def test_how_far_a_noisy_signal_has_gone():

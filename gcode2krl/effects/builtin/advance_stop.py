@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Ints
 from gcode2krl.effects.effect import Applied, Effect, Parameter
 from gcode2krl.effects.inputs import Inputs
 
@@ -44,7 +44,7 @@ class AdvanceStop(Effect):
         return with_stops(inputs, chosen, applied["hold_s"])
 
 
-def with_stops(inputs: Inputs, rows: NDArray[np.int64], hold_s: float) -> Inputs:
+def with_stops(inputs: Inputs, rows: Ints, hold_s: float) -> Inputs:
     """Return the inputs of the motion that stops exactly at some targets and stands there so long."""
     targets = inputs.targets
     if targets is None or len(rows) == 0:

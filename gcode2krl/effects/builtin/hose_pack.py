@@ -5,7 +5,8 @@ from types import MappingProxyType
 import numpy as np
 
 from gcode2krl import frames as fr
-from gcode2krl.effects.effect import Applied, Effect, Floats, Load, Parameter
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
 from gcode2krl.effects.inputs import Inputs
 
 _H0 = ("h0_x_N", "h0_y_N", "h0_z_N")

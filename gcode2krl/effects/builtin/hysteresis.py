@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter, every_joint
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
 from gcode2krl.units import RAD_PER_DEG

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter, Target
+from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
 from gcode2krl.effects.inputs import Inputs
 
 _LENGTHS = ("a1", "a2", "c1", "c2", "c3", "c4")

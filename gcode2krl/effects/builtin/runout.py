@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.cutting import cutting_load
 from gcode2krl.cutting.law import feed_per_tooth, law_array
 from gcode2krl.effects import arm
 from gcode2krl.effects.coefficients import edge_only
-from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Floats, Load, Parameter, Target
+from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Parameter, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
@@ -61,7 +61,7 @@ class Runout(Effect):
         return force_N, moment_Nmm
 
 
-def _missing(number: int, rows: NDArray[np.int64], inputs: Inputs, applied: Applied) -> Floats:
+def _missing(number: int, rows: Ints, inputs: Inputs, applied: Applied) -> Floats:
     """Return the edge force (n, 3) along ``$BASE`` that idle teeth do not bring."""
     forces, motion, material = inputs.forces, inputs.motion, inputs.cell.material
     missing = np.zeros((len(rows), 3))
@@ -101,7 +101,7 @@ def idle_arcs(phi_rad: Floats, sine: Floats) -> Floats:
     return np.ascontiguousarray(np.stack(pieces, axis=2).reshape(len(phi_rad), -1))
 
 
-def along_base(force_N: Floats, inputs: Inputs, rows: NDArray[np.int64]) -> Floats:
+def along_base(force_N: Floats, inputs: Inputs, rows: Ints) -> Floats:
     """Return forces (n, 3) along feed, normal and axial of the commanded path as ones along ``$BASE``."""
     axis = inputs.tool_rotation[rows, :, 2]
     velocity = inputs.velocity_mm_s[rows]

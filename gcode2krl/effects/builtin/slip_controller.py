@@ -5,9 +5,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.compliance import project_normal
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Floats, Load, Parameter
+from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.weight import with_weight
 from gcode2krl.units import RAD_PER_DEG

@@ -6,9 +6,10 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Floats, Target
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.frame_effect import frame_of, frame_parameters, is_nothing
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.errors import input_error

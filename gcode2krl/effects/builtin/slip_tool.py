@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
+from gcode2krl.arrays import Floats
 from gcode2krl.effects.coefficients import with_larger_tools
-from gcode2krl.effects.effect import Applied, Effect, Floats, Load, Parameter
+from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.signals import Signals
 

@@ -4,7 +4,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gcode2krl.effects.effect import DIRECTION, Applied, Effect, Floats, Parameter, direction_parameters
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import DIRECTION, Applied, Effect, Parameter, direction_parameters
 from gcode2krl.effects.inputs import Inputs
 
 

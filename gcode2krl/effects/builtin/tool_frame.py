@@ -1,6 +1,7 @@
 """The measured tip is moved by a frame in the tool."""
 
-from gcode2krl.effects.effect import Applied, Effect, Floats
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.frame_effect import FRAME_NAMES, frame_of, frame_parameters, is_nothing
 from gcode2krl.effects.inputs import Inputs
 

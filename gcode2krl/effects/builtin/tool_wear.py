@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Floats, Load, Parameter
+from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.units import MM_PER_M
 

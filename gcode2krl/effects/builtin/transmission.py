@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import JOINTS, Applied, Effect, Floats, Parameter, Target
+from gcode2krl.effects.effect import JOINTS, Applied, Effect, Parameter, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.units import RAD_PER_DEG
 

@@ -4,11 +4,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.effects.effect import (
     DIRECTION,
     Applied,
     Effect,
-    Floats,
     Parameter,
     Target,
     Values,

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from gcode2krl.effects.effect import Applied, Effect, Floats, Parameter
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.effect import Applied, Effect, Parameter
 from gcode2krl.effects.inputs import Inputs
 
 

@@ -1,0 +1,44 @@
+"""A prediction on a grid fine enough for what lies between its samples.
+
+A blended corner of a rapid lasts some 5 ms; samples 12 ms apart cut it by tenths of a millimetre, which is
+no gap.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.beside.trace import cubic
+from gcode2krl.predict import plan_motion, solve_joints
+from gcode2krl.prediction import Prediction
+
+STEP_S = 0.004
+"""The cycle of a KRC4 under RSI."""
+_SAME_MM = 0.05
+"""Planned anew, the prediction's own samples must be met; else it was not planned by these laws."""
+
+
+def refined_prediction(prediction: Prediction) -> Prediction:
+    """Return the prediction sampled every 4 ms, the material removed again; as it is where finer."""
+    motion = prediction.motion
+    if motion is None or len(motion) < 3 or prediction.joints is None:
+        return prediction
+    if float(np.median(np.diff(motion.time_s))) <= STEP_S * 1.01:
+        return prediction
+    try:
+        fine = plan_motion(prediction.targets, prediction.cell, STEP_S)
+        again = cubic(motion.time_s, fine.time_s, fine.position_mm)
+        apart = np.linalg.norm(again - motion.position_mm, axis=1)
+        if float(np.sqrt(np.mean(apart**2))) > _SAME_MM:
+            return prediction
+        joints = solve_joints(fine, prediction.cell)
+        forces = None
+        if prediction.forces is not None:
+            from gcode2krl.cutting import cut
+
+            forces = cut(prediction.toolpath, fine, prediction.cell)
+    except Gcode2KrlError:
+        return prediction
+    inputs = {**prediction.inputs, "dt_s": STEP_S}
+    return replace(prediction, motion=fine, joints=joints, forces=forces, deflection=None, inputs=inputs)

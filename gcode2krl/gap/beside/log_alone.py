@@ -1,0 +1,75 @@
+"""Runs without a prediction: the log's own commanded joints are the path."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gcode2krl import frames as fr
+from gcode2krl import robot
+from gcode2krl.cell import Cell, load_cell
+from gcode2krl.effects import Inputs
+from gcode2krl.effects.operators import play
+from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.trace import linear
+from gcode2krl.gap.fit.noise import resolution
+from gcode2krl.runs import Run
+
+_S_PER_H = 3600.0
+
+
+def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:
+    """Return a pair for each run that has a controller's table."""
+    started = [run.head.started for run in runs if run.head.started is not None]
+    first = min(started) if started else None
+    pairs = []
+    for number, run in enumerate(runs):
+        hours = 0.0
+        if first is not None and run.head.started is not None:
+            hours = (run.head.started - first).total_seconds() / _S_PER_H
+        inputs = _inputs(run, cell if cell is not None else load_cell(), hours, cell is not None)
+        if inputs is not None:
+            pairs.append(Pair(run=run, number=number, inputs=inputs, from_log=True))
+    return pairs
+
+
+def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | None:
+    table = run.controller
+    if table is None:
+        return None
+    path = next((q for q in (table.q_cmd_rad, table.q_act_rad, table.q_load_rad) if q is not None), None)
+    if path is None:
+        return None
+    q = np.nan_to_num(path)
+    # a commanded angle that stands flickers by its last decimal, which is no reversal
+    q = np.stack([play(column, resolution(column) * np.sqrt(12.0)) for column in q.T], axis=1)
+    count = len(q)
+    tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=1)
+    kinematic = known_robot and run.head.angles == "absolute" and bool(np.isfinite(path).all())
+    position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+    if kinematic:
+        position, rotation = robot.forward(q, cell, tool)
+    load = np.zeros((count, 3))
+    if kinematic and run.force is not None:
+        measured = linear(table.time_s, run.force.time_s, run.force.force_N)
+        if run.head.frames.force != "base":
+            turned = fr.rotation_from_quaternion(rotation)
+            if run.head.frames.force == "sensor":
+                turned = turned @ cell.tool_matrix(tool)[:3, :3].T
+            measured = np.einsum("nij,nj->ni", turned, measured)
+        load = measured
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    return Inputs(
+        cell=cell,
+        time_s=table.time_s,
+        move=np.zeros(count, dtype=np.int32),
+        source_line=np.zeros(count, dtype=np.int32),
+        path_mm=way,
+        tool=np.full(count, tool, dtype=np.int32),
+        spindle_rad_s=np.zeros(count),
+        q_cmd_rad=q,
+        position_mm=position,
+        rotation=rotation,
+        force_base_N=load,
+        moment_base_Nmm=np.zeros((count, 3)),
+        hours=hours,
+    )

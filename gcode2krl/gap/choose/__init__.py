@@ -1,0 +1,1 @@
+"""Which effects are at work, how sure, and how much they explain."""

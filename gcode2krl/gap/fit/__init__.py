@@ -1,0 +1,1 @@
+"""The statistical model of a link and its fit."""

@@ -1,0 +1,165 @@
+"""Signatures: what an effect does to a signal per unit of its size, from the effect's own implementation.
+
+A block is an effect at a target with one set of shapes; its columns are finite differences of `simulate`
+around the nominal model, one for each of the settings that span the effect.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied, Effect, Parameter
+from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.beside.trace import Trace
+
+PHASE = "phase"
+HZ = "hz"
+
+
+@dataclass(frozen=True)
+class Block:
+    """An effect at a target with its shapes."""
+
+    effect: Effect
+    target: str | None
+    shape: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, str | None]:
+        """Return what the block is an instance of: effect and target."""
+        return self.effect.name, self.target
+
+    def settings(self, trace: Trace, size: float = 1.0) -> list[Applied]:
+        """Return the effects whose signals, less the nominal ones, span the block; ``size`` 1 is typical."""
+        shapes = [dict(self.shape)]
+        if PHASE in self.effect.names:
+            shapes = [dict(self.shape) | {PHASE: turn} for turn in (0.0, math.pi / 2.0)]
+        return [
+            Applied(self.effect, self.target, values)
+            for shape in shapes
+            for values in self.effect.settings(trace.inputs, self.target, shape, size)
+        ]
+
+    def applied(
+        self, coefficients: Floats, trace: Trace, shape: Mapping[str, float] | None = None
+    ) -> Applied:
+        """Return the effect that a combination of the block's columns is."""
+        form = dict(self.shape) | dict(shape or {})
+        if PHASE in self.effect.names:
+            form[PHASE] = math.atan2(coefficients[1], coefficients[0])
+            coefficients = np.array([math.hypot(coefficients[0], coefficients[1])])
+        values = self.effect.combined(coefficients, trace.inputs, self.target, form)
+        return Applied(self.effect, self.target, values)
+
+    def bounds(self, trace: Trace) -> tuple[Floats, Floats]:
+        """Return the plausible range (c,), (c,) of the coefficients; symmetric where they are a vector."""
+        effect = self.effect
+        sizes = [p for p in effect.parameters if not p.is_shape and p.name not in (effect.direction or ())]
+        if PHASE in effect.names or effect.direction is not None:
+            width = 2 if PHASE in effect.names else 3 * len(sizes)
+            most = max(_share(p.high, p, effect, trace, self.target) for p in sizes)
+            return np.full(width, -most), np.full(width, most)
+        ends = np.array([
+            sorted(_share(end, p, effect, trace, self.target) for end in (p.low, p.high)) for p in sizes
+        ])  # fmt: skip
+        return ends[:, 0], ends[:, 1]
+
+    def free_shapes(self) -> tuple[str, ...]:
+        """Return the shapes that a refit may move: those whose grid is a mere start, not a count."""
+        return tuple(
+            p.name
+            for p in self.effect.parameters
+            if p.is_shape
+            and p.name not in (self.effect.direction or ())
+            and p.name not in (PHASE, "harmonic")
+        )
+
+
+def _share(value: float, p: Parameter, effect: Effect, trace: Trace, target: str | None) -> float:
+    name = p.name
+    nominal = effect.nominal(trace.inputs, target)[name]
+    start = effect.start(trace.inputs, target)[name]
+    return (value - nominal) / (start - nominal) if start != nominal else 0.0
+
+
+def blocks_of(effect: Effect, target: str | None) -> Iterator[Block]:
+    """Yield the blocks of an effect at a target, one a combination of shapes."""
+    seen = []
+    for shape in effect.shapes():
+        form = {name: value for name, value in shape.items() if name != PHASE}
+        if form not in seen:
+            seen.append(form)
+            yield Block(effect, target, form)
+
+
+def blocks_at(effect: Effect, target: str | None, hz: tuple[float, ...]) -> Iterator[Block]:
+    """Yield the blocks of an effect with a frequency, at these frequencies in place of its grid's."""
+    seen = set()
+    for block in blocks_of(effect, target):
+        rest = {name: value for name, value in block.shape.items() if name != HZ}
+        for value in hz:
+            key = (value, *sorted(rest.items()))
+            if key not in seen:
+                seen.add(key)
+                yield Block(effect, target, rest | {HZ: value})
+
+
+def strongest_hz(
+    residuals: list[Floats], step_s: float, low: float, high: float, most: int
+) -> tuple[float, ...]:
+    """Return the frequencies of the highest peaks of the mean power of residuals (n, k), most powerful first.
+
+    Neighbours within 15 % of a higher peak are not taken.
+    """
+    length = min(len(each) for each in residuals)
+    mean = sum(
+        np.abs(np.fft.rfft(each[:length] - each[:length].mean(axis=0), axis=0)) ** 2 for each in residuals
+    )
+    power, hz = np.sum(mean, axis=1), np.fft.rfftfreq(length, step_s)
+    wide = max(1, round(0.3 * length * step_s))
+    power = np.convolve(power, np.ones(wide) / wide, mode="same")
+    found: list[float] = []
+    for i in np.argsort(-power):
+        if low <= hz[i] <= high and all(abs(hz[i] / other - 1.0) > 0.15 for other in found):
+            found.append(float(hz[i]))
+            if len(found) == most:
+                break
+    return tuple(found)
+
+
+class Signatures:
+    """Columns by part, each computed once."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, float, str, str | None, tuple[tuple[str, float], ...]], Floats] = {}
+        self._kept: list[Trace] = []
+        self._names: dict[int, int] = {}
+
+    def same(self, known: Trace, other: Trace) -> None:
+        """Let a trace whose stamps are moved by a few ms have the columns of the other one."""
+        self._kept += [known, other]
+        self._names[id(other)] = self._names.get(id(known), id(known))
+
+    def columns(self, block: Block, trace: Trace, size: float = 1.0) -> Floats:
+        """Return the block's columns (k, n, c) on a trace, none where the effect is not possible there."""
+        key = (self._names.get(id(trace), id(trace)), size, *block.key, tuple(sorted(block.shape.items())))
+        if key not in self._known:
+            self._kept.append(trace)
+            self._known[key] = _columns(block, trace, size)
+        return self._known[key]
+
+
+def _columns(block: Block, trace: Trace, size: float) -> Floats:
+    n, k = trace.shape
+    try:
+        settings = block.settings(trace, size)
+        found = np.empty((k, n, len(settings)))
+        for number, applied in enumerate(settings):
+            found[:, :, number] = (trace.sample([applied]) - trace.nominal).T
+    except Gcode2KrlError:
+        return np.zeros((k, n, 0))
+    found[~np.isfinite(found)] = 0.0
+    return found

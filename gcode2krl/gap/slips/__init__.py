@@ -1,0 +1,1 @@
+"""Set-up slips, tested before everything else."""

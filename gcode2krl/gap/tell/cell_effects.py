@@ -1,0 +1,50 @@
+"""Named causes into a cell file, so that the next prediction has them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gcode2krl import library
+from gcode2krl.cell import resolve_cell
+from gcode2krl.errors import input_error
+from gcode2krl.files import write_together
+from gcode2krl.gap.tell.result import Gap
+
+
+def apply_to_cell(gap: Gap, file: Path, base: Path | None, sources: Sequence[str]) -> int:
+    """Write a cell file with the named causes as ``[[effects]]``, return how many were added.
+
+    Parameters
+    ----------
+    file : is written; where it exists its keys are kept and comments are lost.
+    base : cell file to begin from where ``file`` does not exist.
+    sources : the runs that the causes come from.
+
+    Raises
+    ------
+    NotUnderstoodError
+        A file is no cell file, or cannot be written.
+    """
+    import tomli_w
+
+    begin = file if file.exists() else base
+    data: dict[str, Any] = library.read_toml(begin) if begin is not None else {}
+    before = data.get("effects", [])
+    if not isinstance(before, list):
+        raise input_error("cell-key", "effects: found no list", "write [[effects]]", source=str(file))
+    causes = [cause for cause in gap.named if cause.effect.kind == "cause"]
+    entries = [
+        {
+            "name": one.effect.name,
+            **({"target": one.target} if one.target is not None else {}),
+            "parameters": {name: float(f"{value:.6g}") for name, value in one.values.items()},
+            "source": f"diagnosed from {', '.join(sources)}",
+        }
+        for one in causes
+    ]
+    same = {(entry["name"], entry.get("target")) for entry in entries}
+    kept = [entry for entry in before if (entry.get("name"), entry.get("target")) not in same]
+    data["effects"] = [*kept, *entries]
+    resolve_cell(data, beside=file.parent, source=str(file))
+    write_together({file: tomli_w.dumps(data).encode("utf-8")})
+    return len(entries)
