@@ -25,8 +25,7 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     With ``rotation`` the true orientation of the tool comes too. Effects of one stage follow each other in
     the order given. Without effects the tip is the commanded one plus the nominal deflection.
     """
-    for one in applied:
-        inputs = one.effect.replan(inputs, one)
+    inputs = _planned(inputs, applied)
     q_cmd = inputs.q_cmd_rad
     q_act = q_load = q_true = q_cmd
     for one in applied:
@@ -67,8 +66,7 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
 
 def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
     """Return what `simulate` does as far as commanded joints and clocks go; the rest is nominal or zero."""
-    for one in applied:
-        inputs = one.effect.replan(inputs, one)
+    inputs = _planned(inputs, applied)
     q_cmd, nothing = inputs.q_cmd_rad, np.zeros_like(inputs.position_mm)
     signals = Signals(
         inputs=inputs,
@@ -85,6 +83,12 @@ def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
     for one in applied:
         signals = one.effect.instruments(signals, one)
     return signals
+
+
+def _planned(inputs: Inputs, applied: Sequence[Applied]) -> Inputs:
+    for one in applied:
+        inputs = inputs if one.planned else one.effect.replan(inputs, one)
+    return inputs
 
 
 def _pose(

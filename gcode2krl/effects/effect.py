@@ -77,6 +77,8 @@ class Applied:
     effect: "Effect"
     target: Target = None
     values: Values = field(default_factory=dict)
+    planned: bool = False
+    """The inputs it is simulated from hold its plan already."""
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
@@ -127,6 +129,12 @@ class Effect:
     """What `Inputs.offers` must contain for the effect to be simulated: ``cut``, ``plan``."""
     direction: tuple[str, str, str] | None = None
     """Three parameters that are a direction only: their length does not matter, the size has its own."""
+    searched_in: frozenset[str] = frozenset()
+    """Links in which a slip is tried as a cause is."""
+    is_clock: bool = False
+    """It is the clock of a table, or of some of its columns: the target says which."""
+    own_model: bool = False
+    """The controller moves by a model of the robot other than the cell's: joints differ, the tip does not."""
 
     # What it is
 
@@ -155,6 +163,21 @@ class Effect:
             if here is not None:
                 found.add(here)
         return frozenset(found)
+
+    def searched(self, link: str, target: Target, examined: frozenset[str]) -> bool:
+        """Tell whether a diagnosis tries the effect in a link, given the links that have data.
+
+        Causes are tried wherever they show, slips in `searched_in` only: most have a test of their own.
+        """
+        tried = self.kind == "cause" or link in self.searched_in
+        return tried and link in self.visible_links(examined, target)
+
+    def learned(self, applied: Applied, link: str) -> Applied | None:
+        """Return what later links take over of the effect as fitted in a link; None where that is nothing.
+
+        What only the force sensor shows does not bend the arm.
+        """
+        return None if self.family == "sensor" else applied
 
     # Its values
 
@@ -222,6 +245,11 @@ class Effect:
 
     def _sizes(self) -> tuple[Parameter, ...]:
         return tuple(p for p in self.parameters if not p.is_shape and p.name not in (self.direction or ()))
+
+    @property
+    def plans_anew(self) -> bool:
+        """Tell whether the motion is planned again: a signature then tells little of the effect's size."""
+        return "plan" in self.needs
 
     @property
     def is_linear(self) -> bool:

@@ -1,7 +1,7 @@
 """The sim-to-real gap: where runs differ from their prediction, why, and what is gone once it is modelled."""
 
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.diagnosis import diagnose, diagnose_log
-from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.gap.tell.report import text_report
 from gcode2krl.gap.tell.result import Gap
 

@@ -1,7 +1,6 @@
 """The diagnosis: runs beside their predictions, link by link, to one answer."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Applied, Effect, inputs_of, library
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.beside.clocks import coarse_offset, fitted_offset
 from gcode2krl.gap.beside.fine_prediction import refined_prediction
@@ -21,8 +21,7 @@ from gcode2krl.gap.beside.scan import examine_scans
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.fitted_joints import with_fitted
 from gcode2krl.gap.choose.judgement import Judgement, judge
-from gcode2krl.gap.choose.selection import Question, replans
-from gcode2krl.gap.fit.mismatch import Mismatch
+from gcode2krl.gap.choose.selection import Question
 from gcode2krl.gap.fit.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
 from gcode2krl.gap.slips.set_up import Slip, clock_slips, slips_of
 from gcode2krl.gap.slips.stops import unplanned_stops
@@ -33,21 +32,13 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run, check_program
 
 _S_PER_H = 3600.0
-_SLIPS_THAT_ARE_CAUSES = {
-    "path": ("absolute_accuracy",), "servo": ("rsi_on",), "force": ("swapped_tool",),
-    "mechanics": ("swapped_tool", "load"),
-}  # fmt: skip
-"""Slips that are searched for as every effect is; the others have tests of their own."""
 _SET = 0.1
 """The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
 _PEAKS = 4
 _LOST, _CLOCKS_LOST = ("unexplained", "partly_explained"), 4
 """Where the run's own timing replaced the plan's, an instrument's clock is known so many times worse."""
-_LENGTH_MM = 0.1
-"""Coefficients of force known to 3 % tell a depth of cut of some mm no better."""
 _CLOCKS_OF_TWO = 2
 """Two clocks are the same where they differ by no more than normal mismatch of both."""
-_TIMING = ("velocity_rule", "corner", "advance_stop", "override")
 
 
 def diagnose(
@@ -200,13 +191,10 @@ def _with_coarse_clocks(pair: Pair) -> Pair:
 def _apply_slips(state: _State, slips: Sequence[Slip]) -> None:
     """Let later links start from what a slip did to the motion."""
     for slip in slips:
-        if slip.applied.effect.name == "override":
-            state.pairs = [
-                replace(pair, inputs=slip.applied.effect.replan(pair.inputs, slip.applied))
-                for pair in state.pairs
-            ]
-        elif slip.applied.effect.name != "clock":
-            planned = _planned_once(state, slip.applied)
+        if slip.applied.effect.is_clock:
+            continue  # it was taken off the stamps
+        planned = _planned_once(state, slip.applied)
+        if not slip.applied.effect.plans_anew:  # else all that it does is in the plan
             state.found.append(planned)
             state.slips.append(planned)
 
@@ -214,9 +202,7 @@ def _apply_slips(state: _State, slips: Sequence[Slip]) -> None:
 def _planned_once(state: _State, applied: Applied) -> Applied:
     """Take what a cause does to the commanded joints into the inputs; return the rest of what it does."""
     state.pairs = [replace(pair, inputs=applied.effect.replan(pair.inputs, applied)) for pair in state.pairs]
-    rest = copy(applied.effect)
-    rest.replan = lambda inputs, applied: inputs  # type: ignore[method-assign]
-    return replace(applied, effect=rest)
+    return replace(applied, planned=True)
 
 
 def _examined(state: _State) -> Iterator[str]:
@@ -239,16 +225,12 @@ def _question(state: _State, link: str, traces: Sequence[Trace]) -> Question:
     upstream = frozenset(each for each in EXAMINED if each not in state.examined)
     blocks: list[Block] = []
     for effect in state.known.values():
-        if effect.kind == "slip" and (state.slips or effect.name not in _SLIPS_THAT_ARE_CAUSES.get(link, ())):
+        if effect.kind == "slip" and state.slips:
             continue
-        if effect.name in state.exclude or (state.stopped and replans(effect)):
+        if effect.name in state.exclude or (state.stopped and effect.plans_anew):
             continue
-        if effect.name == "swapped_tool" and link == "mechanics" and "force" in state.examined:
-            continue  # the force has shown it, and each try removes the material again
         for target in effect.targets(cell):
-            if link in effect.visible_links(state.examined, target) and _relevant(
-                effect, target, link, state
-            ):
+            if effect.searched(link, target, state.examined):
                 if HZ in effect.names:
                     p = effect.parameter(HZ)
                     peaks = strongest_hz(
@@ -269,22 +251,12 @@ def _step(traces: Sequence[Trace]) -> float:
     return float(np.median(np.diff(traces[0].time_s)))
 
 
-def _relevant(effect: Effect, target: str | None, link: str, state: _State) -> bool:
-    """Leave out clocks that another link has already set right."""
-    if effect.name != "clock":
-        return True
-    if link == "path":
-        return target == "controller"
-    if link == "servo":
-        return target == "q_cmd"
-    return target != "controller" or "path" not in state.examined
-
-
 def _learn(state: _State, judgement: Judgement) -> None:
     """Take what a link says into the model of the later ones."""
     named = list(judgement.applied)
     if judgement.link == "force":
-        state.found += [_sure_length(one) for one in named if one.effect.family != "sensor"]
+        learned = [one.effect.learned(one, judgement.link) for one in named]
+        state.found += [one for one in learned if one is not None]
         if judgement.verdict in _LOST:
             state.pairs = [pair.with_measured_load() for pair in state.pairs]
     if judgement.link == "servo":
@@ -293,10 +265,10 @@ def _learn(state: _State, judgement: Judgement) -> None:
         state.pairs = with_fitted(state.pairs, judgement, _question_of(judgement))
     if judgement.link != "path":
         return
-    planned = [one for one in named if one.effect.name in _TIMING]
+    planned = [one for one in named if one.effect.plans_anew]
     for one in planned:
         state.pairs = [replace(pair, inputs=one.effect.replan(pair.inputs, one)) for pair in state.pairs]
-    if any(one.effect.name == "absolute_accuracy" for one in named):
+    if any(one.effect.own_model for one in named):
         state.pairs = [_without_own_model(pair) for pair in state.pairs]
         return
     if judgement.verdict in _LOST:
@@ -309,13 +281,6 @@ def _without_own_model(pair: Pair) -> Pair:
     on_time = refined(pair.with_own_model())
     inputs = replace(on_time.inputs, q_cmd_rad=pair.inputs.q_cmd_rad)
     return replace(on_time, inputs=inputs).with_nominal_joints()
-
-
-def _sure_length(one: Applied) -> Applied:
-    """Return another tool without a length that forces cannot tell from none."""
-    if one.effect.name != "swapped_tool" or abs(one.values["length_mm"]) > _LENGTH_MM:
-        return one
-    return replace(one, values={**one.values, "length_mm": 0.0})
 
 
 def _free_controller(state: _State, servo: Judgement) -> None:
@@ -337,7 +302,7 @@ def _free_controller(state: _State, servo: Judgement) -> None:
 def _clock(judgement: Judgement | None, target: str) -> Applied | None:
     """Return the named clock of a table or of columns."""
     named = judgement.applied if judgement is not None else ()
-    return next((one for one in named if (one.effect.name, one.target) == ("clock", target)), None)
+    return next((one for one in named if one.effect.is_clock and one.target == target), None)
 
 
 def _question_of(judgement: Judgement) -> Question:

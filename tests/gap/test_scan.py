@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.scan import examine_scans
 from gcode2krl.gap.diagnosis import known_effects
-from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.runs.scan import Scan
 from tests.gap.synthetic import prediction, runs
 

@@ -25,6 +25,7 @@ class WrongClock(Effect):
 
     name = "clock"
     family = "timing"
+    is_clock = True
     links = frozenset().union(*_LINKS.values())
     parameters = (
         Parameter(
@@ -44,6 +45,16 @@ class WrongClock(Effect):
     def links_at(self, target: Target) -> frozenset[str]:
         """Return the links between this table and another one."""
         return _LINKS.get(target or "", self.links)
+
+    def searched(self, link: str, target: Target, examined: frozenset[str]) -> bool:
+        """Leave out clocks of the controller that an earlier link has set right."""
+        if not super().searched(link, target, examined):
+            return False
+        if link == "path":
+            return target == "controller"
+        if link == "servo":
+            return target == "q_cmd"
+        return target != "controller" or "path" not in examined
 
     def instruments(self, signals: Signals, applied: Applied) -> Signals:
         """Return the signals with that clock."""

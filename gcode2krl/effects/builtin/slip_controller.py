@@ -25,6 +25,7 @@ class RsiOn(Effect):
     family = "set-up slips"
     links = frozenset({"servo"})
     kind = "slip"
+    searched_in = frozenset({"servo"})
     parameters = (
         Parameter(
             "gain", "", 0.0, 1.5, nominal=0.0, start=1.0, linear=True, minimum=0.0,
@@ -62,6 +63,7 @@ class WrongLoad(Effect):
     family = "set-up slips"
     links = frozenset({"mechanics"})
     kind = "slip"
+    searched_in = frozenset({"mechanics"})
     vectors = MappingProxyType({"further_mm": _FURTHER})
     parameters = (
         Parameter(
@@ -102,6 +104,8 @@ class AbsoluteAccuracy(Effect):
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
     kind = "slip"
+    searched_in = frozenset({"path"})
+    own_model = True
     vectors = MappingProxyType({"offsets_deg": _OFFSETS})
     parameters = tuple(
         Parameter(name, "deg", -1.0, 1.0, nominal=0.0, start=0.02, linear=True,

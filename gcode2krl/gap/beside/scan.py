@@ -13,10 +13,10 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Applied, Effect, simulate
+from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import linear
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.fit.mismatch import Mismatch, sigma
 
 _REACH_MM = 1.0
 """A point further from where a floor or a wall should be belongs to neither."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.selection import Examination, replans
+from gcode2krl.gap.choose.selection import Examination
 from gcode2krl.gap.fit.gram import PRIOR, stretches_of_all
 from gcode2krl.gap.fit.numbers import FIXED
 from gcode2krl.gap.fit.sensitivity import unbounded_jacobian
@@ -52,7 +52,7 @@ def intervals_of(found: Examination) -> list[dict[str, Interval]]:
         at += width
         drawn = [free.applied(x).values for x in mine]
         own = found.applied[number].values
-        share = _LAW if replans(free.effect) else _MODEL
+        share = _LAW if free.effect.plans_anew else _MODEL
         usual = _usual(found, number)
         result.append(
             {

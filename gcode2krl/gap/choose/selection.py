@@ -8,6 +8,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied, Effect
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.scoring import (
     LEAST_RATIO,
@@ -19,7 +20,6 @@ from gcode2krl.gap.choose.scoring import (
 )  # fmt: skip
 from gcode2krl.gap.fit.gram import Ledger, rows_of
 from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.noise_source import noise_of
 from gcode2krl.gap.fit.nuisance import Nuisance, nuisance_of
@@ -195,7 +195,7 @@ def _candidates(found: Examination, rows: int, allowed: Sequence[Column]) -> lis
     plain = [
         score
         for score in scores(found.ledger, allowed)
-        if (score.within or replans(found.blocks[score.column.block].effect))
+        if (score.within or found.blocks[score.column.block].effect.plans_anew)
         and score.surprise > found.level
         and score.gain > LEAST_RATIO**2 * found.times
     ]
@@ -222,7 +222,7 @@ def _accept(
         for score in short:
             block = found.blocks[score.column.block]
             start = block.applied(score.coefficients, found.traces[0])
-            if replans(block.effect):
+            if block.effect.plans_anew:
                 fitted = _replanned(found, block, start, _HOPELESS * best)
                 best = min(best, fitted.chi2)
             else:
@@ -266,7 +266,7 @@ def _certain(found: Examination, score: Score, fitted: Fitted) -> float | None:
     certain = surprise(gain / slope.inflation(), score.column.width)
     if certain < found.level:
         return None
-    if replans(score_effect(found, score)):
+    if score_effect(found, score).plans_anew:
         return certain
     before = found.target.residual(found.applied)
     return certain if slope.left_out_gain(before, _GROUPS) > 0.0 else None
@@ -280,7 +280,7 @@ def within_mismatch(found: Examination, number: int) -> bool:
     limits = question.mismatch.limits(applied, duration, question.clocks)
     if not limits:
         return False
-    if replans(applied.effect):
+    if applied.effect.plans_anew:
         return _time_off_s(found, applied) <= question.mismatch.clock_s
     nominal = applied.effect.nominal(trace.inputs, applied.target)
     deviation = found.fitted.deviations(number)
@@ -312,19 +312,14 @@ def _shortlist(found: Examination, ranked: list[Score], rows: int) -> list[Score
     for score in ranked:
         block = found.blocks[score.column.block]
         key = block.key
-        if replans(block.effect):
+        if block.effect.plans_anew:
             short.setdefault(key, score)
             continue
         bent = not block.effect.is_linear and score.gain > _BENT_SHARE * ranked[0].gain
         if (_worth(score, rows) >= least or bent) and key not in short:
             short[key] = score
-    near = [score for score in short.values() if not replans(found.blocks[score.column.block].effect)]
+    near = [score for score in short.values() if not found.blocks[score.column.block].effect.plans_anew]
     return [*near[:_SHORTLIST], *(score for score in short.values() if score not in near)]
-
-
-def replans(effect: Effect) -> bool:
-    """Tell whether an effect plans the motion anew: its linear signature then tells little of its size."""
-    return type(effect).replan is not Effect.replan and not effect.is_linear
 
 
 def _replanned(found: Examination, block: Block, linear: Applied, hopeless: float) -> Fitted:

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.effects.mismatch import sigma
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.selection import Question, nuisance_for
-from gcode2krl.gap.fit.mismatch import sigma
 from gcode2krl.gap.fit.signatures import Signatures
 
 LINKS = ("gear", "mechanics")

@@ -7,8 +7,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Effect
+from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.mismatch import Mismatch, sigma
 from gcode2krl.gap.fit.signatures import Block, Signatures
 from gcode2krl.units import DEG_PER_RAD
 

@@ -13,6 +13,7 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.frame_effect import frame_of
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.beside.clocks import fitted_offset
 from gcode2krl.gap.beside.commanded import on_the_curve
@@ -20,7 +21,6 @@ from gcode2krl.gap.beside.links import MODEL_RAD, traces_of
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.gap.fit.noise import white
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.refitting import refit

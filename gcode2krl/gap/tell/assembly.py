@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.links import JOINTS, LINKS, SIGNAL, UNIT, needs
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judgement import Cause, Judgement
-from gcode2krl.gap.fit.mismatch import Mismatch
 from gcode2krl.gap.slips.set_up import Slip
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.gap.tell.where import place
