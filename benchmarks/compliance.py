@@ -21,8 +21,8 @@ import time
 import numpy as np
 
 from gcode2krl import load_cell
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import displace
-from gcode2krl.sections import VIRTUAL_JOINTS
 
 LOOP_SAMPLES = 1000
 MATRIX_CHUNK, COLUMN_CHUNK = 2000, 5000

@@ -15,9 +15,9 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl import load_cell
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import displace, joint_shares, tip_position
 from gcode2krl.robot import inverse
-from gcode2krl.sections import VIRTUAL_JOINTS
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 FORCE_N = 750.0

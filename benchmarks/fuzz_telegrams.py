@@ -55,16 +55,16 @@ TRICKS = (
 def prepare(place: Path) -> Try:
     """Start sessions; return what tries a case."""
     from gcode2krl import load_cell
+    from gcode2krl.cell.online_section import Online, Probe
     from gcode2krl.errors import input_error
-    from gcode2krl.online.compensator import compensator
+    from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.server import warm_up
     from gcode2krl.online.session import Phase, begin, exchange
     from gcode2krl.online.telegram import MalformedError, answer_text, parse
-    from gcode2krl.online_section import Online, Probe
 
     probe = Probe(rest_cycles=5, settle_cycles=5)
     devices = [
-        compensator(load_cell(), Online(mode=mode, probe=probe), load_frame="sensor")
+        build_compensator(load_cell(), Online(mode=mode, probe=probe), load_frame="sensor")
         for mode in ("cartesian", "axis")
     ]
     for device in devices:

@@ -20,8 +20,8 @@ import numpy as np
 from gcode2krl import load_cell, set_targets
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gcode import read_stream
-from gcode2krl.krc4.identify import identify_controller
-from gcode2krl.krc4.trial_program import controller_test_program
+from gcode2krl.identify.controller import identify_controller
+from gcode2krl.identify.trial_program import controller_test_program
 from gcode2krl.runs import ControllerTrace
 
 CYCLE_S = 0.012

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gcode2krl.compliance.identify_sensor import identify_sensor
 from gcode2krl.compliance.sensor import Calibration, compensate
-from gcode2krl.compliance.sensor_poses import SensorPoses
 from gcode2krl.frames import quaternion_from_rotation
+from gcode2krl.identify.sensor import identify_sensor
+from gcode2krl.identify.sensor_poses import SensorPoses
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples" / "identify"))
 make = import_module("make_measurements")

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from gcode2krl import load_cell
-from gcode2krl.compliance.identify_stiffness import KEYS, identify_stiffness
-from gcode2krl.compliance.measurements import read_measurements
+from gcode2krl.identify.measurements import read_measurements
+from gcode2krl.identify.stiffness import KEYS, identify_stiffness
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples" / "identify"))
 make = import_module("make_measurements")

@@ -106,14 +106,14 @@ def burn(seconds):
 def measure(options):
     """Return what the controller and the server saw."""
     from gcode2krl import load_cell
-    from gcode2krl.online.compensator import compensator
+    from gcode2krl.cell.online_section import Online, RobotLink
+    from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.recorder import Recorder
     from gcode2krl.online.server import open_socket, serve
-    from gcode2krl.online_section import Online, RobotLink
 
     settings = Online(cycle_s=options.cycle_ms / 1000.0, mode=options.mode, link=RobotLink(lost_cycles=100))
     settings = settings.model_copy(update={"link": settings.link.model_copy(update={"port": 0})})
-    device = compensator(load_cell(), settings, load_frame="base")
+    device = build_compensator(load_cell(), settings, load_frame="base")
     stop = threading.Event()
     phases = {}
 

@@ -21,12 +21,12 @@ import numpy as np
 from gcode2krl import load_cell
 from gcode2krl import robot as arm
 from gcode2krl.cell import Cell
-from gcode2krl.online.compensator import Compensator, compensator
+from gcode2krl.cell.online_section import Gains, Online, Probe, RobotLink
+from gcode2krl.online.compensator import Compensator, build_compensator
 from gcode2krl.online.limits import Bounds
 from gcode2krl.online.server import warm_up
 from gcode2krl.online.session import Phase, Session, begin, exchange, silent
 from gcode2krl.online.telegram import Answer, MalformedError, Telegram, answer_text, parse
-from gcode2krl.online_section import Gains, Online, Probe, RobotLink
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.units import DEG_PER_RAD
 
@@ -366,7 +366,7 @@ class Episodes:
         axis = bool(rng.random() < 0.3)
         own = settings_at_random(rng, axis)
         knots, header = pilot() if rng.random() < 0.5 else (None, None)
-        device = compensator(self.cell, own, load_frame="base", knots=knots, header=header)
+        device = build_compensator(self.cell, own, load_frame="base", knots=knots, header=header)
         peer = Robot(device, self.jacobian, self.q_rad, rng, lag=float(rng.choice([1.0, 0.3])),
                      reports=bool(rng.random() < 0.5))  # fmt: skip
         peer.relative = target is Phase.ZERO
@@ -484,7 +484,7 @@ def drive(cycles: int, seed: int = 1, say: Callable[[str], None] | None = None) 
     pairs = list(itertools.product(PHASES, names))
     shown = 0
     for mode in ("cartesian", "axis"):
-        warm_up(compensator(episodes.cell, Online(mode=mode), load_frame="base"))
+        warm_up(build_compensator(episodes.cell, Online(mode=mode), load_frame="base"))
     while report.cycles < cycles:
         for index in rng.permutation(len(pairs)):
             target, name = pairs[index]

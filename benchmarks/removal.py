@@ -21,9 +21,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from gcode2krl.cell.sections import Tool  # noqa: E402
 from gcode2krl.cutting.engagement import engage  # noqa: E402
 from gcode2krl.cutting.height_field import HeightField  # noqa: E402
-from gcode2krl.sections import Tool  # noqa: E402
 from tests.cutting import scenes  # noqa: E402
 
 FLAT = Tool(diameter_mm=16, teeth=3, flute_length_mm=30)

@@ -5,7 +5,7 @@ python docs/make_findings.py
 
 from pathlib import Path
 
-from gcode2krl.codes import Code, codes
+from gcode2krl.codes import Code, all_codes
 
 PAGE = Path(__file__).with_name("findings.md")
 _HEAD = """# Findings
@@ -30,7 +30,7 @@ program (nothing is written), a *warning* does so with `--strict` only, a *note*
 
 def page() -> str:
     """Return the page."""
-    return _HEAD + "".join(_row(code) for code in codes().values())
+    return _HEAD + "".join(_row(code) for code in all_codes().values())
 
 
 def _row(code: Code) -> str:

@@ -4,9 +4,7 @@ The names below are the public Python interface; they are imported on first use,
 ``import gcode2krl`` stays quick.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from gcode2krl.version import __version__
@@ -15,10 +13,11 @@ _HOMES = {
     "load_cell": "gcode2krl.cell",
     "Cell": "gcode2krl.cell",
     "read_gcode": "gcode2krl.gcode",
-    "set_targets": "gcode2krl.predict",
-    "plan_motion": "gcode2krl.predict",
+    "set_targets": "gcode2krl.pipeline",
+    "plan_motion": "gcode2krl.pipeline",
+    "predict": "gcode2krl.pipeline",
     "Prediction": "gcode2krl.prediction",
-    "solve_joints": "gcode2krl.predict",
+    "solve_joints": "gcode2krl.pipeline",
     "write_krl": "gcode2krl.krl",
     "verify_krl": "gcode2krl.krl",
     "cut": "gcode2krl.cutting",
@@ -52,13 +51,13 @@ __all__ = [
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell, load_cell
-    from gcode2krl.compliance.deflect import deflect
-    from gcode2krl.cutting.cut import cut
+    from gcode2krl.compliance.deflection_table import deflect
+    from gcode2krl.cutting.milling import cut
     from gcode2krl.errors import Gcode2KrlError, Issue
     from gcode2krl.gap.diagnosis import diagnose
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
-    from gcode2krl.predict import plan_motion, predict, set_targets, solve_joints
+    from gcode2krl.pipeline import plan_motion, predict, set_targets, solve_joints
     from gcode2krl.prediction import Prediction
     from gcode2krl.runs import Run, load_run
 
@@ -70,16 +69,6 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_HOMES[name]), name)
 
 
-class _Package(ModuleType):
-    """The package; ``gcode2krl.predict`` is the function, although a module has the same name."""
-
-    @property
-    def predict(self) -> Any:
-        return import_module("gcode2krl.predict").predict
-
-    @predict.setter
-    def predict(self, module: ModuleType) -> None:
-        """Importing the module of that name does not hide the function."""
-
-
-sys.modules[__name__].__class__ = _Package
+def __dir__() -> list[str]:
+    """Name what is public; not what happens to have been imported."""
+    return __all__

@@ -1,10 +1,12 @@
-"""Names for the types of arrays; shapes and units are in the docstrings of what has them."""
+"""The array types of the whole package; shapes stand in the docstrings of what takes and returns them."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Ints32 = NDArray[np.int32]
-"""Columns of the tables: moves, lines, tools."""
+"""Source lines, tools and rows of other tables: the columns that are stored as they are."""
+Bools = NDArray[np.bool_]
+Rows = NDArray[np.int64]
+"""Row numbers, to index a table's columns with."""

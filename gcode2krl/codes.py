@@ -24,7 +24,7 @@ class Code:
 
 
 @cache
-def codes() -> Mapping[str, Code]:
+def all_codes() -> Mapping[str, Code]:
     """Return code name → entry, in alphabetical order."""
     import tomllib
 
@@ -39,7 +39,7 @@ def codes() -> Mapping[str, Code]:
 @cache
 def follows(name: str) -> frozenset[str]:
     """Return the codes that may cause this one, over any number of steps; empty for an unknown code."""
-    known = codes()
+    known = all_codes()
     causes: set[str] = set()
     waiting = [name]
     while waiting:

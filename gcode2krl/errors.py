@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gcode2krl.codes import codes, follows
+from gcode2krl.codes import all_codes, follows
 
 Severity = Literal["error", "warning", "note"]
 MOST_LINES = 20
@@ -40,7 +40,7 @@ class Issue:
 
     def advice(self) -> str:
         """Return the remedy; where the finding has none of its own, that of its code in the table."""
-        entry = None if self.remedy else codes().get(self.code)
+        entry = None if self.remedy else all_codes().get(self.code)
         if entry is None:
             return self.remedy
         first, _, rest = entry.remedy.rstrip(".").partition(" ")

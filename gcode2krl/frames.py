@@ -5,9 +5,9 @@ R = Rz(A)·Ry(B)·Rx(C).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from gcode2krl.arrays import Floats, Ints
 
 _GIMBAL_COS = 1e-9
 
@@ -110,7 +110,7 @@ def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
     return result
 
 
-def equal_runs(values: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def equal_runs(values: Floats) -> tuple[Ints, Ints]:
     """Return (first row of each run of equal rows (r,), run of each row (n,)) of ``values`` (n, c)."""
     changes = np.zeros(len(values), dtype=np.bool_)
     for column in values.T:

@@ -8,13 +8,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import Issue
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
 
 
 class Event(NamedTuple):
@@ -81,15 +78,15 @@ class Toolpath(Table):
     """(n,) programmed speed, inf on rapids."""
     spindle_rad_s: Floats = _column(np.float64)
     """(n,) positive for M3."""
-    tool: Ints = _column(np.int32)
+    tool: Ints32 = _column(np.int32)
     """(n,) tool in the spindle during the row; 0 = none named so far."""
     exact_stop: Bools = _column(np.bool_)
     tolerance_mm: Floats = _column(np.float64)
     """(n,) blend tolerance of ``G64 P``, NaN = none."""
     dwell_s: Floats = _column(np.float64)
-    source_line: Ints = _column(np.int32)
+    source_line: Ints32 = _column(np.int32)
     """(n,) 1-based line of the file."""
-    arc: Ints = _column(np.int32)
+    arc: Ints32 = _column(np.int32)
     """(n,) number of the arc this row is a chord of, or -1."""
     machine: Bools = _column(np.bool_)
     """(n,) rows from G28, G30 and G53."""
@@ -99,7 +96,7 @@ class Toolpath(Table):
     positions a robot may be sent to."""
     length_offset_mm: Floats = _column(np.float64)
     """(n,) tool length offset in force (G43), NaN = none (G49)."""
-    length_offset_tool: Ints = _column(np.int32)
+    length_offset_tool: Ints32 = _column(np.int32)
     """(n,) the tool whose length that is (H), -1 = none."""
     events: tuple[Event, ...] = ()
     source: str = ""
@@ -128,11 +125,11 @@ class Targets(Table):
     """(p,) approximation distance at the end of this motion, 0 = exact stop."""
     wait_s: Floats = _column(np.float64)
     """(p,) dwell at the target."""
-    move: Ints = _column(np.int32)
+    move: Ints32 = _column(np.int32)
     """(p,) row of Toolpath, -1 = added (HOME, approach, final retract)."""
-    source_line: Ints = _column(np.int32)
+    source_line: Ints32 = _column(np.int32)
     """(p,) line of the G-code, 0 = added."""
-    tool: Ints = _column(np.int32)
+    tool: Ints32 = _column(np.int32)
     """(p,) tool number whose frame moves."""
     events: tuple[Event, ...] = ()
     source: str = ""
@@ -155,11 +152,11 @@ class Motion(Table):
     """(m,) magnitude of the jerk vector of the tip."""
     path_mm: Floats = _column(np.float64)
     """(m,) arc length along the blended path."""
-    move: Ints = _column(np.int32)
+    move: Ints32 = _column(np.int32)
     """(m,) row of Toolpath."""
     corner: Bools = _column(np.bool_)
     """(m,) True inside an approximated corner."""
-    tool: Ints = _column(np.int32)
+    tool: Ints32 = _column(np.int32)
     """(m,) tool number whose frame moves."""
 
 
@@ -175,9 +172,9 @@ class Joints(Table):
     """(m,) distance to the nearest joint limit, negative beyond it."""
     sigma_min: Floats = _column(np.float64)
     """(m,) smallest singular value of the Jacobian, its translations over the length of the stretched arm."""
-    status: Ints = _column(np.int32)
+    status: Ints32 = _column(np.int32)
     """(m,) KUKA's S bits."""
-    turn: Ints = _column(np.int32)
+    turn: Ints32 = _column(np.int32)
     """(m,) KUKA's T bits."""
 
 
@@ -199,7 +196,7 @@ class Forces(Table):
     """(m,) width of cut normal to the feed."""
     phi_rad: Floats = _column(np.float64, None)
     """(m, 2k) entry and exit angles of the engagement arcs from the feed normal, NaN padded."""
-    tool: Ints = _column(np.int32)
+    tool: Ints32 = _column(np.int32)
     """(m,) tool number that cuts."""
     relative_band: float = 0.0
     """Half-width of the 90 % band of the forces, relative."""

@@ -1,7 +1,6 @@
 """Cells for tests: one that states everything itself, and parts of cells over the demonstration."""
 
-from gcode2krl import library
-from gcode2krl.cell import Cell, resolve_cell
+from gcode2krl.cell import Cell, library, resolve_cell
 
 _DEMONSTRATION = library.read_model("cells", "kr300_demonstration")
 OWN_CELL = {key: value for key, value in _DEMONSTRATION.items() if key != "model"} | {"based_on": ""}

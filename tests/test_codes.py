@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl.codes import closest, codes, follows
+from gcode2krl.codes import all_codes, closest, follows
 from gcode2krl.krl.release import NEVER_RELEASED, STRICTER_HERE
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -101,13 +101,13 @@ def _stated_severities() -> Iterator[tuple[str, str, str]]:
 def test_every_code_of_the_source_is_in_the_table() -> None:
     used = _used()
     assert len(used) > 200
-    missing = {word: file for word, file in used.items() if word not in codes()}
+    missing = {word: file for word, file in used.items() if word not in all_codes()}
     assert not missing, f"describe these in gcode2krl/codes.toml, or list them in NOT_CODES: {missing}"
 
 
 def test_every_code_of_the_table_is_in_the_source() -> None:
     literals = _literals()
-    assert [name for name in codes() if name not in literals] == []
+    assert [name for name in all_codes() if name not in literals] == []
 
 
 def test_the_scan_would_notice_a_missing_entry() -> None:
@@ -128,7 +128,7 @@ def test_the_scan_would_notice_a_missing_entry() -> None:
 def test_severities_are_those_of_the_source() -> None:
     stated = list(_stated_severities())
     assert len({code for code, _, _ in stated}) > 150
-    known = codes()
+    known = all_codes()
     wrong = [
         (code, severity, place)
         for code, severity, place in stated
@@ -139,7 +139,7 @@ def test_severities_are_those_of_the_source() -> None:
         assert "error" in known[code].severity
 
 
-@pytest.mark.parametrize("entry", codes().values(), ids=lambda entry: entry.name)
+@pytest.mark.parametrize("entry", all_codes().values(), ids=lambda entry: entry.name)
 def test_an_entry_is_whole(entry) -> None:
     severities = entry.severity.split(", ")
     assert severities
@@ -156,11 +156,11 @@ def test_an_entry_is_whole(entry) -> None:
 
 
 def test_the_table_is_in_alphabetical_order() -> None:
-    assert list(codes()) == sorted(codes())
+    assert list(all_codes()) == sorted(all_codes())
 
 
 def test_causes_are_known_and_no_finding_is_its_own_cause() -> None:
-    known = codes()
+    known = all_codes()
     for entry in known.values():
         assert set(entry.follows) <= set(known), entry.name
         for cause in follows(entry.name):
@@ -168,8 +168,8 @@ def test_causes_are_known_and_no_finding_is_its_own_cause() -> None:
 
 
 def test_a_mistyped_code_is_recognised() -> None:
-    assert closest("spindel-off", codes()) == "spindle-off"
-    assert closest("qqqqqq", codes()) == ""
+    assert closest("spindel-off", all_codes()) == "spindle-off"
+    assert closest("qqqqqq", all_codes()) == ""
     assert follows("no-such-code") == frozenset()
 
 
@@ -180,4 +180,4 @@ def test_the_page_of_findings_is_made_from_the_table() -> None:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.PAGE.read_text("utf-8") == module.page(), "run python docs/make_findings.py"
-    assert module.page().count("\n| `") == len(codes())
+    assert module.page().count("\n| `") == len(all_codes())

@@ -12,7 +12,7 @@ import pytest
 
 from gcode2krl import Prediction, load_cell, predict
 from tests.conftest import ROOT
-from tests.krc4.test_identify import Controller, trace_of, write_csv
+from tests.identify.test_controller import Controller, trace_of, write_csv
 
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CELL = """based_on = "demonstration"

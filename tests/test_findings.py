@@ -2,7 +2,7 @@
 
 import pytest
 
-from gcode2krl.codes import codes, follows
+from gcode2krl.codes import all_codes, follows
 from gcode2krl.errors import MOST_LINES, MOST_PLACES, Issue, NotUnderstoodError, told
 
 
@@ -59,7 +59,7 @@ def test_no_code_prints_more_than_eight_lines_and_the_rest_is_counted() -> None:
 
 
 def test_at_most_twenty_lines_and_errors_first() -> None:
-    names = list(codes())[:30]
+    names = list(all_codes())[:30]
     issues = [Issue("note", name, 1, "a") for name in names] + [_error("template", 0, "broken")]
     shown = told(issues)
     assert shown.findings[0].first.code == "template"
@@ -92,8 +92,8 @@ def test_what_stands_before_a_cause_or_is_worse_is_no_consequence() -> None:
 
 
 def test_causes_go_over_several_steps() -> None:
-    assert "no-feed" in codes()["no-motion-mode"].follows
-    assert "negative-feed" not in codes()["no-motion-mode"].follows
+    assert "no-feed" in all_codes()["no-motion-mode"].follows
+    assert "negative-feed" not in all_codes()["no-motion-mode"].follows
     assert "negative-feed" in follows("no-motion-mode")
 
 
@@ -113,7 +113,7 @@ def test_an_exception_says_it_in_few_lines_and_carries_everything() -> None:
     assert len(error.issues) == 2094
 
 
-@pytest.mark.parametrize("code", codes())
+@pytest.mark.parametrize("code", all_codes())
 def test_a_finding_without_a_remedy_of_its_own_takes_that_of_the_table(code: str) -> None:
     text = Issue("error", code, 3, "wrong").text("part.nc")
     _, arrow, remedy = text.partition(f"[{code}] -> ")

@@ -9,12 +9,12 @@ import pytest
 
 from gcode2krl import cut, plan_motion
 from gcode2krl.cell import load_cell, resolve_cell
+from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.cli.main import _run
-from gcode2krl.confirmation import future_confirmation
 from gcode2krl.cutting.tool_use import plunge_limit_mm
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
-from gcode2krl.predict import predict_toolpath
+from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.program import check_toolpath
 
 HEAD = "G21 G90 G17 G54\nT9 M6\nS8000 M3\nG0 X0 Y0\nG43 Z5 H9\n"

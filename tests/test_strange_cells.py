@@ -6,14 +6,14 @@ import sys
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.cell_templates import TemplateError, render
+from gcode2krl.cell.template_rules import problem
+from gcode2krl.cell.templates import TemplateError, render
 from gcode2krl.cli.cell_list import findings, to_confirm
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.template_rules import problem
 
 BASED = 'based_on = "demonstration"\n'
 ENDLESS = """
-from gcode2krl.cell_templates import TemplateError, render
+from gcode2krl.cell.templates import TemplateError, render
 try:
     print(render({template!r}, {{}}))
 except TemplateError as error:

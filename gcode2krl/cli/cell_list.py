@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 from typing import Any
 
-from gcode2krl import switching
-from gcode2krl.cell import Cell, plain_view
-from gcode2krl.confirmation import future_confirmation
+from gcode2krl.cell import Cell, plain_view, switching
+from gcode2krl.cell.confirmation import future_confirmation
+from gcode2krl.cell.ranges import range_issues
+from gcode2krl.cell.sections import Frame
 from gcode2krl.errors import Issue
-from gcode2krl.ranges import range_issues
-from gcode2krl.sections import Frame
 
 MISSING = "MISSING"
 Row = tuple[str, str, str]

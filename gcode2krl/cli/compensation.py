@@ -12,7 +12,7 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Motion
 
 if TYPE_CHECKING:
-    from gcode2krl.compensate import Compensated
+    from gcode2krl.compensation.iteration import Compensated
 
 
 def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str | Path] = ()) -> Prediction:
@@ -25,7 +25,7 @@ def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str |
     RefusedError
         Where there is no deflection, or it is not sure enough to move a robot by it.
     """
-    from gcode2krl.compensate import compensate, keeping_forces
+    from gcode2krl.compensation.iteration import compensate, keeping_forces
 
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     if motion is None or forces is None or deflection is None:
@@ -59,7 +59,7 @@ def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str |
 def _draw(done: "Compensated", motion: Motion, file: Path, inputs: Sequence[str | Path]) -> None:
     """Draw the bent path without and with the correction."""
     from gcode2krl.files import write_together
-    from gcode2krl.report.compensation_figure import compensation_figure
+    from gcode2krl.report.compensation_figures import compensation_figure
     from gcode2krl.report.drawing import look
 
     require_other(file, *inputs)

@@ -6,7 +6,7 @@ from textwrap import TextWrapper, shorten
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.codes import Code, closest, codes
+from gcode2krl.codes import Code, all_codes, closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 _WIDTH = 100
@@ -24,7 +24,7 @@ def command(code: str | None, as_json: bool) -> int:
     """
     console = Console(as_json=as_json)
     try:
-        entries = tuple(codes().values()) if code is None else (_entry(code),)
+        entries = tuple(all_codes().values()) if code is None else (_entry(code),)
     except Gcode2KrlError as error:
         if not as_json:
             raise
@@ -44,7 +44,7 @@ def command(code: str | None, as_json: bool) -> int:
 def _entry(word: str) -> Code:
     """Return the entry of a code as a person writes it, with or without its line or brackets."""
     name = word.strip("[] ").partition(":")[0].lower()
-    known = codes()
+    known = all_codes()
     if name not in known:
         near = closest(name, known)
         remedy = f"did you mean {near!r}?" if near else "`gcode2krl explain` lists all"
@@ -58,7 +58,7 @@ def _record(entry: Code) -> dict[str, object]:
 
 
 def _brief(entry: Code) -> str:
-    width = max(len(name) for name in codes())
+    width = max(len(name) for name in all_codes())
     return f"{entry.name:<{width}}  {shorten(entry.why, _WIDTH - width, placeholder=' …')}"
 
 

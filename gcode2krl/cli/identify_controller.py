@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from gcode2krl.krc4.identify import CornerFit, Estimate, Identification, Section
+    from gcode2krl.identify.controller import CornerFit, Estimate, Identification, Section
     from gcode2krl.runs import ControllerTrace
 
 _MOST_SHOWN = 20
@@ -72,8 +72,8 @@ def command(
 def _identify(
     trace_path: str, part: str | None, cell: Cell, tolerance_mm: float | None, console: Console
 ) -> "Identification":
-    from gcode2krl.krc4.identify import identify_controller
-    from gcode2krl.predict import set_targets
+    from gcode2krl.identify.controller import identify_controller
+    from gcode2krl.pipeline import set_targets
     from gcode2krl.runs import read_controller_trace
 
     trace = read_controller_trace(trace_path)
@@ -86,8 +86,8 @@ def _identify(
 
 def _identify_test(trace: "ControllerTrace", cell: Cell, console: Console) -> "Identification":
     """Fit a trace of the test program: with the lines that turn the tool, else without."""
-    from gcode2krl.krc4.identify import identify_controller
-    from gcode2krl.predict import controller_test_targets
+    from gcode2krl.identify.controller import identify_controller
+    from gcode2krl.pipeline import controller_test_targets
 
     with console.progress("fitting", None):
         try:
@@ -206,7 +206,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
     """
     import tomli_w
 
-    from gcode2krl import library
+    from gcode2krl.cell import library
     from gcode2krl.files import write_together
 
     data = library.read_toml(file) if file.exists() else {}

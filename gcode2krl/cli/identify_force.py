@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
@@ -16,10 +15,8 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.units import MS_PER_S
 
 if TYPE_CHECKING:
-    from gcode2krl.cutting.identify_force import ForceFit
+    from gcode2krl.identify.force import ForceFit
     from gcode2krl.runs import Run
-
-Floats = NDArray[np.float64]
 
 
 @click.command("force")
@@ -88,7 +85,7 @@ def _inputs(run_folder: str, prediction: str | None) -> "tuple[Run, Prediction]"
 def _fit(run: "Run", predicted: Prediction) -> "ForceFit":
     from gcode2krl import frames as fr
     from gcode2krl.cutting import force_basis
-    from gcode2krl.cutting.identify_force import fit_force
+    from gcode2krl.identify.force import fit_force
 
     motion, force, cell = predicted.motion, run.force, predicted.cell
     if motion is None or force is None:
@@ -105,7 +102,7 @@ def _fit(run: "Run", predicted: Prediction) -> "ForceFit":
 
 
 def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
-    from gcode2krl.cutting.identify_force import NAMES
+    from gcode2krl.identify.force import NAMES
 
     console.say(f"{run_folder}: {fit.samples} samples in cut")
     units = ("N/mm2",) * 3 + ("N/mm",) * 3
@@ -120,7 +117,7 @@ def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
 
 
 def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
-    from gcode2krl.cutting.identify_force import NAMES
+    from gcode2krl.identify.force import NAMES
 
     coefficients = {
         name: {"value": float(value), "low": float(value - half), "high": float(value + half)}
@@ -137,9 +134,9 @@ def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
     """Write the coefficients as ``[material]`` into a cell file, its other keys kept; comments are lost."""
     import tomli_w
 
-    from gcode2krl import library
-    from gcode2krl.cutting.identify_force import NAMES
+    from gcode2krl.cell import library
     from gcode2krl.files import write_together
+    from gcode2krl.identify.force import NAMES
 
     data = library.read_toml(file) if file.exists() else {}
     material = cell.material

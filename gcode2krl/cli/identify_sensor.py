@@ -10,8 +10,8 @@ from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_
 from gcode2krl.errors import Gcode2KrlError
 
 if TYPE_CHECKING:
-    from gcode2krl.compliance.estimate import Estimate
-    from gcode2krl.compliance.identify_sensor import SensorIdentification
+    from gcode2krl.identify.estimate import Estimate
+    from gcode2krl.identify.sensor import SensorIdentification
 
 
 @click.command("sensor")
@@ -50,8 +50,8 @@ def command(
     console = Console(quiet, as_json)
     files: list[Path] = []
     try:
-        from gcode2krl.compliance.identify_sensor import identify_sensor
-        from gcode2krl.compliance.sensor_poses import read_poses
+        from gcode2krl.identify.sensor import identify_sensor
+        from gcode2krl.identify.sensor_poses import read_poses
 
         if output is not None:
             calibration = read_cell(cell_path).online.calibration  # is measured anew

@@ -13,8 +13,8 @@ from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import UM_PER_MM
 
 if TYPE_CHECKING:
-    from gcode2krl.compliance.estimate import Estimate
-    from gcode2krl.compliance.identify_stiffness import JointFit, StiffnessIdentification
+    from gcode2krl.identify.estimate import Estimate
+    from gcode2krl.identify.stiffness import JointFit, StiffnessIdentification
 
 
 @click.command("stiffness")
@@ -55,8 +55,8 @@ def command(
 def _run(
     measurements: str, cell_path: str | None, plot: str | None, apply_to: str | None, console: Console
 ) -> "tuple[StiffnessIdentification, list[Path]]":
-    from gcode2krl.compliance.identify_stiffness import identify_stiffness
-    from gcode2krl.compliance.measurements import read_measurements
+    from gcode2krl.identify.measurements import read_measurements
+    from gcode2krl.identify.stiffness import identify_stiffness
 
     cell = read_cell(cell_path)
     readings = read_measurements(measurements)
@@ -87,7 +87,7 @@ def _say(result: "StiffnessIdentification", cell: Cell, console: Console) -> Non
 
 
 def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -> str:
-    from gcode2krl.compliance.identify_stiffness import AXES, KEYS, in_cell
+    from gcode2krl.identify.stiffness import AXES, KEYS, in_cell
 
     own = in_cell(cell, fit.joint, KEYS[axis])
     head = f"  {fit.joint if axis == 0 else '':<11} {AXES[axis]} {KEYS[axis]}  "
@@ -112,7 +112,7 @@ def _record(result: "StiffnessIdentification", files: list[Path], cell: Cell) ->
 
 
 def _joint_record(fit: "JointFit", cell: Cell) -> dict[str, Any]:
-    from gcode2krl.compliance.identify_stiffness import KEYS, in_cell
+    from gcode2krl.identify.stiffness import KEYS, in_cell
 
     record: dict[str, Any] = {"readings": len(fit.row), "noise_mm": fit.noise_mm, "known": list(fit.known)}
     for axis, (key, estimate) in enumerate(zip(KEYS, fit.k_Nmm_rad, strict=True)):

@@ -8,10 +8,10 @@ from typing import Any
 import click
 
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.cell.library import read_toml
 from gcode2krl.cli.console import Console
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.files import refuse_inputs
-from gcode2krl.library import read_toml
 from gcode2krl.tables import Toolpath
 
 STANDARD = "-"

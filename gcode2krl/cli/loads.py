@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.prediction import Prediction
 from gcode2krl.units import MM_PER_M
 
 
-def largest(vectors: NDArray[np.float64]) -> float:
+def largest(vectors: Floats) -> float:
     """Return the largest length of vectors (n, 3); 0 where all are unknown."""
     size = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     return float(np.fmax.reduce(size, initial=0.0))

@@ -74,7 +74,7 @@ def _write_krl(
 ) -> tuple[list[Path], int, tuple[Issue, ...]]:
     """Write the program with the lines that turn the tool; returns files, lines and findings."""
     from gcode2krl.krl import write_krl
-    from gcode2krl.predict import controller_test_targets
+    from gcode2krl.pipeline import controller_test_targets
 
     cell = read_cell(cell_path)
     targets, inputs = controller_test_targets(cell, at), cell_files(cell_path)
@@ -93,6 +93,6 @@ def _write_gcode(
 
 
 def _gcode(cell_path: str | None, at: tuple[float, float, float] | None) -> str:
-    from gcode2krl.krc4.trial_program import controller_test_program
+    from gcode2krl.identify.trial_program import controller_test_program
 
     return controller_test_program(read_cell(cell_path), at or None)

@@ -4,8 +4,7 @@ import json
 
 import click
 
-from gcode2krl import library
-from gcode2krl.cell import Cell, cell_schema, load_cell
+from gcode2krl.cell import Cell, cell_schema, library, load_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.errors import Gcode2KrlError, input_error
 

@@ -7,6 +7,7 @@ import click
 import numpy as np
 
 from gcode2krl.cell import Cell
+from gcode2krl.cell.online_section import Online
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     cell_files,
@@ -20,7 +21,6 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.files import make_folder, write_together
-from gcode2krl.online_section import Online
 from gcode2krl.prediction import Prediction
 
 TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
@@ -166,10 +166,10 @@ def _predicted(
     if part is None:
         part = str(_test_piece())
         if cell.stock is None:
-            from gcode2krl.sections import Stock
+            from gcode2krl.cell.sections import Stock
 
             cell = cell.model_copy(update={"stock": Stock(box_mm=TEST_PIECE_STOCK)})
-    from gcode2krl.predict import predict_toolpath
+    from gcode2krl.pipeline import predict_toolpath
 
     try:
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
@@ -182,14 +182,11 @@ def _predicted(
 
 def _test_piece() -> Path:
     """Return the test piece: that of the installed package, or of the checkout."""
-    from gcode2krl import library
+    from gcode2krl.cell.library import models_folder
 
-    root = Path(library.__file__).parent
-    found = [
-        p
-        for p in (root / "models" / "test_piece.nc", root.parent / "examples" / "test_piece.nc")
-        if p.is_file()
-    ]
+    models = models_folder()
+    places = (models / "test_piece.nc", models.parent / "examples" / "test_piece.nc")
+    found = [place for place in places if place.is_file()]
     if not found:
         raise input_error("file-unreadable", "the test piece is not installed", "name a part")
     return found[0]
@@ -237,8 +234,8 @@ def replay_command(
     if output is not None:
         require_other(Path(output), *inputs)
     cell = read_cell(cell_path)
-    from gcode2krl.online.replay import as_json as replay_json
-    from gcode2krl.online.replay import columns, replay
+    from gcode2krl.online.log_replay import as_json as replay_json
+    from gcode2krl.online.log_replay import columns, replay
     from gcode2krl.runs import load_run
 
     knots, header = _pilot(sidecar)
@@ -308,12 +305,12 @@ def serve_command(
         for file in written:
             console.say(str(file))
         return 0
-    from gcode2krl.online.compensator import compensator
+    from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.recorder import Recorder
     from gcode2krl.online.server import open_socket, serve
     from gcode2krl.online.session import Phase
 
-    device = compensator(
+    device = build_compensator(
         cell, settings, tool=tool, load_frame="sensor", calibration=_calibration(settings), knots=knots,
         header=header,
     )  # fmt: skip
@@ -395,12 +392,12 @@ def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
 
 def _controller_files(cell: Cell, form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:
     """Write what belongs into the controller's folder ``SensorInterface``."""
-    from gcode2krl.krl.rsi_files import rsi_files
+    from gcode2krl.krl.rsi_files import rsi_texts
 
     if cell.online.link.address == "0.0.0.0":
         words = "the controller cannot look for the server at 0.0.0.0"
         raise input_error("online-address", words, "give --address, that of the PC in the robot's network")
-    texts = rsi_files(name, cell.online, cell.pilot, form)
+    texts = rsi_texts(name, cell.online, cell.pilot, form)
     make_folder(folder)
     files = {folder / key: text.replace("\n", "\r\n").encode("ascii") for key, text in texts.items()}
     write_together(files, inputs)

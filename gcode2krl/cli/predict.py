@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     STANDARD,
@@ -24,11 +25,10 @@ from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.prediction import RECORD, Prediction, refuse_foreign
-from gcode2krl.result_limits import cycle_acceleration
+from gcode2krl.prediction.limits import cycle_acceleration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
@@ -76,7 +76,7 @@ def command(
         _require_outputs(folder, part_mesh, inputs)
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        from gcode2krl.predict import add_effects, corner_table, predict_toolpath
+        from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.progress("predicting", None):
             settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
@@ -229,10 +229,10 @@ def _load_figures(prediction: Prediction) -> "dict[str, Figure]":
     }
 
 
-def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], NDArray[np.float64]]":
+def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], Floats]":
     """Return the virtual joints and how much of the deflection (m, 10) each causes, along the whole."""
+    from gcode2krl.cell.sections import VIRTUAL_JOINTS
     from gcode2krl.compliance import joint_shares
-    from gcode2krl.sections import VIRTUAL_JOINTS
 
     joints, forces, deflection = prediction.joints, prediction.forces, prediction.deflection
     if joints is None or forces is None or deflection is None:

@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from gcode2krl import library
-from gcode2krl.cell import Cell, resolve_cell
-from gcode2krl.compliance.identify_stiffness import KEYS, JointFit, StiffnessIdentification
+from gcode2krl.cell import Cell, library, resolve_cell
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.errors import input_error
 from gcode2krl.files import write_together
-from gcode2krl.sections import VIRTUAL_JOINTS
+from gcode2krl.identify.stiffness import KEYS, JointFit, StiffnessIdentification
 
 _OF_END_EFFECTOR = ("sensor", "spindle")
 _OTHERS = "; others: "

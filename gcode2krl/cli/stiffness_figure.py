@@ -4,7 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gcode2krl.cell import Cell
-from gcode2krl.compliance.identify_stiffness import AXES, KEYS, StiffnessIdentification, in_cell
+from gcode2krl.identify.stiffness import AXES, KEYS, StiffnessIdentification, in_cell
 from gcode2krl.report.drawing import BLUE, GREEN, GREY, SKY, VERMILION
 
 _PER_MILLION = 1e6

@@ -7,13 +7,13 @@ from typing import Any
 import click
 import numpy as np
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
 from gcode2krl.files import write_together
-from gcode2krl.sections import VIRTUAL_JOINTS
-from gcode2krl.tables import Bools, Floats
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 Three = tuple[float, float, float]

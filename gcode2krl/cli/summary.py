@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
-
-Floats = NDArray[np.float64]
 
 
 def summary_lines(

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     STANDARD,
@@ -25,15 +25,12 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.cli.loads import largest
 from gcode2krl.cli.standard_files import write_bytes
-from gcode2krl.confirmation import future_confirmation
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Targets
 
 if TYPE_CHECKING:
     from gcode2krl.krl import WrittenProgram
-
-Floats = NDArray[np.float64]
 
 
 @click.command("translate")
@@ -112,7 +109,7 @@ def command(
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.krl import suggested_name, write_krl
-        from gcode2krl.predict import corner_errors, predict_toolpath, solve_joints, targets_and_joints
+        from gcode2krl.pipeline import corner_errors, predict_toolpath, solve_joints, targets_and_joints
 
         options = _words(
             tolerance=tolerance,
@@ -190,7 +187,7 @@ def _refuse_online(online: str | None, both: bool, compensate: str | None, file:
         sentence = "--online writes RSI files, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src")
     if compensate == "offline":
-        from gcode2krl.compensate import refuse_twice
+        from gcode2krl.compensation.iteration import refuse_twice
 
         refuse_twice(online=True, both=both)
 

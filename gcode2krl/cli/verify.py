@@ -36,7 +36,7 @@ def command(
         prediction = None
         if compensate == "offline":
             from gcode2krl.cli.compensation import compensated
-            from gcode2krl.predict import predict_toolpath
+            from gcode2krl.pipeline import predict_toolpath
 
             prediction = compensated(predict_toolpath(toolpath, cell, tolerance_mm=tolerance), None)
         report = verify_krl(program, toolpath, cell, tolerance, prediction=prediction)

@@ -1,6 +1,5 @@
 """Joints and Forces to Deflection: the elastic chain of Haehn & Weigold 2020, and its identification."""
 
-from gcode2krl.compliance.deflect import deflect
 from gcode2krl.compliance.deflection import (
     deflection_magnitude,
     deflection_of,
@@ -10,6 +9,7 @@ from gcode2krl.compliance.deflection import (
     tip_position,
     tip_velocity,
 )
+from gcode2krl.compliance.deflection_table import deflect
 from gcode2krl.compliance.model import missing_stiffness
 from gcode2krl.compliance.projection import project_normal
 

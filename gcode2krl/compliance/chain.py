@@ -14,13 +14,11 @@ import math
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int32]
+from gcode2krl.arrays import Floats, Ints32
 
 FRAMES = 10
-"""Frames with a virtual joint, in the order of `gcode2krl.sections.VIRTUAL_JOINTS`."""
+"""Frames with a virtual joint, in the order of `gcode2krl.cell.sections.VIRTUAL_JOINTS`."""
 AXIS_FRAME = (0, 1, 3, 5, 6, 7)
 """The frame that each axis A1 to A6 turns."""
 AXIS_SIGN = (-1.0, 1.0, 1.0, -1.0, 1.0, -1.0)
@@ -47,7 +45,7 @@ def displaced_rows(
     softness: Floats,
     base: Floats,
     tips_mm: Floats,
-    tool: Ints,
+    tool: Ints32,
     shift_mm: Floats,
     turn_rad: Floats,
 ) -> None:
@@ -83,7 +81,7 @@ def tip_rows(
     frames: Floats,
     base: Floats,
     tips_mm: Floats,
-    tool: Ints,
+    tool: Ints32,
     position_mm: Floats,
     velocity_mm_s: Floats,
 ) -> None:
@@ -120,7 +118,7 @@ def _take_load(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _start(tips_mm: Floats, tool: Ints, first: int, rows: int, state: Floats) -> None:
+def _start(tips_mm: Floats, tool: Ints32, first: int, rows: int, state: Floats) -> None:
     """Put the tip of each row into frame 10, neither shifted nor turned."""
     state[SHIFT:] = 0.0
     state[TURN_W] = 1.0

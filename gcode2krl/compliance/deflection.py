@@ -8,10 +8,11 @@ backlash, friction or weight. The authors found the measured deflection 6 % larg
 import numpy as np
 import numpy.typing as npt
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.compliance import chain, model
 from gcode2krl.compliance.projection import project_rows
-from gcode2krl.compliance.rows import Floats, in_chunks, rows_of
+from gcode2krl.compliance.rows import in_chunks, rows_of
 
 STANDSTILL_MM_S = 1e-6
 """A tip slower than this has no feed direction: rounding of the joint speeds alone looks like 1e-7 mm/s."""
@@ -72,8 +73,8 @@ def joint_shares(
 ) -> Floats:
     """Return what each virtual joint alone costs: displacements (n, 10, 3) in mm along the root's axes.
 
-    The order is that of `gcode2krl.sections.VIRTUAL_JOINTS`; all other joints are rigid. The sum is that of
-    `displace` to second order in the elastic angles. Parameters and errors as there.
+    The order is that of `gcode2krl.cell.sections.VIRTUAL_JOINTS`; all other joints are rigid. The sum is
+    that of `displace` to second order in the elastic angles. Parameters and errors as there.
     """
     soft = model.softness(cell)
     alone = (np.where(np.arange(chain.FRAMES)[:, None] == i, soft, 0.0) for i in range(chain.FRAMES))

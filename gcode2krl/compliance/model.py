@@ -9,19 +9,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compliance.rows import Floats
+from gcode2krl.cell.sections import VIRTUAL_JOINTS, missing_key
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.sections import VIRTUAL_JOINTS, missing_key
-
-Ints = npt.NDArray[np.int32]
 
 
 class Tips(NamedTuple):
     """Tool tips in frame 10: ``position_mm`` (k, 3), and which of them each row has, ``tool`` (n,)."""
 
     position_mm: Floats
-    tool: Ints
+    tool: Ints32
 
 
 def frames(cell: Cell) -> Floats:

@@ -4,7 +4,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gcode2krl.compliance.rows import Floats, rows_of
+from gcode2krl.arrays import Floats
+from gcode2krl.compliance.rows import rows_of
 
 
 def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from gcode2krl.arrays import Floats
 
 CHUNK = 20_000
 """Rows that a thread takes at once: inputs and results of a chunk stay in its cache."""

@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError, model_validator
 
 from gcode2krl import frames as fr
-from gcode2krl import library
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import library
+from gcode2krl.cell.sections import Finite, Section
 from gcode2krl.errors import input_error
-from gcode2krl.sections import Finite, Section
 
-Floats = NDArray[np.float64]
 Three = tuple[Finite, Finite, Finite]
 _PAIRS = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 

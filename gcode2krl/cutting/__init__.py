@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gcode2krl.cutting.cut import Removal, cut, force_basis, no_forces, remove
+from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
-from gcode2krl.kernel_cache import drop_stale
+from gcode2krl.cutting.milling import Removal, cut, force_basis, no_forces, remove
 
 # compiled kernels are looked up when they are first called
 drop_stale(

@@ -7,12 +7,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcode2krl.sections import Tool
+from gcode2krl.arrays import Floats
+from gcode2krl.cell.sections import Tool
 from gcode2krl.units import RAD_PER_DEG
-
-Floats = NDArray[np.float64]
 
 DRILL_POINT_DEG = 118.0
 """Point angle of a drill that states none: the usual twist drill."""

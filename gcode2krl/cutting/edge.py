@@ -12,8 +12,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cutting.kernels import kernel
 from gcode2krl.cutting.rings import correct_at_walls, stand_above_cutter, take_off_recent, tops_on_ring
 from gcode2krl.cutting.slices import LINEAR_EDGE, arc_force
@@ -40,40 +40,40 @@ _LOWER, _LOWER_TOP, _UPPER, _UPPER_TOP, _SHARE = range(5)  # rows of `Work.rows`
 class Cutters(NamedTuple):
     """What the kernels need of each tool, a row each."""
 
-    bands: NDArray[np.float64]
+    bands: Floats
     """(t, s, 7) stretches of the edge from the tip up: z low and high, r low and high, sin and cos of the
     edge angle, contact width."""
-    used: NDArray[np.int64]
+    used: Ints
     """(t,) bands in use."""
-    wall_bins: NDArray[np.int64]
+    wall_bins: Ints
     """(t,) points all around the rim, a multiple of 4."""
-    ring_bins: NDArray[np.int64]
+    ring_bins: Ints
     """(t,) points all around a ring between two bands, a multiple of 4."""
-    teeth: NDArray[np.float64]
-    lag_mm: NDArray[np.float64]
+    teeth: Floats
+    lag_mm: Floats
     """(t,) way by which the field lags behind."""
-    above: NDArray[np.float64]
+    above: Floats
     """(t, 4) shank: radius, height of its lower end; holder: the same; radius 0 = not checked."""
 
 
 class Work(NamedTuple):
     """Scratch memory of one thread."""
 
-    turn: NDArray[np.float64]
+    turn: Floats
     """(8, bins) sin and cos of the wall's and the ring's bins; over the ring's bins the integrals of sin,
     cos, sin², sin·cos."""
-    heading: NDArray[np.float64]
+    heading: Floats
     """(2, bins) x and y of the directions of the bins."""
-    rows: NDArray[np.float64]
+    rows: Floats
     """(5, bins) thickness above a band's lower and upper ring, each with the material's top; share."""
-    reach: NDArray[np.float64]
+    reach: Floats
     """(2, bins) largest radius of the edge that is engaged, 0 = none; largest height of material there."""
-    recent: NDArray[np.int64]
+    recent: Ints
     """(8, 2) first and last sample of sweeps that the field does not show yet."""
-    arcs: NDArray[np.float64]
-    arc: NDArray[np.float64]
-    part: NDArray[np.float64]
-    total: NDArray[np.float64]
+    arcs: Floats
+    arc: Floats
+    part: Floats
+    total: Floats
 
 
 def new_work() -> Work:

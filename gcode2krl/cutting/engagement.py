@@ -11,16 +11,15 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.reading import Result, cut_strip
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path
-from gcode2krl.sections import Tool
 
-Floats = NDArray[np.float64]
 _BINS = 16
 _FEWEST_BINS = 96
 _MOST_WALL_BINS = 960
@@ -35,7 +34,7 @@ _FEW_SAMPLES = 2000
 
 
 def engage(
-    field: HeightField, position_mm: Floats, tool: NDArray[np.int32], rapid: NDArray[np.bool_], f_z_mm:
+    field: HeightField, position_mm: Floats, tool: Ints32, rapid: Bools, f_z_mm:
     Floats, tools: Sequence[Tool], law: Floats, threads: int | None = None,
 ) -> Result:  # fmt: skip
     """Cut a motion out of a field, which changes; return engagement and mean force of every sample.
@@ -159,7 +158,7 @@ def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
     )
 
 
-def _round_up(bins: Floats) -> NDArray[np.int64]:
+def _round_up(bins: Floats) -> Ints:
     return (_BINS * np.ceil(bins / _BINS)).astype(np.int64)
 
 

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
 from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.sections import Tool
 from gcode2krl.tables import Forces
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 _CONTACT_MM = 0.01
 """Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
 _GRAZE_MM = 3.0
@@ -38,7 +36,7 @@ _SHORT_S = 0.1
 class Cut:
     """What is known of each sample (m rows) beside its forces."""
 
-    source_line: NDArray[np.int32]
+    source_line: Ints32
     rapid: Bools
     spindle_rad_s: Floats
     f_z_mm: Floats
@@ -252,7 +250,7 @@ def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
                     break
 
 
-def _tools(forces: Forces) -> NDArray[np.int32]:
+def _tools(forces: Forces) -> Ints32:
     return np.unique(forces.tool)
 
 

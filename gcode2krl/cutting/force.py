@@ -11,16 +11,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import Shape, shape_of
 from gcode2krl.cutting.law import linear_edge_law
 from gcode2krl.cutting.slices import mean_rows, peak_rows
 from gcode2krl.errors import NotUnderstoodError, input_error
-from gcode2krl.sections import Tool
 from gcode2krl.units import RAD_PER_DEG
 
-Floats = NDArray[np.float64]
 _ROWS_A_PART = 20_000
 _ROUNDING_RAD = 1e-9
 
@@ -187,7 +187,7 @@ def _check_arcs(arcs: Floats) -> None:
         )
 
 
-def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
+def _refuse(name: str, values: Floats, bad: Bools, allowed: str) -> None:
     if bad.any():
         row = int(np.argmax(bad))
         raise _wrong(f"{name}: row {row}: found {np.atleast_1d(values)[row]:g}, allowed: {allowed}")

@@ -19,12 +19,10 @@ All of it is an assumption, so what it finds is a warning.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.tables import Toolpath
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 FLAT_MM = 1e-6
 """Moves that rise or go across by less are rounding of the G-code's numbers."""
 _MOST = 0.95

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cutting.kernels import kernel
 from gcode2krl.cutting.sweep import BLOCK, LANES, Grid, refresh
 
-Floats = NDArray[np.float64]
 CELLS_PER_DIAMETER = 160.0
 """Default resolution: 0.1 mm for a cutter of 16 mm."""
 MAX_CELLS = 16_000_000

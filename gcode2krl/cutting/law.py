@@ -3,14 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from gcode2krl.arrays import Floats
+from gcode2krl.cell.sections import Material
 from gcode2krl.cutting.slices import KIENZLE, LINEAR_EDGE
 from gcode2krl.errors import input_error
-from gcode2krl.sections import Material
 from gcode2krl.units import MM_PER_M, RAD_PER_REV
-
-Floats = NDArray[np.float64]
 
 THIN_CHIP_MM = 0.005
 """Below this largest chip an edge rubs and ploughs rather than cuts: an assumption, about the edge radius of

@@ -9,21 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import shape_of
 from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
 from gcode2krl.errors import input_error
-from gcode2krl.sections import Tool
 from gcode2krl.tables import Toolpath
 
 if TYPE_CHECKING:
     import trimesh
 
-Floats = NDArray[np.float64]
 MANY_SAMPLES = 200_000
 _FEW_CELLS_PER_DIAMETER = 40.0
 _METRES_MM = 1.0
@@ -184,9 +183,7 @@ def _coarser(field: HeightField, most_cells: int) -> tuple[Floats, Floats, Float
     return tops, places[0], places[1]
 
 
-def _sides(
-    top: NDArray[np.int64], below: NDArray[np.int64], filled: NDArray[np.bool_]
-) -> Iterator[NDArray[np.int64]]:
+def _sides(top: Ints, below: Ints, filled: Bools) -> Iterator[Ints]:
     """Yield the walls (f, 4) along the border of the field; elsewhere top and bottom meet."""
     for first, second, border in (
         ((0, slice(None, -1)), (0, slice(1, None)), filled[0]),

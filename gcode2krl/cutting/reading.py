@@ -11,9 +11,7 @@ way that is nothing: no point in front of a convex cutter was inside it before.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gcode2krl.arrays import Floats
 from gcode2krl.cutting.edge import A_P, LEAST, MOST, MOST_RECENT, add_bands, fill_turn, write_union
 from gcode2krl.cutting.kernels import inlined, kernel
 from gcode2krl.cutting.removal import remove_sweep
@@ -30,20 +28,20 @@ STRAIGHT_ON = 0.985
 class Result(NamedTuple):
     """A row per sample; zero and NaN in air."""
 
-    force_N: NDArray[np.float64]
+    force_N: Floats
     """(n, 3) on the tool, along the axes of the field."""
-    moment_Nmm: NDArray[np.float64]
+    moment_Nmm: Floats
     """(n, 3) about the tip."""
-    torque_Nmm: NDArray[np.float64]
-    a_p_mm: NDArray[np.float64]
-    a_e_mm: NDArray[np.float64]
-    phi_rad: NDArray[np.float64]
+    torque_Nmm: Floats
+    a_p_mm: Floats
+    a_e_mm: Floats
+    phi_rad: Floats
     """(n, 2 * ARCS) pairs, NaN padded."""
-    ramp_rad: NDArray[np.float64]
+    ramp_rad: Floats
     """(n,) angle of descent."""
-    centre_mm: NDArray[np.float64]
+    centre_mm: Floats
     """(n,) material below the middle of a descending tool."""
-    overlap_mm: NDArray[np.float64]
+    overlap_mm: Floats
     """(n, 3) how far rapid, shank and holder are in the material."""
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cutting.kernels import kernel
 
 LANES = np.uintp(16)
@@ -30,11 +31,11 @@ class Grid(NamedTuple):
     height: NDArray[np.float32]
     """(ny, nx) top of the material over the middle of a cell, -inf = none. The first row and column, the last
     row and the last LANES columns are empty."""
-    wall: NDArray[np.int32]
+    wall: Ints32
     """(ny, nx) the sweep whose wall runs through a cell, -1 = none."""
     bound: NDArray[np.float32]
     """(ceil(ny/BLOCK), ceil(nx/BLOCK)) no height in the block is above it."""
-    visits: NDArray[np.int32]
+    visits: Ints32
     place: tuple[float, float, float, float]
     """Low corner x, y of the whole field and size of a cell along x, y in mm."""
     shift: tuple[int, int]
@@ -45,14 +46,14 @@ class Grid(NamedTuple):
 class Path(NamedTuple):
     """Samples in the order of time, in the frame of the field (z = tool axis)."""
 
-    position_mm: NDArray[np.float64]
+    position_mm: Floats
     """(n, 3) tips."""
-    tool: NDArray[np.int32]
+    tool: Ints32
     """(n,) row of `outlines`."""
-    rapid: NDArray[np.bool_]
-    first: NDArray[np.bool_]
+    rapid: Bools
+    first: Bools
     """(n,) True where no sweep leads to the sample: the first one, and after a change of tool."""
-    outlines: NDArray[np.float64]
+    outlines: Floats
     """(t, 7) radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
 
 

@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Material, Tool
 from gcode2krl.errors import Issue
-from gcode2krl.sections import Material, Tool
 from gcode2krl.tables import Forces
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 STEEP_RAD = np.deg2rad(20.0)
 """Descent above which a mill goes down rather than along: assumed, ramps are flatter."""
 _FLAT_RAD = np.deg2rad(60.0)
@@ -26,7 +24,7 @@ _SOFTER = 3.0
 
 
 def uses(
-    line: NDArray[np.int32], rapid: Bools, f_z_mm: Floats, ramp_rad: Floats, centre_mm: Floats,
+    line: Ints32, rapid: Bools, f_z_mm: Floats, ramp_rad: Floats, centre_mm: Floats,
     forces: Forces, cell: Cell,
 ) -> Iterator[Issue]:  # fmt: skip
     """Yield one warning a tool: the first place where it cuts as its kind does not.

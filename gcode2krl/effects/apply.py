@@ -131,7 +131,7 @@ def remembered(cut: Cut, most: int = 64) -> Cut:
 def _cut_of(prediction: Prediction) -> Cut | None:
     if prediction.forces is None:
         return None
-    from gcode2krl.cutting.cut import cut
+    from gcode2krl.cutting.milling import cut
 
     return remembered(partial(cut, prediction.toolpath))
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from gcode2krl.cell import Cell
-from gcode2krl.sections import LinearEdge, Material, Tool
+from gcode2krl.cell.sections import LinearEdge, Material, Tool
 
 _KIENZLE = {"radial": "radial_ratio", "axial": "axial_ratio"}
 

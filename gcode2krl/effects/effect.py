@@ -16,7 +16,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.sections import VIRTUAL_JOINTS
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 
 if TYPE_CHECKING:
     from gcode2krl.effects.inputs import Inputs

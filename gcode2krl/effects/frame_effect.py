@@ -1,8 +1,8 @@
 """What the effects that move or turn a whole frame share."""
 
 from gcode2krl.arrays import Floats
+from gcode2krl.cell.sections import Frame
 from gcode2krl.effects.effect import Applied, Parameter
-from gcode2krl.sections import Frame
 
 FRAME_NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 

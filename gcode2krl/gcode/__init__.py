@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from gcode2krl.compiled.kernel_cache import drop_stale, load_numba
 from gcode2krl.gcode.read import CHORD_TOLERANCE_MM, read_gcode, read_stream
-from gcode2krl.kernel_cache import drop_stale, load_numba
 
 __all__ = ["CHORD_TOLERANCE_MM", "read_gcode", "read_stream"]
 
@@ -13,9 +13,9 @@ drop_stale(
     Path(__file__).parent,
     "arcs.py",
     "findings.py",
-    "gather.py",
+    "block_words.py",
     "motion.py",
-    "report.py",
+    "reporting.py",
     "rows.py",
     "settings.py",
     "state.py",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
-from gcode2krl.gcode.report import CONSEQUENCES, DROPPED, FINDINGS
+from gcode2krl.gcode.reporting import CONSEQUENCES, DROPPED, FINDINGS
 from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
 
 Record = Any

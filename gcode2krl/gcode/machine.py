@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.gcode import findings as f
-from gcode2krl.gcode.gather import FAULTY, NOTHING, OTHER_AXES, gather
+from gcode2krl.gcode.block_words import FAULTY, NOTHING, OTHER_AXES, gather
 from gcode2krl.gcode.motion import machine_home, move
-from gcode2krl.gcode.report import EVENTS, MUTE, ROWS, event, note, report, report_unless
+from gcode2krl.gcode.reporting import EVENTS, MUTE, ROWS, event, note, report, report_unless
 from gcode2krl.gcode.rows import emit
 from gcode2krl.gcode.settings import apply_settings, stops
 from gcode2krl.gcode.state import (

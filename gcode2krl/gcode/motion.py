@@ -15,7 +15,7 @@ from gcode2krl.gcode.arcs import (
     radii_fit,
     sweep_angle,
 )
-from gcode2krl.gcode.report import CONSEQUENCES, MUTE, ROWS, note, report, report_unless, rests_on_doubt
+from gcode2krl.gcode.reporting import CONSEQUENCES, MUTE, ROWS, note, report, report_unless, rests_on_doubt
 from gcode2krl.gcode.rows import emit, follow, learn, target
 from gcode2krl.gcode.settings import whole
 from gcode2krl.gcode.state import (

@@ -15,7 +15,7 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
-from gcode2krl.gcode.report import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
+from gcode2krl.gcode.reporting import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
 from gcode2krl.gcode.rows import ROW
 from gcode2krl.gcode.state import (
     EVENT_COOLANT,

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.gcode import findings as f
-from gcode2krl.gcode.report import event, note, report, report_unless
+from gcode2krl.gcode.reporting import event, note, report, report_unless
 from gcode2krl.gcode.state import (
     DOUBT_CENTRE,
     DOUBT_DISTANCE,

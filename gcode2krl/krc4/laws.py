@@ -7,9 +7,10 @@ that reproduces all 15 combinations of the paper's second study. Short moves, un
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from gcode2krl.arrays import Floats
+
 _REVERSAL_COS = -1.0 + 1e-12
 _HALVINGS = 52
 """Bisections that leave nothing of an interval of length 1 in double precision."""

@@ -3,20 +3,19 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.compiled.chunks import edges, in_parts
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample, sample_times
-from gcode2krl.parts import edges, in_parts
 from gcode2krl.tables import Motion, Targets
-from gcode2krl.tool_tips import motion_starts
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
-Floats = NDArray[np.float64]
 _MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
 """Share of the time above which a loss is a finding."""
@@ -48,12 +47,12 @@ class Chain:
     """(n,) angle that the tool turns by."""
     blend_mm: Floats
     """(n,) min(CDIS, half lines) at the end of each move; 0 = exact stop, or straight on."""
-    stop: NDArray[np.bool_]
+    stop: Bools
     """(n,) True where the end of a move is an exact stop."""
     wait_s: Floats
-    move: NDArray[np.int32]
-    source_line: NDArray[np.int32]
-    tool: NDArray[np.int32]
+    move: Ints32
+    source_line: Ints32
+    tool: Ints32
     cos_half: Floats
     """(n,) cos(alpha/2) at the end of each move, alpha = interior angle."""
     scale: Floats
@@ -106,7 +105,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     )
 
 
-def _owners(move: NDArray[np.int32]) -> NDArray[np.int32]:
+def _owners(move: Ints32) -> Ints32:
     """Return the row of the Toolpath (n,) of each motion; what is added has that of the one it leads to."""
     own = np.array(move)
     added, programmed = np.flatnonzero(move < 0), np.flatnonzero(move >= 0)
@@ -283,7 +282,7 @@ def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floa
     return d, cos_half
 
 
-def _goes_straight_on(d: Floats, cos_half: Floats) -> NDArray[np.bool_]:
+def _goes_straight_on(d: Floats, cos_half: Floats) -> Bools:
     """Mark the vertices (n,) that are no corners: their curve is off by less than the text can say.
 
     So a tangent stays one when its points are rounded to the decimals of the text.
@@ -294,7 +293,7 @@ def _goes_straight_on(d: Floats, cos_half: Floats) -> NDArray[np.bool_]:
 
 def _scales(
     length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
-    stop: NDArray[np.bool_], cell: Cell,
+    stop: Bools, cell: Cell,
 ) -> Floats:  # fmt: skip
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
@@ -322,11 +321,11 @@ def _scales(
 
 def _wide_corners(
     length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
-    stop: NDArray[np.bool_], cell: Cell,
-) -> NDArray[np.int64]:  # fmt: skip
+    stop: Bools, cell: Cell,
+) -> Ints:  # fmt: skip
     """Return the moves with a corner behind them that is long enough for the change of speed there."""
 
-    def part(first: int, behind: int) -> NDArray[np.int64]:
+    def part(first: int, behind: int) -> Ints:
         here = slice(first, behind)
         changing = (blend[here] > 0) & ~stop[here] & (speed[here] != speed[first + 1 : behind + 1])
         rows = np.flatnonzero(changing) + first
@@ -338,13 +337,13 @@ def _wide_corners(
     return np.concatenate(in_parts(part, edges(max(len(length) - 1, 0))) or [np.zeros(0, dtype=np.int64)])
 
 
-def _widest(length: Floats, ratio: Floats, cdis: Floats, rows: NDArray[np.int64]) -> Floats:
+def _widest(length: Floats, ratio: Floats, cdis: Floats, rows: Ints) -> Floats:
     """Return the distance before the corners behind some moves, where speeds of this ratio meet there."""
     lines = np.minimum(length[rows], length[rows + 1] / ratio) / 2
     return np.minimum(cdis[rows] / np.maximum(1.0, ratio), lines)
 
 
-def _in_view(length: Floats, rows: NDArray[np.int64], cell: Cell) -> Floats:
+def _in_view(length: Floats, rows: Ints, cell: Cell) -> Floats:
     """Return the length of the moves behind the corners of some moves that the look-ahead knows."""
     way = np.concatenate([[0.0], np.cumsum(length)]) if len(rows) else np.zeros(1)
     advance = cell.controller.advance
@@ -352,7 +351,7 @@ def _in_view(length: Floats, rows: NDArray[np.int64], cell: Cell) -> Floats:
     return way[np.minimum(seen, len(way) - 1)] - way[np.minimum(rows + 1, len(way) - 1)]
 
 
-def _rotations(chain: Chain, row: NDArray[np.int64], part: Floats) -> Floats:
+def _rotations(chain: Chain, row: Ints, part: Floats) -> Floats:
     """Orientation goes with the position along each move (``$ORI_TYPE = #VAR``)."""
     if _one_orientation(chain.from_rotation, chain.to_rotation):
         return np.broadcast_to(chain.to_rotation[0], (len(row), 4))

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcode2krl.arrays import Bools, Floats, Ints
+
 _ROOM = 0.8
 """A move that a slow place holds back over more than this share of its length runs slowly as a whole."""
 _NEARLY, _SHORT = 0.99, 4.0
@@ -38,7 +38,7 @@ class Profile(NamedTuple):
 
 
 def plan_profile(
-    length_mm: Floats, speed_mm_s: Floats, blend_mm: Floats, stop: NDArray[np.bool_], wait_s: Floats,
+    length_mm: Floats, speed_mm_s: Floats, blend_mm: Floats, stop: Bools, wait_s: Floats,
     a_mm_s2: Floats | float, k_s: float, moves_in_view: int, averages: bool,
 ) -> Profile:  # fmt: skip
     """Plan a chain of n moves that starts and ends at rest.
@@ -75,7 +75,7 @@ def plan_profile(
     return Profile(t, s, v, a, i, move_end, total)
 
 
-def _run_ends(speed_mm_s: Floats, a_mm_s2: Floats, bound_mm_s: Floats) -> NDArray[np.int64]:
+def _run_ends(speed_mm_s: Floats, a_mm_s2: Floats, bound_mm_s: Floats) -> Ints:
     """Return the last move of each run: moves of one speed whose inner vertices hold nothing back.
 
     Such a run is one programmed rectangle to the law, however many moves it has.

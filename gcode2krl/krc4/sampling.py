@@ -10,14 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.compiled.chunks import edges, in_parts
 from gcode2krl.krc4.profile import Profile
-from gcode2krl.parts import edges, in_parts
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 
 class Samples(NamedTuple):

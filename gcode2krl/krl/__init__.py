@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gcode2krl.kernel_cache import drop_stale
+from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.krl.names import suggested_name
 from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.read import read_krl

@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Rows
 from gcode2krl.cell import Cell
-
-Rows = NDArray[np.int64]
 
 
 def view(cell: Cell) -> int:

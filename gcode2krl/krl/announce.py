@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import krc4
+from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.krc4 import Chain
@@ -25,8 +25,6 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Motion, Targets
 from gcode2krl.units import RAD_PER_DEG
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Form = Literal["index", "values"]
 _SHARP = np.sin(30.0 * RAD_PER_DEG / 2.0)
 """cos(alpha/2) from which a corner is a change of direction: it turns by 30° or more. Our choice; what turns

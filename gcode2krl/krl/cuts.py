@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import view
@@ -18,8 +19,6 @@ from gcode2krl.krl.windows import Windows
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 _CDIS_MM = 0.1
 """Approximation where pieces meet, in a cell that has none of its own."""
 _CDIS_STEP_MM = 1e-3

@@ -8,12 +8,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.cell.tool_tips import motion_starts
 from gcode2krl.tables import Joints, Table, Targets
-from gcode2krl.tool_tips import motion_starts
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

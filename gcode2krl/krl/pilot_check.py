@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import krc4
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
@@ -19,7 +20,6 @@ from gcode2krl.pilot.sidecar import NOT_YET
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MS_PER_S
 
-Floats = NDArray[np.float64]
 _ROUNDING_S = 0.001
 """A delay is written in whole ms."""
 _REMEDY = "translate again"

@@ -7,13 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.krl.number_text import in_decimals
 from gcode2krl.krl.triggers import Triggers
 from gcode2krl.pilot import Knots, PilotHeader, knot_rows, sidecar_head
 from gcode2krl.pilot.knots import FORCE_DECIMALS, LEAD_DECIMALS
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
 SUBPROGRAM = "GK_PILOT"
 NO_KNOT_YET = -1
 """What the variable of the form ``index`` holds before knot 0 is announced."""

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
 _DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)

@@ -9,10 +9,10 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections import Pilot
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krl.names import DEVICES
-from gcode2krl.online_section import Online
-from gcode2krl.sections import Pilot
 
 Form = Literal["index", "values", "none"]
 LONGEST_NAME = 16
@@ -67,7 +67,7 @@ def file_names(name: str) -> tuple[str, str]:
     return f"{name}_ETH.xml", f"{name}.rsi.xml"
 
 
-def rsi_files(name: str, settings: Online, pilot: Pilot, form: Form) -> dict[str, str]:
+def rsi_texts(name: str, settings: Online, pilot: Pilot, form: Form) -> dict[str, str]:
     """Return file name → text of both files of ``name``."""
     ethernet, flow = file_names(name)
     return {

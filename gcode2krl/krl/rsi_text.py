@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.krl.rsi_files import Form, file_names, rsi_files
-from gcode2krl.online_section import Online
+from gcode2krl.cell.online_section import Online
+from gcode2krl.krl.rsi_files import Form, file_names, rsi_texts
 from gcode2krl.tables import Targets
 
 INTERRUPT = 21
@@ -58,7 +58,7 @@ class RsiText:
     @property
     def files(self) -> dict[str, str]:
         """File name → text of what belongs beside the program."""
-        return rsi_files(self.name, self.cell.online, self.cell.pilot, self.form)
+        return rsi_texts(self.name, self.cell.online, self.cell.pilot, self.form)
 
 
 def rsi_rows(targets: Targets) -> tuple[int, int]:

@@ -5,20 +5,18 @@ from functools import lru_cache
 from typing import Any
 
 import jinja2
-import numpy as np
-from numpy.typing import NDArray
 
-from gcode2krl import cell_templates, template_rules
 from gcode2krl import frames as fr
-from gcode2krl.cell import Cell, controller_axes, plain_view
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import Cell, controller_axes, plain_view, template_rules
+from gcode2krl.cell import templates as cell_templates
+from gcode2krl.cell.sections import missing, missing_key
+from gcode2krl.cell.switching import template_issue
 from gcode2krl.errors import RefusedError
 from gcode2krl.krl.number_text import fixed
-from gcode2krl.sections import missing, missing_key
-from gcode2krl.switching import template_issue
 from gcode2krl.tables import Event
 from gcode2krl.units import DEG_PER_RAD
 
-Floats = NDArray[np.float64]
 _MESSAGE_CHARACTERS = 70
 
 

@@ -4,15 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.krl.advance import view
 from gcode2krl.krl.windows import Windows
 from gcode2krl.units import MS_PER_S
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 _BEYOND = np.iinfo(np.int64).max // 2
 _BETWEEN_S = 0.003
 """Added to the cycle between triggers of different motions: each motion's start, read from the samples of a

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.announce import pilot_forces
-from gcode2krl.krl.compose import SIDECAR, Layout, compose, turn_bits
+from gcode2krl.krl.composition import SIDECAR, Layout, compose, turn_bits
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText
@@ -22,12 +22,11 @@ from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.pilot import knot_rows, read_pilot
-from gcode2krl.predict import plan_motion, set_targets, solve_joints
+from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, S_PER_MIN
 
-Floats = NDArray[np.float64]
 POSITION_LIMIT_MM = 0.002
 ROTATION_LIMIT_DEG = 0.001
 SPEED_LIMIT_MM_S = 0.1 / S_PER_MIN

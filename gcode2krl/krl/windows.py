@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
@@ -17,8 +18,6 @@ from gcode2krl.krl.statements import event_statements
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 COUNTS_FROM_END_OF_ARC = True
 """At an approximated start point ``DISTANCE=0`` switches where the approximation ends, not where it begins
 (KUKA's documentation as remembered; not confirmed by a trace)."""

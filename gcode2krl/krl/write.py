@@ -12,7 +12,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.compose import SIDECAR, Layout, compose
+from gcode2krl.krl.composition import SIDECAR, Layout, compose
 from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
@@ -22,7 +22,7 @@ from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import file_names
 from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.verify import VerifyReport, compare
-from gcode2krl.predict import solve_ptp_joints
+from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB

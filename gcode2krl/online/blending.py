@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from gcode2krl.online.rows import Bools, Floats, frozen
-from gcode2krl.online_section import Online
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.rows import frozen
 
 STEADY_SHARE = 0.2
 """An estimate is steady while it changes by less than this share of the threshold; our choice."""

@@ -13,18 +13,17 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.cell.online_section import Online
 from gcode2krl.compliance import deflection_of, missing_stiffness
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
 from gcode2krl.errors import NotUnderstoodError, input_error
-from gcode2krl.frames import Floats
 from gcode2krl.online.blending import BlendState, blend_start, blended
 from gcode2krl.online.feed import FeedState, feed_of, feed_start
 from gcode2krl.online.filters import FilterState, filter_start, filtered
 from gcode2krl.online.limits import Bounds, LimitState, axis_bounds, cartesian_bounds, limit_start, limited
 from gcode2krl.online.pilot_gate import Announced, GateState, PilotTable, estimate, gate_start, pilot_table
-from gcode2krl.online.rows import Bools, Ints
-from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.robot.inverse_kinematics import all_branches
 from gcode2krl.robot.kinematics import flange_pose, status_turn
@@ -111,7 +110,7 @@ class State(NamedTuple):
     limit: LimitState
 
 
-def compensator(
+def build_compensator(
     cell: Cell,
     settings: Online,
     *,

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from gcode2krl.online.rows import Floats, Ints, frozen
-from gcode2krl.online_section import Online
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.rows import frozen
 
 WINDOW_S = 0.020
 """Positions come with few decimals: over this time the direction is right to 1° at 25 mm/s and 0.01 mm."""

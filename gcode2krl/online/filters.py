@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from gcode2krl.online.rows import Bools, Floats, Ints, frozen
-from gcode2krl.online_section import Online
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.rows import frozen
 
 WIDTH = 6
 """Force x, y, z in N and moment x, y, z in N·mm."""

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cutting.law import feed_per_tooth
-from gcode2krl.frames import Floats
-from gcode2krl.online.rows import Bools, frozen
+from gcode2krl.online.rows import frozen
 from gcode2krl.prediction import Prediction
 
 SIDE_RAD = 0.05

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from gcode2krl.online.rows import Bools, Floats, frozen
-from gcode2krl.online_section import Gains, Online
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.cell.online_section import Gains, Online
+from gcode2krl.online.rows import frozen
 from gcode2krl.units import RAD_PER_DEG
 
 NO_CORRECTION = 1e6

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from gcode2krl.arrays import Ints32
 from gcode2krl.errors import Issue
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
-from gcode2krl.tables import Ints
 
 Runs = Mapping[Case, Run]
 
@@ -24,7 +24,7 @@ def figures_of(runs: Runs, judged: Judged) -> dict[str, float | None]:
     return {f"{case}_mm": _worst(run, judged.counts) for case, run in runs.items()}
 
 
-def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints) -> dict[str, Any]:
+def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints32) -> dict[str, Any]:
     """Return the object of ``online simulate --json``; ``source_line`` (n,) is the line of each sample."""
     figures = figures_of(runs, judged)
     before, after = figures["uncompensated_mm"], figures["pilot_mm"]
@@ -96,6 +96,6 @@ def _depth(twin: Twin, run: Run, judged: Judged) -> float | None:
     return float(np.abs(np.einsum("ij,ij->i", run.error_mm[judged.counts], axis)).max())
 
 
-def _of_line(number: int, runs: Runs, judged: Judged, source_line: Ints) -> dict[str, float | int | None]:
+def _of_line(number: int, runs: Runs, judged: Judged, source_line: Ints32) -> dict[str, float | int | None]:
     here = judged.counts & (source_line == number)
     return {"line": number, **{f"{case}_mm": _worst(run, here) for case, run in runs.items()}}

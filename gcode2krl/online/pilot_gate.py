@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from gcode2krl.online.rows import Bools, Floats, Ints, frozen
-from gcode2krl.online_section import Online
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.rows import frozen
 from gcode2krl.pilot import Knots, PilotHeader
 
 NO_KNOT_YET = -1

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.effects.arm import tip_mm
 from gcode2krl.effects.operators import lag, play, since_reversal
-from gcode2krl.frames import Floats
 
 
 def reaction(sent: Floats, time_s: Floats, dead_s: float, lag_s: float) -> Floats:

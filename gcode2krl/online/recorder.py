@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import input_error
-from gcode2krl.frames import Floats
 
 MOST_WAITING = 50_000
 """Lines between the threads: about a minute of a dead disk at 4 ms."""

@@ -1,11 +1,9 @@
 """Arrays as the compiled loops of `online` want them."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from gcode2krl.arrays import Floats
 
 
 def frozen(values: ArrayLike, *shape: int) -> Floats:

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import input_error
-from gcode2krl.frames import Floats
 from gcode2krl.online.compensator import Compensator, start, step
 from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import Gate

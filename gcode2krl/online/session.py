@@ -18,13 +18,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gcode2krl.frames import Floats, rotation_from_quaternion
+from gcode2krl.arrays import Floats
+from gcode2krl.cell.online_section import Online
+from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.online.compensator import Compensator, Samples, State, joints_at, start, step
 from gcode2krl.online.feed import feed_of
 from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import NO_KNOT_YET, Announced, Gate
 from gcode2krl.online.telegram import Answer, Telegram
-from gcode2krl.online_section import Online
 from gcode2krl.robot import forward
 
 _S_PER_MS = 1e-3

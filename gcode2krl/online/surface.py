@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl.frames import Floats
+from gcode2krl.arrays import Floats
 from gcode2krl.online.judge import CELL_MM, SIDE_RAD, Judged, floor_over, grid_of
 from gcode2krl.online.twin import Run
 from gcode2krl.prediction import Prediction

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl.frames import Floats
-from gcode2krl.online_section import Online
+from gcode2krl.arrays import Floats
+from gcode2krl.cell.online_section import Online
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 LONGEST = 8192
@@ -69,8 +69,8 @@ class Telegram:
 def parse(data: bytes) -> Telegram:
     """Return the telegram of a datagram; raises `MalformedError`.
 
-    Tags are those of the Ethernet file that `krl.rsi_files` writes. RIst, RSol, AIPos, ASPos and IPOC must
-    be there.
+    Tags are those of the Ethernet file that `krl.rsi_files.rsi_texts` writes. RIst, RSol, AIPos, ASPos
+    and IPOC must be there.
     """
     values = _elements(data)
     ipoc = values.get("IPOC", {}).get("", b"")

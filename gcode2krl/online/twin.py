@@ -12,25 +12,25 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections import VirtualJoint
 from gcode2krl.compliance import deflection_of, project_normal
 from gcode2krl.errors import input_error
-from gcode2krl.frames import Floats
 from gcode2krl.online.compensator import (
     Compensator,
     Corrections,
     Samples,
-    compensator,
+    build_compensator,
     joints_at,
     start,
     stream,
 )
 from gcode2krl.online.pilot_gate import Announced
 from gcode2krl.online.plant import reaction, tip_shift_mm, with_backlash
-from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
 from gcode2krl.prediction import Prediction
-from gcode2krl.sections import VirtualJoint
 from gcode2krl.tables import Forces, Joints, Motion
 from gcode2krl.units import RAD_PER_DEG
 
@@ -203,7 +203,7 @@ def _device(twin: Twin, case: Case) -> Compensator:
     settings = twin.settings.model_copy(update={"mode": "axis" if case == "axis" else "cartesian"})
     cell = stiffer(twin.cell, twin.world.stiffness_scale)
     piloted = case in ("pilot", "axis")
-    return compensator(
+    return build_compensator(
         cell, settings, tool=twin.tool, load_frame="base",
         knots=twin.knots if piloted else None, header=twin.header if piloted else None,
     )  # fmt: skip

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import Issue
-from gcode2krl.tables import Bools, Floats, Ints, Table, _column
+from gcode2krl.tables import Table, _column
 
-Rows = NDArray[np.int64]
 LEAST_TOLERANCE_N = 10.0
 TOLERANCE_SHARE = 0.03
 """The default tolerance: the larger of 10 N and this share of the largest force."""
@@ -32,7 +31,7 @@ _WRITTEN_N = 0.1
 class Knots(Table):
     """Knots of the pilot force, counted from 0, rounded to the decimals in which they are written."""
 
-    line: Ints = _column(np.int32)
+    line: Ints32 = _column(np.int32)
     """(k,) line of the G-code."""
     path_mm: Floats = _column(np.float64)
     """(k,) arc length along the predicted path."""
@@ -57,7 +56,7 @@ def knots_of(
     deflection_mm: Floats | None = None,
     breaks: Rows | None = None,
     *,
-    line: Ints | None = None,
+    line: Ints32 | None = None,
     tolerance_N: float | None = None,
     cycle_s: float = CYCLE_S,
 ) -> Knots:
@@ -131,7 +130,7 @@ def force_at(knots: Knots, time_s: Floats) -> Floats:
     return force
 
 
-def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints, cell: Cell) -> Floats:
+def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
     """Return vectors (m, 3) along ``$BASE`` in the frame in which the cell wants its knots.
 
     ``tcp`` is the tool frame as the controller has it (``[tool] axis`` says which of its axes points from

@@ -12,6 +12,7 @@ from typing import Literal, cast
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.pilot.knots import (
     DEFLECTION_DECIMALS,
@@ -21,7 +22,6 @@ from gcode2krl.pilot.knots import (
     TIME_DECIMALS,
     Knots,
 )
-from gcode2krl.tables import Floats
 
 SCHEMA = "gcode2krl/pilot/1"
 NOT_YET = -1

@@ -1,7 +1,7 @@
 """Toolpath to Targets: what the KRL program will say."""
 
 from gcode2krl.program.checks import check_toolpath, require_geometry
-from gcode2krl.program.doubtful import doubtful, feeds_per_tooth
+from gcode2krl.program.doubts import doubtful, feeds_per_tooth
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.table import below_table

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from gcode2krl.parts import edges, in_parts
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.compiled.chunks import edges, in_parts
 
 LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
 """The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
@@ -20,11 +20,11 @@ _REVERSAL_COS = math.cos(math.radians(1.0))
 
 
 def corner_cdis(
-    position_mm: NDArray[np.float64],
-    tolerance_mm: NDArray[np.float64],
+    position_mm: Floats,
+    tolerance_mm: Floats,
     cdis_mm: float,
-    exact: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+    exact: Bools,
+) -> Floats:
     """Return CDIS (p,) in mm at the end of each motion.
 
     ``tolerance_mm`` (p,) is NaN where none is asked for: there ``cdis_mm`` holds. ``exact`` (p,) forces 0.

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.program.needs import doubtful_issues, lacks_geometry, missing_issues
@@ -38,13 +38,13 @@ def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
         raise RefusedError((*toolpath.issues, *check_toolpath(toolpath, cell)), toolpath.source)
 
 
-def _stretches(wrong: NDArray[np.bool_]) -> list[int]:
+def _stretches(wrong: Bools) -> list[int]:
     """Return the first row of each run of wrong rows."""
     starts = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
     return [int(row) for row in starts[:MOST_PLACES]]
 
 
-def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     known = toolpath.is_position()
     from_known = np.concatenate([[False], known[:-1]])
     for row in _stretches(feed & ~(known & from_known)):
@@ -82,20 +82,20 @@ def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
 
 def axes_nowhere(toolpath: Toolpath) -> str:
     """Return the words for axes that no line gives a position, empty where each has one, or nothing moves."""
-    known: NDArray[np.bool_] = np.any(toolpath.known, axis=0)
+    known: Bools = np.any(toolpath.known, axis=0)
     lines = int(toolpath.source_line.max(initial=0))
     return (
         "" if known.all() or lines == 0 else f"{_axes(~known)} given no absolute position in {lines:,} lines"
     )
 
 
-def _axes(chosen: NDArray[np.bool_]) -> str:
+def _axes(chosen: Bools) -> str:
     """Return ``Z is`` or ``X, Y and Z are``."""
     *others, last = (name for name, is_chosen in zip("XYZ", chosen, strict=True) if is_chosen)
     return f"{', '.join(others)} and {last} are" if others else f"{last} is"
 
 
-def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _machine_moves(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     for row in _stretches(toolpath.machine & ~toolpath.rapid):
         yield Issue(
             "error",
@@ -115,7 +115,7 @@ def _machine_moves(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> I
             )
 
 
-def _spindle(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     speed = toolpath.spindle_rad_s
     for row in _stretches(feed & (speed == 0)):
         yield Issue(
@@ -165,7 +165,7 @@ def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Iss
         )
 
 
-def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     most_mm_s = cell.controller.vel_cp_m_s * MM_PER_M
     for row in _stretches(feed & (toolpath.feed_mm_s > most_mm_s * (1 + 1e-9))):
         yield Issue(
@@ -191,7 +191,7 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator
             )
 
 
-def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _length_offsets(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     other = feed & (toolpath.tool > 0) & (toolpath.length_offset_tool != toolpath.tool)
     for row in _stretches(other):
         number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
@@ -208,7 +208,7 @@ def _length_offsets(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> 
         )
 
 
-def _clearance(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _clearance(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     clearance = cell.clearance_z_mm
     if clearance is None:
         yield Issue(
@@ -230,7 +230,7 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Itera
         )
 
 
-def _tools(toolpath: Toolpath, cell: Cell, feed: NDArray[np.bool_]) -> Iterator[Issue]:
+def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     moves = toolpath.is_position() & ~toolpath.machine
     for number in np.unique(toolpath.tool[moves]).tolist():
         row = int(np.flatnonzero(moves & (toolpath.tool == number))[0])

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gcode2krl import ranges
-from gcode2krl.cell import Cell, plain_view
+from gcode2krl.cell import Cell, plain_view, ranges
+from gcode2krl.cell.sections import missing_key
 from gcode2krl.errors import Issue
-from gcode2krl.sections import missing_key
 from gcode2krl.tables import Event, Toolpath
 
 _LEAST_WAIT_S = 0.5
@@ -103,8 +102,8 @@ def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
         yield "load.mass_kg", "$LOAD is written with $TOOL"
     if any(event.kind == "spindle" for event in toolpath.events) and cell.spindle.max_rpm is None:
         yield "spindle.max_rpm", "whether the spindle can turn at S is not known"
-    from gcode2krl import cell_templates
-    from gcode2krl.switching import SAMPLE
+    from gcode2krl.cell import templates as cell_templates
+    from gcode2krl.cell.switching import SAMPLE
 
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
     templates = cell.templates()
@@ -120,7 +119,7 @@ def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
 
 def _unread_pairs(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield the pairs that the program uses and whose second half calls a subprogram."""
-    from gcode2krl import switching
+    from gcode2krl.cell import switching
 
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}

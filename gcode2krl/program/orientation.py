@@ -1,14 +1,14 @@
 """From tool axis and spin to the tool frame: a mill may be turned freely about its own axis."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats
 
 _NEARLY_ONE = 1.0 - 1e-12
 
 
-def tool_rotation(axis: NDArray[np.float64], spin_rad: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def tool_rotation(axis: Floats, spin_rad: Floats | float) -> Floats:
     """Return tool frames as quaternions (n, 4) whose z is ``axis`` (n, 3).
 
     At zero spin the frame is ``$BASE`` turned by the shortest way from z to the axis, so a 3-axis program
@@ -22,7 +22,7 @@ def tool_rotation(axis: NDArray[np.float64], spin_rad: NDArray[np.float64] | flo
     return _rotation(axis, np.broadcast_to(np.asarray(spin_rad, dtype=float), (len(axis),)))
 
 
-def _rotation(axis: NDArray[np.float64], spin_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotation(axis: Floats, spin_rad: Floats) -> Floats:
     x, y, z = axis[:, 0], axis[:, 1], axis[:, 2]
     upside_down = z < -_NEARLY_ONE
     scale = np.sqrt(2.0 * np.where(upside_down, 1.0, 1.0 + z))

@@ -8,12 +8,11 @@ programming over a grid. ``stiffest`` picks the angle that bends least, with the
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.units import RAD_PER_DEG
 
-Floats = NDArray[np.float64]
-Quality = Callable[[NDArray[np.int64], float], Floats]
+Quality = Callable[[Ints, float], Floats]
 
 GRID_RAD = 5.0 * RAD_PER_DEG
 GOOD_ENOUGH = 0.3
@@ -77,7 +76,7 @@ def _grid() -> Floats:
     return spins[np.argsort(np.abs(spins), kind="stable")]
 
 
-def _judged_rows(position_mm: Floats) -> NDArray[np.int64]:
+def _judged_rows(position_mm: Floats) -> Ints:
     """Return rows spread over the program, its outermost points among them."""
     rows = np.linspace(0, len(position_mm) - 1, min(_SAMPLES, len(position_mm))).astype(np.int64)
     extremes = [op(position_mm[:, k]) for k in range(3) for op in (np.argmin, np.argmax)]
@@ -88,12 +87,12 @@ def _way(position_mm: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm, axis=0), axis=1))])
 
 
-def _allowed_steps(path: Floats, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def _allowed_steps(path: Floats, rows: Ints) -> Ints:
     """Return how many steps of the grid the spin may take between judged rows."""
     return np.maximum(1, ((path[rows[1:]] - path[rows[:-1]]) / STEP_MM).astype(np.int64))
 
 
-def _changing(position_mm: Floats, rows: NDArray[np.int64], spins: Floats, table: Floats) -> Floats | None:
+def _changing(position_mm: Floats, rows: Ints, spins: Floats, table: Floats) -> Floats | None:
     """Dynamic programming along the path, per branch; None where it is no better than a constant."""
     order = np.argsort(spins)
     spins, table = spins[order], table[order]
@@ -112,7 +111,7 @@ def _changing(position_mm: Floats, rows: NDArray[np.int64], spins: Floats, table
     return spin
 
 
-def _cheapest_track(cost_here: Floats, allowed: NDArray[np.int64]) -> tuple[float, NDArray[np.int64]]:
+def _cheapest_track(cost_here: Floats, allowed: Ints) -> tuple[float, Ints]:
     """Return (cost, grid index per sample) of the cheapest way through the grid (spins, samples).
 
     No wrap at ±180°: a full turn about the tool would wind up A6.

@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Tool
 from gcode2krl.errors import Issue
-from gcode2krl.sections import Tool
 from gcode2krl.tables import Targets
 
-Floats = NDArray[np.float64]
 _GRID_MM = 1e-3
 """Decimals of the KRL text."""
 _MOST = 20

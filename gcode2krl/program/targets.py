@@ -14,18 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import edges, in_parts
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.parts import edges, in_parts
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M
 
-Floats = NDArray[np.float64]
 HomePose = Callable[[int], tuple[Floats, Floats]]
-SpinOf = Callable[[Floats, Floats, NDArray[np.int32]], Floats | float]
+SpinOf = Callable[[Floats, Floats, Ints32], Floats | float]
 GRID_MM = 1e-3
 """Decimals of the KRL text: rows that print as the same point are one target."""
 
@@ -59,12 +59,12 @@ class _Columns:
 
     position: list[Floats] = field(default_factory=list)
     axis: list[Floats] = field(default_factory=list)
-    move: list[NDArray[np.int32]] = field(default_factory=list)
-    tool: list[NDArray[np.int32]] = field(default_factory=list)
+    move: list[Ints32] = field(default_factory=list)
+    tool: list[Ints32] = field(default_factory=list)
     kind: list[NDArray[np.int8]] = field(default_factory=list)
     count: int = 0
 
-    def append(self, position: Floats, axis: Floats, move: NDArray[np.int32], tool: int, kind: int) -> None:
+    def append(self, position: Floats, axis: Floats, move: Ints32, tool: int, kind: int) -> None:
         size = len(position)
         self.position.append(position)
         self.axis.append(axis)
@@ -240,17 +240,15 @@ class _Plan:
             source=toolpath.source,
         )
 
-    def _source_lines(self, move: NDArray[np.int32], kind: NDArray[np.int8]) -> NDArray[np.int32]:
+    def _source_lines(self, move: Ints32, kind: NDArray[np.int8]) -> Ints32:
         """Return the G-code line of each target; what is added has that of the move it leads to."""
-        line: NDArray[np.int32] = self.toolpath.source_line[np.maximum(move, 0)]
+        line: Ints32 = self.toolpath.source_line[np.maximum(move, 0)]
         own, added = np.flatnonzero(move >= 0), np.flatnonzero(move < 0)
         after = own[np.minimum(np.searchsorted(own, added), len(own) - 1)]
         line[added] = np.where(kind[added] == _HOME, 0, self.toolpath.source_line[move[after]])
         return line
 
-    def _said_by_moves(
-        self, move: NDArray[np.int32], kind: NDArray[np.int8], tolerance_mm: float | None
-    ) -> "_Said":
+    def _said_by_moves(self, move: Ints32, kind: NDArray[np.int8], tolerance_mm: float | None) -> "_Said":
         """Return what the G-code says of the targets; added ones are rapid, without a tolerance.
 
         The tolerance's precedence: ``G64 P``, then the one asked for, then the cell's.
@@ -281,7 +279,7 @@ class _Plan:
         return np.concatenate(self.columns.axis)
 
     def _rotations(
-        self, position: Floats, axis: Floats, tool: NDArray[np.int32], kind: NDArray[np.int8], spin_of: SpinOf
+        self, position: Floats, axis: Floats, tool: Ints32, kind: NDArray[np.int8], spin_of: SpinOf
     ) -> Floats:
         planned = _as_slice(kind != _HOME)
         axis = _rows(axis, planned)
@@ -292,7 +290,7 @@ class _Plan:
             position[row], rotation[row] = self.home_pose(int(tool[row]))
         return rotation
 
-    def _place_events(self, stand: "_StandingAt", kept_index: NDArray[np.int64]) -> tuple[Event, ...]:
+    def _place_events(self, stand: "_StandingAt", kept_index: Ints) -> tuple[Event, ...]:
         placed: list[Event] = []
         earliest, switched = 0, 0
         for index, event in enumerate(self.toolpath.events):
@@ -320,9 +318,7 @@ class _Plan:
         earlier = [k for k in self._changes_at(row) if k <= index]
         return float(self.toolpath.events[earlier[-1]].values.get("dwell_s", 0.0)) if earlier else 0.0
 
-    def _dwells(
-        self, row: int, stand: "_StandingAt", kept_index: NDArray[np.int64]
-    ) -> list[tuple[int, float]]:
+    def _dwells(self, row: int, stand: "_StandingAt", kept_index: Ints) -> list[tuple[int, float]]:
         """Return (target, seconds) of the dwell at a row: before and after tool changes there."""
         marks = [(int(kept_index[stand.at(row)]), 0.0)]
         for index in self._changes_at(row):
@@ -343,14 +339,14 @@ class _Plan:
     def _exact_stops(
         self,
         said: "_Said",
-        move: NDArray[np.int32],
+        move: Ints32,
         kind: NDArray[np.int8],
-        tool: NDArray[np.int32],
+        tool: Ints32,
         wait: Floats,
         events: tuple[Event, ...],
-    ) -> NDArray[np.bool_]:
+    ) -> Bools:
         """Mark the targets (p) that are reached at rest; among them both ends of the predicted motion."""
-        exact: NDArray[np.bool_] = (kind != _LIN) | (wait > 0) | said.exact_stop
+        exact: Bools = (kind != _LIN) | (wait > 0) | said.exact_stop
         exact[:-1] |= (said.rapid[:-1] != said.rapid[1:]) | (kind[1:] != _LIN)
         exact[1:] |= tool[1:] != tool[:-1]  # the way there began with another tip
         exact[[event.row for event in events]] = True
@@ -390,16 +386,16 @@ class _Plan:
 class _Said(NamedTuple):
     """What the G-code says of each target (p)."""
 
-    rapid: NDArray[np.bool_]
+    rapid: Bools
     speed_mm_s: Floats
     tolerance_mm: Floats
-    exact_stop: NDArray[np.bool_]
+    exact_stop: Bools
 
 
 class _StandingAt:
     """Finds the planned motion at whose end the tool stands after a row of the Toolpath."""
 
-    def __init__(self, move: NDArray[np.int32]) -> None:
+    def __init__(self, move: Ints32) -> None:
         self.moved = np.flatnonzero(move >= 0)
         self.rows = move[self.moved]
 
@@ -408,11 +404,9 @@ class _StandingAt:
         return int(self.moved[index]) if index >= 0 else 0
 
 
-def _distinct(
-    position: Floats, axis: Floats, kind: NDArray[np.int8], tool: NDArray[np.int32]
-) -> NDArray[np.bool_]:
+def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints32) -> Bools:
     """Mark the rows that print as another point than the row before, are PTP or move another tool."""
-    different: NDArray[np.bool_] = (kind != _LIN) | (np.arange(len(kind)) == 0)
+    different: Bools = (kind != _LIN) | (np.arange(len(kind)) == 0)
 
     def part(start: int, end: int) -> None:
         rows, first = slice(start + 1, end + 1), slice(start, end)
@@ -426,7 +420,7 @@ def _distinct(
     return different
 
 
-def _as_slice(chosen: NDArray[np.bool_]) -> slice | NDArray[np.int64]:
+def _as_slice(chosen: Bools) -> slice | Ints:
     """Return the index of the chosen rows, a slice where they stand together, so that nothing is copied."""
     rows = np.flatnonzero(chosen)
     together = len(rows) and rows[-1] - rows[0] == len(rows) - 1

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib import style
-from numpy.typing import NDArray
 
-from gcode2krl.tables import Bools, Floats, Ints, Motion, Targets, Toolpath
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.tables import Motion, Targets, Toolpath
 
 # Okabe and Ito's palette, told apart with every kind of colour vision
 BLACK, GREY, PALE = "#000000", "#6E6E6E", "#BDBDBD"
@@ -82,7 +82,7 @@ def thin_dots(points_mm: Floats, most: int = MOST_POINTS) -> Floats:
     return dots[:: -(-len(dots) // most)]
 
 
-def _kept(columns: list[Floats], rows: int, most: int) -> NDArray[np.int64]:
+def _kept(columns: list[Floats], rows: int, most: int) -> Ints:
     """Return the row numbers that stay when ``rows`` rows are thinned to at most ``most``."""
     if rows <= most:
         return np.arange(rows)
@@ -123,7 +123,7 @@ def intervals(time_s: Floats, mask: Bools, most: int = MOST_BARS) -> tuple[list[
     return list(zip(start.tolist(), (end - start).tolist(), strict=True)), gap
 
 
-def line_ticks(time_s: Floats, line: Ints, most: int = 14) -> tuple[list[float], list[str]]:
+def line_ticks(time_s: Floats, line: Ints32, most: int = 14) -> tuple[list[float], list[str]]:
     """Return times at which a G-code line begins and their labels, in order and at most ``most`` + 1.
 
     Of the lines that begin too close together to label each, the one that lasts longest is labelled. Line 0,
@@ -145,7 +145,7 @@ def line_ticks(time_s: Floats, line: Ints, most: int = 14) -> tuple[list[float],
     return times, labels
 
 
-def lines_of(toolpath: Toolpath, motion: Motion) -> Ints:
+def lines_of(toolpath: Toolpath, motion: Motion) -> Ints32:
     """Return (m,) the G-code line of each sample, 0 where it has none."""
     row = np.clip(motion.move, 0, len(toolpath) - 1)
     return np.where(motion.move >= 0, toolpath.source_line[row], 0).astype(np.int32)
@@ -223,9 +223,7 @@ def worst_corner(targets: Targets, motion: Motion) -> Corner | None:
     return Corner(int(row), line, float(distance), float(reach[row]), sampled, point, unit[row - 1], across)
 
 
-def _nearest_samples(
-    targets: Targets, motion: Motion, row_of: NDArray[np.int64], reach: Floats
-) -> tuple[NDArray[np.int64], Bools]:
+def _nearest_samples(targets: Targets, motion: Motion, row_of: Ints, reach: Floats) -> tuple[Ints, Bools]:
     """Return (p,) the corner sample nearest to each vertex, and whether it and both its neighbours are in
     that corner."""
     nearest = np.zeros(len(targets), dtype=np.int64)
@@ -251,7 +249,7 @@ def _nearest_samples(
     return nearest, resolved
 
 
-def _between_samples(path_mm: Floats, nearest: NDArray[np.int64], vertex: Floats) -> Floats:
+def _between_samples(path_mm: Floats, nearest: Ints, vertex: Floats) -> Floats:
     """Return (k, 3) the points nearest to the vertices on the parabolas through three samples each."""
     before, middle, after = (path_mm[nearest + step] for step in (-1, 0, 1))
     s = np.linspace(-1.0, 1.0, 201)[:, None, None]

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.files import make_folder, write_together
 from gcode2krl.report.drawing import (
     BLACK,
@@ -35,7 +36,7 @@ from gcode2krl.report.drawing import (
     thin_path,
     worst_corner,
 )
-from gcode2krl.tables import Bools, Floats, Ints, Joints, Motion, Targets, Toolpath
+from gcode2krl.tables import Joints, Motion, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD
 
 _DPI = 150
@@ -374,7 +375,7 @@ def _time_limits(axes: Axes, motion: Motion) -> None:
     axes.set_xlim(start, end if end > start else start + 1.0)
 
 
-def _line_axis(axes: Axes, motion: Motion, line: Ints) -> None:
+def _line_axis(axes: Axes, motion: Motion, line: Ints32) -> None:
     """Put G-code lines along the top, each where it begins."""
     upper = axes.secondary_xaxis("top")
     times, labels = line_ticks(motion.time_s, line)

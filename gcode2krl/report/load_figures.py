@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.report.drawing import (
     BLACK,
     BLUE,
@@ -24,7 +25,7 @@ from gcode2krl.report.drawing import (
     look,
     thin,
 )
-from gcode2krl.tables import Deflection, Floats, Forces, Ints, Motion, Toolpath
+from gcode2krl.tables import Deflection, Forces, Motion, Toolpath
 from gcode2krl.units import DEG_PER_RAD
 
 _MOST_SEGMENTS = 40_000
@@ -169,7 +170,7 @@ def _draw_arcs(axes: Axes, time_s: Floats, phi_rad: Floats) -> None:
     axes.set_yticks([0, 90, 180])
 
 
-def _largest(axes: Axes, size: Floats, motion: Motion, line: Ints, unit: str) -> None:
+def _largest(axes: Axes, size: Floats, motion: Motion, line: Ints32, unit: str) -> None:
     if not np.isfinite(size).any():
         return
     row = int(np.nanargmax(size))
@@ -178,7 +179,7 @@ def _largest(axes: Axes, size: Floats, motion: Motion, line: Ints, unit: str) ->
     axes.set_title(words, loc="right", fontsize=8, color=GREY)
 
 
-def _finish(figure: Figure, panels: Sequence[Axes], motion: Motion, line: Ints, title: str) -> None:
+def _finish(figure: Figure, panels: Sequence[Axes], motion: Motion, line: Ints32, title: str) -> None:
     """Give all panels the time axis, the first one the G-code lines, and the figure its legend."""
     start, end = float(motion.time_s[0]), float(motion.time_s[-1])
     panels[0].set_xlim(start, end if end > start else start + 1.0)

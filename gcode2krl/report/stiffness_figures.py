@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.report.drawing import BLACK, BLUE, GREY, ORANGE, PALE, VERMILION, look
-from gcode2krl.tables import Bools, Floats
 
 
 def workspace_figure(x_mm: Floats, y_mm: Floats, deflection_mm: Floats, title: str) -> Figure:

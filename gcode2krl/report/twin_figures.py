@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gcode2krl.arrays import Floats
 from gcode2krl.report.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, SKY, VERMILION, look
-from gcode2krl.tables import Floats
 
 _MOST_DOTS = 20_000
 _COLOURS = "RdBu_r"

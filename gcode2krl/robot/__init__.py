@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gcode2krl.kernel_cache import drop_stale
+from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.robot.joints import (
     angles_near,
     follow,

@@ -8,16 +8,14 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.robot.inverse_kinematics import one_branch
 from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.poses import flange_frames
 from gcode2krl.robot.standing import WRIST_ZONE_RAD, limit_margin, limits_rad
 from gcode2krl.units import RAD_PER_REV
-
-Floats = NDArray[np.float64]
 
 _TRIAL_SAMPLES = 2000
 
@@ -27,8 +25,8 @@ class Path(NamedTuple):
 
     position_mm: Floats
     rotation: Floats
-    tool: NDArray[np.int32]
-    starts: NDArray[np.bool_]
+    tool: Ints32
+    starts: Bools
     """(n,) True where a chain starts: there the joints come from HOME, not from the row before."""
 
 
@@ -38,7 +36,7 @@ class Branch(NamedTuple):
     number: int
     turns_rad: Floats
     """(6,) whole turns added to the turns nearest to HOME."""
-    samples: NDArray[np.int64]
+    samples: Ints
     q_rad: Floats
     """(t, 6) joints at these samples, the turns included."""
 
@@ -70,13 +68,13 @@ def same_branch(path: Path, q_rad: Floats, cell: Cell) -> Floats:
     return one_branch(position, rotation, geometry, number, q_rad)
 
 
-def thinned(starts: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def thinned(starts: Ints, count: int) -> Ints:
     """Return the samples of the trial: some 2000, with the first of each chain and the last of all."""
     evenly = np.arange(0, count, max(1, count // _TRIAL_SAMPLES))
     return np.unique(np.concatenate([evenly, starts, np.arange(count)[-1:]]))
 
 
-def best_branch(path: Path, samples: NDArray[np.int64], cell: Cell) -> Branch:
+def best_branch(path: Path, samples: Ints, cell: Cell) -> Branch:
     """Return the branch and turns that keep a thinned path (samples of the full one) within the limits.
 
     Among branches that do, the one whose weakest point (limits, wrist) is not poor and whose start lies
@@ -97,7 +95,7 @@ def best_branch(path: Path, samples: NDArray[np.int64], cell: Cell) -> Branch:
 def _chains(
     position: Floats,
     rotation: Floats,
-    starts: NDArray[np.bool_],
+    starts: Bools,
     number: int,
     home: Floats,
     reference: Floats,

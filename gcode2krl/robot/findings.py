@@ -7,13 +7,12 @@ sampled again, so that a message can tell the place and the angle.
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import ROWS
 from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.parts import ROWS
 from gcode2krl.robot.branch import Branch, Path
-from gcode2krl.robot.jacobian import smallest_singular_value
 from gcode2krl.robot.lines import Line, sample_lines
 from gcode2krl.robot.poses import forward
 from gcode2krl.robot.standing import (
@@ -27,10 +26,9 @@ from gcode2krl.robot.standing import (
     limits_rad,
     what_is_wrong,
 )
+from gcode2krl.robot.velocity_kinematics import smallest_singular_value
 from gcode2krl.tables import Targets
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
-
-Floats = NDArray[np.float64]
 
 WEAK_SIGMA = 0.03
 """Smallest singular value below which an excessive joint speed is called a singularity of the arm."""
@@ -44,7 +42,7 @@ _PTP_TOLERANCE_MM = 0.01
 
 
 def joint_findings(
-    targets: Targets, q: Floats, wrong: Bits, samples: NDArray[np.int64], branch: Branch, cell: Cell
+    targets: Targets, q: Floats, wrong: Bits, samples: Ints, branch: Branch, cell: Cell
 ) -> tuple[Issue, ...]:
     """Return what stands in the robot's way, by line.
 
@@ -96,7 +94,7 @@ def _last_reached(q: Floats, row: int) -> Floats | None:
     return None
 
 
-def _spans(wrong: Bits, samples: NDArray[np.int64]) -> list[tuple[int, int]]:
+def _spans(wrong: Bits, samples: Ints) -> list[tuple[int, int]]:
     """Return (first row, end) of the spans in which the first stretches of each kind begin, with neighbours.
 
     A stretch begins with a run of wrong rows, or within it where a row or the one before has several samples.
@@ -116,7 +114,7 @@ def _spans(wrong: Bits, samples: NDArray[np.int64]) -> list[tuple[int, int]]:
     return [(int(start), int(end)) for start, end in zip(starts[first], ends[last], strict=True)]
 
 
-def _runs(has: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _runs(has: Bools) -> tuple[Ints, Ints]:
     """Return the first row of each run of True and the one behind its last."""
     change = np.diff(np.concatenate([[False], has, [False]]).astype(np.int8))
     return np.flatnonzero(change == 1), np.flatnonzero(change == -1)

@@ -13,7 +13,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gcode2krl.robot.kinematics import FloatArray, read_only
+from gcode2krl.arrays import Floats
+from gcode2krl.robot.kinematics import read_only
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -30,7 +31,7 @@ _BLOCK = 4096
 """Rows whose directions stay in the processor's cache."""
 
 
-def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: npt.ArrayLike) -> FloatArray:
+def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: npt.ArrayLike) -> Floats:
     """Return every set of angles that puts the flange into the given poses.
 
     Joint limits are not looked at. Where axes 4 and 6 are one, A4 is 0 and both wrist branches are equal;
@@ -68,7 +69,7 @@ def one_branch(
     geometry: npt.ArrayLike,
     branch: int,
     q_reference_rad: npt.ArrayLike,
-) -> FloatArray:
+) -> Floats:
     """Return the angles of one branch along a path, without jumps of a full turn.
 
     Each angle is the turn nearest to that of the row before, in the first row to the reference, so A4 and A6
@@ -124,7 +125,7 @@ def one_branch(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _all_rows(position_mm: FloatArray, rotation: FloatArray, geometry: FloatArray, q_rad: FloatArray) -> None:
+def _all_rows(position_mm: Floats, rotation: Floats, geometry: Floats, q_rad: Floats) -> None:
     for i in range(position_mm.shape[0]):
         for branch in range(8):
             y, x, _, _ = _directions(position_mm, i, rotation, i, geometry, branch, 1.0, 0.0, 1.0, 0.0)
@@ -134,12 +135,12 @@ def _all_rows(position_mm: FloatArray, rotation: FloatArray, geometry: FloatArra
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _direction_rows(
-    position_mm: FloatArray,
-    rotation: FloatArray,
-    geometry: FloatArray,
+    position_mm: Floats,
+    rotation: Floats,
+    geometry: Floats,
     branch: int,
-    y: FloatArray,
-    x: FloatArray,
+    y: Floats,
+    x: Floats,
 ) -> bool:
     """Write the angles (6, n) as directions y, x; False where one depends on the row before, or is none."""
     regular = True
@@ -155,7 +156,7 @@ def _direction_rows(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _wind_rows(angle_rad: FloatArray, q_reference_rad: FloatArray, q_rad: FloatArray) -> None:
+def _wind_rows(angle_rad: Floats, q_reference_rad: Floats, q_rad: Floats) -> None:
     """Write the turns (n, 6) of angles (6, n) that are nearest to the row before."""
     for j in range(6):
         before = q_reference_rad[j]
@@ -166,12 +167,12 @@ def _wind_rows(angle_rad: FloatArray, q_reference_rad: FloatArray, q_rad: FloatA
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _path_rows(
-    position_mm: FloatArray,
-    rotation: FloatArray,
-    geometry: FloatArray,
+    position_mm: Floats,
+    rotation: Floats,
+    geometry: Floats,
     branch: int,
-    q_reference_rad: FloatArray,
-    q_rad: FloatArray,
+    q_reference_rad: Floats,
+    q_rad: Floats,
 ) -> None:
     """Write the angles row by row, each with what the one before leaves open."""
     before = np.empty(6)
@@ -202,11 +203,11 @@ def _nearest_turn(angle_rad: float, before_rad: float) -> float:
 
 @numba.njit(nogil=True, error_model="numpy", forceinline=True)
 def _directions(
-    position_mm: FloatArray,
+    position_mm: Floats,
     k: int,
-    rotation: FloatArray,
+    rotation: Floats,
     i: int,
-    geometry: FloatArray,
+    geometry: Floats,
     branch: int,
     cos_1: float,
     sin_1: float,

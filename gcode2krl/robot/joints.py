@@ -8,20 +8,18 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import ROWS, edges, in_parts
 from gcode2krl.errors import Issue
-from gcode2krl.parts import ROWS, edges, in_parts
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
-from gcode2krl.robot.jacobian import smallest_singular_value
 from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.lines import Line, count_samples, sample_lines, samples_at
 from gcode2krl.robot.standing import Bits, limit_margin, speed_share_of_rows, what_is_wrong
+from gcode2krl.robot.velocity_kinematics import smallest_singular_value
 from gcode2krl.tables import Joints, Motion, Targets
-
-Floats = NDArray[np.float64]
 
 _ANGLE_GRID_RAD = 1e-9
 _AGREEMENT_RAD = 1e-9
@@ -45,7 +43,7 @@ def target_angles(targets: Targets, cell: Cell) -> tuple[Floats, tuple[Issue, ..
     return q, joint_findings(targets, q, wrong, np.diff(counts, prepend=0), branch, cell)
 
 
-def joints_at(q_rad: Floats, tool: NDArray[np.int32], cell: Cell, conditioning: bool = True) -> Joints:
+def joints_at(q_rad: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:
     """Return the table of angles (p, 6) at targets that move the tools (p,); speeds are NaN."""
     return _joints(q_rad, np.broadcast_to(np.nan, q_rad.shape), tool, cell, conditioning)
 
@@ -82,7 +80,7 @@ def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
     starts = np.zeros(count, dtype=np.bool_)
     starts[0] = True
 
-    def path(rows: slice | NDArray[np.int64]) -> Path:
+    def path(rows: slice | Ints) -> Path:
         return Path(motion.position_mm[rows], motion.rotation[rows], motion.tool[rows], starts[rows])
 
     samples = thinned(np.zeros(1, dtype=np.int64), count)
@@ -132,7 +130,7 @@ def _speeds(q: Floats, motion: Motion) -> Floats:
     return qd
 
 
-def _branch_of(targets: Targets, counts: NDArray[np.int64], cell: Cell) -> Branch:
+def _branch_of(targets: Targets, counts: Ints, cell: Cell) -> Branch:
     starts = counts[targets.ptp & ~targets.home] - 1
     samples = thinned(starts, int(counts[-1]))
     return best_branch(_path(samples_at(targets, cell, counts, samples)), samples, cell)
@@ -142,9 +140,7 @@ def _path(line: Line) -> Path:
     return Path(line.position_mm, line.rotation, line.tool, np.isnan(line.duration_s))
 
 
-def _along_lines(
-    targets: Targets, counts: NDArray[np.int64], branch: Branch, cell: Cell
-) -> tuple[Floats, Bits]:
+def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> tuple[Floats, Bits]:
     """Return the joints (p, 6) at the targets, and what is wrong on the way to each (p,)."""
     q = np.full((len(targets), 6), np.nan)
     wrong = np.zeros(len(targets), dtype=np.uint16)
@@ -167,9 +163,7 @@ def _along_lines(
     return q, wrong
 
 
-def _with_row_before(
-    targets: Targets, counts: NDArray[np.int64], start: int, end: int, cell: Cell
-) -> tuple[Line, int]:
+def _with_row_before(targets: Targets, counts: Ints, start: int, end: int, cell: Cell) -> tuple[Line, int]:
     """Return the line to targets ``start`` to ``end`` - 1 and how many samples of the row before lead it."""
     first = max(start - 1, 0)
     line = sample_lines(targets, cell, first, end)
@@ -196,7 +190,7 @@ def _solve_parts(
         last = np.array(q[start + reached[-1]])
 
 
-def _joints(q: Floats, qd: Floats, tool: NDArray[np.int32], cell: Cell, conditioning: bool = True) -> Joints:
+def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:
     geometry = cell.robot.geometry.array()
     count = len(q)
     margin = np.empty(count)

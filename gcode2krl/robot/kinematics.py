@@ -15,11 +15,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
+from gcode2krl.arrays import Floats, Ints32
 
 
-def read_only(name: str, values: npt.ArrayLike, *shape: int) -> FloatArray:
+def read_only(name: str, values: npt.ArrayLike, *shape: int) -> Floats:
     """Return a contiguous, read-only float64 view or copy of ``values``, its shape checked.
 
     A kernel that always sees this one array type is compiled once, whatever table its input came from.
@@ -47,7 +46,7 @@ def read_only(name: str, values: npt.ArrayLike, *shape: int) -> FloatArray:
     return array
 
 
-def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[Floats, Floats]:
     """Return where the flange is, eq. 1.
 
     Parameters
@@ -78,7 +77,7 @@ def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[FloatArr
 
 def status_turn(
     q_rad: npt.ArrayLike, geometry: npt.ArrayLike, grid_rad: float = 0.0
-) -> tuple[IntArray, IntArray]:
+) -> tuple[Ints32, Ints32]:
     """Return status S and turn T, the two integers with which KRL makes a pose name one set of angles.
 
     Status: bit 0, the wrist centre is behind axis 1 (overhead); bit 1, A3 >= phi, where phi = -atan2(a2, c3)
@@ -114,9 +113,7 @@ def status_turn(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _status_rows(
-    q: FloatArray, geometry: FloatArray, grid_rad: float, status: IntArray, turn: IntArray
-) -> None:
+def _status_rows(q: Floats, geometry: Floats, grid_rad: float, status: Ints32, turn: Ints32) -> None:
     a1, a2, _, c2, c3, _ = geometry
     stretched, forearm = math.atan2(a2, c3), math.hypot(a2, c3)
     angle = np.empty(6)
@@ -145,7 +142,7 @@ def _wrapped(angle_rad: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _flange_rows(q: FloatArray, geometry: FloatArray, position_mm: FloatArray, rotation: FloatArray) -> None:
+def _flange_rows(q: Floats, geometry: Floats, position_mm: Floats, rotation: Floats) -> None:
     a1, a2, c1, c2, c3, c4 = geometry
     for i in range(q.shape[0]):
         cos_1, sin_1 = math.cos(q[i, 0]), math.sin(q[i, 0])

@@ -4,18 +4,14 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.parts import edges, in_parts
+from gcode2krl.cell.tool_tips import Rows, motion_starts
+from gcode2krl.compiled.chunks import edges, in_parts
 from gcode2krl.tables import Targets
-from gcode2krl.tool_tips import Rows, motion_starts
 from gcode2krl.units import RAD_PER_DEG
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 STEP_MM, STEP_RAD = 10.0, 2.0 * RAD_PER_DEG
 """Largest step between the samples of a line that are checked."""
@@ -27,7 +23,7 @@ class Line:
 
     position_mm: Floats
     rotation: Floats
-    tool: NDArray[np.int32]
+    tool: Ints32
     target: Ints
     """(m,) the target each sample leads to."""
     duration_s: Floats

@@ -1,15 +1,14 @@
 """Tool poses in ``$BASE`` to joint angles and back, for a cell."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.robot.inverse_kinematics import all_branches
-from gcode2krl.robot.jacobian import jacobian as tip_jacobian
 from gcode2krl.robot.kinematics import flange_pose
-
-Floats = NDArray[np.float64]
+from gcode2krl.robot.velocity_kinematics import jacobian as tip_jacobian
 
 
 def forward(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> tuple[Floats, Floats]:
@@ -41,9 +40,7 @@ def jacobian(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> Floats:
     return tip_jacobian(q, cell.robot.geometry.array(), cell.tool_matrix(tool)[:3, 3])
 
 
-def flange_frames(
-    position_mm: Floats, rotation: Floats, tool: NDArray[np.int32], cell: Cell
-) -> tuple[Floats, Floats]:
+def flange_frames(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> tuple[Floats, Floats]:
     """Return the flange in the robot root, (n, 3) and (n, 3, 3): ``$BASE``·pose·``$TOOL``⁻¹.
 
     One tool in one orientation gives one rotation, (1, 3, 3).

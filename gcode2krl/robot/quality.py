@@ -1,19 +1,18 @@
 """How comfortable a pose is: distance from joint limits and from the wrist and elbow singularities."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.robot.inverse_kinematics import all_branches
 from gcode2krl.robot.poses import flange_frames
 from gcode2krl.robot.standing import limits_rad
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
-Floats = NDArray[np.float64]
 COMFORTABLE_RAD = 30.0 * RAD_PER_DEG
 
 
-def pose_quality(position_mm: Floats, rotation: Floats, tool: NDArray[np.int32], cell: Cell) -> Floats:
+def pose_quality(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
     """Return (n, 8) per branch: 1 = 30° from everything, 0 = at a limit or singular, -1 = impossible.
 
     Each joint counts with its best whole turn; the elbow by A3's distance from the stretched arm.

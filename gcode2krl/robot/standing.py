@@ -6,8 +6,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.robot.kinematics import FloatArray, read_only
+from gcode2krl.robot.kinematics import read_only
 from gcode2krl.units import RAD_PER_DEG
 
 Bits = NDArray[np.uint16]
@@ -20,7 +21,7 @@ WRIST_ZONE_RAD = 5.0 * RAD_PER_DEG
 _SPEED_ROOM = 1.0 + 1e-6
 
 
-def limits_rad(cell: Cell) -> FloatArray:
+def limits_rad(cell: Cell) -> Floats:
     """Return the joint limits (6, 2); without known limits, infinite ones."""
     pairs = cell.robot.limits.q_deg
     if pairs is None:
@@ -28,13 +29,13 @@ def limits_rad(cell: Cell) -> FloatArray:
     return np.array(pairs) * RAD_PER_DEG
 
 
-def limit_margin(q_rad: FloatArray, cell: Cell) -> FloatArray:
+def limit_margin(q_rad: Floats, cell: Cell) -> Floats:
     """Return the distance (n,) in rad to the nearest joint limit, negative beyond it; NaN where q is."""
     margin, _ = _judged(q_rad, np.empty(0), cell)
     return margin
 
 
-def what_is_wrong(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> Bits:
+def what_is_wrong(q_rad: Floats, duration_s: Floats, cell: Cell) -> Bits:
     """Return the bits (n,) of what must not be: beyond a limit, out of reach, too fast.
 
     ``duration_s`` (n,) is the time since the row before, NaN where there is none. A joint is too fast where
@@ -45,9 +46,7 @@ def what_is_wrong(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> Bits
     return wrong
 
 
-def speed_share_of_rows(
-    qd_rad_s: FloatArray, row: NDArray[np.int32], count: int, cell: Cell
-) -> FloatArray | None:
+def speed_share_of_rows(qd_rad_s: Floats, row: Ints32, count: int, cell: Cell) -> Floats | None:
     """Return the largest share (count,) of its limit that a joint speed has in each row, 0 where none is.
 
     ``row`` (m,) is the row that each of the speeds (m, 6) belongs to. None where the limits are not known.
@@ -61,7 +60,7 @@ def speed_share_of_rows(
     return share
 
 
-def _judged(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> tuple[FloatArray, Bits]:
+def _judged(q_rad: Floats, duration_s: Floats, cell: Cell) -> tuple[Floats, Bits]:
     q = read_only("q_rad", q_rad, -1, 6)
     speeds = cell.robot.speeds.qd_deg_s
     most = np.empty(0) if speeds is None else np.array(speeds) * RAD_PER_DEG
@@ -73,11 +72,11 @@ def _judged(q_rad: FloatArray, duration_s: FloatArray, cell: Cell) -> tuple[Floa
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _judge_rows(
-    q: FloatArray,
-    duration_s: FloatArray,
-    limits: FloatArray,
-    most_rad_s: FloatArray,
-    margin: FloatArray,
+    q: Floats,
+    duration_s: Floats,
+    limits: Floats,
+    most_rad_s: Floats,
+    margin: Floats,
     wrong: Bits,
 ) -> None:
     """Without durations only the margin is written; without ``most_rad_s`` the wrist is looked at."""
@@ -105,7 +104,7 @@ def _judge_rows(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _share_rows(qd: FloatArray, most_rad_s: FloatArray, row: NDArray[np.int32], share: FloatArray) -> None:
+def _share_rows(qd: Floats, most_rad_s: Floats, row: Ints32, share: Floats) -> None:
     for i in range(qd.shape[0]):
         for j in range(6):
             found = abs(qd[i, j]) / most_rad_s[j]

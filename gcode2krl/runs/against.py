@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.runs import matching
 from gcode2krl.runs.folder import Run
@@ -15,7 +15,6 @@ from gcode2krl.runs.head import RunHead
 from gcode2krl.runs.measured import SIGNALS, XYZ, Controller, Measured
 from gcode2krl.units import DEG_PER_RAD
 
-Floats = NDArray[np.float64]
 _REACH_S = 10.0
 _CLOCK_S = 0.5
 """A larger offset of the clock is worth a word; smaller ones are fitted by whoever compares."""
@@ -101,7 +100,7 @@ def _signals(run: Run, position_mm: Floats, q_rad: Floats | None) -> Iterator[_S
         yield _Signal(run.controller, xyz_cmd, run.controller.position_cmd_mm, position_mm, _LENGTH)
     if run.controller is not None and run.controller.q_cmd_rad is not None and q_rad is not None:
         both = np.vstack([run.controller.q_cmd_rad, q_rad])
-        known: NDArray[np.bool_] = np.asarray(np.isfinite(both).all(axis=0))
+        known: Bools = np.asarray(np.isfinite(both).all(axis=0))
         if known.any() and run.head.angles == "absolute":
             columns = tuple(name for name, good in zip(q_cmd, known.tolist(), strict=True) if good)
             measured, predicted = run.controller.q_cmd_rad[:, known], q_rad[:, known]

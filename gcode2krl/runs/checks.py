@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs import matching
 from gcode2krl.runs.controller_trace import resolution_mm
@@ -15,7 +15,6 @@ from gcode2krl.runs.head import RunHead
 from gcode2krl.runs.measured import SIGNALS, TIME, XYZ, Controller, Force, Measured, Tracker
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_REV
 
-Floats = NDArray[np.float64]
 _LONGEST_CYCLE_S = 0.5
 _SHORTEST_CYCLE_S = 1e-6
 _EPOCH_S = 1e8
@@ -164,7 +163,7 @@ def _compare_joints(table: Controller, name: str, reference: str) -> None:
     measured, wanted = getattr(table, name), getattr(table, reference)
     if measured is None or wanted is None:
         return
-    there: NDArray[np.bool_] = np.isfinite(measured).all(axis=0)
+    there: Bools = np.isfinite(measured).all(axis=0)
     known = there & np.isfinite(wanted).all(axis=0)
     if not known.any():
         return

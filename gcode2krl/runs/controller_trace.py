@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.runs.measured import LEAST_ROWS, TIME
 from gcode2krl.runs.tables import missing_column, read_sheet
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 POSITION = ("x_cmd_mm", "y_cmd_mm", "z_cmd_mm")
 _LONGEST_CYCLE_S = 1.0
 _METRES_SHOW_BELOW = 0.02

@@ -12,12 +12,11 @@ from pathlib import Path, PureWindowsPath
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.runs.tables import printable
 
-Floats = NDArray[np.float64]
 _FIRST_WORD = "DIAEXTENDED"
 _LONGEST_HEADER = 4_000_000
 _MOST_VALUES = 2_000_000_000

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gcode2krl.arrays import Floats
+
 _AXIS_RANGE_DEG = 370.0
 """No axis of the robots here turns further; a motor does."""
 _LONGEST_LAG_S = 0.2

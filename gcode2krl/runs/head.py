@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.toml_guard import NotTomlError, read_bounded_toml
+from gcode2krl.files.toml_guard import NotTomlError, read_bounded_toml
 
 FrameName = Literal["base", "tcp", "sensor"]
 Origin = Literal["interpolator", "filtered", "measured"]

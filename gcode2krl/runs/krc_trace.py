@@ -13,15 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.runs.diadem import Channel, DataSet, is_data_set, read_data_set
 from gcode2krl.runs.drives import Angles, axis_angles
 from gcode2krl.runs.tables import Sheet
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 
-Floats = NDArray[np.float64]
 _UNITS = {
     "deg": {"°": 1.0, "deg": 1.0, "grad": 1.0, "m°": 1e-3, "mdeg": 1e-3, "µ°": 1e-6, "rad": DEG_PER_RAD},
     "mm": {"mm": 1.0, "m": MM_PER_M, "µm": 1e-3, "um": 1e-3},

@@ -4,11 +4,10 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.units import DEG_PER_RAD, MM_PER_INCH, MM_PER_M, RAD_PER_DEG
 
-Floats = NDArray[np.float64]
 LENGTH_FACTORS = {
     1.0 / MM_PER_M: "metres", MM_PER_M: "micrometres", 1.0 / MM_PER_INCH: "inches",
     MM_PER_INCH: "millimetres taken for inches",
@@ -184,7 +183,7 @@ class Course(NamedTuple):
     """(n,)"""
     direction: Floats
     """(n, k) unit vectors."""
-    steady: NDArray[np.bool_]
+    steady: Bools
     """(n,) True where the speed changes by less than 5 % within ± 0.16 s."""
 
 
@@ -206,7 +205,7 @@ def course(time_s: Floats, position: Floats, most: int) -> Course:
     return Course(points[chosen], speed[chosen], direction, steady[chosen])
 
 
-def nearest(points: Floats, others: Floats) -> tuple[NDArray[np.int64], Floats]:
+def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
     """Return for each of ``points`` (n, k) the nearest of ``others`` (p, k), and its distance."""
     squares = np.sum(points**2, axis=1)[:, None] + np.sum(others**2, axis=1) - 2.0 * points @ others.T
     index = np.argmin(squares, axis=1)

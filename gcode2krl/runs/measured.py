@@ -8,14 +8,12 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.runs.tables import Sheet, missing_column
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 TIME = "t_s"
 LEAST_ROWS = 10
 LARGEST_VALUE = 1e15

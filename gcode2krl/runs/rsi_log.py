@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs.tables import Sheet, read_sheet
 from gcode2krl.units import MS_PER_S
 
-Floats = NDArray[np.float64]
 _LONGEST_TELEGRAM = 16384
 _LARGEST_LOG = 1_000_000_000
 _ELEMENT = re.compile(rb"<(\w{1,32})((?:\s+\w{1,32}\s*=\s*\"[^\"<>]{0,64}\")+)\s*/?>")

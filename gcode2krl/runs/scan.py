@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs.measured import LARGEST_VALUE, LEAST_ROWS, XYZ
 from gcode2krl.runs.tables import missing_column, read_sheet
 
-Floats = NDArray[np.float64]
 _LONGEST_HEADER = 65536
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.parquet_guard import DamagedError, read_parquet
+from gcode2krl.files.parquet_guard import DamagedError, read_parquet
 
 if TYPE_CHECKING:
     import polars as pl
 
-Floats = NDArray[np.float64]
 _EMPTY_WORDS = ("", "nan", "null", "none", "na")
 _MOST_NAMES, _LONGEST_NAME = 12, 60
 

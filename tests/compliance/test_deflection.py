@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 
 from gcode2krl.cell import resolve_cell
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import (
     deflection_magnitude,
     deflection_of,
@@ -17,7 +18,6 @@ from gcode2krl.compliance import (
     tip_position,
     tip_velocity,
 )
-from gcode2krl.sections import VIRTUAL_JOINTS
 from tests.compliance import independent
 from tests.compliance.loads import HOME, NONE, OTHER_GEOMETRY, other_cell, poses, random_load, vectors
 from tests.conftest import ROOT

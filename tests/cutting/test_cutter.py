@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from gcode2krl.cell.library import names, read_model
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import bottom_of, outline, shape_of, slices_of
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import linear_edge_law
 from gcode2krl.cutting.slices import arc_force
-from gcode2krl.library import names, read_model
-from gcode2krl.sections import Tool
 
 LAW = linear_edge_law([796.1, 168.8, 222.0, 27.7, 30.8, 1.4])
 FLAT = Tool(diameter_mm=16, teeth=3, flute_length_mm=40)

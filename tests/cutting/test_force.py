@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcode2krl.cell.sections import Kienzle, LinearEdge, Material, Tool
 from gcode2krl.cutting.cutter import shape_of
 from gcode2krl.cutting.force import cutting_load, mean_force
 from gcode2krl.cutting.law import law_array, linear_edge_law, spindle_power
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.sections import Kienzle, LinearEdge, Material, Tool
 from tests.cutting import brute_force as brute
 
 pi = math.pi

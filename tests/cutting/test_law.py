@@ -3,6 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from gcode2krl.cell.library import names, read_model
+from gcode2krl.cell.sections import Kienzle, Material, Tool
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import (
     contact_feed,
@@ -13,8 +15,6 @@ from gcode2krl.cutting.law import (
     spindle_power,
 )
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.library import names, read_model
-from gcode2krl.sections import Kienzle, Material, Tool
 
 pi = math.pi
 

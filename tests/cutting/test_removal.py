@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import outline
 from gcode2krl.cutting.edge import _edge_force
 from gcode2krl.cutting.engagement import engage, outlines_of
@@ -16,7 +17,6 @@ from gcode2krl.cutting.force import mean_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.slices import arc_force
 from gcode2krl.cutting.sweep import outline_height
-from gcode2krl.sections import Tool
 from tests.cutting import scenes
 from tests.cutting.scenes import LAW
 

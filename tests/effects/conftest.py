@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, plan_motion, robot
+from gcode2krl.cell.sections import Stock
 from gcode2krl.effects import Inputs, inputs_of, library
 from gcode2krl.gcode import read_stream
-from gcode2krl.predict import predict_toolpath
-from gcode2krl.sections import Stock
+from gcode2krl.pipeline import predict_toolpath
 
 PART = """G21 G90 G17 G94
 T1 M6

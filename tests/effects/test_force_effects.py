@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gcode2krl.cell.sections import Kienzle, Stock
 from gcode2krl.cutting import cut, no_forces
 from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.effects.apply import remembered
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.sections import Kienzle, Stock
 
 
 def run(inputs, known, *texts):

@@ -12,7 +12,7 @@ from gcode2krl.compliance import deflection_of
 from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
-from gcode2krl.predict import predict_toolpath
+from gcode2krl.pipeline import predict_toolpath
 
 DEG = np.pi / 180.0
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import robot
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import deflection_of
 from gcode2krl.effects import parse, simulate
 from gcode2krl.frames import rotation_from_quaternion
-from gcode2krl.sections import VIRTUAL_JOINTS
 
 DEG = np.pi / 180.0
 

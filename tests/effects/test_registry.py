@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gcode2krl import load_cell
+from gcode2krl.cell.sections import EffectEntry
 from gcode2krl.effects import Applied, Effect, Parameter, from_cell, library, parse, resolve, simulate
 from gcode2krl.effects.effect import LINKS
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.sections import EffectEntry
 from tests.conftest import ROOT
 
 KNOWN, CELL = library(), load_cell()

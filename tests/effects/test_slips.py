@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gcode2krl import robot
+from gcode2krl.cell.sections import Frame
 from gcode2krl.compliance import deflection_of, displace, project_normal
 from gcode2krl.effects import parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.frames import rotation_from_quaternion
-from gcode2krl.sections import Frame
 
 
 def run(inputs, known, text, **more):

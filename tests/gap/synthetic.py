@@ -55,7 +55,7 @@ def prediction(program: str = PROGRAM, dt_s: float = 0.012) -> Prediction:
         }
     )
     toolpath = read_stream(io.BytesIO(program.encode()), "part.nc", cell)
-    from gcode2krl.predict import predict_toolpath
+    from gcode2krl.pipeline import predict_toolpath
 
     nominal = predict_toolpath(toolpath, cell, dt_s=dt_s)
     assert nominal.motion is not None

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.codes import codes
+from gcode2krl.codes import all_codes
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.findings import FINDINGS
@@ -33,5 +33,5 @@ def _texts(example: str) -> list[str]:
 
 @pytest.mark.parametrize("code", sorted({finding.code for finding in FINDINGS.values()} - _NO_GCODE))
 def test_the_example_of_a_code_causes_it(code: str) -> None:
-    example = codes()[code].example
+    example = all_codes()[code].example
     assert any(code in _found(text) for text in _texts(example)), example

@@ -5,7 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gcode2krl import parts, plan_motion, set_targets
+from gcode2krl import plan_motion, set_targets
+from gcode2krl.compiled import chunks as parts
 from gcode2krl.krc4 import build_chain, motion, sampling
 from tests.krc4.conftest import HEAD, polyline
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcode2krl.predict import plan_motion
+from gcode2krl.pipeline import plan_motion
 from tests.krl.brute_replay import Law, replay
 from tests.krl.replay import read_program
 

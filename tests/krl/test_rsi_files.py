@@ -5,10 +5,10 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from gcode2krl.cell import resolve_cell
+from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections import Pilot
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.krl.rsi_files import ethernet_xml, file_names, rsi_files, signal_flow_xml
-from gcode2krl.online_section import Online
-from gcode2krl.sections import Pilot
+from gcode2krl.krl.rsi_files import ethernet_xml, file_names, rsi_texts, signal_flow_xml
 
 FORMS = ["index", "values", "none"]
 MODES = ["cartesian", "axis"]
@@ -84,7 +84,7 @@ def test_both_files_say_what_the_cell_says():
         },
         "pilot": {"index_variable": "$SEN_PINT[7]", "hash_variable": "$SEN_PINT[9]"},
     })  # fmt: skip
-    texts = rsi_files("RSI_7", own.online, own.pilot, "index")
+    texts = rsi_texts("RSI_7", own.online, own.pilot, "index")
     assert list(texts) == ["RSI_7_ETH.xml", "RSI_7.rsi.xml"]
     config = ET.fromstring(texts["RSI_7_ETH.xml"]).find("CONFIG")
     assert {e.tag: e.text for e in config} == {
@@ -109,13 +109,13 @@ def test_both_files_say_what_the_cell_says():
 )
 def test_a_variable_that_rsi_cannot_read_is_refused(pilot, form):
     with pytest.raises(RefusedError, match="online-pilot"):
-        rsi_files("A", Online(), Pilot(**pilot), form)
-    assert rsi_files("A", Online(), Pilot(**pilot), "none")
+        rsi_texts("A", Online(), Pilot(**pilot), form)
+    assert rsi_texts("A", Online(), Pilot(**pilot), "none")
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_texts_are_ascii(form):
-    assert all(text.isascii() for text in rsi_files("A", Online(), Pilot(), form).values())
+    assert all(text.isascii() for text in rsi_texts("A", Online(), Pilot(), form).values())
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_rsipi_reads_the_files_as_we_mean_them(tmp_path):
     """An independent reader of both files, where it is installed."""
     parser = pytest.importorskip("RSIPI.config_parser")
     limits = pytest.importorskip("RSIPI.rsi_limit_parser")
-    for file_name, text in rsi_files("E", Online(), Pilot(), "index").items():
+    for file_name, text in rsi_texts("E", Online(), Pilot(), "index").items():
         (tmp_path / file_name).write_text(text)
     config = parser.ConfigParser(str(tmp_path / "E_ETH.xml"))
     assert set(config.receive_variables["RKorr"]) == set("XYZABC")

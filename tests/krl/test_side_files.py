@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl import verify_krl
 from gcode2krl.krl import write_krl
-from gcode2krl.predict import predict_toolpath
+from gcode2krl.pipeline import predict_toolpath
 from tests.krl.test_verify import ZIGZAG, errors
 
 

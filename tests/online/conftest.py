@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from gcode2krl.online.compensator import compensator
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.session import begin, exchange
 from gcode2krl.online.telegram import answer_text, parse
-from gcode2krl.online_section import Online
 
 
 @dataclass
@@ -56,4 +56,4 @@ def settings():
 
 @pytest.fixture(scope="session")
 def device(cell, settings):
-    return compensator(cell, settings, load_frame="base")
+    return build_compensator(cell, settings, load_frame="base")

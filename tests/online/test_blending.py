@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gcode2krl.cell.online_section import Online
 from gcode2krl.online.blending import blend_start, blended
-from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 

@@ -7,13 +7,14 @@ import pytest
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
+from gcode2krl.cell.online_section import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.compliance.sensor import Calibration, unloaded
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.compensator import (
     Corrections,
     Samples,
-    compensator,
+    build_compensator,
     joints_at,
     sensor_in_flange,
     start,
@@ -21,7 +22,6 @@ from gcode2krl.online.compensator import (
     stream,
 )
 from gcode2krl.online.pilot_gate import Announced
-from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.units import RAD_PER_DEG
 
@@ -61,7 +61,7 @@ def samples(cell, seed=1):
 @pytest.mark.parametrize("frame", ["base", "tcp", "sensor"])
 def test_sample_by_sample_gives_the_bits_of_the_stream(cell, mode, frame):
     knots, header = pilot()
-    device = compensator(
+    device = build_compensator(
         cell, Online(mode=mode), load_frame=frame, knots=knots, header=header,
         calibration=CALIBRATION if frame == "sensor" else None,
     )  # fmt: skip
@@ -78,7 +78,7 @@ def test_sample_by_sample_gives_the_bits_of_the_stream(cell, mode, frame):
 
 
 def test_a_steady_force_is_corrected_by_what_the_compliance_says(cell):
-    device = compensator(cell, Online(), load_frame="base")
+    device = build_compensator(cell, Online(), load_frame="base")
     taken = samples(cell)
     load = np.tile([0.0, 300.0, -80.0, 0.0, 0.0, 2000.0], (COUNT, 1))
     taken = Samples(**{f.name: getattr(taken, f.name) for f in fields(Samples)} | {"load": load})
@@ -93,7 +93,7 @@ def test_axis_corrections_move_the_tip_as_the_cartesian_ones_do(cell):
     quick = {"rate_mm_s": 1e4, "step_mm": 10.0, "axis_rate_deg_s": (1e4,) * 6}
     found = {}
     for mode in ("cartesian", "axis"):
-        device = compensator(cell, Online(mode=mode, **quick), load_frame="base")
+        device = build_compensator(cell, Online(mode=mode, **quick), load_frame="base")
         found[mode] = stream(device, start(device), taken)[1]
     before, turned = robot.forward(taken.q_command_rad, cell, 1)
     after, turned_after = robot.forward(taken.q_command_rad + found["axis"].correction, cell, 1)
@@ -103,7 +103,7 @@ def test_axis_corrections_move_the_tip_as_the_cartesian_ones_do(cell):
 
 def test_a_sensor_with_weight_and_offset_gives_the_load_at_the_tip(cell):
     """The reading is built forwards: load at the tip, carried to the sensor, plus what it shows unloaded."""
-    device = compensator(cell, Online(), load_frame="sensor", calibration=CALIBRATION)
+    device = build_compensator(cell, Online(), load_frame="sensor", calibration=CALIBRATION)
     taken = samples(cell)
     force, moment = np.array([120.0, 300.0, -80.0]), np.array([500.0, -300.0, 2000.0])
     tool = fr.invert(sensor_in_flange(cell)) @ cell.tool_matrix(1)
@@ -124,7 +124,7 @@ def test_a_sensor_with_weight_and_offset_gives_the_load_at_the_tip(cell):
 
 def test_pilot_knots_of_the_tool_frame_are_turned_to_the_base(cell):
     knots, header = pilot()
-    device = compensator(cell, Online(), load_frame="base", knots=knots, header=header)
+    device = build_compensator(cell, Online(), load_frame="base", knots=knots, header=header)
     _, out = stream(device, start(device), samples(cell))
     used = out.gate == 0
     _, turned = robot.forward(samples(cell).q_rad[used][:1], cell, 1)
@@ -140,7 +140,7 @@ def test_a_joint_limit_ahead_holds_the_correction(cell):
     taken = Samples(
         **{f.name: getattr(taken, f.name) for f in fields(Samples)} | {"q_rad": here, "q_command_rad": here}
     )
-    device = compensator(cell, Online(), load_frame="base")
+    device = build_compensator(cell, Online(), load_frame="base")
     _, out = stream(device, start(device), taken)
     wanted = joints_at(here, out.wanted_mm, cell)
     towards = wanted[:, 2] < here[:, 2]
@@ -158,4 +158,4 @@ def test_a_pose_out_of_reach_holds_it_too(cell):
 def test_a_cell_without_stiffness_is_refused(cell):
     soft = cell.model_copy(update={"compliance": cell.compliance.model_copy(update={"virtual_joints": {}})})
     with pytest.raises(NotUnderstoodError, match="stiffness"):
-        compensator(soft, Online())
+        build_compensator(soft, Online())

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gcode2krl.cell.online_section import Online
 from gcode2krl.online.feed import feed_of, feed_start
-from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 

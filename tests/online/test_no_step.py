@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.online.compensator import compensator
+from gcode2krl.cell.online_section import Online, Probe
+from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.session import Phase, exchange
 from gcode2krl.online.telegram import parse
-from gcode2krl.online_section import Online, Probe
 from tests.online.conftest import talk
 from tests.online.krc import Krc
 from tests.online.test_session import SIDE, check, ramp, rests
@@ -77,7 +77,7 @@ def test_a_robot_that_goes_on_moving_away_gets_no_answer_any_more(cell, device, 
 @pytest.mark.parametrize("lost", [10, 100])
 def test_a_robot_that_was_started_anew_is_not_sent_the_old_correction(cell, axis, lost):
     own = Online(mode="axis" if axis else "cartesian")
-    device = compensator(cell, own, load_frame="base")
+    device = build_compensator(cell, own, load_frame="base")
     krc = Krc(cell, stands_s=0.3, axis=axis)
     session, log = talk(device, krc, 300, load=ramp)
     assert np.abs(krc.applied).max() > 0.0
@@ -117,7 +117,7 @@ def test_a_lost_link_alone_is_no_restart(cell, device):
 
 def test_a_slow_limit_holds_for_the_proof_too(cell):
     own = Online(rate_mm_s=10.0, probe=Probe(amplitude_mm=0.04))
-    device = compensator(cell, own, load_frame="base")
+    device = build_compensator(cell, own, load_frame="base")
     session, log = talk(device, Krc(cell, stands_s=2.0), 300, load=lambda k: SIDE)
     assert session.phase is Phase.RUNNING
     check(log, own)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gcode2krl.cell.online_section import Online
 from gcode2krl.online.pilot_gate import Announced, Gate, PilotTable, estimate, gate_start
-from gcode2krl.online_section import Online
 
 SETTINGS = Online()
 DT_S = 0.004

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, robot
+from gcode2krl.cell.online_section import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.online.replay import as_json, columns, replay
-from gcode2krl.online_section import Online
+from gcode2krl.online.log_replay import as_json, columns, replay
 from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.runs import load_run
 from gcode2krl.units import DEG_PER_RAD

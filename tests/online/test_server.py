@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gcode2krl.cell.online_section import Online, RobotLink
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.krl.rsi_files import ethernet_xml
-from gcode2krl.online.compensator import compensator
+from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.recorder import Recorder
 from gcode2krl.online.server import open_socket, serve
 from gcode2krl.online.session import Phase
-from gcode2krl.online_section import Online, RobotLink
 from tests.online.krc import Krc
 from tests.online.relay import GARBAGE, Relay
 
@@ -38,7 +38,7 @@ def running(cell, *, folder=None, force=None, **link):
     """Run a server in a thread; yields its port and what it ends with."""
     link = {"port": free_port(), "silence_s": 1.5, **link}
     settings = Online(link=RobotLink(**link))
-    device = compensator(cell, settings, load_frame="base")
+    device = build_compensator(cell, settings, load_frame="base")
     stop, outcome = threading.Event(), {}
     with open_socket(device) as server, Recorder(folder) as recorder:
 
@@ -150,7 +150,7 @@ def test_the_port_of_another_program_is_an_error_of_one_line(cell):
     port = free_port()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", port))
-        device = compensator(cell, Online(link=RobotLink(port=port)))
+        device = build_compensator(cell, Online(link=RobotLink(port=port)))
         with pytest.raises(NotUnderstoodError, match=f"127.0.0.1:{port}"):
             open_socket(device)
 

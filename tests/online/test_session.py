@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.online.compensator import compensator
+from gcode2krl.cell.online_section import Online
+from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.session import Phase, begin, exchange, silent
 from gcode2krl.online.telegram import parse
-from gcode2krl.online_section import Online
 from gcode2krl.pilot import Knots, PilotHeader
 from tests.online.conftest import Log, talk
 from tests.online.krc import Krc
@@ -63,7 +63,7 @@ def test_an_absolute_robot_is_proven_and_then_compensated(cell, device, settings
 @pytest.mark.parametrize("axis", [False, True])
 @pytest.mark.parametrize("robot", [{}, {"dead_cycles": 3}, {"dead_cycles": 5}])
 def test_a_robot_that_adds_up_is_held_at_zero(cell, settings, robot, axis):
-    own = compensator(
+    own = build_compensator(
         cell, settings.model_copy(update={"mode": "axis" if axis else "cartesian"}), load_frame="base"
     )
     krc = Krc(cell, relative=True, axis=axis, **robot)
@@ -113,7 +113,7 @@ def test_a_robot_that_begins_to_add_up_while_running_gets_no_more_answers_and_no
 @pytest.mark.parametrize("mode", ["cartesian", "axis"])
 def test_twelve_milliseconds(cell, mode):
     own = Online(cycle_s=0.012, mode=mode)
-    device = compensator(cell, own, load_frame="base")
+    device = build_compensator(cell, own, load_frame="base")
     krc = Krc(cell, cycle_ms=12, axis=mode == "axis")
     session, log = talk(device, krc, 400, load=ramp)
     assert session.phase is Phase.RUNNING
@@ -123,7 +123,7 @@ def test_twelve_milliseconds(cell, mode):
 @pytest.mark.parametrize(("own_s", "other_ms"), [(0.004, 12), (0.012, 4)])
 def test_the_other_cycle_is_noticed(cell, own_s, other_ms):
     own = Online(cycle_s=own_s)
-    device = compensator(cell, own, load_frame="base")
+    device = build_compensator(cell, own, load_frame="base")
     krc = Krc(cell, cycle_ms=other_ms)
     session, log = talk(device, krc, 200, load=lambda k: SIDE)
     assert not log.array()[-1].any()
@@ -227,9 +227,9 @@ def test_a_joint_limit_ahead(cell, settings):
     degrees[0][0] = degrees[0][1] - 100.0
     limits = cell.robot.limits.model_copy(update={"q_deg": tuple(tuple(pair) for pair in degrees)})
     narrow = cell.model_copy(update={"robot": cell.robot.model_copy(update={"limits": limits})})
-    device = compensator(narrow, settings, load_frame="base")
+    device = build_compensator(narrow, settings, load_frame="base")
     session, log = talk(device, Krc(cell, speed_mm_s=0.0), 500, load=ramp)
-    free = compensator(cell, settings, load_frame="base")
+    free = build_compensator(cell, settings, load_frame="base")
     _, without = talk(free, Krc(cell, speed_mm_s=0.0), 500, load=ramp)
     assert session.phase is Phase.RUNNING
     assert np.abs(without.array()[-1]).max() > 0.5
@@ -283,7 +283,7 @@ def telling(form, knots, checksum=12345, override=100):
 @pytest.mark.parametrize("form", ["index", "values"])
 def test_the_pilot_is_used_in_both_forms(cell, settings, form):
     knots, header = pilot(form)
-    device = compensator(cell, settings, load_frame="base", knots=knots, header=header)
+    device = build_compensator(cell, settings, load_frame="base", knots=knots, header=header)
     session, log = talk(device, Krc(cell, stands_s=0.3), 400, load=ramp, change=telling(form, knots))
     assert Gate.OPEN in log.gate
     assert session.phase is Phase.RUNNING
@@ -293,7 +293,7 @@ def test_the_pilot_is_used_in_both_forms(cell, settings, form):
 @pytest.mark.parametrize("wrong", [{"checksum": 1}, {"override": 50}])
 def test_a_pilot_that_does_not_fit_is_not(cell, settings, form, wrong):
     knots, header = pilot(form)
-    device = compensator(cell, settings, load_frame="base", knots=knots, header=header)
+    device = build_compensator(cell, settings, load_frame="base", knots=knots, header=header)
     session, log = talk(device, Krc(cell, stands_s=0.3), 400, load=ramp, change=telling(form, knots, **wrong))
     assert Gate.OPEN not in log.gate
     assert session.phase is Phase.RUNNING  # the measured force alone

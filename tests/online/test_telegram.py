@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcode2krl.cell.online_section import Online
 from gcode2krl.online.telegram import Answer, MalformedError, answer_text, parse
-from gcode2krl.online_section import Online
 
 GOOD = (
     b'<Rob Type="KUKA"><RIst X="1.5" Y="-2" Z="3e1" A="0.0" B="0.0" C="0.0"/>'

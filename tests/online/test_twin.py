@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell
+from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections import Stock
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.judge import floor_over, grid_of, judged
 from gcode2krl.online.outcome import as_json, figures_of, findings, simulate_all
 from gcode2krl.online.surface import surface_of
 from gcode2krl.online.twin import World, simulate, stiffer, twin_of
-from gcode2krl.online_section import Online
-from gcode2krl.predict import predict
-from gcode2krl.sections import Stock
+from gcode2krl.pipeline import predict
 
 SLOT = """\
 T1 M6

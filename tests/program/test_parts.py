@@ -5,7 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gcode2krl import load_cell, parts, read_gcode, set_targets
+from gcode2krl import load_cell, read_gcode, set_targets
+from gcode2krl.compiled import chunks as parts
 from gcode2krl.program import blending, targets
 from tests.conftest import EXAMPLES
 

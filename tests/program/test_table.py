@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl import frames as fr
 from gcode2krl.cell import resolve_cell
-from gcode2krl.predict import checked
+from gcode2krl.pipeline import checked
 from gcode2krl.program.table import below_table, lowest_points
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"

@@ -12,8 +12,8 @@ from gcode2krl.cell import resolve_cell
 from gcode2krl.cli.stiffness_map import LATERAL_N, Case, command, plane_map, pose_cost, spin_map
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.predict import set_targets, solve_joints
-from gcode2krl.report.compensation_figure import compensation_figure, exaggeration
+from gcode2krl.pipeline import set_targets, solve_joints
+from gcode2krl.report.compensation_figures import compensation_figure, exaggeration
 from gcode2krl.report.stiffness_figures import joint_cost_figure, spin_figure, workspace_figure
 from tests.krl.conftest import read
 

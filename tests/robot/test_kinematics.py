@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gcode2krl.robot.inverse_kinematics import all_branches, one_branch
-from gcode2krl.robot.jacobian import jacobian, smallest_singular_value
 from gcode2krl.robot.kinematics import flange_pose, status_turn
+from gcode2krl.robot.velocity_kinematics import jacobian, smallest_singular_value
 
 FloatArray = npt.NDArray[np.float64]
 

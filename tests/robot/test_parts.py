@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from gcode2krl import parts as parts_of_columns
 from gcode2krl import set_targets
 from gcode2krl.cell import resolve_cell
+from gcode2krl.compiled import chunks as parts_of_columns
 from gcode2krl.gcode import read_stream
 from gcode2krl.robot import findings, follow, follow_motion, forward, joints, lines, motion_angles
 from gcode2krl.robot.joints import target_angles

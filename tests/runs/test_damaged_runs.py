@@ -48,7 +48,7 @@ def test_a_path_that_no_system_takes_leads_nowhere(folder, key):
 
 @pytest.mark.parametrize("rows", [2**40, 2**58])
 def test_a_table_that_announces_exabytes(folder, rows):
-    from tests.test_damaged_predictions import announce
+    from tests.prediction.test_damaged import announce
 
     frame = pl.DataFrame({"t_s": np.arange(5000) * 0.004} | {f"f{a}_N": np.arange(5000) * 1.0 for a in "xyz"})
     frame.write_parquet(folder / "force.parquet")

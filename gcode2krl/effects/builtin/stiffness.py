@@ -3,9 +3,9 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.effects.effect import Applied, Effect, Parameter, every_virtual_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.sections import VIRTUAL_JOINTS
 
 
 class Stiffness(Effect):

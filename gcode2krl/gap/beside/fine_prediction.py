@@ -10,7 +10,7 @@ import numpy as np
 
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.trace import cubic
-from gcode2krl.predict import plan_motion, solve_joints
+from gcode2krl.pipeline import plan_motion, solve_joints
 from gcode2krl.prediction import Prediction
 
 STEP_S = 0.004

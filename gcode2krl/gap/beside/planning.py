@@ -6,7 +6,7 @@ from typing import Any
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects.inputs import Plan
-from gcode2krl.predict import plan_motion
+from gcode2krl.pipeline import plan_motion
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Motion, Targets
 

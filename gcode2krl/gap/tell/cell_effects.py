@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from gcode2krl import library
-from gcode2krl.cell import resolve_cell
+from gcode2krl.cell import library, resolve_cell
 from gcode2krl.errors import input_error
 from gcode2krl.files import write_together
 from gcode2krl.gap.tell.result import Gap

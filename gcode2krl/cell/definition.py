@@ -1,0 +1,427 @@
+"""The cell: robot, controller, tools, frames and outputs, read from ``cell.toml`` over ``models/``.
+
+A cell is its own: what its file does not name is missing, and a stage that needs it says so by raising
+`RefusedError` with the key's name. ``based_on`` takes over from another cell by name; each value taken over
+is in ``taken_over``. Without a file, the demonstration cell serves: the KR 300 R2500 ultra of Hähn & Weigold
+2020. Every key carries its unit; `sections` has the tables.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import library
+from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
+from gcode2krl.cell.keys import meant_key
+from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections import (
+    Axis,
+    Clearance,
+    Compliance,
+    Controller,
+    EffectEntry,
+    Frame,
+    Frames,
+    GuardInput,
+    Home,
+    Load,
+    Material,
+    OneLine,
+    Pilot,
+    Program,
+    ResultLimits,
+    Robot,
+    Section,
+    Spindle,
+    Stock,
+    Table,
+    TakenOver,
+    Tool,
+    ToolNumber,
+    Verified,
+    missing,
+)
+from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.units import RAD_PER_DEG
+
+_RESOLVED = ("taken_over", "defaults")
+"""Keys of a resolved cell that no file may state."""
+_REACHING = ("controller", "frames", "load", "spindle", "program", "pilot", "online")
+"""Sections with defaults that go into a program."""
+_MODELS = (("robot", "robots"), ("controller", "controllers"), ("material", "materials"))
+_CUTTER = ("kind", "diameter_mm", "teeth", "corner_radius_mm", "helix_deg", "taper_deg", "point_deg")
+_MOST_ISSUES = 100
+CODES_WITHOUT_SIGNALS = {
+    "M0": "HALT",
+    "M1": "; optional stop (M1) is not used",
+    "M2": "; program end (M2)",
+    "M30": "; program end (M30)",
+}
+"""What these M-codes become where the cell does not say otherwise: nothing of theirs depends on a cell."""
+
+
+class Cell(Section):
+    """A resolved cell; what its file and its base do not state is None, empty or a documented default."""
+
+    name: OneLine = ""
+    based_on: OneLine = ""
+    """The cell that this one takes over from: ``demonstration`` or another cell file."""
+    verified: Verified | None = None
+    robot: Robot = Robot()
+    controller: Controller = Controller()
+    tool: dict[ToolNumber, Tool] = Field(default_factory=dict)
+    mounted_tool: Annotated[int, Field(strict=True, ge=1, le=99999)] | None = None
+    """The tool in the spindle when the program starts without a T word."""
+    frames: Frames = Frames()
+    work_offsets: dict[
+        Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Frame
+    ] = Field(default_factory=dict)
+    home: Home = Home()
+    clearance: Clearance = Clearance()
+    material: Material | None = None
+    stock: Stock | None = None
+    table: Table | None = None
+    limits: ResultLimits = ResultLimits()
+    load: Load = Load()
+    compliance: Compliance = Compliance()
+    pilot: Pilot = Pilot()
+    online: Online = Online()
+    spindle: Spindle = Spindle()
+    effects: tuple[EffectEntry, ...] = ()
+    guard_inputs: tuple[GuardInput, ...] = ()
+    program: Program = Program()
+    m_code: dict[Annotated[str, Field(pattern=r"^M(0|[1-9][0-9]{0,3})$")], str] = Field(default_factory=dict)
+    """KRL (Jinja2) for each M-code, ``M3 = "…"``; what has no entry is refused."""
+    tool_change: str = ""
+    """KRL (Jinja2) that changes the tool on the clearance plane."""
+    taken_over: tuple[TakenOver, ...] = ()
+    """What came from ``based_on``; only the reader of cell files writes it."""
+    defaults: tuple[str, ...] = ()
+    """Dotted keys of documented defaults that nobody stated; only the reader of cell files writes it."""
+
+    @property
+    def is_confirmed(self) -> bool:
+        """True where a person confirmed every value: ``verified`` never covers what is taken over."""
+        return self.verified is not None and not self.taken_over
+
+    @property
+    def clearance_z_mm(self) -> float | None:
+        """Height of the clearance plane in ``$BASE``, None where the cell has none."""
+        z_mm = self.clearance.z_mm
+        return None if z_mm is None or z_mm == "none" else float(z_mm)
+
+    def home_q_rad(self) -> Floats:
+        """Return HOME (6,) in radians; raises `RefusedError` where it is not stated."""
+        if self.home.q_deg is None:
+            raise missing("home.q_deg")
+        return np.array(self.home.q_deg) * RAD_PER_DEG
+
+    def base_matrix(self) -> Floats:
+        """Return ``$BASE`` in the robot root (4, 4); raises `RefusedError` where it is not stated."""
+        if self.frames.base is None:
+            raise missing("frames.base")
+        return self.frames.base.matrix()
+
+    def tool_matrix(self, number: int) -> Floats:
+        """Return the tool frame (4, 4) in the flange whose z points from tip to holder.
+
+        A tool of another length than ``frames.tool_length_mm`` has its tip shifted along that axis. Raises
+        `RefusedError` where the cell does not state the tool, the frame or a length.
+        """
+        lacking = self.missing_of_tool(number)
+        tool, frame = self.tool.get(number), self.frames.tool
+        if tool is not None and tool.frame is not None:
+            return tool.frame.matrix() @ controller_axes(tool.axis or "+z")
+        if tool is None or frame is None or lacking:
+            raise missing(*lacking)
+        longer_mm = (tool.length_mm or 0.0) - (self.frames.tool_length_mm or 0.0)
+        shift = fr.transform([0.0, 0.0, -longer_mm], np.eye(3))
+        return frame.matrix() @ shift
+
+    def missing_of_tool(self, number: int) -> tuple[str, ...]:
+        """Return the keys without which a tool's tip is not known; empty where it is."""
+        tool = self.tool.get(number)
+        if tool is None:
+            return (f"tool.{number}",)
+        if tool.frame is not None:
+            return ()
+        stated = {
+            "frames.tool": self.frames.tool,
+            "frames.tool_length_mm": self.frames.tool_length_mm,
+            f"tool.{number}.length_mm": tool.length_mm,
+        }
+        return tuple(key for key, value in stated.items() if value is None)
+
+    def templates(self) -> dict[str, str]:
+        """Return key → template of all KRL that the cell brings along."""
+        codes = {f"m_code.{code}": text for code, text in self.m_code.items()}
+        others = {
+            "tool_change": self.tool_change,
+            "program.prologue": self.program.prologue,
+            "program.epilogue": self.program.epilogue,
+        }
+        return codes | {key: text for key, text in others.items() if text}
+
+
+def controller_axes(axis: Axis) -> Floats:
+    """Return Q (4, 4) that turns the inner tool frame (z = tip to holder) into the controller's axes.
+
+    ``T_controller = T_inner · Q⁻¹``; Q maps z onto the controller's ``axis``.
+    """
+    turns = {
+        "+z": (0, 0, 0),
+        "-z": (0, 0, 180),
+        "+x": (0, 90, 0),
+        "-x": (0, -90, 0),
+        "+y": (0, 0, -90),
+        "-y": (0, 0, 90),
+    }
+    return fr.transform([0.0, 0.0, 0.0], np.round(fr.rotation_from_abc(np.array(turns[axis]) * RAD_PER_DEG)))
+
+
+def load_cell(path: str | Path | None = None) -> Cell:
+    """Read a cell file, over the cell it is ``based_on`` if it says so; without a path, the demonstration.
+
+    Raises `NotUnderstoodError` that names file, key, what was found and what is allowed.
+    """
+    if path is None:
+        return _default_cell()
+    file = Path(path)
+    return resolve_cell(library.read_toml(file), beside=file.parent, source=str(file))
+
+
+def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str = "cell") -> Cell:
+    """Lay ``data`` (a cell file as read) over its base, fill in the models, and check it."""
+    try:
+        _refuse_keys_of_tools(data)
+        stated = lay_over_base(data, beside, source, (Path(source).resolve(),) if beside is not None else ())
+        merged = dict(stated.data)
+        known = stated_keys(merged)
+        for section, kind in _MODELS:
+            if section in merged:
+                merged[section] = _fill_in(merged[section], kind)
+        _take_compliance_of_robot(merged)
+        if isinstance(merged.get("tool"), dict):
+            merged["tool"] = {number: _fill_in_tool(tool) for number, tool in merged["tool"].items()}
+        own_codes = merged.get("m_code", {})
+        if isinstance(own_codes, dict):
+            merged["m_code"] = {**CODES_WITHOUT_SIGNALS, **own_codes}
+        merged["taken_over"] = [_record(taken) for taken in stated.taken]
+        cell = Cell.model_validate(merged)
+    except NotUnderstoodError as error:
+        raise NotUnderstoodError(error.issues, error.source or source) from None
+    except ValidationError as error:
+        raise NotUnderstoodError(_validation_issues(error), source) from None
+    wrong = (*_split_pairs(stated), *_contradictions(cell, known))
+    if wrong:
+        raise NotUnderstoodError(wrong, source)
+    return cell.model_copy(update={"defaults": tuple(_defaults(cell, known))})
+
+
+def plain_view(cell: Cell) -> dict[str, Any]:
+    """Return the cell as plain values: numbers, text, and tables of them, as its templates see it."""
+    view = cell.model_dump(mode="python", exclude={"taken_over", "defaults"})
+    view["clearance_z_mm"] = cell.clearance_z_mm
+    return view
+
+
+def as_toml(cell: Cell) -> dict[str, Any]:
+    """Return a resolved cell as plain tables; what is None is left out, as TOML has no null."""
+    record = cell.model_dump(mode="json", exclude_none=True)
+    record["tool"] = {str(number): tool for number, tool in record["tool"].items()}
+    return record
+
+
+def cell_from_resolved(record: dict[str, Any], source: str) -> Cell:
+    """Return the cell that `as_toml` wrote, without laying it over anything."""
+    try:
+        return Cell.model_validate(record)
+    except ValidationError as error:
+        raise NotUnderstoodError(_validation_issues(error), source) from None
+
+
+def cell_schema() -> dict[str, Any]:
+    """Return the JSON schema of a cell file for editors; nothing is required, as a file may be partial."""
+    schema = Cell.model_json_schema()
+    for key in _RESOLVED:
+        del schema["properties"][key]
+    _drop_required(schema)
+    schema["title"] = "gcode2krl cell file"
+    return schema
+
+
+@lru_cache(maxsize=1)
+def _default_cell() -> Cell:
+    return resolve_cell(library.read_model("cells", DEMONSTRATION), source="the demonstration cell")
+
+
+def _fill_in(section: Any, kind: str) -> Any:
+    """Lay a section's own keys over the model it names."""
+    if not isinstance(section, dict) or not isinstance(section.get("model"), str) or not section["model"]:
+        return section
+    found = library.read_model(kind, section["model"])
+    if kind == "materials" and section.keys() & {"linear_edge", "kienzle"}:
+        found = {key: value for key, value in found.items() if key not in ("linear_edge", "kienzle")}
+    return {**library.merge(found, section), "model": found.get("model", section["model"])}
+
+
+def _fill_in_tool(tool: Any) -> Any:
+    """Lay a tool over its model; one whose cutter differs from the model's says so in its name."""
+    filled = _fill_in(tool, "tools")
+    if filled is tool or not isinstance(filled, dict):
+        return filled
+    found = library.read_model("tools", tool["model"])
+    if any(key in tool and tool[key] != found.get(key) for key in _CUTTER):
+        filled["model"] = f"{filled['model']} (changed)"
+    return filled
+
+
+def _refuse_keys_of_tools(data: Mapping[str, Any]) -> None:
+    """Raise where a key is one that only a resolved cell has, or a tool's number is not written plainly.
+
+    ``[tool.01]`` beside ``[tool.1]`` would be the same tool twice, and one of them lost.
+    """
+    for key in _RESOLVED:
+        if key in data:
+            raise NotUnderstoodError(_key_issue(f"{key}: there is no such key"))
+    tools = data.get("tool")
+    for number in tools if isinstance(tools, dict) else ():
+        if not re.fullmatch(r"[1-9][0-9]{0,4}", str(number), re.ASCII):
+            raise NotUnderstoodError(
+                _key_issue(f"tool.{str(number)[:40]}: found no tool number, allowed: 1 to 99999")
+            )
+
+
+def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
+    """Yield what no single key shows: impossible sizes, halves of pairs, double meanings."""
+    from gcode2krl.cell import ranges, switching
+
+    yield from (issue for issue in ranges.range_issues(cell) if issue.severity == "error")
+    if cell.mounted_tool is not None and cell.mounted_tool not in cell.tool:
+        number = cell.mounted_tool
+        yield _key_issue(f"mounted_tool: found {number}, and the cell has no [tool.{number}]")
+    templates = cell.templates()
+    view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
+    texts = switching.rendered(templates, view)
+    yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
+    yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
+
+
+def _split_pairs(stated: StatedCell) -> Iterator[Issue]:
+    whose = {taken.key: taken.source for taken in stated.taken}
+    for number, frame in split_pairs(stated):
+        own, other = (number, frame) if number not in whose else (frame, number)
+        yield Issue(
+            "error",
+            "frame-split",
+            0,
+            f"{own} is stated here, and {other}, which belongs to it, comes from {whose[other]!r}",
+            f"state {number} and {frame} in one file, as the controller has them",
+        )
+
+
+def _named_outputs(cell: Cell, stated: frozenset[str]) -> dict[str, int | None]:
+    """Return key → output of all outputs that keys name; those of the online side where they are stated."""
+    spindle, link = cell.spindle, cell.online.link
+    named = {
+        f"spindle.{key}": getattr(spindle, key)
+        for key in ("run_cw_output", "run_ccw_output", "flood_output", "mist_output")
+    }
+    return named | {
+        f"online.link.{key}": getattr(link, key)
+        for key in ("t1_output", "ready_output")
+        if any(name.startswith("online.link.") for name in stated)
+    }
+
+
+def _named_inputs(cell: Cell) -> dict[str, int | None]:
+    guards = {f"guard_inputs ({item.meaning})": item.number for item in cell.guard_inputs}
+    return {"spindle.at_speed_input": cell.spindle.at_speed_input, **guards}
+
+
+def _defaults(cell: Cell, stated: frozenset[str]) -> Iterator[str]:
+    """Yield the dotted keys of documented defaults, of the sections that a program rests on."""
+    record = cell.model_dump(mode="json", include=set(_REACHING), exclude_none=True)
+    for key in sorted(stated_keys(record)):
+        value = key.rpartition(".")[2]
+        whole = any(key.startswith(f"{name}.") for name in stated)  # a list or frame that is stated whole
+        if key not in stated and not whole and value not in ("source", "sure", "model"):
+            yield key
+    yield from (f"m_code.{code}" for code in CODES_WITHOUT_SIGNALS if f"m_code.{code}" not in stated)
+    for number, tool in cell.tool.items():
+        if tool.frame is not None and tool.axis is None:
+            yield f"tool.{number}.axis"
+        if tool.frame is None and tool.length_mm is not None and f"tool.{number}.length_mm" not in stated:
+            yield f"tool.{number}.length_mm"
+
+
+def _record(taken: Taken) -> dict[str, Any]:
+    return {"key": taken.key, "value": taken.value, "source": taken.source, "verified": taken.verified}
+
+
+def _take_compliance_of_robot(merged: dict[str, Any]) -> None:
+    """Move a robot model's virtual joints below the cell's own, which hold sensor and spindle."""
+    robot = merged.get("robot")
+    if not isinstance(robot, dict) or "compliance" not in robot:
+        return
+    robot = dict(robot)
+    below = robot.pop("compliance")
+    merged["robot"] = robot
+    own = merged.get("compliance", {})
+    if isinstance(below, dict) and isinstance(own, dict):
+        merged["compliance"] = library.merge(below, own)
+
+
+def _validation_issues(error: ValidationError) -> Iterator[Issue]:
+    """Turn pydantic's findings into lines that name the key, what was found and what is allowed."""
+    not_keys = ("literal[", "constrained-", "function-", "float", "int", "tuple", "[key]")
+    for detail in error.errors(include_url=False)[:_MOST_ISSUES]:
+        place = [step for step in detail["loc"] if not str(step).startswith(not_keys)]
+        key = ".".join(str(step)[:80] for step in place)
+        remedy = ""
+        message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        if detail["type"] == "missing":
+            text = f"{key}: missing"
+        elif detail["type"] == "extra_forbidden":
+            text = f"{key}: there is no such key"
+            remedy = _did_you_mean(place)
+        elif detail["type"] == "value_error":
+            text = f"{key}: {message}"
+        else:
+            text = f"{key}: found {_brief(detail['input'])}, allowed: {message}"
+        yield _key_issue(text, remedy)
+
+
+def _did_you_mean(place: list[str | int]) -> str:
+    near = meant_key(Cell, place) if place else ""
+    return f"did you mean {near}? {_KEYS_LISTED}" if near else ""
+
+
+_KEYS_LISTED = "docs/cell.md and `gcode2krl models schema` list the keys"
+
+
+def _key_issue(text: str, remedy: str = "") -> Issue:
+    return Issue("error", "cell-key", 0, text, remedy or _KEYS_LISTED)
+
+
+def _brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def _drop_required(node: Any) -> None:
+    if isinstance(node, dict):
+        if isinstance(node.get("required"), list):
+            del node["required"]
+        for child in node.values():
+            _drop_required(child)
+    elif isinstance(node, list):
+        for child in node:
+            _drop_required(child)

@@ -1,0 +1,125 @@
+"""The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
+
+import copy
+import difflib
+import re
+import tomllib
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from gcode2krl.errors import input_error
+
+MOST_BYTES = 4_000_000
+"""A cell with 1,000 tools has 0.2 MB."""
+MOST_LEVELS = 32
+"""The deepest table of a cell has 5 levels; the time of `tomllib` grows with the square of a key's parts."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"]*+"|'[^']*+')"""
+_MANY_DOTS = re.compile(rf"(?<![A-Za-z0-9_\-\"'])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
+KINDS = ("robots", "controllers", "tools", "materials", "cells")
+
+
+def models_folder() -> Path:
+    """Return the folder ``models/``: inside the installed package, else beside it in a checkout."""
+    package = Path(__file__).resolve().parents[1]
+    inside = package / "models"
+    return inside if inside.is_dir() else package.parent / "models"
+
+
+def names(kind: str) -> dict[str, Path]:
+    """Return model name → file for one kind (one of `KINDS`)."""
+    return dict(_names(models_folder() / kind))
+
+
+@lru_cache(maxsize=len(KINDS))
+def _names(folder: Path) -> dict[str, Path]:
+    return {str(read_toml(file).get("model", file.stem)): file for file in sorted(folder.glob("*.toml"))}
+
+
+@lru_cache(maxsize=256)
+def _of_library(file: Path) -> dict[str, Any]:
+    """Return a file of the library, which does not change while a command runs."""
+    return read_toml(file)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file; raises `NotUnderstoodError` naming the file and line where it cannot."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise input_error(
+            "file-unreadable", f"cannot read: {why}", "name a file that is there", source=str(path)
+        ) from None
+    if len(data) > MOST_BYTES:
+        raise input_error(
+            "file-too-large", f"more than {MOST_BYTES // 1_000_000} MB is no model or cell file",
+            "name the right file", source=str(path),
+        )  # fmt: skip
+    try:
+        return parse_toml(data.decode("utf-8-sig"), str(path))
+    except UnicodeDecodeError as error:
+        raise input_error(
+            "not-utf8", f"byte {error.start} is not UTF-8", "save it as UTF-8", source=str(path)
+        ) from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """Parse TOML in bounded time; raises `NotUnderstoodError` where it is none, or is nested too deeply."""
+    remedy = "see docs/cell.md for the format"
+    for number, line in enumerate(text.split("\n"), start=1):
+        if _MANY_DOTS.search(line):
+            sentence = f"line {number}: a key of more than {MOST_LEVELS} parts: nested too deeply"
+            raise input_error("not-toml", sentence, remedy, source=source)
+    try:
+        found = tomllib.loads(text)
+    except RecursionError:
+        raise input_error("not-toml", "nested too deeply", remedy, source=source) from None
+    except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
+        raise input_error("not-toml", str(error)[:200], remedy, source=source) from None
+    if _levels(found) > MOST_LEVELS:
+        raise input_error("not-toml", f"more than {MOST_LEVELS} levels", remedy, source=source)
+    return found
+
+
+def _levels(found: dict[str, Any]) -> int:
+    """Return how deeply tables and lists are nested, counted no further than just beyond the limit."""
+    level = 0
+    here: list[dict[str, Any] | list[Any]] = [found]
+    while here and level <= MOST_LEVELS:
+        level += 1
+        inside = (part for one in here for part in (one.values() if isinstance(one, dict) else one))
+        here = [part for part in inside if isinstance(part, dict | list)]
+    return level
+
+
+def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, Any]:
+    """Read one model by its name, or by a path ending in ``.toml`` relative to the file that names it."""
+    if model.endswith(".toml"):
+        return read_toml((beside or Path()) / model)
+    known = names(kind)
+    by_folded_name = {_fold(name): file for name, file in known.items()}
+    file = by_folded_name.get(_fold(model))
+    if file is None:
+        near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
+        meant = [name for name in known if _fold(name) in near]
+        remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"
+        raise input_error(
+            "model-unknown", f"{kind[:-1]}.model: found {model[:60]!r}, allowed: {', '.join(known)}", remedy
+        )
+    return copy.deepcopy(_of_library(file))
+
+
+def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Return ``base`` with ``over`` laid on top, table by table."""
+    merged = dict(base)
+    for key, value in over.items():
+        below = merged.get(key)
+        both_tables = isinstance(below, dict) and isinstance(value, dict)
+        merged[key] = merge(below, value) if both_tables and isinstance(below, dict) else value
+    return merged
+
+
+def _fold(name: str) -> str:
+    return "".join(name.split()).casefold()

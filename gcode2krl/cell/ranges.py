@@ -1,0 +1,130 @@
+"""Plausible and possible ranges of the cell's physical keys: a slip of unit or digit is seen before it moves.
+
+``ranges.toml`` has the table. Beyond the possible range a value is an error of the cell file, beyond the
+plausible one a warning.
+"""
+
+import math
+import re
+import tomllib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+from pydantic import BaseModel
+
+from gcode2krl.errors import Issue
+
+_ANGLES = re.compile(
+    r"((?:frames\.(?:base|tool)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
+)
+_EIGHTH_TURN_RAD = math.pi / 4
+_NEAR_RAD = 2e-4
+_FULL_TURN = 8.01
+"""In eighths of a turn: the angles of a frame are no larger."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a key may be: (low, high) that is plausible and that is possible, and why."""
+
+    plausible: tuple[float, float]
+    possible: tuple[float, float]
+    source: str
+
+
+@lru_cache(maxsize=1)
+def all_ranges() -> dict[str, Range]:
+    """Return key → range; ``*`` stands for a number or a name: ``tool.*.diameter_mm``."""
+    text = resources.files("gcode2krl.cell").joinpath("ranges.toml").read_text(encoding="utf-8")
+    return {
+        key: Range(tuple(row["plausible"]), tuple(row["possible"]), row["source"])
+        for key, row in tomllib.loads(text).items()
+    }
+
+
+def range_issues(cell: BaseModel, tools: Collection[int] | None = None) -> Iterator[Issue]:
+    """Yield each value of a resolved cell that is impossible (error) or hardly plausible (warning).
+
+    Of ``tools`` alone where they are given.
+    """
+    table = all_ranges()
+    for key, value in numbers(cell):
+        known = table.get(general(key))
+        if known is None or (tools is not None and key.startswith("tool.") and _number(key) not in tools):
+            continue
+        low, high = known.possible
+        if not low <= value <= high:
+            yield _issue("error", "cell-impossible", key, value, known.possible, known.source)
+            continue
+        low, high = known.plausible
+        if not low <= value <= high:
+            yield _issue("warning", "cell-doubtful", key, value, known.plausible, known.source)
+    yield from _radians(cell)
+
+
+def _number(key: str) -> int:
+    return int(key.split(".")[1])
+
+
+def general(key: str) -> str:
+    """Return a dotted key with ``*`` for the number of a tool and the names of offsets and joints."""
+    key = re.sub(r"^tool\.\d+\.", "tool.*.", key)
+    key = re.sub(r"^work_offsets\.(G59\.\d|G\d+)\.", "work_offsets.*.", key)
+    return re.sub(r"^compliance\.virtual_joints\.\w+\.", "compliance.virtual_joints.*.", key)
+
+
+def numbers(cell: BaseModel) -> Iterator[tuple[str, float]]:
+    """Yield (dotted key, value) of every number in a cell; those of a list have its key."""
+    yield from _numbers(cell, "")
+
+
+def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from _numbers(getattr(value, name), f"{key}.{name}" if key else name)
+    elif isinstance(value, dict):
+        for name, one in value.items():
+            yield from _numbers(one, f"{key}.{name}")
+    elif isinstance(value, tuple | list):
+        for one in value:
+            yield from _numbers(one, key)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, float(value)
+
+
+def _issue(
+    severity: str, code: str, key: str, value: float, allowed: tuple[float, float], source: str
+) -> Issue:
+    word = "possible" if severity == "error" else "usual"
+    bounds = f"{allowed[0]:g} and more" if allowed[1] == math.inf else f"{allowed[0]:g} to {allowed[1]:g}"
+    text = f"{key} = {value:g} is not {word}: {bounds} ({source})"
+    return Issue(
+        "error" if severity == "error" else "warning",
+        code,
+        0,
+        text,
+        f"correct {key}: check its unit and digits",
+    )
+
+
+def _radians(cell: BaseModel) -> Iterator[Issue]:
+    """Yield the frames, and HOME, whose angles are multiples of 45 degrees when read as radians."""
+    angles: dict[str, list[float]] = {}
+    for key, value in numbers(cell):
+        match = _ANGLES.fullmatch(key)
+        if match:
+            angles.setdefault(match[1] or key, []).append(value)
+    for key, found in angles.items():
+        eighths = [abs(angle) / _EIGHTH_TURN_RAD for angle in found]
+        whole = all(abs(turn - round(turn)) * _EIGHTH_TURN_RAD < _NEAR_RAD for turn in eighths)
+        if whole and 0.99 < max(eighths) <= _FULL_TURN:
+            shown = ", ".join(f"{angle:g}" for angle in found)
+            name = key.rstrip(".")
+            yield Issue(
+                "error", "cell-impossible", 0,
+                f"{name}: the angles {shown} are multiples of pi/4: radians, where degrees are meant",
+                f"write the angles of {name} in degrees",
+            )  # fmt: skip

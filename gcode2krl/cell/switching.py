@@ -1,0 +1,178 @@
+"""What the M-codes of a cell switch, read back from its rendered templates: pairs, and double meanings."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from gcode2krl.cell import template_rules as rules
+from gcode2krl.cell.templates import MissingValueError, TemplateError, render
+from gcode2krl.errors import Issue, Severity
+
+_OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
+"""Of the spindle, in rpm: a template may switch by it."""
+SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
+_OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
+"""Which M-code switches off what another switches on."""
+_SPINDLE, _COOLANT = ("M3", "M4"), ("M7", "M8")
+
+
+def template_issue(key: str, what: str) -> Issue:
+    """Return the finding on a template of the cell; ``key`` names it: ``m_code.M8``."""
+    return Issue("error", "template", 0, f"{key} of the cell: {what}", f"correct {key} in the cell file")
+
+
+def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, str]:
+    """Return key → KRL of the templates, with sample values; what cannot be rendered is left out."""
+    texts = {}
+    for key, template in templates.items():
+        try:
+            texts[key] = render(template, {**SAMPLE, **view})
+        except TemplateError:
+            continue
+    return texts
+
+
+def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return key → KRL at several speeds of the spindle, and with what a block may say and leave out."""
+    found: dict[str, list[str]] = {}
+    others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
+    others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
+    for other in others:
+        for key, text in rendered(templates, {**view, **other}).items():
+            found.setdefault(key, []).append(text)
+    return found
+
+
+def template_issues(
+    templates: Mapping[str, str], view: Mapping[str, Any], externals: tuple[str, ...]
+) -> Iterator[Issue]:
+    """Yield what is wrong with each template, rendered with sample values."""
+    for key, template in templates.items():
+        try:
+            what = rules.problem(render(template, {**SAMPLE, **view}), externals)
+        except MissingValueError:
+            continue  # missing, not wrong: said where the program needs it
+        except TemplateError as error:
+            what = str(error)
+        if what:
+            yield template_issue(key, what)
+
+
+def pair_issues(templates: Mapping[str, str], view: Mapping[str, Any]) -> Iterator[Issue]:
+    """Yield the halves of pairs: what switches on without its partner that switches off.
+
+    A warning where the partner calls a subprogram, whose effect is not read. What switches by a condition of
+    its template counts as it is worst.
+    """
+    texts = rendered_widely(templates, view) if any(f"m_code.{on}" in templates for on in _OFF) else {}
+    for on, off in _OFF.items():
+        on_key, off_key = f"m_code.{on}", f"m_code.{off}"
+        if on_key not in templates:
+            continue
+        if off_key not in templates:
+            yield _pair(off_key, f"{on_key} without {off_key}: nothing switches off what {on} switches on")
+        elif off_key in texts and not all(map(rules.statements, texts[off_key])):
+            yield _pair(off_key, f"{off_key} is empty: nothing switches off what {on} switches on")
+        elif on_key in texts and off_key in texts:
+            switched_on = frozenset().union(*map(rules.may_be_on, texts[on_key]))
+            left = switched_on - frozenset.intersection(*map(rules.surely_off, texts[off_key]))
+            if left:
+                names, called = ", ".join(sorted(left)), rules.calls(texts[off_key][0])
+                text = f"{on_key} switches on {names}, which {off_key} does not switch off"
+                if called:
+                    text += f", unless {called[0]} does"
+                yield _pair(off_key, text, "warning" if called else "error")
+
+
+def meaning_issues(
+    texts: Mapping[str, str], named: Mapping[str, int | None], inputs: Mapping[str, int | None]
+) -> Iterator[Issue]:
+    """Yield outputs and inputs with two meanings, one finding for each of them.
+
+    ``named`` holds the outputs that keys of the cell name, ``inputs`` the inputs.
+    """
+    seen: set[str] = set()
+    for issue in _meanings(texts, named, inputs):
+        signal = issue.message.split()[0]
+        if signal not in seen:
+            seen.add(signal)
+            yield issue
+
+
+def _meanings(
+    texts: Mapping[str, str], named: Mapping[str, int | None], inputs: Mapping[str, int | None]
+) -> Iterator[Issue]:
+    yield from _same_number(named, "$OUT", _may_share)
+    yield from _same_number(inputs, "$IN", lambda a, b: False)
+    on = {key: rules.may_be_on(text) | frozenset(rules.pulses(text)) for key, text in texts.items()}
+    spindle = _union(on, _SPINDLE)
+    coolant = _union(on, _COOLANT)
+    for signal in sorted(spindle | coolant):
+        others = [
+            key
+            for key, signals in on.items()
+            if signal in signals
+            and (key == "tool_change" or (key.startswith("m_code.") and not _is_of(key, _SPINDLE, _COOLANT)))
+        ]
+        if signal in spindle and signal in coolant:
+            yield _two_meanings(signal, "the spindle (m_code.M3, M4)", "the coolant (m_code.M7, M8)")
+        elif others and (signal in spindle or "tool_change" in others):
+            what = "the spindle (m_code.M3, M4)" if signal in spindle else "the coolant (m_code.M7, M8)"
+            yield _two_meanings(signal, what, others[0])
+    for key, number in named.items():
+        if number is None or not key.startswith("online."):
+            continue
+        signal = f"$OUT[{number}]"
+        for user in (
+            user for user, text in texts.items() if signal in {s.name for s in rules.switched(text)}
+        ):
+            yield _two_meanings(signal, key, user)
+
+
+def signals_text(texts: Mapping[str, str], key: str) -> str:
+    """Return what a template switches as a person reads it: ``$OUT[1] on, $OUT[2] off``."""
+    found = {one.name: one for one in rules.switched(texts.get(key, ""))}
+    text = texts.get(key, "")
+    pulsed = rules.pulses(text)
+    words = [
+        f"{one.name} {'on' if one.value else 'off'}{'' if one.sure else ' (perhaps)'}"
+        for one in found.values()
+        if one.name not in pulsed
+    ]
+    words += [f"{name} pulsed" for name in pulsed]
+    words += [line for line in rules.statements(text) if line.startswith("$ANOUT")]
+    words += [f"calls {name}" for name in rules.calls(text)]
+    return ", ".join(words)
+
+
+def _is_of(key: str, *groups: tuple[str, ...]) -> bool:
+    return any(key.removeprefix("m_code.") in group for group in groups)
+
+
+def _union(on: Mapping[str, frozenset[str]], codes: tuple[str, ...]) -> frozenset[str]:
+    return frozenset().union(*(on.get(f"m_code.{code}", frozenset()) for code in codes))
+
+
+def _may_share(one: str, other: str) -> bool:
+    """One valve for flood and mist is a plain machine; all else is a mistake."""
+    return {one, other} == {"spindle.flood_output", "spindle.mist_output"}
+
+
+def _same_number(named: Mapping[str, int | None], what: str, may_share: Any) -> Iterator[Issue]:
+    users: dict[int, str] = {}
+    for key, number in named.items():
+        if number is None:
+            continue
+        first = users.setdefault(number, key)
+        if first != key and not may_share(first, key):
+            yield _two_meanings(f"{what}[{number}]", first, key)
+
+
+def _pair(key: str, text: str, severity: Severity = "error") -> Issue:
+    return Issue(
+        severity, "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of that off"
+    )
+
+
+def _two_meanings(signal: str, one: str, other: str) -> Issue:
+    text = f"{signal} has two meanings: {one}, and {other}"
+    return Issue("error", "signal-twice", 0, text, f"give {other} a signal of its own")

@@ -1,0 +1,268 @@
+"""Offline compensation: targets moved against the deflection, so that the bent robot cuts the intended path.
+
+The correction is minus the deflection without its component along the feed (Haehn & Weigold 2020, eq. 10),
+here of the intended straight line. Everything is told by the place on the intended path: a correction normal
+to a line leaves the place along it as it was, so forces, corrections and rounds compare place by place.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gcode2krl import compliance, robot
+from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats, Ints32, Rows
+from gcode2krl.cell import Cell
+from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.compensation.correction import SETTLED_MM, Contact, Shift, interpolated, wanted_correction
+from gcode2krl.compensation.intended_path import Deviation, Evaluated, Placed, Ways, deviation_from
+from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.pipeline import checked, plan_motion
+from gcode2krl.tables import Deflection, Forces, Motion, Targets, Toolpath
+
+Evaluate = Callable[[Targets], Evaluated]
+
+MOST_BAND = 0.5
+"""Half-width of the 90 % band over the deflection above which a correction may do more harm than good."""
+MOST_CORRECTION_MM = 10.0
+"""A larger correction is none: no robot that cuts bends that far, and lines would lose their shape."""
+_MOST_ROUNDS = 15
+_DIVIDING_ROUNDS = 3
+"""After so many rounds lines divide no more, so that the targets of two rounds compare row by row."""
+_IDENTIFIED = ("verified", "checked")
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """Targets with the correction in them, and what it brings."""
+
+    targets: Targets
+    """What to write; a moved line that is not straight any more is several rows of the same ``move``."""
+    intended: Targets
+    """The same rows without the correction."""
+    before: Deviation
+    after: Deviation
+    evaluated: Evaluated
+    """Motion, Joints, Forces and Deflection of ``targets``."""
+    figures: dict[str, float]
+    issues: tuple[Issue, ...]
+
+
+def compensate(
+    toolpath: Toolpath, targets: Targets, cell: Cell, evaluate: Evaluate, *, tolerance_mm: float = 0.01
+) -> Compensated:
+    """Return targets moved by the correction, found in rounds until they change by less than 1 µm.
+
+    Assumption: the deflection is a function of the place on the path; it may depend on the correction itself
+    as long as it grows more slowly than that. Rapids, approaches and moves in air are not touched. Where the
+    correction jumps (contact, a change of engagement) it is ramped with the slope that speed, acceleration
+    and approximation allow, at most `MOST_SLOPE`.
+
+    Parameters
+    ----------
+    targets : those of `pipeline.set_targets`, the path that the tool shall cut.
+    evaluate : targets → Motion, Joints, Forces and Deflection of them; `keeping_forces` is one.
+    tolerance_mm : how far a line may be from the correction between its ends before it is divided.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the tolerance is not positive.
+    RefusedError
+        Where the deflection is too unsure (see `refuse_unsure`), a correction is larger than
+        `MOST_CORRECTION_MM`, or the rounds do not settle.
+    """
+    if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
+        raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive", "0.01 is usual")
+    ways = Ways.of(toolpath, targets, cell)
+    first = evaluate(targets)
+    refuse_unsure(first[3], cell)
+    contact = Contact.of(ways, first)
+    field = before = wanted_correction(ways, first, contact, Shift.none(ways), tolerance_mm, True)
+    for rounds in range(1, _MOST_ROUNDS + 1):
+        shift = field.shift
+        _refuse_large(shift.largest_mm(), targets.source)
+        plain, moved = _with_rows(targets, ways, shift, cell)
+        evaluated = evaluate(moved)
+        field = wanted_correction(ways, evaluated, contact, shift, tolerance_mm, rounds < _DIVIDING_ROUNDS)
+        change_mm = field.shift.change_mm(shift)
+        if change_mm <= SETTLED_MM:
+            break
+    was = deviation_from(ways, first, before.placed, before.ramped)
+    now = deviation_from(ways, evaluated, field.placed, field.ramped)
+    issues = (
+        *_settled(change_mm, tolerance_mm, targets.source),
+        *_rest(now, tolerance_mm),
+        *_new_findings(moved, targets, cell),
+    )
+    figures = {
+        "rounds": float(rounds),
+        "change_mm": change_mm,
+        "rows_added": float(len(moved) - len(targets)),
+        "max_correction_mm": shift.largest_mm(),
+        "before_max_mm": was.max_mm,
+        "before_rms_mm": was.rms_mm,
+        "after_max_mm": now.max_mm,
+        "after_rms_mm": now.rms_mm,
+        "after_steady_max_mm": now.steady_max_mm,
+    }
+    moved = replace(moved, issues=(*targets.issues, *issues))
+    return Compensated(moved, plain, was, now, evaluated, figures, issues)
+
+
+def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
+    """Raise `RefusedError` where the 90 % band's half-width exceeds half the correction.
+
+    Unless coefficients and stiffness were measured: the stiffness of robot and end effector is "verified" or
+    "checked", and so is the material, whose source says that it was identified. A published set of
+    coefficients may be "verified" too, but as a quotation: it is no measurement of this material.
+    """
+    if deflection.relative_band <= MOST_BAND or identified(cell):
+        return
+    sentence = (
+        f"the deflection is known to ± {deflection.relative_band:.0%} only (90 %), a correction needs "
+        f"± {MOST_BAND:.0%}: it could make the part worse"
+    )
+    remedy = "measure a slot (`gcode2krl identify force`) and the stiffness (`gcode2krl identify stiffness`)"
+    raise RefusedError(Issue("error", "compensation-unsure", 0, sentence, remedy))
+
+
+def identified(cell: Cell) -> bool:
+    """Tell whether the cell's force coefficients and stiffness were identified, see `refuse_unsure`."""
+    material = cell.material
+    return (
+        material is not None
+        and material.sure in _IDENTIFIED
+        and "identified" in material.source
+        and cell.compliance.sure in _IDENTIFIED
+        and cell.compliance.robot_sure in _IDENTIFIED
+    )
+
+
+def refuse_twice(online: bool, both: bool) -> None:
+    """Raise `RefusedError` where the online compensation would correct again what the targets correct."""
+    if online and not both:
+        sentence = "offline and online compensation together correct the same deflection twice"
+        remedy = "choose one; --both where the server knows of the offset, which `online serve` does not"
+        raise RefusedError(Issue("error", "compensation-twice", 0, sentence, remedy))
+
+
+def keeping_forces(
+    toolpath: Toolpath, targets: Targets, motion: Motion, forces: Forces, cell: Cell
+) -> Evaluate:
+    """Return an ``evaluate`` that keeps the forces of the intended path, place by place.
+
+    Right to first order where the correction succeeds, because the tool then cuts what was intended. Reach
+    and stiffness are those of the moved targets. ``motion`` and ``forces`` belong to ``targets``.
+    """
+    ways = Ways.of(toolpath, targets, cell)
+    known = ways.place(motion)
+    path_mm, last = known.distinct()
+    dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else cell.controller.cycle_s
+
+    def evaluate(moved: Targets) -> Evaluated:
+        planned = plan_motion(moved, cell, dt_s)
+        placed = ways.place(planned, _shift_of(moved, targets, ways))
+        joints = robot.follow_motion(planned, cell)
+        kept = _forces_at(forces, path_mm, last, placed, planned.tool)
+        return planned, joints, kept, compliance.deflect(joints, kept, cell)
+
+    return evaluate
+
+
+def _shift_of(moved: Targets, targets: Targets, ways: Ways) -> Floats:
+    """Return how far (p, 3) the intended targets are moved; of a divided line its last row is the target."""
+    lin = np.flatnonzero((moved.move >= 0) & ~moved.ptp)
+    last = np.zeros(len(ways.row_of), dtype=np.int64)
+    last[moved.move[lin]] = lin
+    shift = np.zeros_like(targets.position_mm)
+    rows = np.flatnonzero(ways.cuts)
+    shift[rows] = moved.position_mm[last[targets.move[rows]]] - targets.position_mm[rows]
+    return shift
+
+
+def _forces_at(forces: Forces, path_mm: Floats, last: Rows, placed: "Placed", tool: Ints32) -> Forces:
+    """Return forces at other samples: vectors in between, the rest of the nearest; none off the ways."""
+    rows = np.flatnonzero(placed.row >= 0)
+    at_mm = placed.path_mm[rows]
+    middle = (path_mm[1:] + path_mm[:-1]) / 2.0
+    nearest = last[np.searchsorted(middle, at_mm)] if len(last) else np.zeros(0, dtype=np.int64)
+    rows = rows[: len(nearest)]
+    columns: dict[str, Any] = {}
+    for name in ("force_base_N", "moment_base_Nmm", "peak_N", "torque_Nmm", "a_p_mm", "a_e_mm", "phi_rad"):
+        values = getattr(forces, name)
+        columns[name] = np.full((len(placed.row), *values.shape[1:]), np.nan if name == "phi_rad" else 0.0)
+        columns[name][rows] = values[nearest]
+    for name in ("force_base_N", "moment_base_Nmm"):
+        if len(rows):
+            columns[name][rows] = interpolated(at_mm, path_mm, getattr(forces, name)[last])
+    return Forces(**columns, tool=tool, relative_band=forces.relative_band)
+
+
+def _with_rows(targets: Targets, ways: Ways, shift: Shift, cell: Cell) -> tuple[Targets, Targets]:
+    """Return the targets with the lines divided, without and with the shift; events go with their rows."""
+    order = np.repeat(np.arange(len(targets)), np.bincount(shift.row, minlength=len(targets)) + 1)
+    own = np.flatnonzero(np.diff(order, append=len(targets)))
+    new = np.ones(len(order), dtype=np.bool_)
+    new[own] = False
+    copied = ("ptp", "home", "speed_mm_s", "move", "source_line", "tool")
+    columns = {name: getattr(targets, name)[order] for name in copied}
+    position, moved = targets.position_mm[order], targets.position_mm + shift.target_mm
+    rotation, cdis, wait = (getattr(targets, name)[order] for name in ("rotation", "cdis_mm", "wait_s"))
+    position[new] = ways.start_mm[shift.row] + shift.along_mm[:, None] * ways.unit[shift.row]
+    share = shift.along_mm / ways.length_mm[shift.row]
+    _, from_rotation = motion_starts(targets, cell, shift.row)
+    rotation[new] = fr.slerp(np.asarray(from_rotation), targets.rotation[shift.row], share)
+    cdis[new], wait[new] = ways.piece_cdis_mm[shift.row], 0.0
+    events = tuple(event._replace(row=int(own[event.row])) for event in targets.events)
+    plain = replace(
+        targets, position_mm=position, rotation=rotation, cdis_mm=cdis, wait_s=wait, events=events, **columns
+    )
+    shifted = position.copy()
+    shifted[own], shifted[new] = moved, position[new] + shift.piece_mm
+    return plain, replace(plain, position_mm=shifted)
+
+
+def _refuse_large(largest_mm: float, source: str) -> None:
+    if largest_mm <= MOST_CORRECTION_MM:
+        return
+    sentence = f"a correction of {largest_mm:.1f} mm is more than {MOST_CORRECTION_MM:g} mm"
+    remedy = (
+        "check stiffness and forces; where forces grow with the correction, keep those of the intended path"
+    )
+    raise RefusedError(Issue("error", "compensation-large", 0, sentence, remedy), source)
+
+
+def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Issue]:
+    """Yield what there is to say about rounds that did not settle; raise where they are no use."""
+    if change_mm <= SETTLED_MM:
+        return
+    sentence = f"the targets still change by {change_mm:.4f} mm after {_MOST_ROUNDS} rounds"
+    if change_mm > tolerance_mm:
+        remedy = "the forces grow with the correction: keep the forces, or take smaller cuts"
+        raise RefusedError(Issue("error", "compensation-unsettled", 0, sentence, remedy), source)
+    yield Issue("warning", "compensation-unsettled", 0, sentence, "compare the residual with your tolerance")
+
+
+def _rest(after: Deviation, tolerance_mm: float) -> Iterator[Issue]:
+    """Yield where more than the tolerance remains."""
+    if after.max_mm <= tolerance_mm:
+        return
+    size = np.linalg.norm(np.where(after.cuts[:, None], after.offset_mm, 0.0), axis=1)
+    yield Issue(
+        "note",
+        "compensation-rest",
+        int(after.source_line[int(size.argmax())]),
+        f"the correction leaves up to {after.max_mm:.3f} mm in corners and where it has to be ramped "
+        f"(contact, changes of engagement), {after.steady_max_mm:.3f} mm elsewhere",
+        "enter and leave the material on a ramp or an arc",
+    )
+
+
+def _new_findings(moved: Targets, targets: Targets, cell: Cell) -> Iterator[Issue]:
+    """Yield what the robot finds in the moved targets and not in the intended ones."""
+    found, _ = checked(replace(moved, issues=()), cell)
+    known = {(issue.code, issue.line) for issue in targets.issues}
+    yield from (issue for issue in found.issues if (issue.code, issue.line) not in known)

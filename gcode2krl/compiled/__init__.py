@@ -1,0 +1,1 @@
+"""What the compiled kernels and the long columns share: the cache of kernels, chunks, threads."""

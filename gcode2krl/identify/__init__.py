@@ -1,0 +1,1 @@
+"""Measurements to a cell's numbers: controller, stiffness, force sensor, cutting force."""

@@ -1,0 +1,322 @@
+"""Targets to the text of a KRL program: head, guard, motions, events, subprograms."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import frames as fr
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.krl import statements as st
+from gcode2krl.krl.names import part_name
+from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
+from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.provenance import provenance_lines
+from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
+from gcode2krl.krl.rsi_text import RsiText, rsi_rows
+from gcode2krl.tables import Joints, Targets
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M
+from gcode2krl.version import __version__
+
+NEWLINE = b"\r\n"
+SIDECAR = ".pilot.csv"
+DECLARATIONS = """DECL KRLMSG_T GK_MSG
+DECL KRLMSGPAR_T GK_PAR[3]
+DECL KRLMSGOPT_T GK_OPT
+DECL INT GK_HANDLE"""
+MESSAGE_SETUP = """GK_PAR[1]={PAR_TYPE #EMPTY}
+GK_PAR[2]={PAR_TYPE #EMPTY}
+GK_PAR[3]={PAR_TYPE #EMPTY}
+GK_OPT={VL_STOP TRUE,CLEAR_P_RESET TRUE,CLEAR_P_SAW FALSE,LOG_TO_DB FALSE}"""
+FRAME_DECLARATIONS = """DECL FRAME GK_INV
+DECL FRAME GK_DIFF"""
+EXT_BAS = "EXT BAS (BAS_COMMAND :IN,REAL :IN )"
+_T_GRID_RAD = 1e-4 / DEG_PER_RAD
+_LOOK_BACK = 0.2
+"""Share of a subprogram within which a standstill is preferred as its end."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the text is laid out; what the header must say of the options."""
+
+    guard: bool = True
+    split: Literal["defs", "files"] = "defs"
+    single_file: bool = False
+    """Declarations inside the .src, no .dat (standard output)."""
+    options: str = ""
+    allowed: tuple[str, ...] = ()
+    forces: bool = False
+    """True where material removal and cutting forces have been predicted."""
+    online: str = ""
+    """Name of the RSI files of a program that is corrected online."""
+
+
+def compose(
+    targets: Targets,
+    joints: Joints,
+    cell: Cell,
+    name: str,
+    layout: Layout,
+    pilot: PilotText | None = None,
+) -> dict[str, bytes]:
+    """Return file name → bytes of the program ``name``.
+
+    ``.src``, ``.dat``, split ``name_001.src`` …, ``.pilot.csv`` where there is a pilot force, and the RSI
+    files where the program is corrected online.
+    """
+    writer = _Composer(targets, joints, cell, name, layout, pilot)
+    return writer.files()
+
+
+class _Composer:
+    def __init__(
+        self,
+        targets: Targets,
+        joints: Joints,
+        cell: Cell,
+        name: str,
+        layout: Layout,
+        pilot: PilotText | None,
+    ) -> None:
+        self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
+        self.source = st.ascii_text(_file_name(targets.source), 40)
+        self.position, self.abc_deg = written_poses(targets, cell)
+        self.speed_m_s = targets.speed_mm_s / MM_PER_M
+        self.state = np.array([-1.0, -1.0, 0.0])
+        self.events: dict[int, list[tuple[float, str]]] = {}
+        for event in targets.events:
+            text = st.event_statements(event, cell)
+            self.events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
+        self.guarded_pose = False
+        self.pilot = pilot
+        self.checksum = 0
+        if pilot is not None:
+            self.triggers, self.trigger_start = pilot.before(len(targets))
+            self.checksum = self._checksum(pilot)
+        self.rsi = self._rsi(layout.online) if layout.online else None
+
+    def _rsi(self, name: str) -> RsiText:
+        on, off = rsi_rows(self.targets)
+        form = self.pilot.header.form if self.pilot is not None else "none"
+        return RsiText(name, self.cell, form, on, off, int(self.targets.tool[off]))
+
+    def files(self) -> dict[str, bytes]:
+        """Compose the main program and its subprograms."""
+        most = self.cell.program.max_lines
+        count = len(self.targets)
+        body: list[bytes] = []
+        subprograms: list[tuple[str, bytes]] = []
+        if count <= most and self.layout.split == "defs":
+            body.append(self._motions(0, count))
+        else:
+            for start, end, whole in self._chunks(most):
+                if not whole:
+                    body.append(self._motions(start, end))
+                    continue
+                part = part_name(self.name, len(subprograms) + 1)
+                body.append(_text(f"{part}( )"))
+                self.state[:] = -1.0, -1.0, 0.0  # each part says its speed and CDIS again
+                subprograms.append((part, self._motions(start, end)))
+                self.state[:] = -1.0, -1.0, 0.0
+        return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
+
+    def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
+        """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program.
+
+        So does the motion at whose end RSI is switched off: its variables are those of the main program.
+        """
+        chunks: list[tuple[int, int, bool]] = []
+        start, count = 0, len(self.targets)
+        apart = self.targets.ptp.copy()
+        if self.rsi is not None:
+            apart[self.rsi.off] = True
+        while start < count:
+            if apart[start]:
+                chunks.append((start, start + 1, False))
+                start += 1
+                continue
+            following = np.flatnonzero(apart[start:])
+            end = start + int(following[0]) if len(following) else count
+            if end - start > most:
+                end = start + most
+                standing = np.flatnonzero(self.targets.cdis_mm[end - int(most * _LOOK_BACK) : end] == 0)
+                if len(standing):
+                    end = end - int(most * _LOOK_BACK) + int(standing[-1]) + 1
+            chunks.append((start, end, True))
+            start = end
+        return chunks
+
+    def _motions(self, start: int, end: int) -> bytes:
+        """Motions of rows start..end with their waits and events."""
+        ptp, wait = self.targets.ptp, self.targets.wait_s
+        special = np.zeros(end - start, dtype=bool)
+        special |= ptp[start:end] | (wait[start:end] > 0)
+        rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
+        special[[row - start for row in rows if start <= row < end]] = True
+        pieces: list[bytes] = []
+        at = start
+        for row in [*(np.flatnonzero(special) + start), end]:
+            stop = min(row + 1, end) if row < end and not ptp[row] else row
+            if stop > at:
+                pieces.append(self._lines(at, stop))
+            if row < end:
+                pieces.append(self._around(row))
+                at = row + 1
+            else:
+                at = end
+        return b"".join(pieces)
+
+    def _lines(self, start: int, end: int) -> bytes:
+        rows = slice(start, end)
+        return motion_lines(
+            self.position[rows], self.abc_deg[rows], self.speed_m_s[rows], self.targets.cdis_mm[rows],
+            self.targets.source_line[rows], self.state, self.cell.program.comment_every,
+            self._triggers_before(start, end),
+        )  # fmt: skip
+
+    def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Return the text of the triggers of rows start..end, and where that of each row begins."""
+        if self.pilot is None:
+            return NOTHING_BEFORE
+        first = self.trigger_start[start : end + 1]
+        return self.triggers[first[0] : first[-1]], first - first[0]
+
+    def _checksum(self, pilot: PilotText) -> int:
+        if pilot.stated is not None:
+            return pilot.stated
+        targets, home = self.targets, self.targets.home[:, None]
+        q_deg = self.joints.q_rad * DEG_PER_RAD
+        return checksum(
+            np.where(home, np.nan, self.position), np.where(home, np.nan, self.abc_deg),
+            np.where(home, q_deg, np.nan), targets.ptp, targets.speed_mm_s, targets.cdis_mm, pilot.rows,
+        )  # fmt: skip
+
+    def _around(self, row: int) -> bytes:
+        """What stands at a special row: its PTP, then dwell and events; RSI is on or off without them."""
+        lines: list[str] = []
+        targets = self.targets
+        if targets.ptp[row]:
+            lines.append(self._ptp(row))
+            if not targets.home[row] and self.layout.guard and not self.guarded_pose:
+                self.guarded_pose = True
+                q_deg = self.joints.q_rad[row] * DEG_PER_RAD
+                lines.append(st.environment().get_template("pose_guard.j2").render(q_deg=q_deg))
+        if self.rsi is not None and row == self.rsi.off:
+            lines.append(self.rsi.end)
+        waited_s = 0.0
+        for dwell_s, text in self.events.get(row, []):
+            lines += _dwell(dwell_s - waited_s)
+            waited_s = max(waited_s, dwell_s)
+            lines.append(text)
+        lines += _dwell(targets.wait_s[row] - waited_s)
+        if self.rsi is not None and row == self.rsi.on:
+            lines.append(self.rsi.start)
+        return _text("\n".join(lines))
+
+    def _ptp(self, row: int) -> str:
+        if self.targets.home[row]:
+            return f"PTP {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
+        values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
+        pose = ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True))
+        turn = turn_bits(self.joints.q_rad[row])
+        return f"PTP {{{pose},S {int(self.joints.status[row])},T {turn}}}"
+
+    def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
+        tools = sorted({int(number) for number in np.unique(self.targets.tool)})
+        checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
+        declarations = [EXT_BAS] if self.layout.single_file else []
+        if self.layout.split == "files":
+            declarations += [f"EXT {name}( )" for name, _ in subprograms]
+        declarations.append(DECLARATIONS)
+        if checks:
+            declarations.append(FRAME_DECLARATIONS)
+        if self.rsi is not None:
+            declarations.append(RSI_DECLARATIONS)
+        template = st.environment().get_template("head.src.j2")
+        text = template.render(
+            source=self.source,
+            name=self.name,
+            version=__version__,
+            cell=self.cell,
+            motions=len(self.targets),
+            options=st.ascii_text(self.layout.options, 200),
+            allowed=self.layout.allowed,
+            guard=self.layout.guard,
+            forces=self.layout.forces,
+            provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
+            pilot=self.pilot,
+            rsi=self.rsi,
+            pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
+            frame_checks=checks,
+            unnumbered=st.unnumbered(self.cell, tools),
+            declarations="\n".join(declarations),
+            message_setup=MESSAGE_SETUP,
+            base=st.base_statement(self.cell),
+            tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
+        )
+        return _text(text) + _text(st.render(self.cell, "program.prologue"))
+
+    def _foot(self) -> bytes:
+        return _text(st.render(self.cell, "program.epilogue")) + _text("END")
+
+    def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
+        parts: dict[str, bytes] = {}
+        needs = f" {SUBPROGRAM}(".encode("ascii")
+        called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
+        for name, motions in subprograms:
+            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
+            text = [_text(f"DEF {name}( )\n{needed}"), motions, _text("END")]
+            if self.layout.split == "files":
+                head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
+                own = called if needs in motions else []  # a local subprogram is known in its file only
+                parts[f"{name}.src"] = b"".join([head, *text, *own])
+            else:
+                main += [NEWLINE, *text]
+        lost = [NEWLINE, _text(self.rsi.lost)] if self.rsi is not None else []
+        files = {f"{self.name}.src": b"".join([*main, *called, *lost]), **parts}
+        if not self.layout.single_file:
+            data = st.environment().get_template("data.dat.j2")
+            files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
+        if self.pilot is not None and self.pilot.sidecar:
+            files[f"{self.name}{SIDECAR}"] = self.pilot.file(self.checksum)
+        if self.rsi is not None:
+            files |= {name: _text(text) for name, text in self.rsi.files.items()}
+        return files
+
+
+def turn_bits(q_rad: Floats) -> int:
+    """Return KUKA's T of joint angles (6,): a bit for each angle that prints as negative."""
+    return sum(1 << k for k, angle in enumerate(q_rad) if np.rint(angle / _T_GRID_RAD) < 0)
+
+
+def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
+    """Return positions (p, 3) in mm and A, B, C (p, 3) in degrees in the controller's tool axes."""
+    rotation = targets.rotation
+    abc_deg = np.empty((len(targets), 3))
+    for number in np.unique(targets.tool):
+        rows = targets.tool == number if (targets.tool != number).any() else slice(None)
+        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
+        chosen = rotation[rows]
+        first, run = fr.equal_runs(chosen)
+        turned = fr.rotation_from_quaternion(chosen[first]) @ turn
+        abc_deg[rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
+    return targets.position_mm, abc_deg
+
+
+def _dwell(seconds: float) -> list[str]:
+    """Return a dwell, marked so that it is not taken for a wait of a template."""
+    return [f"WAIT SEC {fixed(seconds, 3)} ; dwell"] if seconds > 0 else []
+
+
+def _text(text: str) -> bytes:
+    """Encode text with the controller's line ends; blank lines are dropped."""
+    lines = [line.rstrip() for line in re.split(r"\r?\n", text)]
+    return b"".join(line.encode("ascii", "replace") + NEWLINE for line in lines if line)
+
+
+def _file_name(source: str) -> str:
+    return re.split(r"[\\/]", source)[-1]

@@ -1,0 +1,404 @@
+"""The pipeline, and whatever needs two stages: targets with their spin search, joints of targets."""
+
+import hashlib
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl import compliance, cutting, gcode, krc4, program, robot
+from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.cell import Cell, load_cell
+from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
+from gcode2krl.identify import trial_program
+from gcode2krl.prediction import Prediction
+from gcode2krl.prediction import limits as result_limits
+from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
+from gcode2krl.units import RAD_PER_DEG
+from gcode2krl.version import __version__
+
+if TYPE_CHECKING:
+    from gcode2krl.effects import Applied
+
+_SLOWING_ROUNDS = 3
+_ACROSS_N = 100.0
+_PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
+_ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
+
+
+def predict(
+    part: str | Path,
+    cell: Cell | None = None,
+    *,
+    dt_s: float | None = None,
+    tolerance_mm: float | None = None,
+    chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
+    block_delete: bool = False,
+    forces: bool = True,
+    effects: "Sequence[str | Applied]" = (),
+    effect_folders: Sequence[str | Path] = (),
+) -> Prediction:
+    """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
+
+    ``dt_s`` is the sample time, by default the controller's cycle; ``forces`` False leaves out material
+    removal and what rests on it. A stage that cannot run (no material, unknown stiffness) leaves None and a
+    note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; a folder of
+    own effects is named in ``effect_folders``. Raises `NotUnderstoodError` where the
+    G-code, the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
+    """
+    cell = cell if cell is not None else load_cell()
+    toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
+    settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
+    prediction = predict_toolpath(
+        toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance_mm, settings=settings, forces=forces
+    )
+    return add_effects(prediction, effects, effect_folders)
+
+
+def add_effects(
+    prediction: Prediction, effects: "Sequence[str | Applied]" = (), folders: Sequence[str | Path] = ()
+) -> Prediction:
+    """Return a prediction with the effects of its cell and further ones, see `effects.with_effects`.
+
+    Raises `NotUnderstoodError` where an effect, its target or a parameter is not one of the library.
+    """
+    if not effects and not prediction.cell.effects:
+        return prediction
+    from gcode2krl.effects import from_cell, library, with_effects
+    from gcode2krl.effects.registry import resolve
+
+    known = library(folders)
+    cell = prediction.cell
+    applied = [*from_cell(cell, known), *resolve(effects, known, cell)]
+    changed = with_effects(prediction, applied, plan=_plan_anew(prediction))
+    named = [str(effect) for effect in effects]
+    return replace(changed, inputs={**changed.inputs, "effects": named})
+
+
+def _plan_anew(prediction: Prediction) -> Callable[[Targets, Cell], Motion]:
+    dt_s = float(prediction.inputs["dt_s"])
+    return lambda targets, cell: plan_motion(targets, cell, dt_s)
+
+
+def predict_toolpath(
+    toolpath: Toolpath,
+    cell: Cell,
+    *,
+    dt_s: float | None = None,
+    tolerance_mm: float | None = None,
+    settings: dict[str, Any] | None = None,
+    targets: Targets | None = None,
+    forces: bool = True,
+) -> Prediction:
+    """Run every stage behind the G-code; see `predict`. ``targets`` where they are known already."""
+    dt_s = cell.controller.cycle_s if dt_s is None else dt_s
+    if targets is None:
+        targets = set_targets(toolpath, cell, tolerance_mm)
+    motion = plan_motion(targets, cell, dt_s)
+    joints = solve_joints(motion, cell)
+    loads: tuple[Forces | None, Deflection | None, tuple[Issue, ...]] = (None, None, ())
+    if forces:
+        loads = forces_and_deflection(toolpath, motion, joints, cell)
+    inputs: dict[str, Any] = {
+        "program": toolpath.source,
+        "version": __version__,
+        "dt_s": dt_s,
+        **(settings or {}),
+    }
+    if tolerance_mm is not None:
+        inputs["tolerance_mm"] = tolerance_mm
+    source = Path(toolpath.source)
+    if source.is_file():
+        inputs["program_sha256"] = hashlib.sha256(source.read_bytes()).hexdigest()
+    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
+
+
+def forces_and_deflection(
+    toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell
+) -> tuple[Forces | None, Deflection | None, tuple[Issue, ...]]:
+    """Return forces and deflection, None where a stage cannot run, and the findings that say why.
+
+    Raises `NotUnderstoodError` where the stock that the cell names cannot be read.
+    """
+    if cell.material is None:
+        remedy = "give [material] in the cell"
+        return None, None, (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
+    line = toolpath.source_line[np.clip(motion.move, 0, len(toolpath) - 1)]
+    try:
+        forces = cutting.cut(toolpath, motion, cell)
+    except RefusedError as error:
+        return None, None, tuple(replace(issue, severity="warning") for issue in error.issues)
+    absurd = result_limits.absurd_forces(forces, line)
+    if absurd is not None:
+        return None, None, (*forces.issues, absurd)
+    cuts = np.zeros(len(toolpath), dtype=np.bool_)
+    cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
+    found = (
+        *result_limits.force_findings(forces, line, cell),
+        *program.feeds_per_tooth(toolpath, cell, cuts),
+    )
+    forces = replace(forces, issues=(*forces.issues, *found))
+    missing = compliance.missing_stiffness(cell)
+    if missing is not None:
+        return forces, None, (replace(missing, severity="note"),)
+    with np.errstate(all="ignore"):  # what comes out beyond all sense is a finding
+        deflection = compliance.deflect(joints, forces, cell)
+    reached = np.asarray(np.isfinite(joints.q_rad).all(axis=1))
+    absurd = result_limits.absurd_deflection(deflection, reached, line)
+    if absurd is not None:
+        return forces, None, (absurd,)
+    beyond = tuple(result_limits.deflection_findings(deflection, line, cell))
+    return forces, replace(deflection, issues=(*deflection.issues, *beyond)), ()
+
+
+def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:
+    """Return what the KRL program will say: poses, spin about the tool axis, CDIS, speeds, stops.
+
+    ``tolerance_mm`` is the blend tolerance at corners: below ``G64 P``, above the cell's own. The findings
+    of the G-code, of the cell and of the robot (reach, limits, singularities) travel with the table; the
+    writer refuses what is an error.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the program has no motion, or the tolerance is not positive.
+    RefusedError
+        Where the cell does not state robot, ``$BASE``, HOME or a tool's tip.
+    """
+    return targets_and_joints(toolpath, cell, tolerance_mm)[0]
+
+
+def targets_and_joints(
+    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
+) -> tuple[Targets, Joints]:
+    """Return what `set_targets` returns, and the joints it was checked with (``sigma_min`` left NaN)."""
+    if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
+        raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
+    program.require_geometry(toolpath, cell)
+    planned = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
+    warnings = program.doubtful(toolpath, cell, tolerance_mm)
+    return checked(replace(planned, issues=(*planned.issues, *warnings)), cell)
+
+
+def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
+    """Return the targets with what robot (reach, limits, singularities) and table find, and the joints."""
+    joints, findings = robot.follow(targets, cell, conditioning=False)
+    found = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
+    rows = np.flatnonzero(targets.ptp)
+    _PTP_KNOWN[found] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
+    return found, replace(joints, issues=findings)
+
+
+def controller_test_targets(
+    cell: Cell, origin_mm: tuple[float, float, float] | None = None, *, turning: bool = True
+) -> Targets:
+    """Return the targets of the controller's test program, with the lines that turn the tool or without.
+
+    Raises what `krc4.trial_program.controller_test_program` raises.
+    """
+    text = trial_program.controller_test_program(cell, origin_mm).encode("ascii")
+    targets = set_targets(gcode.read_stream(io.BytesIO(text), "test program", cell), cell)
+    return checked(trial_program.with_turning_lines(targets, cell), cell)[0] if turning else targets
+
+
+def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:
+    """Return the path the controller will command, sampled every ``dt_s`` (12 ms, or 4 ms under RSI).
+
+    Corners, time law and look-ahead by `krc4`; where a joint would exceed its speed limit the move is slowed
+    down (assumption: to exactly that limit). ``issues`` say where time is lost and how much; what rests on a
+    hypothesis about the controller says "unverified". Spindle start, tool changes and M-codes take no time
+    here.
+
+    Raises
+    ------
+    NotUnderstoodError
+        Where the program has no motion, or ``dt_s`` is not positive.
+    """
+    targets = set_targets(source, cell) if isinstance(source, Toolpath) else source
+    chain = krc4.build_chain(targets, cell)
+    profile = krc4.plan(chain, cell)
+    motion = krc4.sample_motion(targets, chain, profile, cell, dt_s)
+    issues = list(krc4.motion_issues(chain, profile, cell))
+    slowed = chain.speed_mm_s
+    for _ in range(_SLOWING_ROUNDS):
+        share = _joint_speed_share(motion, chain, cell)
+        if share is None or share.max(initial=0.0) <= 1.0 + 1e-3:
+            break
+        slowed = slowed / np.maximum(share, 1.0)
+        slower = krc4.with_speed(chain, slowed)
+        new_profile = krc4.plan(slower, cell)
+        motion = krc4.sample_motion(targets, slower, new_profile, cell, dt_s)
+        lost_s = new_profile.total_s - profile.total_s
+        worst = int(np.argmin(slowed / chain.speed_mm_s))
+        issues = [issue for issue in issues if issue.code != "joint-speed"]
+        sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
+        remedy = "lower F there, move the part, or turn the tool about its axis"
+        issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
+    issues += result_limits.motion_findings(motion, _lines(targets, motion), cell)
+    planned = replace(motion, issues=tuple(issues))
+    if motion in _ANGLES_KNOWN:
+        _ANGLES_KNOWN[planned] = _ANGLES_KNOWN.pop(motion)
+    return planned
+
+
+def _lines(targets: Targets, motion: Motion) -> Ints32:
+    """Return the G-code line of each sample (m,)."""
+    own = targets.move >= 0
+    line = np.zeros(int(max(targets.move.max(), motion.move.max(initial=0))) + 1, dtype=np.int32)
+    line[targets.move[own]] = targets.source_line[own]
+    return line[motion.move]
+
+
+def corner_errors(
+    toolpath: Toolpath, targets: Targets, cell: Cell, tolerance_mm: float | None = None
+) -> tuple[Floats, tuple[Issue, ...]]:
+    """Return the corner error (n,) in mm at the end of each move, and where a tolerance is not kept.
+
+    A tolerance is asked for by ``G64 P``, by ``tolerance_mm`` or by the cell, in this order; ``G64 P`` does
+    not speak of motions that are added (approach, retract).
+    """
+    chain = krc4.build_chain(targets, cell)
+    error_mm = chain.corner_error_mm()
+    own = cell.controller.tolerance_mm
+    below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+    move = targets.move[chain.first + 1 : chain.first + 1 + len(error_mm)]
+    programmed = np.where(move >= 0, toolpath.tolerance_mm[move], np.nan)
+    allowed = np.where(np.isnan(programmed), below, programmed)
+    beyond = np.flatnonzero(error_mm > allowed * (1.0 + 1e-9))
+    findings = tuple(
+        Issue(
+            "error",
+            "corner-tolerance",
+            int(chain.source_line[row]),
+            f"the corner is {error_mm[row]:.4f} mm off, {allowed[row]:g} mm were asked for",
+            "lower the tolerance",
+        )
+        for row in beyond[:20]
+    )
+    return error_mm, findings
+
+
+def corner_table(prediction: Prediction) -> dict[str, NDArray[Any]]:
+    """Return the blended corners as columns (c,): G-code line, distance, error and position in mm."""
+    chain = krc4.build_chain(prediction.targets, prediction.cell)
+    corners = np.flatnonzero(chain.blend_mm > 0)
+    x, y, z = chain.end_mm[corners].T
+    return {
+        "source_line": chain.source_line[corners],
+        "d_mm": chain.blend_mm[corners] * chain.scale[corners],
+        "error_mm": chain.corner_error_mm()[corners],
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+    }
+
+
+def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
+    """Return the joints at each target, or at each sample of a Motion: one branch, KUKA's signs, S and T.
+
+    For Targets ``qd_rad_s`` is NaN, and the findings on reach, limits and singularities are in ``issues``.
+    """
+    if isinstance(source, Motion):
+        return robot.joints_from_angles(source, *_motion_angles(source, cell), cell)
+    joints, findings = robot.follow(source, cell)
+    return replace(joints, issues=findings)
+
+
+def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
+    """Return the joints at the PTP targets alone, which is what a program needs; other rows are NaN.
+
+    Those of targets that were planned here are remembered as long as the targets live.
+    """
+    known = _PTP_KNOWN.get(targets)
+    if known is None or known[0] is not cell:
+        return robot.ptp_joints(targets, cell)
+    _, rows, q_rad, status, turn = known
+    count = len(targets)
+    nothing = np.full((count, 6), np.nan)
+    q, bits = nothing.copy(), np.zeros((2, count), dtype=np.int32)
+    q[rows], bits[:, rows] = q_rad, (status, turn)
+    return Joints(
+        q_rad=q,
+        qd_rad_s=nothing,
+        limit_margin_rad=nothing[:, 0],
+        sigma_min=nothing[:, 0],
+        status=bits[0],
+        turn=bits[1],
+    )
+
+
+def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats | None:
+    """Return the largest joint speed over its limit (n,) of each move of the chain; None without limits."""
+    if cell.robot.speeds.qd_deg_s is None or len(chain.length_mm) == 0:
+        return None
+    _, qd_rad_s = _motion_angles(motion, cell)
+    rows = int(max(chain.move.max(), motion.move.max())) + 1
+    by_row = robot.speed_share(motion, qd_rad_s, cell, rows)
+    return None if by_row is None else by_row[chain.move]
+
+
+def _motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
+    """Return angles and speeds (m, 6) of a Motion, remembered as long as it lives."""
+    known = _ANGLES_KNOWN.get(motion)
+    if known is None or known[0] is not cell:
+        known = (cell, *robot.motion_angles(motion, cell))
+        _ANGLES_KNOWN[motion] = known
+    return known[1], known[2]
+
+
+def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
+    def home_pose(tool: int) -> tuple[Floats, Floats]:
+        position, rotation = robot.forward(cell.home_q_rad(), cell, tool)
+        return position[0], rotation[0]
+
+    return home_pose
+
+
+def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
+    spin = cell.frames.spin
+    if not isinstance(spin, str):
+        return lambda position, axis, tool: float(spin) * RAD_PER_DEG
+    if spin == "stiffest":
+        missing = compliance.missing_stiffness(cell)
+        if missing is not None:
+            raise NotUnderstoodError(missing, source=cell.name)
+
+    def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
+        def quality(rows: Ints, spin_rad: float) -> Floats:
+            rotation = program.tool_rotation(axis[rows], spin_rad)
+            return robot.pose_quality(position[rows], rotation, tool[rows], cell)
+
+        def bending(rows: Ints, spin_rad: float) -> Floats:
+            rotation = program.tool_rotation(axis[rows], spin_rad)
+            return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
+
+        if spin == "stiffest":
+            return program.stiffest_spin(position, quality, bending)
+        return program.smooth_spin(position, quality)
+
+    return searched
+
+
+def _bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, cell: Cell) -> Floats:
+    """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
+
+    The root mean square over all directions across the axis; NaN where a branch cannot be.
+    """
+    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    result = np.full((len(position), 8), np.nan)
+    for number in np.unique(tool):
+        rows = np.flatnonzero(tool == number)
+        q = robot.inverse(position[rows], rotation[rows], cell, int(number)).reshape(-1, 6)
+        square = np.zeros(len(q))
+        for direction in (across[rows], np.cross(axis[rows], across[rows])):
+            load_N = np.repeat(_ACROSS_N * direction, 8, axis=0)
+            bent_mm, _ = compliance.deflection_of(q, load_N, np.zeros(3), np.zeros(3), cell, int(number))
+            square += np.einsum("ij,ij->i", bent_mm, bent_mm)
+        result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
+    return result

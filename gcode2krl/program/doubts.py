@@ -1,0 +1,192 @@
+"""What a program may say, but hardly means: warnings from the G-code and the cell alone."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from gcode2krl.arrays import Bools
+from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Material, Tool
+from gcode2krl.errors import Issue
+from gcode2krl.program.source_text import line_with
+from gcode2krl.tables import Event, Toolpath
+from gcode2krl.units import MS_PER_S, RAD_PER_REV, S_PER_MIN
+
+LONG_DWELL_S = 30.0
+"""Assumed: a spindle needs some seconds to start, a chip some turns to break; 30 s are a slip of the unit."""
+WIDE_CORNER_MM = 3.0
+"""Assumed: a corner that is rounded by more is not what a milled part asks for (the test program of
+`identify controller` rounds by 2.4 mm on purpose)."""
+RUBBING_MM = 0.001
+"""Feed per tooth below which nothing comes off: a fifth of the edge radius of the sharpest carbide, 5 µm."""
+THICK_MM, THICK_OF_DIAMETER, THICK_OF_FLAT_IN_METAL = 0.2, 0.1, 0.03
+"""Feed per tooth above which no mill of that diameter cuts: usual are 0.002 to 0.02 of it, 0.05 in wood; at
+small depth a ball or a corner radius makes the chip thinner than the feed."""
+_DOWN_MM = 0.01
+_SHORT_MM = 1e-6
+
+
+def doubtful(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Iterator[Issue]:
+    """Yield warnings on dwells, blending and stops in the cut beyond what is usual.
+
+    ``tolerance_mm`` is the blend tolerance asked for, below ``G64 P`` and above the cell's.
+    """
+    feed = ~toolpath.rapid & ~toolpath.machine & toolpath.is_position()
+    feed[:1] = False
+    yield from _dwells(toolpath)
+    yield from _blends(toolpath, cell, tolerance_mm, feed)
+    yield from _stops_in_cut(toolpath, cell, feed)
+
+
+def _dwells(toolpath: Toolpath) -> Iterator[Issue]:
+    long = np.flatnonzero(toolpath.dwell_s > LONG_DWELL_S)
+    if not len(long):
+        return
+    row, seconds = int(long[0]), float(toolpath.dwell_s[long[0]])
+    first = int(toolpath.source_line[row])
+    last = int(toolpath.source_line[row + 1]) if row + 1 < len(toolpath) else first + 100
+    span = toolpath.source, first, max(last, first)
+    line = _line_in(span, rf"G0*4(?![0-9]).*P0*{seconds:g}") or _line_in(span, r"G0*4(?![0-9])") or first
+    many = f", {len(long)} times" if len(long) > 1 else ""
+    yield Issue(
+        "warning",
+        "dwell-long",
+        line,
+        f"a dwell of {seconds:g} s ({seconds / S_PER_MIN:.1f} min){many}: G4 P counts seconds",
+        f"if milliseconds are meant, write G4 P{seconds / MS_PER_S:g}",
+    )
+
+
+def _line_in(span: tuple[str, int, int], pattern: str) -> int | None:
+    source, first, last = span
+    return line_with(source, pattern, first, last)
+
+
+def _blends(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None, feed: Bools) -> Iterator[Issue]:
+    controller = cell.controller
+    programmed = feed & (toolpath.tolerance_mm > WIDE_CORNER_MM)
+    if programmed.any():
+        row = int(np.argmax(programmed))
+        line = int(toolpath.source_line[row])
+        value = float(toolpath.tolerance_mm[row])
+        found = line_with(toolpath.source, r"G64.*P", 1, line, from_end=True)
+        remedy = "G64 P0.05 is usual; under G20 P counts inches"
+        yield _wide_blend(f"G64 P allows corners to be {value:g} mm off", found or line, remedy)
+    rest = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
+    if not rest.any():
+        return
+    asked = tolerance_mm if tolerance_mm is not None else controller.tolerance_mm
+    if asked is not None:
+        if asked > WIDE_CORNER_MM:
+            name = "--tolerance" if tolerance_mm is not None else "[controller] tolerance_mm ="
+            line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, rest)[0]])
+            words = f"{name} {asked:g} allows corners to be as many mm off"
+            yield _wide_blend(words, line, "0.02 to 0.2 is usual")
+    elif controller.cdis_mm * math.sqrt(0.125) > WIDE_CORNER_MM:
+        row, error_mm = _widest_corner(toolpath, controller.cdis_mm, rest)
+        words = f"[controller] cdis_mm = {controller.cdis_mm:g} rounds corners, this one by {error_mm:.3f} mm"
+        yield _wide_blend(words, int(toolpath.source_line[row]), "0.05 to 1 is usual for milling")
+
+
+def _wide_blend(words: str, line: int, remedy: str) -> Issue:
+    return Issue("warning", "blend-wide", line, words, remedy)
+
+
+def _widest_corner(toolpath: Toolpath, cdis_mm: float, rows: Bools) -> tuple[int, float]:
+    """Return the row at whose end CDIS rounds most, and by how much: d·cos(alpha/2)/2 (see `blending`)."""
+    chosen = np.flatnonzero(rows[:-1] & rows[1:])
+    if not len(chosen):
+        return int(np.argmax(rows)), 0.0
+    position = toolpath.position_mm
+    before, after = position[chosen] - position[chosen - 1], position[chosen + 1] - position[chosen]
+    long_before, long_after = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
+    product = np.maximum(long_before * long_after, _SHORT_MM**2)
+    cos_half = np.sqrt(np.clip(0.5 - 0.5 * np.einsum("ij,ij->i", before, after) / product, 0.0, 1.0))
+    error = 0.5 * np.minimum(cdis_mm, 0.5 * np.minimum(long_before, long_after)) * cos_half
+    worst = int(np.argmax(error))
+    return int(chosen[worst]), float(error[worst])
+
+
+def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
+    """M0 and M1 where the tool stands lower than where its feed run began: in what it cuts."""
+    stops = [event for event in toolpath.events if _stops(event, cell)]
+    if not stops:
+        return
+    row = np.arange(len(feed))
+    begin = np.maximum.accumulate(np.where(feed, 0, row))  # the row before the feed run
+    height = np.einsum("ij,ij->i", toolpath.position_mm, toolpath.axis)
+    for event in stops:
+        depth_mm = float(height[begin[event.row]] - height[event.row])
+        if feed[event.row] and depth_mm > _DOWN_MM:
+            turning = "the spindle turning" if _spindle_on(toolpath, event) else "the spindle stopped"
+            yield Issue(
+                "warning",
+                "stop-in-cut",
+                int(event.values["line"]),
+                f"M{event.values['m']} stops the program with the tool in the cut, {depth_mm:.2f} mm below "
+                f"where it went in, and {turning}",
+                "retract before the stop and go back in behind it",
+            )
+
+
+def _stops(event: Event, cell: Cell) -> bool:
+    """Tell whether an event is M0 or M1 and the cell's KRL for it does more than comment."""
+    number = event.values.get("m")
+    if number not in (0, 1):
+        return False
+    text = cell.m_code.get(f"M{number}", "")
+    return any(line.strip() and not line.strip().startswith(";") for line in text.splitlines())
+
+
+def _spindle_on(toolpath: Toolpath, stop: Event) -> bool:
+    rpm = 0.0
+    for event in toolpath.events:
+        if event is stop:
+            break
+        if event.kind == "spindle":
+            rpm = event.values["rpm"]
+    return rpm != 0.0
+
+
+def _thick_share(tool: Tool, material: Material | None) -> float:
+    flat = tool.kind in ("flat", "drill") and tool.corner_radius_mm == 0.0
+    in_metal = material is not None and not material.is_soft
+    return THICK_OF_FLAT_IN_METAL if flat and in_metal else THICK_OF_DIAMETER
+
+
+def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Issue]:
+    """Yield warnings on a feed per tooth F/(S·z) of nothing, or of more than a mill of that diameter takes.
+
+    ``cuts`` (n,) tells which moves meet material.
+    """
+    turning = (
+        cuts
+        & ~toolpath.rapid
+        & ~toolpath.machine
+        & (toolpath.spindle_rad_s != 0.0)
+        & (toolpath.feed_mm_s > 0.0)
+    )
+    for number in np.unique(toolpath.tool[turning]).tolist():
+        tool = cell.tool.get(number if number else cell.mounted_tool or 0)
+        rows = np.flatnonzero(turning & (toolpath.tool == number))
+        rows = rows[(toolpath.position_mm[rows] != toolpath.position_mm[rows - 1]).any(axis=1)]
+        if tool is None or not len(rows):
+            continue
+        f_z_mm = RAD_PER_REV * toolpath.feed_mm_s[rows] / (np.abs(toolpath.spindle_rad_s[rows]) * tool.teeth)
+        most_mm = max(THICK_MM, _thick_share(tool, cell.material) * tool.diameter_mm)
+        for wrong, words in (
+            (f_z_mm < RUBBING_MM, f"less than {RUBBING_MM:g} mm: edges rub and nothing comes off"),
+            (f_z_mm > most_mm, f"more than {most_mm:g} mm, for a tool of {tool.diameter_mm:g} mm"),
+        ):
+            if wrong.any():
+                row = int(rows[np.argmax(wrong)])
+                rpm = abs(float(toolpath.spindle_rad_s[row])) / RAD_PER_REV * S_PER_MIN
+                yield Issue(
+                    "warning",
+                    "feed-per-tooth",
+                    int(toolpath.source_line[row]),
+                    f"F{toolpath.feed_mm_s[row] * S_PER_MIN:.6g} at S{rpm:.6g} with {tool.teeth} teeth are "
+                    f"{f_z_mm[np.argmax(wrong)]:.3g} mm a tooth, {words}",
+                    "check F, S and the unit, and the tool's teeth in the cell",
+                )

@@ -1,0 +1,344 @@
+"""Offline compensation on stand-in forces: exact where the answer is known, refused where it would guess."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gcode2krl import compliance, robot, write_krl
+from gcode2krl.compensation.intended_path import MOST_SLOPE
+from gcode2krl.compensation.iteration import compensate, identified, keeping_forces, refuse_twice
+from gcode2krl.errors import NotUnderstoodError, RefusedError
+from gcode2krl.gcode import read_stream
+from gcode2krl.krl.read import read_krl
+from gcode2krl.krl.verify import compare
+from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
+from gcode2krl.tables import Forces
+
+HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS8000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\n"
+LINE = "G1 Z-2 F600\nG1 X100 F1500\n"
+RECTANGLE = LINE + "G1 Y60\nG1 X0\nG1 Y0\n"
+CIRCLE = "G1 Z-2 F600\nG3 X0 Y0 I30 J0 F1500\n"
+TAIL = "G0 Z20\nM5\nM30\n"
+CONSTANT = np.array([300.0, 400.0, -100.0])
+
+
+def read(body, cell):
+    toolpath = read_stream(io.BytesIO((HEAD + body + TAIL).encode()), "part.nc", cell)
+    return toolpath, set_targets(toolpath, cell)
+
+
+def below(motion):
+    return (motion.position_mm[:, 2] < 0.0)[:, None]
+
+
+def constant(motion):
+    return np.where(below(motion), CONSTANT, 0.0)
+
+
+def everywhere(motion):
+    return np.tile(CONSTANT, (len(motion), 1))
+
+
+def linear(motion):
+    return np.where(
+        below(motion), np.array([0.0, 400.0, 0.0]) * (1.0 + motion.position_mm[:, :1] / 50.0), 0.0
+    )
+
+
+def quadratic(motion):
+    return np.where(
+        below(motion), np.array([0.0, 800.0, 100.0]) * (motion.position_mm[:, :1] / 100.0) ** 2, 0.0
+    )
+
+
+def jump(motion):
+    return np.where(below(motion) & (motion.position_mm[:, :1] > 40.0), [0.0, 600.0, 0.0], 0.0)
+
+
+def standing_in(law, cell, band=0.3):
+    """The stages behind the targets, with forces that are a function of the commanded position."""
+
+    def evaluate(targets):
+        motion = plan_motion(targets, cell)
+        joints = robot.follow_motion(motion, cell)
+        rows = len(motion)
+        nothing = np.zeros(rows)
+        forces = Forces(
+            force_base_N=law(motion), moment_base_Nmm=np.zeros((rows, 3)), peak_N=nothing, torque_Nmm=nothing,
+            a_p_mm=nothing, a_e_mm=nothing, phi_rad=np.zeros((rows, 2)), tool=motion.tool, relative_band=band,
+        )  # fmt: skip
+        return motion, joints, forces, compliance.deflect(joints, forces, cell)
+
+    return evaluate
+
+
+@pytest.mark.parametrize("law", [constant, everywhere, linear, quadratic, jump])
+@pytest.mark.parametrize("body", [LINE, RECTANGLE, CIRCLE])
+def test_bent_tool_runs_on_the_intended_path(cell, body, law):
+    toolpath, targets = read(body, cell)
+    done = compensate(toolpath, targets, cell, standing_in(law, cell))
+    assert done.before.max_mm > 0.4
+    assert done.after.steady_max_mm < 0.005
+    assert np.count_nonzero(done.after.steady) > 0.5 * np.count_nonzero(done.after.cuts)
+    assert done.after.rms_mm < 0.4 * done.before.rms_mm
+    assert done.figures["change_mm"] <= 1e-3
+
+
+def test_shift_is_minus_the_deflection_normal_to_the_feed(cell):
+    """At the end of a line under a constant force, against eq. 10 computed here at the moved pose."""
+    toolpath, targets = read(LINE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
+    q = solve_joints(done.targets, cell).q_rad[row]
+    base = cell.base_matrix()[:3, :3]
+    bent = compliance.displace(q[None, :], base @ CONSTANT, np.zeros(3), cell, 1)[0][0] @ base
+    expected = -bent * [0.0, 1.0, 1.0]  # the line runs along X
+    assert done.targets.position_mm[row] - done.intended.position_mm[row] == pytest.approx(expected, abs=2e-3)
+
+
+def test_result_stays_when_it_is_evaluated_again(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    evaluate = standing_in(linear, cell)
+    done = compensate(toolpath, targets, cell, evaluate)
+    motion, _, _, deflection = evaluate(done.targets)
+    side = np.flatnonzero(
+        (motion.position_mm[:, 0] > 20.0) & (motion.position_mm[:, 0] < 80.0) & below(motion)[:, 0]
+    )
+    bent = motion.position_mm[side] + deflection.deflection_base_mm[side]
+    y_mm = np.where(bent[:, 1] > 30.0, 60.0, 0.0)
+    assert np.abs(bent[:, 1] - y_mm).max() < 0.005
+    assert np.abs(bent[:, 2] + 2.0).max() < 0.005
+
+
+def test_sharp_corner_keeps_both_lines(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    bent = done.evaluated[0].position_mm + done.evaluated[3].deflection_base_mm
+    near = np.linalg.norm(bent[:, :2] - [100.0, 60.0], axis=1) < 5.0
+    near &= bent[:, 2] < 0.0
+    along_x, along_y = np.abs(bent[near, 1] - 60.0), np.abs(bent[near, 0] - 100.0)
+    assert np.minimum(along_x, along_y).max() < 0.01 + 0.1 / 4.0  # the approximation itself: CDIS 0.1
+
+
+def test_air_and_rapids_are_not_touched(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(constant, cell))
+    shift = np.linalg.norm(done.targets.position_mm - done.intended.position_mm, axis=1)
+    rapid = done.targets.ptp | (done.targets.move < 0) | toolpath.rapid[np.maximum(done.targets.move, 0)]
+    assert shift[rapid].max() == 0.0
+    beside = np.linalg.norm((done.targets.position_mm - done.intended.position_mm)[:, :2], axis=1)
+    above = done.intended.position_mm[:, 2] >= 0.0
+    assert beside[above].max() == 0.0  # along the plunge, where nothing changes, the pieces may move
+    assert shift.max() > 1.0
+
+
+def test_nothing_to_correct_changes_nothing(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(lambda motion: 0.0 * motion.position_mm, cell))
+    assert np.array_equal(done.targets.position_mm, targets.position_mm)
+    assert done.figures["rows_added"] == 0
+
+
+def test_lines_are_divided_within_tolerance_and_keep_speed(cell):
+    toolpath, targets = read(LINE, cell)
+    evaluate = standing_in(quadratic, cell)
+    counts = {}
+    for tolerance_mm in (0.05, 0.01, 0.002):
+        done = compensate(toolpath, targets, cell, evaluate, tolerance_mm=tolerance_mm)
+        counts[tolerance_mm] = done.figures["rows_added"]
+        assert done.after.steady_max_mm <= tolerance_mm
+    assert 0 < counts[0.05] < counts[0.01] < counts[0.002]
+    added_s = done.evaluated[0].time_s[-1] - evaluate(targets)[0].time_s[-1]
+    assert abs(added_s) <= 0.012 + 1e-9
+    speed = done.evaluated[0].speed_mm_s[
+        (done.evaluated[0].position_mm[:, 0] > 5.0) & (done.evaluated[0].position_mm[:, 0] < 95.0)
+    ]
+    assert speed.min() > 0.98 * 25.0
+
+
+def test_straight_correction_divides_nothing(cell):
+    toolpath, targets = read(LINE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
+    on_line = done.intended.move == done.intended.move[row]
+    assert np.count_nonzero(on_line) <= 3  # the end of the ramp after contact
+
+
+def test_pieces_carry_their_line(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(quadratic, cell))
+    moved, intended = done.targets, done.intended
+    new = np.flatnonzero((moved.move[:-1] == moved.move[1:]) & (moved.move[:-1] >= 0) & ~moved.ptp[1:])
+    assert len(new) == done.figures["rows_added"] > 10
+    for name in ("move", "source_line", "speed_mm_s", "tool"):
+        assert np.array_equal(getattr(moved, name)[new], getattr(moved, name)[new + 1])
+    assert (moved.cdis_mm[new] > 0).all()
+    assert (moved.wait_s[new] == 0).all()
+    old = np.setdiff1d(np.arange(len(moved)), new)
+    for name in ("cdis_mm", "wait_s", "move", "rotation", "speed_mm_s"):
+        assert np.array_equal(getattr(moved, name)[old], getattr(targets, name), equal_nan=True)
+    assert np.array_equal(intended.position_mm[old], targets.position_mm)
+    ends = targets.position_mm[np.searchsorted(old, new)]
+    starts = targets.position_mm[np.searchsorted(old, new) - 1]
+    way = (ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None]
+    assert np.linalg.norm(np.cross(intended.position_mm[new] - starts, way), axis=1).max() < 1e-9
+
+
+def test_events_stay_where_they_were(cell):
+    body = "G1 Z-2 F600\nG1 X60 F1500\nM8\nG1 X100\nM9\nG1 Y40\n"
+    toolpath, targets = read(body, cell)
+    done = compensate(toolpath, targets, cell, standing_in(quadratic, cell))
+    assert done.figures["rows_added"] > 0
+    assert len(done.targets.events) == len(targets.events)
+    for before, after in zip(targets.events, done.targets.events, strict=True):
+        assert (before.kind, before.values) == (after.kind, after.values)
+        assert np.array_equal(targets.position_mm[before.row], done.intended.position_mm[after.row])
+    assert any(b.row != a.row for b, a in zip(targets.events, done.targets.events, strict=True))
+
+
+def test_jump_of_the_force_is_ramped(cell):
+    toolpath, targets = read(LINE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(jump, cell))
+    shift = done.targets.position_mm - done.intended.position_mm
+    on_line = np.flatnonzero(done.intended.position_mm[:, 2] == -2.0)
+    step = np.linalg.norm(np.diff(shift[on_line], axis=0), axis=1)
+    way = np.linalg.norm(np.diff(done.intended.position_mm[on_line], axis=0), axis=1)
+    assert (step / way).max() <= MOST_SLOPE * (1.0 + 1e-6)
+    before = done.intended.position_mm[on_line, 0] <= 40.0
+    assert np.linalg.norm(shift[on_line][before], axis=1).max() == 0.0
+    assert any(issue.code == "compensation-rest" for issue in done.issues)
+
+
+def test_force_that_rises_over_the_cutters_radius_is_followed(cell):
+    toolpath, targets = read("G0 X-20\nG1 Z-2 F600\nG1 X100 F1500\nG1 Y60\nG1 X-20\n", cell)
+
+    def entering(motion):
+        x = motion.position_mm[:, :1]
+        engaged = np.clip((x + 8.0) / 16.0, 0.0, 1.0)
+        return np.where(below(motion) & (x > -8.0), engaged * np.array([150.0, 450.0, -50.0]), 0.0)
+
+    done = compensate(toolpath, targets, cell, standing_in(entering, cell))
+    assert done.before.max_mm > 1.0
+    assert done.after.max_mm < 0.02
+    assert done.after.rms_mm < 0.002
+
+
+@pytest.mark.parametrize("tolerance_mm", [0.0, -1.0, np.nan, np.inf])
+def test_tolerance_must_be_positive(cell, tolerance_mm):
+    toolpath, targets = read(LINE, cell)
+    with pytest.raises(NotUnderstoodError, match="tolerance"):
+        compensate(toolpath, targets, cell, standing_in(constant, cell), tolerance_mm=tolerance_mm)
+
+
+def test_forces_that_grow_with_the_correction_settle_or_are_refused(cell):
+    toolpath, targets = read(LINE, cell)
+
+    def pushing(stiffness_N_mm):
+        def law(motion):
+            deep_mm = np.maximum(-motion.position_mm[:, 2:], 0.0)
+            return np.where(below(motion), stiffness_N_mm * deep_mm * np.array([0.0, 0.0, 1.0]), 0.0)
+
+        return standing_in(law, cell)
+
+    done = compensate(toolpath, targets, cell, pushing(200.0))
+    assert done.figures["rounds"] > 2
+    assert done.after.steady_max_mm < 0.01
+    for too_stiff in (1000.0, 4000.0):
+        with pytest.raises(RefusedError, match=r"compensation-(unsettled|large)"):
+            compensate(toolpath, targets, cell, pushing(too_stiff))
+
+
+def test_kept_forces_give_what_forces_by_position_give(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    evaluate = standing_in(linear, cell)
+    motion, _, forces, _ = evaluate(targets)
+    kept = compensate(toolpath, targets, cell, keeping_forces(toolpath, targets, motion, forces, cell))
+    found = compensate(toolpath, targets, cell, evaluate)
+    assert kept.after.steady_max_mm < 0.005
+    assert kept.figures["max_correction_mm"] == pytest.approx(found.figures["max_correction_mm"], rel=0.02)
+    assert kept.evaluated[2].relative_band == forces.relative_band
+
+
+def test_kept_forces_on_the_intended_targets_are_the_forces(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    motion, _, forces, _ = standing_in(linear, cell)(targets)
+    again = keeping_forces(toolpath, targets, motion, forces, cell)(targets)[2]
+    inside = below(motion)[:, 0] & ~toolpath.rapid[motion.move] & ~motion.corner
+    assert again.force_base_N[inside] == pytest.approx(forces.force_base_N[inside], abs=1e-6)
+    assert not again.force_base_N[motion.position_mm[:, 2] > 0.3].any()
+
+
+def test_unsure_deflection_is_refused_unless_identified(cell):
+    toolpath, targets = read(LINE, cell)
+    unsure = standing_in(constant, cell, band=0.6)
+    with pytest.raises(RefusedError, match="compensation-unsure") as caught:
+        compensate(toolpath, targets, cell, unsure)
+    assert "identify force" in caught.value.issues[0].remedy
+    assert cell.material is not None
+    quoted = cell.material.model_copy(update={"sure": "verified", "source": "a book"})
+    measured = cell.material.model_copy(update={"sure": "checked", "source": "identified from slots.csv"})
+    sure = cell.compliance.model_copy(update={"sure": "checked", "robot_sure": "verified"})
+    guessed = cell.compliance.model_copy(update={"sure": "checked", "robot_sure": "unknown"})
+    update = {"material": measured, "compliance": sure}
+    assert identified(cell.model_copy(update=update))
+    for wrong in ({"material": quoted}, {"compliance": guessed}, {"material": None}):
+        assert not identified(cell.model_copy(update=update | wrong))
+    done = compensate(toolpath, targets, cell.model_copy(update=update), unsure)
+    assert done.after.steady_max_mm < 0.005
+
+
+def test_not_together_with_online():
+    refuse_twice(online=False, both=False)
+    refuse_twice(online=True, both=True)
+    with pytest.raises(RefusedError, match="twice"):
+        refuse_twice(online=True, both=False)
+
+
+def test_findings_of_the_moved_targets_are_added_once(cell):
+    toolpath, targets = read(LINE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    assert done.targets.issues[: len(targets.issues)] == targets.issues
+    assert len(set(done.targets.issues)) == len(done.targets.issues)
+
+
+def test_compensated_program_verifies(cell, tmp_path):
+    toolpath, targets = read(RECTANGLE, cell)
+    done = compensate(toolpath, targets, cell, standing_in(linear, cell))
+    written = write_krl(done.targets, tmp_path / "part.src", cell)
+    assert written.report.ok
+    assert written.report.max_deviation_mm < 0.002
+    read_back = read_krl(tmp_path / "part.src")
+    report = compare(read_back, done.targets, solve_joints(done.targets, cell), cell)
+    assert report.ok
+    assert report.max_deviation_mm < 0.002
+    assert not compare(read_back, done.intended, solve_joints(done.intended, cell), cell).ok
+
+
+def test_no_lines_are_divided_where_every_target_is_a_stop(cell):
+    controller = cell.controller.model_copy(update={"advance": 0})
+    stopping = cell.model_copy(update={"controller": controller})
+    toolpath, targets = read(LINE, stopping)
+    done = compensate(toolpath, targets, stopping, standing_in(quadratic, stopping))
+    assert done.figures["rows_added"] == 0
+    assert done.figures["after_rms_mm"] < done.figures["before_rms_mm"]
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.tuples(*[st.floats(-500.0, 500.0)] * 3), st.floats(-np.pi, np.pi))
+def test_any_constant_force_in_any_direction(force, angle):
+    from gcode2krl import load_cell
+
+    cell = load_cell()
+    x, y = 80.0 * np.cos(angle), 80.0 * np.sin(angle)
+    toolpath, targets = read(f"G1 Z-2 F600\nG1 X{x:.3f} Y{y:.3f} F1500\n", cell)
+    law = lambda motion: np.tile(np.array(force), (len(motion), 1))  # noqa: E731
+    done = compensate(toolpath, targets, cell, standing_in(law, cell))
+    assert done.after.steady_max_mm < 0.005
+    end = int(np.flatnonzero(np.hypot(*(done.intended.position_mm[:, :2] - [x, y]).T) < 1e-3)[0])
+    shift = done.targets.position_mm[end] - done.intended.position_mm[end]
+    assert abs(shift @ [np.cos(angle), np.sin(angle), 0.0]) < 1e-4
+    assert replace(done.targets, issues=()).events == done.targets.events
