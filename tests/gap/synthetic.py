@@ -117,7 +117,7 @@ def _run(
     sigma_N: float, sigma_deg: float, load_encoders: bool, controller: bool, tracker: bool, force: bool,
     memory: float, extra: Any, normal: bool, tracker_hz: float,
 ) -> Run:  # fmt: skip
-    from gcode2krl.gap.beside.trace import interpolate
+    from gcode2krl.gap.beside.interpolation import interpolate
 
     signals = simulate(inputs, effects)
     end = float(signals.time_s[-1])

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from gcode2krl.gap.beside.holdout import folds_of
+from gcode2krl.gap.beside.links import SERVO
+from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.beside.trace import Trace
 
 COUNT, STEP_S = 2000, 0.01
@@ -13,7 +15,7 @@ COUNT, STEP_S = 2000, 0.01
 def _part(number: int) -> Trace:
     time_s = STEP_S * np.arange(COUNT)
     return Trace(
-        link="servo", run=f"run-{number}", run_number=number, signal="joint_actual", unit="deg", factor=1.0,
+        link=SERVO, run=f"run-{number}", run_number=number, simulator=Simulator(), factor=1.0,
         components=("A1",), columns=(0,), plus="q_act_rad", inputs=SimpleNamespace(time_s=time_s),
         time_s=time_s, measured=np.zeros((COUNT, 1)), segments=np.array([[0, COUNT]], dtype=np.int64),
     )  # fmt: skip

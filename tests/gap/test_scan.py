@@ -1,13 +1,15 @@
 """Scans against the swept surface: the diameter comes back, and nothing else is taken for it."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.scan import examine_scans
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.links import PART
+from gcode2krl.gap.beside.pairing import pairs_of
+from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.diagnosis import known_effects
 from gcode2krl.runs.scan import Scan
 from tests.gap.synthetic import prediction, runs
@@ -19,7 +21,7 @@ def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
     """Return a run whose scan is that of walls and floors of the nominal motion with another diameter."""
     generator = np.random.default_rng(seed)
     some = runs([], 1, 5, controller=False, tracker=False, normal=False)
-    (pair,) = sys.modules["gcode2krl.gap.diagnosis"]._pairs(prediction(), some)
+    (pair,) = pairs_of(prediction(), some)
     inputs = pair.inputs
     tip = inputs.position_mm + inputs.deflection_mm
     radius = prediction().cell.tool[1].diameter_mm / 2.0 + larger_mm / 2.0
@@ -40,7 +42,7 @@ def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
 
 @pytest.mark.parametrize("larger_mm", [0.12, -0.2])
 def test_a_diameter_comes_back(larger_mm):
-    found = examine_scans([_side(larger_mm)], (), known_effects([]), Mismatch())
+    found = judge_surface(PART, Context((_side(larger_mm),), 1, known_effects([]), Mismatch()))
     assert found is not None
     assert found.offset.value == pytest.approx(larger_mm, abs=0.015)
     assert found.offset.low < larger_mm < found.offset.high
@@ -51,7 +53,7 @@ def test_a_diameter_comes_back(larger_mm):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_right_cutter_is_no_finding(seed):
-    found = examine_scans([_side(seed=seed)], (), known_effects([]), Mismatch())
+    found = judge_surface(PART, Context((_side(seed=seed),), 1, known_effects([]), Mismatch()))
     assert found is not None
     assert found.applied is None
     assert abs(found.offset.value) < 0.015
@@ -59,8 +61,12 @@ def test_a_right_cutter_is_no_finding(seed):
 
 def test_without_scan_or_library_nothing_is_said():
     pair = _side()
+    bare = replace(pair, run=replace(pair.run, scan=None))
     assert (
-        examine_scans([replace(pair, run=replace(pair.run, scan=None))], (), known_effects([]), Mismatch())
+        judge_surface(
+            PART,
+            Context((bare,), 1, known_effects([]), Mismatch()),
+        )
         is None
     )
-    assert examine_scans([pair], (), {}, Mismatch()) is None
+    assert judge_surface(PART, Context((pair,), 1, {}, Mismatch())) is None

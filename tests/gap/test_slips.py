@@ -8,8 +8,8 @@ import pytest
 from gcode2krl.effects import inputs_of, simulate
 from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.gap.beside.commanded import commanded_path, on_the_curve
+from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.beside.trace import cubic
 from gcode2krl.gap.slips.program import other_program
 from gcode2krl.gap.slips.set_up import slips_of
 from gcode2krl.runs import Controller, Run

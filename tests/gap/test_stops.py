@@ -1,10 +1,9 @@
 """Stops that nobody planned, and the times at which places are reached."""
 
-import sys
-
 import numpy as np
 import pytest
 
+from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.diagnosis import known_effects
 from gcode2krl.gap.fit.place_times import gone
 from gcode2krl.gap.slips.stops import unplanned_stops
@@ -14,7 +13,7 @@ SERVO = {"tracker": False, "force": False}
 
 
 def _pairs(some):
-    return list(sys.modules["gcode2krl.gap.diagnosis"]._pairs(prediction(), some))
+    return list(pairs_of(prediction(), some))
 
 
 def test_stops_are_found_with_their_hold():

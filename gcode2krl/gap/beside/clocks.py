@@ -3,13 +3,22 @@
 ``offset_s`` > 0: the samples are older than their stamp, signal(t) = true(t - offset_s).
 """
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.beside.trace import Trace, cubic
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.runs import Controller, Measured
 from gcode2krl.runs.matching import best_shift
+
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.links.base import Link
+
 
 _REACH_S = 10.0
 _STEPS = 12
@@ -41,9 +50,51 @@ def fitted_offset(trace: Trace, most_s: float = 0.5) -> tuple[float, float]:
 
 
 def _shifted(trace: Trace, offset_s: float) -> Floats:
-    from dataclasses import replace
-
     return replace(trace, time_s=trace.time_s - offset_s).nominal
+
+
+def with_table_clock(pair: Pair, link: "Link") -> Pair:
+    """Return the pair with the clock of a link's table set as its trace fits best."""
+    traces = link.traces([pair])
+    if not traces:
+        return pair
+    offset_s, deviation_s = fitted_offset(traces[0])
+    return pair.later(link.table, offset_s) if np.isfinite(deviation_s) else pair
+
+
+def with_coarse_clocks(pair: Pair) -> Pair:
+    """Return the pair with large clock errors taken off its tables; as it is for a log alone."""
+    if pair.from_log:
+        return pair
+    tables = [table for table in (pair.run.controller, pair.run.tracker) if table is not None]
+    offsets = {type(table).__name__.lower(): coarse_offset(pair, table) for table in tables}
+    return replace(pair, clock_s={name: offset for name, offset in offsets.items() if offset != 0.0})
+
+
+def with_controller_clocks(context: Context, path: "Link") -> Context:
+    """Return the context with the controllers' clocks set run by run, where runs keep to the plan's times.
+
+    What is common to all of them stays where it is a finding. Where runs do not keep to the plan, their
+    clocks are fitted along with the time law.
+    """
+    offsets = []
+    for pair in context.pairs:
+        traces = path.traces([pair])
+        offset_s, deviation_s = fitted_offset(traces[0]) if traces else (0.0, np.inf)
+        offsets.append(offset_s if np.isfinite(deviation_s) else 0.0)
+    common_s = float(np.median(offsets)) if offsets else 0.0
+    kept_s = common_s if abs(common_s) > context.mismatch.clock_s else 0.0
+
+    def later(by_s: float) -> list[Pair]:
+        return [
+            pair.later(path.table, offset_s - by_s)
+            for pair, offset_s in zip(context.pairs, offsets, strict=True)
+        ]
+
+    left = [trace.residual for trace in path.traces(later(0.0))]
+    if not left or float(np.sqrt(np.mean(np.concatenate(left) ** 2))) >= path.model_rms:
+        return context
+    return replace(context.with_pairs(later(kept_s)), clocks_set=True)
 
 
 def coarse_offset(pair: Pair, table: Measured) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gap.beside.trace import cubic
+from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.pipeline import plan_motion, solve_joints
 from gcode2krl.prediction import Prediction
 

@@ -7,14 +7,22 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.gram import STRETCH_S
 
+STRETCH_S = 1.0
+"""Longer than an instrument remembers; rows of one stretch are kept together in every split."""
 _GUARD_S = STRETCH_S
 _QUARTERS = 4
 _NEARLY_ALL, _EVENLY = 0.75, 0.2
 _LEAST_KEPT, _LEAST_HELD = 30, 10
 _LEAST_SEEN = 0.1
 """Stretches with less than this of the power that a gap has cannot tell of it, held out or not."""
+
+
+def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:
+    """Return the traces of the runs that explain, and the held-out ones; all explain if none would."""
+    explain = [trace for trace in traces if trace.run_number < explaining]
+    held = [trace for trace in traces if trace.run_number >= explaining]
+    return (explain, held) if explain else (held, [])
 
 
 def folds_of(traces: Sequence[Trace], power: Sequence[Floats] = ()) -> list[tuple[list[Trace], list[Trace]]]:

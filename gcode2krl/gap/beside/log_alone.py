@@ -9,26 +9,22 @@ from gcode2krl import robot
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.effects import Inputs
 from gcode2krl.effects.operators import play
+from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.beside.trace import linear
-from gcode2krl.gap.fit.noise import resolution
+from gcode2krl.gap.beside.pairing import first_start, hours_since
 from gcode2krl.runs import Run
-
-_S_PER_H = 3600.0
 
 
 def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:
     """Return a pair for each run that has a controller's table."""
-    started = [run.head.started for run in runs if run.head.started is not None]
-    first = min(started) if started else None
+    first, known_robot = first_start(runs), cell is not None
+    cell = load_cell() if cell is None else cell
     pairs = []
     for number, run in enumerate(runs):
-        hours = 0.0
-        if first is not None and run.head.started is not None:
-            hours = (run.head.started - first).total_seconds() / _S_PER_H
-        inputs = _inputs(run, cell if cell is not None else load_cell(), hours, cell is not None)
+        inputs = _inputs(run, cell, hours_since(first, run), known_robot)
         if inputs is not None:
-            pairs.append(Pair(run=run, number=number, inputs=inputs, from_log=True))
+            pairs.append(Pair(run=run, number=number, inputs=inputs, from_log=True, known_robot=known_robot))
     return pairs
 
 

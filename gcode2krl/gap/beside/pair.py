@@ -7,7 +7,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Inputs
-from gcode2krl.gap.beside.trace import cubic, linear, nearest_rows
+from gcode2krl.gap.beside.interpolation import cubic, linear, nearest_rows
+from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.runs import Controller, Measured, Run
 
 _SMOOTH_S = 0.05
@@ -25,6 +26,10 @@ class Pair:
     inputs: Inputs
     from_log: bool = False
     """There is no prediction: the inputs' commanded joints are those of the log."""
+    known_robot: bool = True
+    """The cell is that of the robot; without it there are no kinematics."""
+    simulator: Simulator = field(default_factory=Simulator)
+    """Shared by all runs of a prediction."""
     clock_s: Mapping[str, float] = field(default_factory=dict)
     """Offset of each table that is taken off its stamps."""
     fitted: Mapping[str, Floats] = field(default_factory=dict)
@@ -39,6 +44,10 @@ class Pair:
         """Return the time stamps of a table less its coarse clock error."""
         stamps: Floats = table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)
         return stamps
+
+    def later(self, table: str, offset_s: float) -> "Pair":
+        """Return the pair with a clock error of ``offset_s`` taken off the stamps of a table."""
+        return replace(self, clock_s={**self.clock_s, table: self.clock_s.get(table, 0.0) + offset_s})
 
     def with_measured_load(self) -> "Pair":
         """Return the pair with the measured force as what bends the arm, as its model does not hold.

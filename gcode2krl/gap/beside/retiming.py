@@ -4,13 +4,16 @@ Links behind the path are then compared at the same place, whatever the controll
 """
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.beside.links import traces_of
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import late_s
+
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.links.base import Link
 
 _SAME_LENGTH = 0.02
 _STILL = 1e-7
@@ -39,13 +42,13 @@ def retimed(pair: Pair) -> Pair:
     return _at_times(pair, time_s)
 
 
-def refined(pair: Pair) -> Pair:
+def refined(pair: Pair, path: "Link") -> Pair:
     """Return the pair with its times moved by how late the run is, while that is some hundredths of a second.
 
     How late it is comes from the commanded joints along the motion; through rests it goes on in a line.
     """
     for _ in range(_ROUNDS):
-        traces = traces_of("path", [pair])
+        traces = path.traces([pair])
         if not traces or traces[0].shape[1] < 6:
             return pair
         trace = traces[0]

@@ -1,38 +1,31 @@
 """One measured signal of one run beside the model of it: what a link of the chain is judged by."""
 
-from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.effects import Applied, Inputs, Signals, commanded, simulate
+from gcode2krl.effects import Applied, Inputs, Signals
+from gcode2krl.gap.beside.interpolation import interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.simulator import Simulator
 
-_PATHS = {"tcp_base_mm": "position_mm", "q_cmd_rad": "q_cmd_rad", "q_act_rad": "q_cmd_rad",
-          "q_load_rad": "q_cmd_rad"}  # fmt: skip
-"""Signals that follow the commanded path closely: the path is interpolated by cubics, the rest by lines."""
-
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.links.base import Link
 
 _CLOCK_STEP_S = 0.004
-_MOST_KNOWN = 64
-_PATHS_KNOWN: OrderedDict[Any, tuple[Inputs, Signals]] = OrderedDict()
-"""Commanded paths by what they were planned with; the inputs are kept, so that their id stays their own."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
     """A measured signal (n, k), the inputs of its model, and which signals of the model it is."""
 
-    link: str
+    link: "Link"
     run: str
     run_number: int
-    """Number of the run."""
-    signal: str
-    """Name in the report: tcp, force, joint_load …"""
-    unit: str
+    simulator: Simulator
     factor: float
     """From the inner unit to that of the report."""
     components: tuple[str, ...]
@@ -55,7 +48,16 @@ class Trace:
     in_sensor_frame: bool = False
     """The values are along the sensor's axes, which are those of the flange."""
     in_tool_frame: bool = False
-    hints: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def signal(self) -> str:
+        """Return the name in the report: tcp, force, joint_load …"""
+        return self.link.signal
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the report."""
+        return self.link.unit
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -83,7 +85,7 @@ class Trace:
     @cached_property
     def clock_rate(self) -> Floats:
         """(n, k) how fast the signal changes with its own clock: that of ``plus`` where both have one."""
-        if self.minus is None or self.link != "gear":
+        if not self.link.own_clock:
             return self.rate
         step, signals = _CLOCK_STEP_S, self._plain
         times = self.time_s - self.plus_late_s
@@ -106,16 +108,7 @@ class Trace:
         return self._simulated((*self.base, *applied))
 
     def _simulated(self, applied: tuple[Applied, ...]) -> Signals:
-        """Return the signals of the model; the commanded path is one for all runs and simulated once."""
-        if self.link != "path":
-            return simulate(self.inputs, applied)
-        values = tuple((one.effect.name, one.target, *one.values.items()) for one in applied)
-        key = (id(self.inputs.plan), id(self.inputs.time_s), id(self.inputs.q_cmd_rad), values)
-        if key not in _PATHS_KNOWN:
-            _PATHS_KNOWN[key] = (self.inputs, commanded(self.inputs, applied))
-            if len(_PATHS_KNOWN) > _MOST_KNOWN:
-                _PATHS_KNOWN.popitem(last=False)
-        return _PATHS_KNOWN[key][1]
+        return self.link.simulated(self, applied)
 
     def _at(self, signals: Signals, stamps: Floats) -> Floats:
         times = signals.true_time(self.plus, stamps - self.plus_late_s)
@@ -138,53 +131,3 @@ class Trace:
         row = nearest_rows(inputs.time_s, times)
         turned: Floats = np.einsum("nji,nj->ni", rotation[row], values)
         return turned
-
-
-def values_of(signals: Signals, name: str) -> Floats:
-    """Return a signal (m, c); the motor side is the measured one where the inputs have it."""
-    if name == "q_act_rad" and signals.inputs.q_act_rad is not None:
-        return signals.inputs.q_act_rad
-    values: Floats = getattr(signals, name)
-    return values
-
-
-def interpolate(signals: Signals, name: str, times_s: Floats) -> Floats:
-    """Return a signal at other times: the commanded path in it by cubics, what deviates from it by lines.
-
-    A line between samples 12 ms apart is off by a·dt²/8, 0.04 mm at 2 m/s²; a cubic is not.
-    """
-    values = values_of(signals, name)
-    path = getattr(signals.inputs, _PATHS[name], None) if name in _PATHS else None
-    if path is None:
-        return linear(times_s, signals.time_s, values)
-    return cubic(times_s, signals.time_s, path) + linear(times_s, signals.time_s, values - path)
-
-
-def linear(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
-    """Return the columns (m, c) at other times, linearly; the ends are held."""
-    row, share = _place(times_s, own_s)
-    found: Floats = values[row] + share[:, None] * (values[row + 1] - values[row])
-    return found
-
-
-def cubic(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
-    """Return the columns (m, c) at other times by cubic Hermite pieces with central slopes; ends are held."""
-    row, u = _place(times_s, own_s)
-    slope = np.gradient(values, own_s, axis=0)
-    width, u = (own_s[row + 1] - own_s[row])[:, None], u[:, None]
-    a, b = values[row], values[row + 1]
-    da, db = slope[row] * width, slope[row + 1] * width
-    found: Floats = a + u * (da + u * (3.0 * (b - a) - 2.0 * da - db + u * (2.0 * (a - b) + da + db)))
-    return found
-
-
-def nearest_rows(own_s: Floats, times_s: Floats) -> Ints:
-    """Return the row (n,) of the sample nearest to each time."""
-    row, share = _place(times_s, own_s)
-    return row + (share > 0.5)
-
-
-def _place(times_s: Floats, own_s: Floats) -> tuple[Ints, Floats]:
-    row = np.clip(np.searchsorted(own_s, times_s, side="right") - 1, 0, len(own_s) - 2)
-    share = np.clip((times_s - own_s[row]) / (own_s[row + 1] - own_s[row]), 0.0, 1.0)
-    return row, share

@@ -28,7 +28,7 @@ def observable(found: Examination) -> list[dict[str, Any]]:
         needed = max(2.0 * found.first_level, LEAST_RATIO**2 * found.times)
         smallest = abs(start - nominal) * float(np.sqrt(needed / power))
         entry = {
-            "link": found.link, "effect": block.effect.name, "target": block.target, "parameter": name,
+            "link": found.link.name, "effect": block.effect.name, "target": block.target, "parameter": name,
             "smallest": smallest, "seen": share >= SEEN,
         }  # fmt: skip
         if block.key not in best or smallest < best[block.key]["smallest"]:

@@ -73,7 +73,7 @@ def _usual(found: Examination, number: int) -> dict[str, float]:
 
     It is a nuisance of the fit at its own small size, which at the size of the effect has another shape.
     """
-    if found.link not in ("servo", "gear"):
+    if not found.link.of_joints or found.link.tells_time:
         return {}
     limits = found.question.mismatch.limits(found.applied[number], 1.0)
     return {name: _INSIDE * limit for name, limit in limits.items() if name in _SHARED}

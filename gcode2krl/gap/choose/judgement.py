@@ -8,7 +8,9 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
+from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.choose.gap_size import Size, size_of_gap
 from gcode2krl.gap.choose.intervals import Interval, intervals_of
 from gcode2krl.gap.choose.rivals import (
@@ -52,7 +54,7 @@ class Cause:
 class Judgement:
     """What is known of one link."""
 
-    link: str
+    link: Link
     traces: tuple[Trace, ...]
     verdict: str
     causes: tuple[Cause, ...]
@@ -68,8 +70,16 @@ class Judgement:
         """Return the named causes."""
         return tuple(cause.applied for cause in self.causes if cause.probability >= NAMED)
 
+    def fitted(self, trace: Trace) -> Floats:
+        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
+        return fitted_signal(trace, self.examination)
 
-def judge(link: str, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
+    def without(self, applied: Applied) -> "Judgement":
+        """Return the judgement without a cause that a later link has shown to be elsewhere."""
+        return replace(self, causes=tuple(cause for cause in self.causes if cause.applied != applied))
+
+
+def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     """Examine a link on some traces and report on the held-out ones; without any, each trace by turns."""
     known = Signatures()
     moved = with_set_clocks([*traces, *held], question, known)
@@ -93,7 +103,7 @@ def judge(link: str, traces: Sequence[Trace], held: Sequence[Trace], question: Q
 
 
 def _trials(
-    link: str, traces: Sequence[Trace], held: Sequence[Trace], question: Question, known: Signatures,
+    link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question, known: Signatures,
     found: Examination,
 ) -> list["_Trial"]:  # fmt: skip
     """Return one trial a split: what was chosen without the held-out data, and these."""
@@ -172,7 +182,7 @@ def _beside_others(found: Examination, positions: Sequence[int]) -> bool:
 
 
 def _judgement(
-    link: str, traces: Sequence[Trace], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
+    link: Link, traces: Sequence[Trace], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
     whole: Size, held_out: bool,
 ) -> Judgement:  # fmt: skip
     last = sizes[-1]
@@ -194,7 +204,7 @@ def _judgement(
         causes.append(
             Cause(
                 applied=found.applied[number],
-                link=link,
+                link=link.name,
                 probability=own,
                 parameters=intervals[number],
                 shrink=brings if held_out else None,

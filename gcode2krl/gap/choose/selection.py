@@ -9,6 +9,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.scoring import (
     LEAST_RATIO,
@@ -70,7 +71,7 @@ class Question:
 class Examination:
     """What one link's data say."""
 
-    link: str
+    link: Link
     traces: list[Trace]
     noise: list[Noise]
     nuisance: list[list[Nuisance]]
@@ -116,7 +117,7 @@ class Examination:
 
 
 def examine(
-    link: str, traces: Sequence[Trace], question: Question, signatures: Signatures | None = None,
+    link: Link, traces: Sequence[Trace], question: Question, signatures: Signatures | None = None,
     noise: list[Noise] | None = None,
 ) -> Examination:  # fmt: skip
     """Choose and fit effects for a link, from these parts alone."""
@@ -187,7 +188,7 @@ def _select(found: Examination) -> None:
 
 def _is_sound(found: Examination) -> bool:
     """Tell whether the path is met to the accuracy of the model, which is no noise that averages out."""
-    return found.link == "path" and found.fitted.chi2 < found.values
+    return found.link.model_rms > 0.0 and found.fitted.chi2 < found.values
 
 
 def _candidates(found: Examination, rows: int, allowed: Sequence[Column]) -> list[Score]:

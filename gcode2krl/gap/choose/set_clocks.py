@@ -15,8 +15,6 @@ from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.selection import Question, nuisance_for
 from gcode2krl.gap.fit.signatures import Signatures
 
-LINKS = ("gear", "mechanics")
-"""Links whose signals change fast all the time; a force does where the cutter enters and leaves only."""
 _ROUNDS = 2
 _MOST_S = 0.02
 _RIDGE = 1e-6
@@ -28,7 +26,7 @@ def with_set_clocks(traces: Sequence[Trace], question: Question, known: Signatur
     What all runs share is kept where it is more than mismatch: it is a cause to be found.
     """
     traces = list(traces)
-    if not traces or traces[0].link not in LINKS:
+    if not traces or not traces[0].link.sets_clocks:
         return traces
     nuisance = nuisance_for(traces, question, known)
     total = np.zeros(len(traces))
@@ -54,7 +52,7 @@ def with_set_clocks(traces: Sequence[Trace], question: Question, known: Signatur
 
 def _later(trace: Trace, offset_s: float) -> Trace:
     """Return the trace with a clock error taken off: of the load encoders alone, or of the whole table."""
-    if trace.link == "gear":
+    if trace.link.own_clock:
         return replace(trace, plus_late_s=offset_s)
     return replace(trace, time_s=trace.time_s - offset_s)
 

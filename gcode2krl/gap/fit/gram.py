@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.gap.beside.holdout import STRETCH_S
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.box import MOST, boxed
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
 
-STRETCH_S = 1.0
-"""Longer than an instrument remembers; rows of one stretch are kept together in every split."""
 PRIOR = 3.0
 """A size is expected within so many typical ones."""
 

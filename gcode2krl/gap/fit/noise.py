@@ -111,10 +111,3 @@ def _stable(a: Floats) -> Floats:
         return a
     shrink: Floats = a * (0.98 / largest) ** np.arange(1, len(a) + 1)
     return shrink
-
-
-def resolution(values: Floats) -> float:
-    """Return the rms of rounding to the last decimal of (n,) values: step / sqrt(12)."""
-    steps = np.abs(np.diff(np.unique(np.round(values, 12))))
-    steps = steps[steps > 1e-9]
-    return float(steps.min() / np.sqrt(12.0)) if len(steps) else 0.0

@@ -6,8 +6,10 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.gap.beside.trace import Trace, nearest_rows
-from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, resolution, unbiased
+from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance
 
 _SLOW_S = 0.5

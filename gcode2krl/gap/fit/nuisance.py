@@ -61,8 +61,8 @@ def _all(
         return (each for each in items if each is not None)
 
     joints = [f"A{number}" for number in range(1, 7)]
-    behind_gear = trace.link == "gear" or (trace.link == "mechanics" and "gear" in upstream)
-    if trace.link == "servo" or (trace.link == "mechanics" and "servo" in upstream):
+    behind_gear = trace.link.name == "gear" or (trace.link.name == "mechanics" and "gear" in upstream)
+    if trace.link.name == "servo" or (trace.link.name == "mechanics" and "servo" in upstream):
         yield from present([effect("servo_lag", a, "tau_s", m.lag_s) for a in joints])
     if behind_gear:
         play_deg = m.play_rad * DEG_PER_RAD
@@ -72,24 +72,24 @@ def _all(
             for a in joints
             for h in (1.0, 2.0)
         ])  # fmt: skip
-    if trace.link == "gear":
+    if trace.link.name == "gear":
         yield Nuisance("encoder zero", False, _constants(trace) * m.joint_zero_rad * _ROUGH)
-    if trace.link in ("force", "mechanics"):
+    if trace.link.name in ("force", "mechanics"):
         yield from present([
             effect("force_scale", way, "scale", m.coefficients) for way in ("tangential", "radial", "axial")
         ])  # fmt: skip
         yield from present([effect("edge_force", None, "scale", m.coefficients)])
-    if trace.link == "force":
+    if trace.link.name == "force":
         yield Nuisance("force zero", False, _force_zero(trace) * sigma(m.force_zero_N))
         yield Nuisance("sensor gain", False, _diagonal(trace.nominal) * sigma(m.sensor_gain))
-    if trace.link == "mechanics":
+    if trace.link.name == "mechanics":
         yield from present([
             effect("stiffness", str(name), "scale", m.stiffness)
             for name in trace.inputs.cell.compliance.virtual_joints
         ])  # fmt: skip
         yield Nuisance("frame", False, _frame(trace, m))
     yield Nuisance("clock", False, -_stacked(trace.clock_rate)[:, :, None] * sigma(m.clock_s) * clock)
-    if trace.link == "path" or (trace.link == "mechanics" and "path" in upstream):
+    if trace.link.name == "path" or (trace.link.name == "mechanics" and "path" in upstream):
         yield Nuisance("time law", False, _jitter(trace, _JITTER_KNOTS_S) * sigma(m.clock_s))
 
 
@@ -142,6 +142,6 @@ def _jitter(trace: Trace, knots_s: float) -> Floats:
 
 
 def _rows(trace: Trace, rotations: Floats) -> Floats:
-    from gcode2krl.gap.beside.trace import nearest_rows
+    from gcode2krl.gap.beside.interpolation import nearest_rows
 
     return rotations[nearest_rows(trace.inputs.time_s, trace.time_s)]

@@ -11,14 +11,13 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.beside.interpolation import values_of
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.numbers import Free
 
 _PLACES = 400
 _STEPS = 8
 _STEP_SHARE = 0.1
-LEAST_STEP = {"path": 1e-4, "mechanics": 0.5}
-"""rad, mm: shorter ways are noise of the instrument, not motion."""
 
 
 class PlaceTimes:
@@ -26,7 +25,7 @@ class PlaceTimes:
 
     def __init__(self, traces: Sequence[Trace]) -> None:
         self.traces = list(traces)
-        self.measured = [gone(trace.time_s, trace.measured, LEAST_STEP[trace.link]) for trace in traces]
+        self.measured = [gone(trace.time_s, trace.measured, trace.link.least_step) for trace in traces]
 
     def late(self, applied: Sequence[Applied]) -> Floats:
         """Return how late (runs · places,) the runs are beside a plan with these effects, in s.
@@ -36,7 +35,7 @@ class PlaceTimes:
         late = []
         for trace, (own_s, own_way) in zip(self.traces, self.measured, strict=True):
             signals = trace.signals(applied)
-            values = signals.q_cmd_rad if trace.link == "path" else signals.tcp_base_mm
+            values = values_of(signals, trace.plus)
             time_s, way = gone(signals.time_s, values[:, list(trace.columns)], 0.0)
             at = own_way[-1] * (np.arange(_PLACES) + 0.5) / _PLACES
             behind = np.interp(at, own_way, own_s) - np.interp(at, way, time_s)

@@ -17,7 +17,7 @@ from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.beside.clocks import fitted_offset
 from gcode2krl.gap.beside.commanded import on_the_curve
-from gcode2krl.gap.beside.links import MODEL_RAD, traces_of
+from gcode2krl.gap.beside.links import FORCE, MECHANICS, MODEL_RAD, PATH
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.likelihood import Likelihood
@@ -83,12 +83,13 @@ def clock_slips(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Sl
     found = []
     if "clock" not in library:
         return []
-    for name, link in (("controller", "path"), ("tracker", "mechanics")):
+    for link in (PATH, MECHANICS):
+        name = link.table
         offsets = [pair.clock_s.get(name, 0.0) for pair in pairs]
         if not any(offsets):
             continue
         plain = [replace(pair, clock_s={**pair.clock_s, name: 0.0}) for pair in pairs]
-        after, before = traces_of(link, pairs), traces_of(link, plain)
+        after, before = link.traces(pairs), link.traces(plain)
         if not after or not before:
             continue
         offset = float(np.median(offsets))
@@ -97,7 +98,7 @@ def clock_slips(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Sl
         one = Applied(library["clock"], name, {"offset_s": offset, "skew": 0.0})
         words = f"the clock of {name} is {offset:+.3f} s off the prediction's"
         rms = [_rms([trace.residual for trace in traces]) * after[0].factor for traces in (before, after)]
-        found.append(Slip(one, link, rms[0], rms[1], after[0].unit, words, False))
+        found.append(Slip(one, link.name, rms[0], rms[1], after[0].unit, words, False))
     return found
 
 
@@ -115,7 +116,7 @@ def _fatal(library: Mapping[str, Effect], name: str, issue: Issue, pairs: Sequen
 
 def _final(effect: Effect, target: str | None, words: str, pairs: Sequence[Pair]) -> Slip:
     """Return a slip beyond which nothing is compared."""
-    traces = traces_of("path", pairs) or traces_of("mechanics", pairs)
+    traces = PATH.traces(pairs) or MECHANICS.traces(pairs)
     rms = _rms([trace.residual for trace in traces]) if traces else 0.0
     factor, unit = (traces[0].factor, traces[0].unit) if traces else (1.0, "mm")
     values = {p.name: p.start if p.nominal is None else p.nominal for p in effect.parameters}
@@ -136,7 +137,7 @@ def _override(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip
     known = [each for each in percents if each is not None]
     if not known or abs(float(np.median(known)) - 100.0) < _SPEED:
         return []
-    traces = traces_of("path", pairs) or traces_of("mechanics", pairs)
+    traces = PATH.traces(pairs) or MECHANICS.traces(pairs)
     if not traces:
         return []
     guess = float(np.median(known))
@@ -184,7 +185,7 @@ def _moving(time_s: Floats, values: Floats, still: float) -> tuple[float, float]
 
 def _other_frame(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
     """Return another tool or base, if the commanded joints show one."""
-    traces = traces_of("path", pairs)
+    traces = PATH.traces(pairs)
     if not traces or _rms([trace.residual for trace in traces]) < _LARGE_RAD:
         return []
     cell, used = pairs[0].inputs.cell, set(np.unique(pairs[0].inputs.tool).tolist())
@@ -242,7 +243,7 @@ def _refined(traces: Sequence[Trace], best: Applied) -> Applied:
 def _base_number(pair: Pair, effect: Effect) -> Applied:
     """Return the base that the logged joints belong to (Kabsch 1976 on their tips)."""
     from gcode2krl import robot
-    from gcode2krl.gap.beside.trace import cubic
+    from gcode2krl.gap.beside.interpolation import cubic
 
     table = pair.run.controller
     values = dict.fromkeys(effect.names, 0.0)
@@ -250,7 +251,7 @@ def _base_number(pair: Pair, effect: Effect) -> Applied:
         return Applied(effect, None, values)
     tool = int(np.bincount(np.maximum(pair.inputs.tool, 0)).argmax())
     tips, turned = robot.forward(table.q_cmd_rad, pair.inputs.cell, tool)
-    traces = traces_of("path", [pair])
+    traces = PATH.traces([pair])
     late_s, deviation = fitted_offset(traces[0]) if traces else (0.0, np.inf)
     stamps = pair.stamps(table) - (late_s if np.isfinite(deviation) else 0.0)
     wanted = cubic(stamps, pair.inputs.time_s, pair.inputs.position_mm)
@@ -269,7 +270,7 @@ def _base_number(pair: Pair, effect: Effect) -> Applied:
 def _tracker_frame(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
     """Return the frame in which the tracker states the tip, if it is far from ``$BASE`` (Kabsch 1976)."""
     traces = [
-        trace for trace in traces_of("mechanics", pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
+        trace for trace in MECHANICS.traces(pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
     ]
     if "base_frame" not in library or not traces or _rms([trace.residual for trace in traces]) < _LARGE_MM:
         return []
@@ -289,7 +290,7 @@ def _tracker_frame(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list
 
 def _force_unit(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
     """Return the unit of the force table, if it is none of newtons."""
-    traces = traces_of("force", pairs)
+    traces = FORCE.traces(pairs)
     if "unit" not in library or not traces or not any(trace.nominal.any() for trace in traces):
         return []
     power = sum(float(np.sum(trace.nominal**2)) for trace in traces)
@@ -322,7 +323,7 @@ def _slip_if_explained(traces: Sequence[Trace], best: Applied, rms: float, words
     if rms**2 > (1.0 - _EXPLAINS) * before**2:
         return []
     trace = traces[0]
-    return [Slip(best, trace.link, before * trace.factor, rms * trace.factor, trace.unit, words, False)]
+    return [Slip(best, trace.link.name, before * trace.factor, rms * trace.factor, trace.unit, words, False)]
 
 
 def _rms(values: Sequence[Floats]) -> float:

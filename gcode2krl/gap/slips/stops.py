@@ -13,11 +13,11 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Effect, Inputs
 from gcode2krl.effects.builtin.advance_stop import with_stops
-from gcode2krl.gap.beside.clocks import fitted_offset
-from gcode2krl.gap.beside.links import MODEL_RAD, traces_of
+from gcode2krl.gap.beside.clocks import with_table_clock
+from gcode2krl.gap.beside.links import MECHANICS, PATH
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.place_times import LEAST_STEP, gone
+from gcode2krl.gap.fit.place_times import gone
 from gcode2krl.gap.slips.set_up import Slip
 
 _LEAST_S = 0.02
@@ -26,7 +26,6 @@ _MOST_LEFT_OUT = 4
 """So many of the least are left out by and by: a last leg, say, may only look late."""
 _MOST_SHARE = 0.5
 """Where more of the corners are late, it is the time law."""
-_LEAST_OFF = {"path": 2.0 * MODEL_RAD, "mechanics": 0.5}
 _EXPLAINS = 0.95
 _REFINED, _SETTLED_S = 4, 1e-3
 _NEAR_MM = 0.3
@@ -39,7 +38,7 @@ def unplanned_stops(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> tup
     plannable = all("plan" in pair.inputs.offers for pair in pairs)
     if effect is None or not plannable or len(traces) < len(pairs):
         return [], unchanged
-    if _rms(traces) < _LEAST_OFF[traces[0].link]:
+    if _rms(traces) < traces[0].link.least_off:
         return [], unchanged
     jumps = [_stops_of(pair) for pair in pairs]
     before = _rms(traces)
@@ -59,7 +58,7 @@ def unplanned_stops(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> tup
     lines = sorted({int(line) for pair, rows in places for line in _lines(pair, rows)})
     words = f"the robot stopped exactly at {count} corners that are blended in the plan, lines {lines}"
     factor, unit = traces[0].factor, traces[0].unit
-    return [Slip(one, traces[0].link, before * factor, after * factor, unit, words, False)], stopped
+    return [Slip(one, traces[0].link.name, before * factor, after * factor, unit, words, False)], stopped
 
 
 def _held(pairs: Sequence[Pair], stops: Sequence[Ints]) -> tuple[float, list[Pair]]:
@@ -101,8 +100,8 @@ def _lateness(pair: Pair, corners: Ints) -> Floats:
     if not traces or targets is None or not len(corners):
         return np.zeros(len(corners))
     trace = traces[0]
-    own_s, own_way = gone(trace.time_s, trace.measured, LEAST_STEP[trace.link])
-    planned = pair.inputs.q_cmd_rad if trace.link == "path" else pair.inputs.position_mm
+    own_s, own_way = gone(trace.time_s, trace.measured, trace.link.least_step)
+    planned = trace.link.planned(pair.inputs)
     time_s, way = gone(pair.inputs.time_s, planned[:, list(trace.columns)], 0.0)
     rows = _nearest_in_order(pair.inputs.position_mm, targets.position_mm[corners])
     edges = way[np.concatenate([[0], rows, [len(way) - 1]])]
@@ -141,16 +140,12 @@ def _stopped(pair: Pair, rows: Ints, hold_s: float) -> Pair:
 def _on_time(pair: Pair) -> Pair:
     """Return the pair with the clock of its table as it fits best."""
     traces = _traces([pair])
-    offset, deviation = fitted_offset(traces[0]) if traces else (0.0, np.inf)
-    if not np.isfinite(deviation):
-        return pair
-    table = "controller" if traces[0].link == "path" else "tracker"
-    return replace(pair, clock_s={**pair.clock_s, table: pair.clock_s.get(table, 0.0) + offset})
+    return with_table_clock(pair, traces[0].link) if traces else pair
 
 
 def _traces(pairs: Sequence[Pair]) -> list[Trace]:
     """Return what shows how far the runs have come: the commanded joints, without them the tips."""
-    return traces_of("path", pairs) or traces_of("mechanics", pairs)
+    return PATH.traces(pairs) or MECHANICS.traces(pairs)
 
 
 def _lines(pair: Pair, rows: Ints) -> Ints:

@@ -8,7 +8,8 @@ import numpy as np
 
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
-from gcode2krl.gap.beside.links import JOINTS, LINKS, SIGNAL, UNIT, needs
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.links import GEAR, JOINTS, LINKS, MECHANICS, PATH, TIMING
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
@@ -22,11 +23,10 @@ _SURE = 0.95
 """A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
 
 
-def answer(
-    pairs: Sequence[Pair], judgements: Sequence[Judgement], slips: Sequence[Slip], issues: Sequence[Issue],
-    examined: frozenset[str], notes: Sequence[str],
-) -> Gap:  # fmt: skip
+def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> Gap:
     """Return the diagnosis of all links together."""
+    pairs = context.pairs
+    judgements = [each for each in context.judgements if isinstance(each, Judgement)]
     main = max(judgements, key=_weight, default=None)
     gapped = [each for each in judgements if each.verdict != "no_gap"]
     causes = [_slip_cause(slip) for slip in slips]
@@ -50,7 +50,7 @@ def answer(
         named=tuple(named),
         issues=(*issues, *every),
         runs=tuple(pair.name for pair in pairs),
-        notes=(*notes, *_notes(pairs, judgements)),
+        notes=tuple(_notes(pairs, judgements)),
     )
 
 
@@ -60,12 +60,12 @@ def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[s
         yield "angles are relative: no kinematics, no limits, no gravity"
     for each in judgements:
         left = [joint for joint in JOINTS if joint not in each.traces[0].components]
-        if each.link in ("path", "servo", "gear") and left:
-            yield f"{each.link}: {', '.join(left)} left out: not recorded, or never moving"
+        if each.link.of_joints and left:
+            yield f"{each.link.name}: {', '.join(left)} left out: not recorded, or never moving"
     for each in judgements:
         if each.usual:
             names = ", ".join(one.label for one in each.usual)
-            yield f"{each.link}: {names} within normal mismatch"
+            yield f"{each.link.name}: {names} within normal mismatch"
 
 
 def _weight(judgement: Judgement) -> tuple[bool, float]:
@@ -88,16 +88,16 @@ def _verdict(gapped: Sequence[Judgement], slips: Sequence[Slip]) -> str:
 def _gap(main: Judgement | None, slips: Sequence[Slip]) -> dict[str, Any]:
     if main is None or (slips and main.verdict == "no_gap"):
         slip = slips[0] if slips else None
-        link = slip.link if slip else "mechanics"
+        link = next(each for each in LINKS if each.name == (slip.link if slip else MECHANICS.name))
         return {
-            "signal": SIGNAL[link], "unit": UNIT[link],
+            "signal": link.signal, "unit": link.unit,
             "rms_before": slip.rms_before if slip else None, "rms_after": slip.rms_after if slip else None,
             "noise_floor": None, "max_before": None, "max_after": None, "shrink": None, "held_out": False,
         }  # fmt: skip
     size, factor = main.size, main.traces[0].factor
     explained = bool(main.causes)
     return {
-        "signal": "timing" if _is_timing(main) else main.traces[0].signal,
+        "signal": TIMING.signal if _is_timing(main) else main.traces[0].signal,
         "unit": main.traces[0].unit,
         "rms_before": factor * size.before**0.5,
         "rms_after": factor * size.after**0.5,
@@ -110,7 +110,9 @@ def _gap(main: Judgement | None, slips: Sequence[Slip]) -> dict[str, Any]:
 
 
 def _is_timing(judgement: Judgement) -> bool:
-    return judgement.link == "path" and judgement.verdict != "no_gap" and timing_share(judgement.traces) > 0.5
+    return (
+        judgement.link.tells_time and judgement.verdict != "no_gap" and timing_share(judgement.traces) > 0.5
+    )
 
 
 def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
@@ -118,25 +120,25 @@ def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[
     by_link = {each.link: each for each in judgements}
     slipped = {slip.link for slip in slips}
     for link in LINKS:
-        if link == "timing" and "path" in by_link:
-            path = by_link["path"]
+        if link is TIMING and PATH in by_link:
+            path = by_link[PATH]
             before, after = timing_sizes(path.traces, path.examination.applied)
             verdict = path.verdict if _is_timing(path) else "no_gap"
-            entry = {"link": link, "rms_before": before, "rms_after": after, "noise": None, "unit": "s"}
+            entry = {"link": link.name, "rms_before": before, "rms_after": after, "noise": None, "unit": "s"}
             found.append(entry | {"verdict": verdict})
         if link in by_link:
             each = by_link[link]
             factor = each.traces[0].factor
             verdict = "no_gap" if _is_timing(each) else each.verdict
             found.append({
-                "link": link,
+                "link": link.name,
                 "rms_before": factor * each.size.before**0.5,
                 "rms_after": factor * each.size.after**0.5,
                 "noise": factor * each.size.floor**0.5,
                 "unit": each.traces[0].unit,
-                "verdict": "explained" if link in slipped and verdict == "no_gap" else verdict,
+                "verdict": "explained" if link.name in slipped and verdict == "no_gap" else verdict,
             })  # fmt: skip
-        if link == "gear" and link in by_link:
+        if link is GEAR and link in by_link:
             found[-1]["offset_deg"] = _zeros(by_link[link])
     return found
 
@@ -172,11 +174,12 @@ def _where(main: Judgement | None, judgements: Sequence[Judgement]) -> dict[str,
 
 def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
     factor = judgement.traces[0].factor
-    link = "timing" if _is_timing(judgement) and "timing" in cause.applied.effect.links else judgement.link
+    shows_in_time = _is_timing(judgement) and TIMING.name in cause.applied.effect.links
+    link = TIMING if shows_in_time else judgement.link
     return {
         "effect": cause.applied.effect.name,
         "target": cause.applied.target,
-        "link": link,
+        "link": link.name,
         "probability": cause.probability,
         "parameters": {name: each._asdict() for name, each in cause.parameters.items()},
         "shrink": cause.shrink,
@@ -221,12 +224,12 @@ def _rest(main: Judgement | None) -> dict[str, Any]:
 
 
 def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
-    done = {each.link for each in judgements} | (
-        {"timing"} if any(e.link == "path" for e in judgements) else set()
-    )
+    done = {each.link for each in judgements}
+    if PATH in done:
+        done.add(TIMING)
     final = any(slip.final for slip in slips)
     return [
-        {"link": link, "needs": "a run that belongs to the prediction" if final else needs(link)}
+        {"link": link.name, "needs": "a run that belongs to the prediction" if final else link.needs}
         for link in LINKS
         if link not in done
     ]

@@ -8,8 +8,9 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs
 from gcode2krl.effects.operators import since_reversal
+from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links import JOINTS
-from gcode2krl.gap.beside.trace import Trace, nearest_rows
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.noise import Noise
 
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")

@@ -1,0 +1,212 @@
+"""The links of the joints: path, servo and gear."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied, Inputs, Signals
+from gcode2krl.gap.beside.clocks import with_table_clock
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
+from gcode2krl.gap.beside.links.traces import joint_trace
+from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.retiming import refined, retimed
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.runs import Controller
+from gcode2krl.units import RAD_PER_DEG
+
+MODEL_RAD = 4e-4 * RAD_PER_DEG
+"""The predicted path is right to 0.01 mm (tests/plant), 4e-4 degrees at an arm's length."""
+_CLOCK_SET = 0.1
+"""The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
+_CLOCKS_OF_TWO = 2
+"""Two clocks are the same where they differ by no more than normal mismatch of both."""
+
+
+class PathLink(Link):
+    """The commanded joints of the log against the predicted ones; timing is what lies along the motion."""
+
+    name = "path"
+    signal = "joint_commanded"
+    unit = "deg"
+    needs = "controller.csv with q1_cmd_deg …, and a prediction"
+    of_joints = True
+    model_rms = MODEL_RAD
+    tells_time = True
+    least_off = 2.0 * MODEL_RAD
+    least_step = 1e-4
+
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
+        """Return the commanded joints of a run with a prediction."""
+        table = pair.run.controller
+        if table is None or table.q_cmd_rad is None or pair.from_log or pair.run.head.angles == "relative":
+            return None
+        # joints alone: what plans anew need not remove the material again
+        pair = replace(pair, inputs=replace(pair.inputs, cut=None, forces=None))
+        return joint_trace(
+            self, pair, table, table.q_cmd_rad, "q_cmd_rad", None, base=base, sigma_rad=MODEL_RAD
+        )
+
+    def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
+        """Return the commanded path, planned once for all runs of a prediction."""
+        return trace.simulator.commanded(trace.inputs, applied)
+
+    def planned(self, inputs: Inputs) -> Floats:
+        """Return the commanded joints (m, 6)."""
+        return inputs.q_cmd_rad
+
+    def clocks(self, context: Context) -> int:
+        """Return one: that of the controller's table."""
+        return 1
+
+    def clock_share(self, context: Context) -> float:
+        """Return a tenth where the clock was set by the commanded joints already."""
+        return _CLOCK_SET if context.clocks_set else 1.0
+
+    def learn(self, context: Context, judged: Verdict) -> Context:
+        """Plan named time laws into the inputs, then take over the run's own timing.
+
+        Where the controller moves by a model of the robot of its own, its joints are brought back to those of
+        the plan.
+        """
+        for applied in judged.applied:
+            if applied.effect.plans_anew:
+                context = context.replanned(applied)
+        if any(applied.effect.own_model for applied in judged.applied):
+            return context.with_pairs(self._without_own_model(pair) for pair in context.pairs)
+        pairs = context.pairs
+        if is_lost(judged):
+            pairs = tuple(retimed(pair) for pair in pairs)
+        return context.with_pairs(refined(with_table_clock(pair, self), self) for pair in pairs)
+
+    def _without_own_model(self, pair: Pair) -> Pair:
+        """Return the pair on the run's own time, the controller's joints less what its own model adds."""
+        on_time = refined(pair.with_own_model(), self)
+        inputs = replace(on_time.inputs, q_cmd_rad=pair.inputs.q_cmd_rad)
+        return replace(on_time, inputs=inputs).with_nominal_joints()
+
+
+class _DriveLink(Link):
+    """A link between two columns of the controller's table."""
+
+    unit = "deg"
+    of_joints = True
+
+    def learn(self, context: Context, judged: Verdict) -> Context:
+        """Let later links start from the fitted model, where it holds: encoders' noise stays out of them."""
+        if is_lost(judged):
+            return context
+        return context.with_pairs(_with_fitted(pair, judged) for pair in context.pairs)
+
+
+class ServoLink(_DriveLink):
+    """What the drives do of what was commanded: q_act - q_cmd."""
+
+    name = "servo"
+    signal = "joint_actual"
+    needs = "controller.csv with q1_cmd_deg … and q1_act_deg …"
+
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
+        """Return q_act - q_cmd less a logged correction."""
+        table = pair.run.controller
+        if table is None or table.q_act_rad is None or table.q_cmd_rad is None:
+            return None
+        pair = pair.with_measured_joints("q_cmd")
+        difference = table.q_act_rad - table.q_cmd_rad - logged_correction(pair, table)
+        stated_deg = pair.run.head.noise.q_act_deg
+        sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
+        return joint_trace(
+            self, pair, table, difference, "q_act_rad", "q_cmd_rad", base=base, sigma_rad=sigma_rad
+        )
+
+    def learn(self, context: Context, judged: Verdict) -> Context:
+        """Take the clock off the controller's table too, where only its commanded columns have it."""
+        return super().learn(_with_free_controller(context, judged), judged)
+
+
+class GearLink(_DriveLink):
+    """What is behind the gears beside the motors: q_load - q_act."""
+
+    name = "gear"
+    signal = "joint_load"
+    needs = "controller.csv with q1_load_deg … (encoders behind the gear)"
+    own_clock = True
+    sets_clocks = True
+    instrument = ("clock", "encoder zero")
+
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
+        """Return q_load - q_act."""
+        table = pair.run.controller
+        if table is None or table.q_load_rad is None or table.q_act_rad is None:
+            return None
+        pair = pair.with_measured_joints("q_act")
+        noise, sigma_rad = pair.run.head.noise, None
+        if noise.q_load_deg is not None:
+            sigma_rad = float(np.hypot(noise.q_load_deg, noise.q_act_deg or noise.q_load_deg)) * RAD_PER_DEG
+        difference = table.q_load_rad - table.q_act_rad
+        return joint_trace(
+            self, pair, table, difference, "q_load_rad", "q_act_rad", base=base, sigma_rad=sigma_rad
+        )
+
+
+def _with_fitted(pair: Pair, judged: Verdict) -> Pair:
+    """Return the pair with what the judged link really does to the joints, by its fitted model."""
+    table = pair.run.controller
+    trace = next((trace for trace in judged.every if trace.run_number == pair.number), None)
+    if trace is None or table is None:
+        return pair
+    model, stamps = judged.fitted(trace), pair.stamps(table)
+    joints_rad = np.zeros((len(stamps), 6))
+    for column, values in zip(trace.columns, model.T, strict=True):
+        joints_rad[:, column] = np.interp(stamps, trace.time_s, values)
+    return replace(pair, fitted={**pair.fitted, judged.link.name: joints_rad})
+
+
+def _with_free_controller(context: Context, servo: Verdict) -> Context:
+    """Take the clock off the controller's table where its commanded columns alone are off.
+
+    They then differ by the same time from the plan and from the drives.
+    """
+    path = context.timing
+    of_table, of_columns = _clock(path, "controller"), _clock(servo, "q_cmd")
+    if path is None or of_table is None or of_columns is None:
+        return context
+    if abs(of_table["offset_s"] - of_columns["offset_s"]) > _CLOCKS_OF_TWO * context.mismatch.clock_s:
+        return context
+    freed = (pair.later("controller", -of_table["offset_s"]) for pair in context.pairs)
+    return context.without_cause(path, of_table).with_pairs(freed)
+
+
+def _clock(judged: Verdict | None, target: str) -> Applied | None:
+    """Return the named clock of a table or of columns."""
+    named = judged.applied if judged is not None else ()
+    return next((one for one in named if one.effect.is_clock and one.target == target), None)
+
+
+def logged_correction(pair: Pair, table: Controller) -> Floats:
+    """Return what a logged RSI correction moves the joints by (n, 6); rows without an answer hold the last.
+
+    Under a correction the commanded columns stay those of the program and the actual ones move.
+    """
+    joints = np.zeros((len(table), 6))
+    if table.q_correction_rad is not None:
+        joints += _held(table.q_correction_rad)
+    if table.correction_mm is not None:
+        twist = np.zeros((len(table), 6))
+        twist[:, :3] = _held(table.correction_mm)
+        if table.correction_rad is not None:  # A, B, C turn about z, y, x
+            twist[:, 3:] = _held(table.correction_rad)[:, ::-1]
+        jacobian = pair.inputs.jacobian[nearest_rows(pair.inputs.time_s, pair.stamps(table))]
+        joints += np.linalg.solve(jacobian, twist[:, :, None])[:, :, 0]
+    return np.cumsum(joints, axis=0) if pair.run.head.channels.correction == "relative" else joints
+
+
+def _held(values: Floats) -> Floats:
+    """Return the values with the last one before each that is missing; 0 before the first."""
+    known = np.isfinite(values)
+    row = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], -1), axis=0)
+    held: Floats = np.take_along_axis(np.nan_to_num(values), np.maximum(row, 0), axis=0)
+    return np.where(row >= 0, held, 0.0)

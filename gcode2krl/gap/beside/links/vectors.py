@@ -1,0 +1,77 @@
+"""The links of the instruments at the tool: force and mechanics."""
+
+from collections.abc import Sequence
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied, Inputs
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
+from gcode2krl.gap.beside.links.joints import PathLink, ServoLink
+from gcode2krl.gap.beside.links.traces import vector_trace
+from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.trace import Trace
+
+
+class ForceLink(Link):
+    """The measured force against the predicted one."""
+
+    name = "force"
+    signal = "force"
+    unit = "N"
+    needs = "force.csv, and a prediction with forces"
+    table = "force"
+
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
+        """Return the force of a run with a prediction, along the axes in which it is stated."""
+        table, head = pair.run.force, pair.run.head
+        if table is None or pair.from_log:
+            return None
+        return vector_trace(
+            self, pair, table, table.force_N, "force_meas_base_N",
+            base=base, frame=head.frames.force, sigma=head.noise.force_N,
+        )  # fmt: skip
+
+    def learn(self, context: Context, judged: Verdict) -> Context:
+        """Let the named causes bend the arm; where the model does not hold, let the measured force do so."""
+        learned = (applied.effect.learned(applied, self.name) for applied in judged.applied)
+        context = context.with_learned(applied for applied in learned if applied is not None)
+        if is_lost(judged):
+            context = context.with_pairs(pair.with_measured_load() for pair in context.pairs)
+        return context
+
+
+class MechanicsLink(Link):
+    """The tip against FK(joints) + C(q)·F."""
+
+    name = "mechanics"
+    signal = "tcp"
+    unit = "mm"
+    needs = "tracker.csv, absolute angles and a known robot"
+    table = "tracker"
+    sets_clocks = True
+    least_off = 0.5
+    least_step = 0.5
+
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
+        """Return the tip, beside the model from the measured joints."""
+        table, head = pair.run.tracker, pair.run.head
+        if table is None or not pair.known_robot or (pair.from_log and head.angles == "relative"):
+            return None
+        pair = pair.with_measured_joints("q_load")
+        return vector_trace(
+            self, pair, table, table.position_mm, "tcp_base_mm",
+            base=base, frame=head.frames.tracker, sigma=head.noise.tcp_mm,
+        )  # fmt: skip
+
+    def planned(self, inputs: Inputs) -> Floats:
+        """Return the commanded tip (m, 3)."""
+        return inputs.position_mm
+
+    def base(self, context: Context) -> tuple[Applied, ...]:
+        """Return slips and what the force has shown: both move the tip."""
+        return (*context.slips, *context.learned)
+
+    def clocks(self, context: Context) -> int:
+        """Return two where the joints are on the controller's clock, which no path has set."""
+        on_two = not context.has_data(PathLink.name) and context.has_data(ServoLink.name)
+        return max(super().clocks(context), 2 if on_two else 1)

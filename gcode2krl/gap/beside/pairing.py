@@ -1,0 +1,54 @@
+"""Runs and their predictions to pairs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime
+
+from gcode2krl.effects import Inputs, inputs_of
+from gcode2krl.gap.beside.fine_prediction import refined_prediction
+from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.planning import remembered_plan
+from gcode2krl.gap.beside.simulator import Simulator
+from gcode2krl.prediction import Prediction
+from gcode2krl.runs import Run
+
+_S_PER_H = 3600.0
+
+
+def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
+    """Yield each run beside its prediction: the one that its ``run.toml`` names, else the given one.
+
+    Raises an input error where a run is of another program than its prediction.
+    """
+    first = first_start(runs)
+    shared: dict[str, tuple[Inputs, Simulator]] = {}
+    for number, run in enumerate(runs):
+        folder = run.path("prediction")
+        named = folder is not None and folder.exists()
+        key = str(folder) if named else ""
+        if key not in shared:
+            shared[key] = _shared(Prediction.load(folder) if named and folder else prediction)
+        inputs, simulator = shared[key]
+        yield Pair(
+            run=run,
+            number=number,
+            inputs=replace(inputs, hours=hours_since(first, run)),
+            simulator=simulator,
+        )
+
+
+def _shared(prediction: Prediction) -> tuple[Inputs, Simulator]:
+    fine = refined_prediction(prediction)
+    return inputs_of(fine, plan=remembered_plan(fine)), Simulator()
+
+
+def first_start(runs: Sequence[Run]) -> datetime | None:
+    """Return when the earliest of the runs started; None where no run says."""
+    return min((run.head.started for run in runs if run.head.started is not None), default=None)
+
+
+def hours_since(first: datetime | None, run: Run) -> float:
+    """Return the hours from the first start to that of a run; 0 where one is not known."""
+    if first is None or run.head.started is None:
+        return 0.0
+    return (run.head.started - first).total_seconds() / _S_PER_H

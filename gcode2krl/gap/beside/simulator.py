@@ -1,0 +1,38 @@
+"""Commanded paths, planned once for all runs of a prediction."""
+
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from hashlib import blake2b
+
+from gcode2krl.effects import Applied, Inputs, Signals, commanded
+
+_MOST_KEPT = 64
+
+
+class Simulator:
+    """Simulates commanded paths and keeps the last 64 by what they were planned from.
+
+    One belongs to one prediction, so that its cell and its laws are the same for all that it keeps.
+    """
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Hashable, Signals] = OrderedDict()
+
+    def commanded(self, inputs: Inputs, applied: Sequence[Applied]) -> Signals:
+        """Return the signals of the commanded path with effects at work, clocks included."""
+        effects = tuple(
+            (each.effect.name, each.target, each.planned, *each.values.items()) for each in applied
+        )
+        key = (_digest(inputs), effects)
+        if key not in self._kept:
+            self._kept[key] = commanded(inputs, applied)
+            if len(self._kept) > _MOST_KEPT:
+                self._kept.popitem(last=False)
+        return self._kept[key]
+
+
+def _digest(inputs: Inputs) -> bytes:
+    """Return a digest of the planned motion: two that agree in it agree in all that is commanded."""
+    digest = blake2b(inputs.time_s.tobytes())
+    digest.update(inputs.q_cmd_rad.tobytes())
+    return digest.digest()

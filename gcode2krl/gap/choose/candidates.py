@@ -1,0 +1,47 @@
+"""Which effects a link tries, and what else its examination needs to know."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gcode2krl.effects import Effect
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.links import SIGNALS, Link
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.selection import Question
+from gcode2krl.gap.fit.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
+
+_PEAKS = 4
+
+
+def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Question:
+    """Return what a link is examined for."""
+    cell = traces[0].inputs.cell
+    blocks = [
+        block
+        for effect in context.candidates()
+        for target in effect.targets(cell)
+        if effect.searched(link.name, target, context.examined)
+        for block in _blocks(effect, target, traces)
+    ]
+    upstream = frozenset(each.name for each in SIGNALS if not context.has_data(each.name))
+    return Question(
+        context.known,
+        blocks,
+        context.mismatch,
+        upstream,
+        link.clocks(context),
+        link.clock_share(context),
+        context.seed,
+    )
+
+
+def _blocks(effect: Effect, target: str | None, traces: Sequence[Trace]) -> Iterator[Block]:
+    """Yield the blocks of an effect; one with a frequency is tried at the strongest of the residuals."""
+    if HZ not in effect.names:
+        yield from blocks_of(effect, target)
+        return
+    p = effect.parameter(HZ)
+    step_s = float(np.median(np.diff(traces[0].time_s)))
+    peaks = strongest_hz([trace.residual for trace in traces], step_s, p.low, p.high, _PEAKS)
+    yield from blocks_at(effect, target, peaks)

@@ -1,0 +1,175 @@
+"""What the scans of the part say of the cutter: its radius, fitted beside what frames and the arm may do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.effects import Applied, Effect, Inputs, commanded
+from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.links.surface import LEAST_POINTS, SurfaceLink, SurfacePoints
+from gcode2krl.gap.choose.intervals import Interval
+
+_OUTLIERS = 4.0
+_BLOCK_MM = 20.0
+"""Points of one block of the part have one error of the tip's model in common."""
+_CERTAIN = 4.0
+_ROUGH_MM = 1.0
+_TIP_MM = 0.003
+"""The swept surface is known to some micrometres."""
+
+
+@dataclass(frozen=True)
+class SurfaceFinding:
+    """What the scans say; lengths in mm."""
+
+    effect: Effect
+    points: int
+    rms_before: float
+    rms_after: float
+    noise: float
+    offset: Interval
+    """The size of the effect."""
+    shrink: float
+    """On points that the offset was not fitted to."""
+    applied: Applied | None
+    """The cause, where the offset is more than normal mismatch."""
+
+
+def judge_surface(link: SurfaceLink, context: Context) -> SurfaceFinding | None:
+    """Return what scans say of the cutter; None without a scan, or where no wall was scanned."""
+    base = link.base(context)
+    clouds = [cloud for pair in context.pairs if (cloud := link.points(pair, base)) is not None]
+    effect = _of_radius(link, context)
+    if not clouds or effect is None or sum(cloud.wall.sum() for cloud in clouds) < LEAST_POINTS:
+        return None
+    return _finding(clouds, effect, context)
+
+
+def _of_radius(link: SurfaceLink, context: Context) -> Effect | None:
+    """Return the candidate that the part alone can show: a cause with one size, that of the cutter."""
+    for effect in context.candidates():
+        if effect.kind == "cause" and link.name in effect.links and len(effect.names) == 1:
+            return effect
+    return None
+
+
+def _radius_per_size(effect: Effect, inputs: Inputs) -> float:
+    """Return by how much the radius that the part shows grows with the effect's parameter."""
+    start, nominal = effect.start(inputs), effect.nominal(inputs)
+    larger = effect.instruments(commanded(inputs), Applied(effect, None, start)).radius_offset_mm
+    (name,) = effect.names
+    return larger / (start[name] - nominal[name])
+
+
+def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) -> SurfaceFinding:
+    """Return the size of an effect of the radius, and the gap with and without it."""
+    y = np.concatenate([cloud.deviation for cloud in clouds])
+    x, prior = _columns(clouds, context.mismatch)
+    block = _blocks(clouds)
+    good = _inliers(x, y, prior)
+    x, y, block = x[good], y[good], block[good]
+    b, covariance = _fit(x, y, prior, block)
+    rest = y - x @ b
+    others = b.copy()
+    others[0] = 0.0
+    before = y - x @ others
+    even = block % 2 == 0
+    held = [(even, ~even), (~even, even)]
+    power = [_held_out(x, y, prior, chosen, test) for chosen, test in held if chosen.any() and test.any()]
+    noise2 = float(np.mean(rest**2))
+    gap2 = float(np.mean([p[0] for p in power])) - noise2 if power else 0.0
+    left2 = float(np.mean([p[1] for p in power])) - noise2 if power else 0.0
+    shrink = float(np.clip(1.0 - left2 / gap2, 0.0, 1.0)) if gap2 > 0.0 else 0.0
+    deviation = float(np.hypot(np.sqrt(covariance[0, 0]), _TIP_MM))
+    inputs = context.pairs[0].inputs
+    per_size = _radius_per_size(effect, inputs)
+    offset = Interval(*(float((b[0] + k * deviation) / per_size) for k in (0.0, -1.645, 1.645)))
+    applied = Applied(effect, None, {effect.names[0]: offset.value})
+    usual = context.mismatch.limits(applied, 1.0)[effect.names[0]]
+    is_gap = abs(b[0] / per_size) > usual + _CERTAIN * deviation
+    return SurfaceFinding(
+        effect=effect,
+        points=len(y),
+        rms_before=float(np.sqrt(np.mean(before**2))),
+        rms_after=float(np.sqrt(noise2)),
+        noise=float(np.sqrt(noise2)),
+        offset=offset,
+        shrink=shrink,
+        applied=applied if is_gap else None,
+    )
+
+
+def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Floats, Floats]:
+    """Return (n, c) columns and (c,) the weight of each prior: radius; shift, floors and bend of each run."""
+    rows = sum(len(cloud.deviation) for cloud in clouds)
+    x = np.zeros((rows, 1 + 5 * len(clouds)))
+    prior = np.zeros(x.shape[1])
+    prior[0] = 1.0 / _ROUGH_MM**2
+    at = 0
+    for number, cloud in enumerate(clouds):
+        rows_here, first = slice(at, at + len(cloud.deviation)), 1 + 5 * number
+        x[rows_here, 0] = cloud.wall
+        x[rows_here, first : first + 2] = cloud.normal[:, :2]
+        x[rows_here, first + 2] = ~cloud.wall
+        x[rows_here, first + 3] = cloud.deflection
+        x[rows_here, first + 4] = (
+            np.where(cloud.wall, 0.0, cloud.place[:, 0] - cloud.place[:, 0].mean()) / _BLOCK_MM
+        )
+        prior[first : first + 2] = 1.0 / sigma(mismatch.frame_mm) ** 2
+        prior[first + 2] = 1.0 / _ROUGH_MM**2
+        prior[first + 3] = 1.0 / sigma(mismatch.stiffness) ** 2
+        prior[first + 4] = 1.0 / sigma(mismatch.frame_mm) ** 2
+        at += len(cloud.deviation)
+    return x, prior
+
+
+def _blocks(clouds: Sequence[SurfacePoints]) -> Ints:
+    """Return the number (n,) of the block of the part, run by run, that each point lies in."""
+    numbers = [
+        np.column_stack([np.full(len(cloud.place), number), np.floor(cloud.place[:, :2] / _BLOCK_MM)])
+        for number, cloud in enumerate(clouds)
+    ]
+    _, block = np.unique(np.concatenate(numbers), axis=0, return_inverse=True)
+    return np.asarray(block, dtype=np.int64).ravel()
+
+
+def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
+    """Return the coefficients; priors are worth what the scatter of the points makes them."""
+    spread = max(float(np.median(np.abs(y - np.median(y)))) * 1.4826, 1e-3)
+    b: Floats = np.zeros(x.shape[1])
+    for _ in range(3):
+        b[:] = np.linalg.solve(x.T @ x / spread**2 + np.diag(prior), x.T @ y / spread**2)
+        spread = max(1.4826 * float(np.median(np.abs(y - x @ b))), 1e-4)
+    return b
+
+
+def _inliers(x: Floats, y: Floats, prior: Floats) -> Bools:
+    rest = y - x @ _solved(x, y, prior)
+    good: Bools = np.abs(rest) < _OUTLIERS * 1.4826 * np.median(np.abs(rest))
+    return good
+
+
+def _fit(x: Floats, y: Floats, prior: Floats, block: Ints) -> tuple[Floats, Floats]:
+    """Return coefficients and covariance, widened where blocks scatter more than points (White 1980)."""
+    b = _solved(x, y, prior)
+    rest = y - x @ b
+    spread2 = float(np.mean(rest**2))
+    inverse = np.linalg.inv(x.T @ x / spread2 + np.diag(prior))
+    scores = np.zeros((int(block.max()) + 1, x.shape[1]))
+    np.add.at(scores, block, x * (rest / spread2)[:, None])
+    robust = inverse @ (scores.T @ scores) @ inverse
+    wide = np.sqrt(np.maximum(np.diag(robust) / np.diag(inverse), 1.0))
+    return b, inverse * np.outer(wide, wide)
+
+
+def _held_out(x: Floats, y: Floats, prior: Floats, chosen: Bools, test: Bools) -> tuple[float, float]:
+    """Return the mean squares of held-out points without and with the radius of the others."""
+    radius = x[test, 0] * _solved(x[chosen], y[chosen], prior)[0]
+    # the other numbers belong to the held-out points themselves
+    own, others = _solved(x[test], y[test], prior)[1:], x[test, 1:]
+    left = y[test] - radius
+    left = left - others @ _solved(others, left, prior[1:])
+    return float(np.mean((y[test] - others @ own) ** 2)), float(np.mean(left**2))
