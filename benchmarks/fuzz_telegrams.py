@@ -55,7 +55,7 @@ TRICKS = (
 def prepare(place: Path) -> Try:
     """Start sessions; return what tries a case."""
     from gcode2krl import load_cell
-    from gcode2krl.cell.online_section import Online, Probe
+    from gcode2krl.cell.sections.online import Online, Probe
     from gcode2krl.errors import input_error
     from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.server import warm_up

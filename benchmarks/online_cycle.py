@@ -106,7 +106,7 @@ def burn(seconds):
 def measure(options):
     """Return what the controller and the server saw."""
     from gcode2krl import load_cell
-    from gcode2krl.cell.online_section import Online, RobotLink
+    from gcode2krl.cell.sections.online import Online, RobotLink
     from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.recorder import Recorder
     from gcode2krl.online.server import open_socket, serve

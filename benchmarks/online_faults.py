@@ -21,7 +21,7 @@ import numpy as np
 from gcode2krl import load_cell
 from gcode2krl import robot as arm
 from gcode2krl.cell import Cell
-from gcode2krl.cell.online_section import Gains, Online, Probe, RobotLink
+from gcode2krl.cell.sections.online import Gains, Online, Probe, RobotLink
 from gcode2krl.online.compensator import Compensator, build_compensator
 from gcode2krl.online.limits import Bounds
 from gcode2krl.online.server import warm_up

@@ -12,8 +12,8 @@ import itertools
 from pathlib import Path
 
 from gcode2krl import load_cell
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import Stock
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.judge import judged
 from gcode2krl.online.outcome import figures_of
 from gcode2krl.online.twin import CASES, World, simulate, twin_of

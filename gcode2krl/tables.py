@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.compiled.inputs import locked
 from gcode2krl.errors import Issue
 
 
@@ -45,7 +46,7 @@ class Table:
         for spec in fields(self):
             if "tail" not in spec.metadata:
                 continue
-            values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"]).view()
+            values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"])
             rows = len(values) if rows < 0 else rows
             wanted = (rows, *spec.metadata["tail"])
             fits = values.ndim == len(wanted) and all(
@@ -55,8 +56,7 @@ class Table:
                 raise ValueError(
                     f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}"
                 )
-            values.flags.writeable = False
-            object.__setattr__(self, spec.name, values)
+            object.__setattr__(self, spec.name, locked(values))
 
     def __len__(self) -> int:
         for spec in fields(self):

@@ -20,7 +20,6 @@ from gcode2krl.arrays import Floats
 from gcode2krl.cell import library
 from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
 from gcode2krl.cell.keys import meant_key
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import (
     Axis,
     Clearance,
@@ -48,6 +47,7 @@ from gcode2krl.cell.sections import (
     Verified,
     missing,
 )
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.units import RAD_PER_DEG
 

@@ -7,7 +7,7 @@ import click
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     cell_files,

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compliance import chain, model
 from gcode2krl.compliance.projection import project_rows
-from gcode2krl.compliance.rows import in_chunks, rows_of
+from gcode2krl.compliance.rows import rows_of
 
 STANDSTILL_MM_S = 1e-6
 """A tip slower than this has no feed direction: rounding of the joint speeds alone looks like 1e-7 mm/s."""
@@ -126,10 +127,11 @@ def deflection_of(
     bent = rows_of("deflection", deflection, 3)
     correction = np.empty_like(deflection)
 
-    def work(rows: slice) -> None:
+    def work(start: int, end: int) -> None:
+        rows = slice(start, end)
         project_rows(bent[rows], feed[rows], -1.0, correction[rows])
 
-    in_chunks(work, len(deflection), threads)
+    in_chunks(work, chunk_borders(len(deflection)), threads)
     return deflection, correction
 
 
@@ -199,13 +201,14 @@ def _displaced(
     frames = model.frames(cell)
     shift, turn = np.empty((len(q), 3)), np.empty((len(q) if turned else 0, 3))
 
-    def work(rows: slice) -> None:
+    def work(start: int, end: int) -> None:
+        rows = slice(start, end)
         chain.displaced_rows(
             q[rows], force[rows], moment[rows], frames, softness, base, tip.position_mm, tip.tool[rows],
             shift[rows], turn[rows],
         )  # fmt: skip
 
-    in_chunks(work, len(q), threads)
+    in_chunks(work, chunk_borders(len(q)), threads)
     return shift, turn
 
 
@@ -219,10 +222,11 @@ def _tip(
     frames, axes = model.frames(cell), np.ascontiguousarray(base)
     position, velocity = np.empty((len(q), 3)), np.empty((len(q), 3))
 
-    def work(rows: slice) -> None:
+    def work(start: int, end: int) -> None:
+        rows = slice(start, end)
         chain.tip_rows(
             q[rows], qd[rows], frames, axes, tip.position_mm, tip.tool[rows], position[rows], velocity[rows]
         )
 
-    in_chunks(work, len(q), None)
+    in_chunks(work, chunk_borders(len(q)))
     return position, velocity

@@ -8,12 +8,12 @@ any number of threads gives the same result to the last bit.
 import math
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.threads import in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
@@ -103,9 +103,8 @@ def engage(
         )
         return grid, own_begin, own_end, own_begin - begin, rapid_mm
 
-    with ThreadPoolExecutor(len(bounds) - 1) as pool:
-        pieces = list(pool.map(cut, range(len(bounds) - 1)))
-    for grid, begin, end, skip, rapid_mm in pieces:
+    strips = range(len(bounds) - 1)
+    for grid, begin, end, skip, rapid_mm in in_threads(cut, strips, len(strips)):
         field.take_back(grid, axis, begin, end, skip)
         np.maximum(result.overlap_mm[:, 0], rapid_mm, out=result.overlap_mm[:, 0])
     return result

@@ -6,8 +6,6 @@ the tip.
 """
 
 import math
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.cutting.cutter import Shape, shape_of
 from gcode2krl.cutting.law import linear_edge_law
 from gcode2krl.cutting.slices import mean_rows, peak_rows
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.units import RAD_PER_DEG
 
-_ROWS_A_PART = 20_000
 _ROUNDING_RAD = 1e-9
 
 
@@ -111,11 +109,12 @@ def cutting_load(
     if peak:
         lag = 0.0 if tool.kind == "drill" else math.tan(tool.helix_deg * RAD_PER_DEG) * 2.0 / tool.diameter_mm
 
-        def fill(rows: slice) -> None:
+        def fill(start: int, end: int) -> None:
+            rows = slice(start, end)
             phi, a_p, f_z, ramp = (column[rows] for column in columns)
             peak_rows(phi, a_p, f_z, ramp, tool.teeth, lag, shape.array(), law, peaks[rows])
 
-        _in_parts(fill, len(mean))
+        in_chunks(fill, chunk_borders(len(mean)))
         peaks = np.maximum(peaks, np.linalg.norm(mean[:, :3], axis=1))  # no mean exceeds its peak
     return Load(mean[:, :3], mean[:, 3], peaks)
 
@@ -123,22 +122,13 @@ def cutting_load(
 def _means(columns: tuple[Floats, ...], teeth: int, shape: Shape, law: Floats) -> Floats:
     out = np.zeros((len(columns[0]), 4))
 
-    def fill(rows: slice) -> None:
+    def fill(start: int, end: int) -> None:
+        rows = slice(start, end)
         phi, a_p, f_z, ramp = (column[rows] for column in columns)
         mean_rows(phi, a_p, f_z, ramp, teeth, shape.array(), law, out[rows])
 
-    _in_parts(fill, len(out))
+    in_chunks(fill, chunk_borders(len(out)))
     return out
-
-
-def _in_parts(fill: Callable[[slice], None], count: int) -> None:
-    """Fill rows in parts on all cores: the compiled loops release the interpreter."""
-    parts = [slice(low, low + _ROWS_A_PART) for low in range(0, count, _ROWS_A_PART)]
-    if len(parts) <= 1:
-        fill(slice(0, count))
-        return
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(fill, parts))
 
 
 def _columns(

@@ -8,7 +8,7 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import motion_starts
-from gcode2krl.compiled.chunks import edges, in_parts
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
@@ -124,7 +124,7 @@ def _sizes(start: Floats, end: Floats) -> Floats:
         np.sqrt(x * x + y * y + z * z, out=size[first:behind])
         size[first:behind][size[first:behind] < _NO_LENGTH_MM] = 0.0
 
-    in_parts(part, edges(len(size)))
+    in_chunks(part, chunk_borders(len(size)))
     return size
 
 
@@ -278,7 +278,7 @@ def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floa
         widest = np.minimum(cdis[here], np.minimum(length[here], length[after]) / 2)
         d[here] = np.where(real & (cos_turn > -1.0 + 1e-12), widest, 0.0)
 
-    in_parts(part, edges(max(len(size) - 1, 0)))
+    in_chunks(part, chunk_borders(max(len(size) - 1, 0)))
     return d, cos_half
 
 
@@ -334,7 +334,9 @@ def _wide_corners(
         a = np.minimum(acceleration[rows], acceleration[rows + 1])
         return rows[np.abs(v2 - v1) / a + cell.controller.k_s <= 2.0 * widest / v1]
 
-    return np.concatenate(in_parts(part, edges(max(len(length) - 1, 0))) or [np.zeros(0, dtype=np.int64)])
+    return np.concatenate(
+        in_chunks(part, chunk_borders(max(len(length) - 1, 0))) or [np.zeros(0, dtype=np.int64)]
+    )
 
 
 def _widest(length: Floats, ratio: Floats, cdis: Floats, rows: Ints) -> Floats:
@@ -365,7 +367,7 @@ def _one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
         first = to_rotation[0]
         return bool((to_rotation[start:end] == first).all() and (from_rotation[start:end] == first).all())
 
-    return all(in_parts(same, edges(len(to_rotation))))
+    return all(in_chunks(same, chunk_borders(len(to_rotation))))
 
 
 def _standstill(targets: Targets, chain: Chain) -> Motion:

@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.compiled.chunks import edges, in_parts
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import contiguous
 from gcode2krl.krc4.profile import Profile
 
 
@@ -50,7 +51,7 @@ def sample(
 ) -> Samples:
     """Return the motion at rising times (m,) along moves (n,); ``blend_mm`` belongs to the end of each."""
     count = len(time_s)
-    moves = _Moves(*(_read_only(column) for column in (start_mm, end_mm, length_mm, blend_mm)))
+    moves = _Moves(*(contiguous(column) for column in (start_mm, end_mm, length_mm, blend_mm)))
     move, begins = np.empty(count, dtype=np.int64), _sums(length_mm)
     law = tuple(np.empty((4, count)))  # speed, acceleration, jerk and path
     part, corner, position = np.empty(count), np.empty(count, dtype=np.bool_), np.empty((count, 3))
@@ -66,10 +67,10 @@ def sample(
         figures = tuple(row[rows] for row in law)
         _place(move[rows], moves, begins, way, saved, figures, position[rows], part[rows], corner[rows])
 
-    in_parts(law_of, edges(count))
+    in_chunks(law_of, chunk_borders(count))
     _moves(law[3], begins, move)
     way, saved = _way_to_moves(moves)
-    in_parts(place, edges(count))
+    in_chunks(place, chunk_borders(count))
     speed, acceleration, jerk, path = law
     return Samples(position, speed, acceleration, jerk, path, move, part, corner)
 
@@ -83,13 +84,6 @@ class _Moves(NamedTuple):
     blend: Floats
 
 
-def _read_only(column: Floats) -> Floats:
-    """Return a contiguous, read-only view or copy: one type, so that a kernel is compiled once."""
-    view = np.ascontiguousarray(column, dtype=np.float64).view()
-    view.flags.writeable = False
-    return view
-
-
 def _sums(values: Floats) -> Floats:
     """Return the sum (n + 1,) of the values before each, and of all."""
     sums = np.zeros(len(values) + 1)
@@ -101,7 +95,7 @@ def _way_to_moves(moves: _Moves) -> tuple[Floats, Floats]:
     """Return the length of all moves before each move, and how much shorter their corners are, (n + 1,)."""
     count = len(moves.length)
     size, saving = np.zeros(count + 1), np.zeros(count + 1)
-    in_parts(lambda start, end: _savings(moves, start, end, size[1:], saving[1:]), edges(count))
+    in_chunks(lambda start, end: _savings(moves, start, end, size[1:], saving[1:]), chunk_borders(count))
     return np.cumsum(size, out=size), np.cumsum(saving, out=saving)
 
 

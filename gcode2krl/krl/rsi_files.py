@@ -9,8 +9,8 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import Pilot
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.krl.names import DEVICES
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.krl.rsi_files import Form, file_names, rsi_texts
 from gcode2krl.tables import Targets
 

@@ -15,8 +15,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.cell.online_section import Online
-from gcode2krl.online.rows import frozen
+from gcode2krl.cell.sections.online import Online
+from gcode2krl.compiled.inputs import read_only
 
 STEADY_SHARE = 0.2
 """An estimate is steady while it changes by less than this share of the threshold; our choice."""
@@ -56,12 +56,13 @@ def blended(
     ``known`` (n,) is False where there is no estimate; the weight of the last one then goes back, as above.
     The estimate has no moment: what it counts for has none.
     """
-    values = frozen(measured, -1, 6)
+    values = read_only("measured", measured, -1, 6)
     after = BlendState(state.values.copy())
     blend = Blend(np.empty(values.shape), np.empty(len(values)), np.zeros(len(values), dtype=np.bool_))
     patience_s = settings.pilot_lead_s + settings.blend_s + 2.0 * settings.filter_s
+    estimate = read_only("estimate_N", estimate_N, len(values), 3)
     _blend(
-        values, frozen(estimate_N, len(values), 3), np.ascontiguousarray(known), after.values,
+        values, estimate, np.ascontiguousarray(known), after.values,
         settings.cycle_s, settings.threshold_N, settings.blend_s, patience_s, blend.load, blend.weight,
         blend.distrusted,
     )  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of, missing_stiffness
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
 from gcode2krl.errors import NotUnderstoodError, input_error

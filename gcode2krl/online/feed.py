@@ -6,8 +6,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.cell.online_section import Online
-from gcode2krl.online.rows import frozen
+from gcode2krl.cell.sections.online import Online
+from gcode2krl.compiled.inputs import read_only
 
 WINDOW_S = 0.020
 """Positions come with few decimals: over this time the direction is right to 1° at 25 mm/s and 0.01 mm."""
@@ -35,7 +35,7 @@ def feed_start(settings: Online) -> FeedState:
 
 def feed_of(state: FeedState, position_mm: Floats) -> tuple[FeedState, Floats]:
     """Return the feed (n, 3) of commanded positions (n, 3): how far the tool came within the window."""
-    values = frozen(position_mm, -1, 3)
+    values = read_only("position_mm", position_mm, -1, 3)
     after = FeedState(state.positions.copy(), state.counts.copy(), state.direction.copy())
     out = np.empty(values.shape)
     _feed(values, *after, out)

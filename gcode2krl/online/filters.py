@@ -11,8 +11,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.cell.online_section import Online
-from gcode2krl.online.rows import frozen
+from gcode2krl.cell.sections.online import Online
+from gcode2krl.compiled.inputs import read_only
 
 WIDTH = 6
 """Force x, y, z in N and moment x, y, z in N·mm."""
@@ -42,7 +42,7 @@ def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[Filter
     ``average_s``. A sample that is not a number, or above ``most_force_N``, leaves the output as it was; more
     of them in a row than ``sensor_hold_s`` is a lost sensor, and so is at once a force that is no cut.
     """
-    values = frozen(load, -1, WIDTH)
+    values = read_only("load", load, -1, WIDTH)
     after = FilterState(state.low.copy(), state.window.copy(), state.counts.copy())
     out, lost = np.empty(values.shape), np.zeros(len(values), dtype=np.bool_)
     share = -math.expm1(-2.0 * math.pi * settings.lowpass_hz * settings.cycle_s)

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
+from gcode2krl.compiled.inputs import read_only
 from gcode2krl.cutting.law import feed_per_tooth
-from gcode2krl.online.rows import frozen
 from gcode2krl.prediction import Prediction
 
 SIDE_RAD = 0.05
@@ -80,7 +80,13 @@ def grid_of(position_mm: Floats, radius_mm: Floats) -> tuple[Floats, tuple[int, 
 def floor_over(position_mm: Floats, radius_mm: Floats, low_mm: Floats, shape: tuple[int, int]) -> Floats:
     """Return the lowest tip over each cell (ny, nx) in mm; inf where nothing cuts."""
     floor = np.full(shape, np.inf)
-    _lower(frozen(position_mm, -1, 3), frozen(radius_mm, -1), frozen(low_mm, 2), CELL_MM, floor)
+    _lower(
+        read_only("position_mm", position_mm, -1, 3),
+        read_only("radius_mm", radius_mm, -1),
+        read_only("low_mm", low_mm, 2),
+        CELL_MM,
+        floor,
+    )
     return floor
 
 

@@ -7,8 +7,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.cell.online_section import Gains, Online
-from gcode2krl.online.rows import frozen
+from gcode2krl.cell.sections.online import Gains, Online
+from gcode2krl.compiled.inputs import read_only
 from gcode2krl.units import RAD_PER_DEG
 
 NO_CORRECTION = 1e6
@@ -72,7 +72,7 @@ def limited(state: LimitState, wanted: Floats, held: Bools, bounds: Bounds) -> t
     ``held`` (n,), or where r is not a number or beyond `NO_CORRECTION`, the correction stays as it is.
     """
     width = len(bounds.most)
-    values = frozen(wanted, -1, width)
+    values = read_only("wanted", wanted, -1, width)
     after = LimitState(*(part.copy() for part in state))
     out = np.empty(values.shape)
     _limit(

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import project_normal, tip_position
 from gcode2krl.compliance.sensor import Calibration
 from gcode2krl.errors import Issue, input_error

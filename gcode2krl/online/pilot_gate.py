@@ -14,8 +14,8 @@ import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.cell.online_section import Online
-from gcode2krl.online.rows import frozen
+from gcode2krl.cell.sections.online import Online
+from gcode2krl.compiled.inputs import read_only
 from gcode2krl.pilot import Knots, PilotHeader
 
 NO_KNOT_YET = -1
@@ -117,11 +117,22 @@ def estimate(
     after = GateState(state.values.copy())
     if len(table.time_s):
         _track(
-            frozen(time_s, count), frozen(position_mm, count, 3), frozen(told.knot, count),
-            frozen(told.checksum, count), frozen(told.override_percent, count), frozen(told.t1, count),
-            frozen(table.time_s, -1), frozen(table.lead_s, -1), frozen(table.force_N, -1, 3),
-            float(table.checksum), settings.pilot_lead_s, after.values, force, known, reason,
-        )  # fmt: skip
+            read_only("time_s", time_s, count),
+            read_only("position_mm", position_mm, count, 3),
+            read_only("knot", told.knot, count),
+            read_only("checksum", told.checksum, count),
+            read_only("override_percent", told.override_percent, count),
+            read_only("t1", told.t1, count),
+            read_only("time_s", table.time_s, -1),
+            read_only("lead_s", table.lead_s, -1),
+            read_only("force_N", table.force_N, -1, 3),
+            float(table.checksum),
+            settings.pilot_lead_s,
+            after.values,
+            force,
+            known,
+            reason,
+        )
     return after, force, known, reason
 
 

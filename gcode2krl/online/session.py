@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.online.compensator import Compensator, Samples, State, joints_at, start, step
 from gcode2krl.online.feed import feed_of

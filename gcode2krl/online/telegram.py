@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 LONGEST = 8192

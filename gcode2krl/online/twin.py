@@ -14,8 +14,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import VirtualJoint
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of, project_normal
 from gcode2krl.errors import input_error
 from gcode2krl.online.compensator import (

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.compiled.chunks import edges, in_parts
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 
 LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
 """The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
@@ -33,8 +33,8 @@ def corner_cdis(
     count = len(position_mm)
     result = np.empty(count)
     # with a tolerance a corner keeps the level of the one before, so they come one after the other
-    borders = edges(count) if np.isnan(tolerance_mm).all() else [0, count]
-    in_parts(
+    borders = chunk_borders(count) if np.isnan(tolerance_mm).all() else [0, count]
+    in_chunks(
         lambda start, end: _corner_cdis(
             position_mm, tolerance_mm, cdis_mm, exact, LEVELS_MM, start, end, result
         ),

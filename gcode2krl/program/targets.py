@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.chunks import edges, in_parts
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
@@ -270,7 +270,7 @@ class _Plan:
             said.tolerance_mm[rows] = np.where(np.isnan(programmed), below, programmed)
             said.exact_stop[rows] = ~added & toolpath.exact_stop[row]
 
-        in_parts(part, edges(count))
+        in_chunks(part, chunk_borders(count))
         return said
 
     def _axes(self) -> Floats:
@@ -416,7 +416,7 @@ def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints
         if axis.strides[0] != 0:
             different[rows] |= (axis[rows] != axis[first]).any(axis=1)
 
-    in_parts(part, edges(len(kind) - 1))
+    in_chunks(part, chunk_borders(len(kind) - 1))
     return different
 
 

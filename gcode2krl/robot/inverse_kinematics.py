@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
-from gcode2krl.robot.kinematics import read_only
+from gcode2krl.compiled.inputs import read_only
 
 Six = tuple[float, float, float, float, float, float]
 

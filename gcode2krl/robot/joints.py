@@ -11,7 +11,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.chunks import ROWS, edges, in_parts
+from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
 from gcode2krl.errors import Issue
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
@@ -96,7 +96,7 @@ def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
         row_before: Floats = found[0]
         return row_before
 
-    _solve_parts(solve, q, edges(count), cell)
+    _solve_parts(solve, q, chunk_borders(count), cell)
     return q, _speeds(q, motion)
 
 
@@ -124,7 +124,7 @@ def _speeds(q: Floats, motion: Motion) -> Floats:
             np.subtract(q[start + 2 : end + 2], q[start:end], out=inner)
             inner /= window_s
 
-        in_parts(differences, edges(len(q) - 2))
+        in_chunks(differences, chunk_borders(len(q) - 2))
     changed = np.flatnonzero(motion.tool[1:] != motion.tool[:-1])
     qd[changed], qd[changed + 1] = 0.0, 0.0
     return qd
@@ -158,7 +158,7 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
         q[target[ends]] = found_own[ends]
         return found[0] if shared else np.full(6, np.nan)
 
-    _solve_parts(solve, q, edges(len(targets)), cell)
+    _solve_parts(solve, q, chunk_borders(len(targets)), cell)
     q[targets.home] = cell.home_q_rad()
     return q, wrong
 
@@ -179,7 +179,7 @@ def _solve_parts(
     ``solve(start, end, before)`` writes the joints of its rows into ``q`` and returns those (6,) it has for
     the row before them.
     """
-    shared = in_parts(lambda start, end: solve(start, end, None), borders)
+    shared = in_chunks(lambda start, end: solve(start, end, None), borders)
     last = cell.home_q_rad()
     for (start, end), row_before in zip(itertools.pairwise(borders), shared, strict=True):
         reached = np.flatnonzero(~np.isnan(q[start:end, 0]))  # that does not depend on the row before
@@ -206,5 +206,5 @@ def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool 
             tip = cell.tool_matrix(int(number))[:3, 3]
             sigma[own] = smallest_singular_value(q[own], geometry, tip)
 
-    in_parts(part, edges(count, ROWS))
+    in_chunks(part, chunk_borders(count, ROWS))
     return Joints(q_rad=q, qd_rad_s=qd, limit_margin_rad=margin, sigma_min=sigma, status=status, turn=turn)

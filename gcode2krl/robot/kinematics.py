@@ -16,34 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcode2krl.arrays import Floats, Ints32
-
-
-def read_only(name: str, values: npt.ArrayLike, *shape: int) -> Floats:
-    """Return a contiguous, read-only float64 view or copy of ``values``, its shape checked.
-
-    A kernel that always sees this one array type is compiled once, whatever table its input came from.
-
-    Parameters
-    ----------
-    name : str
-        What the error calls the array.
-    values : array_like
-        The numbers.
-    *shape : int
-        The wanted shape, -1 for any length.
-
-    Raises
-    ------
-    ValueError
-        If the shape is another one.
-    """
-    array = np.ascontiguousarray(values, dtype=np.float64).view()
-    lengths = zip(array.shape, shape, strict=False)
-    if array.ndim != len(shape) or any(length not in (-1, found) for found, length in lengths):
-        wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
-        raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
-    array.flags.writeable = False
-    return array
+from gcode2krl.compiled.inputs import read_only
 
 
 def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[Floats, Floats]:

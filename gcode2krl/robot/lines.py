@@ -9,7 +9,7 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import Rows, motion_starts
-from gcode2krl.compiled.chunks import edges, in_parts
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.tables import Targets
 from gcode2krl.units import RAD_PER_DEG
 
@@ -82,7 +82,7 @@ def count_samples(targets: Targets, cell: Cell) -> Ints:
     def steps(start: int, end: int) -> Ints:
         return _motions(targets, cell, slice(start, end)).steps
 
-    return np.cumsum(np.concatenate(in_parts(steps, edges(len(targets)))))
+    return np.cumsum(np.concatenate(in_chunks(steps, chunk_borders(len(targets)))))
 
 
 def sample_lines(targets: Targets, cell: Cell, start: int, end: int) -> Line:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.robot.kinematics import read_only
+from gcode2krl.compiled.inputs import read_only
 from gcode2krl.units import RAD_PER_DEG
 
 Bits = NDArray[np.uint16]

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
-from gcode2krl.robot.kinematics import read_only
+from gcode2krl.compiled.inputs import read_only
 
 _TOGETHER = 64
 """Rows that are worked on side by side."""

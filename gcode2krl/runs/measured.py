@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.compiled.inputs import locked
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.runs.tables import Sheet, missing_column
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
@@ -67,9 +68,7 @@ class Measured:
         for spec in fields(self):
             value = getattr(self, spec.name)
             if isinstance(value, np.ndarray):
-                frozen = value.view()
-                frozen.flags.writeable = False
-                object.__setattr__(self, spec.name, frozen)
+                object.__setattr__(self, spec.name, locked(value))
         object.__setattr__(self, "dropped", MappingProxyType(dict(self.dropped)))
 
     def __len__(self) -> int:

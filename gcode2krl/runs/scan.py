@@ -7,6 +7,7 @@ from typing import NoReturn
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.compiled.inputs import locked
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs.measured import LARGEST_VALUE, LEAST_ROWS, XYZ
 from gcode2krl.runs.tables import missing_column, read_sheet
@@ -52,9 +53,8 @@ def read_scan(path: str | Path) -> Scan:
         row = int(np.argmax(np.abs(kept).max(axis=1)))
         words = f"point {row + 1}: {np.abs(kept).max():.3g} mm is no measured value"
         raise input_error("trace-unit", words, "export the scan in mm", source=str(file))
-    kept.flags.writeable = False
     text = f"{file.name}: {lost} of {len(points)} points dropped for missing values"
-    return Scan(kept, str(file), lost, (Issue("warning", "trace-dropped", 0, text),) if lost else ())
+    return Scan(locked(kept), str(file), lost, (Issue("warning", "trace-dropped", 0, text),) if lost else ())
 
 
 def _read_table(file: Path) -> Floats:

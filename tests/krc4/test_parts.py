@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import plan_motion, set_targets
-from gcode2krl.compiled import chunks as parts
+from gcode2krl.compiled import chunks
 from gcode2krl.krc4 import build_chain, motion, sampling
 from tests.krc4.conftest import HEAD, polyline
 
@@ -35,7 +35,7 @@ def test_same_chain_and_motion(monkeypatch, make_cell, read, text, rows, cdis_mm
     targets = set_targets(read(text, cell), cell)
     whole, moving = build_chain(targets, cell), plan_motion(targets, cell)
     for module in (motion, sampling):
-        monkeypatch.setattr(module, "edges", lambda count: parts.edges(count, rows))
+        monkeypatch.setattr(module, "chunk_borders", lambda count: chunks.chunk_borders(count, rows))
     same(build_chain(targets, cell), whole)
     same(plan_motion(targets, cell), moving)
 

@@ -5,8 +5,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from gcode2krl.cell import resolve_cell
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import Pilot
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl.rsi_files import ethernet_xml, file_names, rsi_texts, signal_flow_xml
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.session import begin, exchange
 from gcode2krl.online.telegram import answer_text, parse

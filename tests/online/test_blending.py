@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.blending import blend_start, blended
 
 SETTINGS = Online()

@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.compliance.sensor import Calibration, unloaded
 from gcode2krl.errors import NotUnderstoodError

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gcode2krl.cell.online_section import Gains, Online
+from gcode2krl.cell.sections.online import Gains, Online
 from gcode2krl.online.limits import axis_bounds, cartesian_bounds, limit_start, limited
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)

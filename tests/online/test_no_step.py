@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.cell.online_section import Online, Probe
+from gcode2krl.cell.sections.online import Online, Probe
 from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.session import Phase, exchange
 from gcode2krl.online.telegram import parse

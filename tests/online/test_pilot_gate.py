@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.pilot_gate import Announced, Gate, PilotTable, estimate, gate_start
 
 SETTINGS = Online()

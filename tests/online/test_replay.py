@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, robot
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.log_replay import as_json, columns, replay

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcode2krl.cell.online_section import Online, RobotLink
+from gcode2krl.cell.sections.online import Online, RobotLink
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.krl.rsi_files import ethernet_xml
 from gcode2krl.online.compensator import build_compensator

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.cell.online_section import Online
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.session import Phase, begin, exchange, silent

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.cell.online_section import Online
 from gcode2krl.cell.sections import Stock
+from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.judge import floor_over, grid_of, judged

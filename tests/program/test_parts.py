@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, read_gcode, set_targets
-from gcode2krl.compiled import chunks as parts
+from gcode2krl.compiled import chunks
 from gcode2krl.program import blending, targets
 from tests.conftest import EXAMPLES
 
@@ -19,7 +19,7 @@ def test_same_targets(monkeypatch, part, rows, tolerance_mm):
     toolpath = read_gcode(part, cell)
     whole = set_targets(toolpath, cell, tolerance_mm)
     for module in (targets, blending):
-        monkeypatch.setattr(module, "edges", lambda count: parts.edges(count, rows))
+        monkeypatch.setattr(module, "chunk_borders", lambda count: chunks.chunk_borders(count, rows))
     planned = set_targets(toolpath, cell, tolerance_mm)
     for spec in fields(whole):
         left, right = getattr(planned, spec.name), getattr(whole, spec.name)

@@ -9,7 +9,7 @@ import pytest
 
 from gcode2krl import set_targets
 from gcode2krl.cell import resolve_cell
-from gcode2krl.compiled import chunks as parts_of_columns
+from gcode2krl.compiled import chunks
 from gcode2krl.gcode import read_stream
 from gcode2krl.robot import findings, follow, follow_motion, forward, joints, lines, motion_angles
 from gcode2krl.robot.joints import target_angles
@@ -33,7 +33,7 @@ def rows_in_a_part(monkeypatch):
 
     def rows_in_a_part(rows):
         for module in (joints, lines):
-            monkeypatch.setattr(module, "edges", lambda count, _=0: parts_of_columns.edges(count, rows))
+            monkeypatch.setattr(module, "chunk_borders", lambda count, _=0: chunks.chunk_borders(count, rows))
 
     return rows_in_a_part
 

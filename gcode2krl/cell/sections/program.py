@@ -1,0 +1,101 @@
+"""Sections of the program: its layout, the pilot, who verified the cell, and what it took over."""
+
+import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from gcode2krl.cell.sections.fields import Finite, OneLine, Positive, Section
+from gcode2krl.cell.template_rules import external_problem
+
+# Only variables of sensors, or the integrator's own: never one that the planner, a frame or an output has.
+_OWN = r"[A-FH-Za-fh-z][A-Za-z0-9_]{0,23}"
+_PILOT_VARIABLE = rf"^(\$SEN_PINT\[[0-9]{{1,2}}\]|{_OWN}(\[[0-9]{{1,3}}\])?)$"
+_PILOT_ARRAY = rf"^(\$SEN_PREA|{_OWN})$"
+
+
+class Pilot(Section):
+    """How the program carries the pilot force."""
+
+    form: Literal["index", "values", "none"] = "index"
+    frame: Literal["tcp", "base"] = "tcp"
+    """Frame in which knots state force and deflection."""
+    lead_s: Positive = 0.040
+    """Least time between the announcement of a knot and the knot."""
+    tolerance_N: Positive | None = None
+    """Largest error of the knots' polyline; default: the larger of 10 N and 3 % of the peak."""
+    index_variable: Annotated[str, Field(pattern=_PILOT_VARIABLE)] = "$SEN_PINT[1]"
+    hash_variable: Annotated[str, Field(pattern=_PILOT_VARIABLE)] = "$SEN_PINT[2]"
+    value_variable: Annotated[str, Field(pattern=_PILOT_ARRAY)] = "$SEN_PREA"
+    max_active: Annotated[int, Field(strict=True, ge=1, le=8)] = 8
+    """Triggers that may wait at the same time."""
+
+
+_EXTERNAL = r"^[A-Za-z][A-Za-z0-9_]{0,23} ?\([A-Za-z0-9_ :,\[\]]*\)$"
+
+
+class Program(Section):
+    """How the KRL text is laid out."""
+
+    max_lines: Annotated[int, Field(strict=True, ge=100)] = 5000
+    comment_every: Annotated[int, Field(strict=True, ge=0, le=10**9)] = 50
+    """A comment with the G-code line every so many motions; 0 = only at events."""
+    tool_length: Literal["g43", "from_table"] = "g43"
+    """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
+    the spindle, for posts that set lengths by touching off and never write G43."""
+    warn_size_mb: Positive = 4.0
+    externals: tuple[Annotated[str, Field(pattern=_EXTERNAL)], ...] = ()
+    """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""
+    prologue: str = ""
+    """KRL (Jinja2) between the guard and the first motion."""
+    epilogue: str = ""
+    """KRL (Jinja2) after the last motion."""
+    memory_moves: Annotated[int, Field(strict=True, ge=1)] = 30000
+    """LIN lines a controller surely holds."""
+
+    @field_validator("externals")
+    @classmethod
+    def _subprograms(cls, externals: tuple[str, ...]) -> tuple[str, ...]:
+        for problem in filter(None, map(external_problem, externals)):
+            raise ValueError(problem)
+        return externals
+
+
+class Verified(Section):
+    """Who confirmed that the cell file matches the real cell."""
+
+    by: Annotated[OneLine, Field(min_length=1, max_length=100)]
+    date: Annotated[str, Field(pattern=r"^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
+
+    @field_validator("date")
+    @classmethod
+    def _day(cls, given: str) -> str:
+        try:
+            datetime.date.fromisoformat(given)
+        except ValueError:
+            raise ValueError(f"{given} is no day of the calendar (year-month-day)") from None
+        return given
+
+
+ToolNumber = Annotated[int, Field(ge=1, le=99999)]
+
+
+class TakenOver(Section):
+    """A value that a cell took over from the one it is based on."""
+
+    key: str
+    """Dotted, as in the file: ``frames.base``."""
+    value: str
+    source: str
+    """The file, or ``demonstration``."""
+    verified: bool
+    """True where that file is verified."""
+
+
+class EffectEntry(Section):
+    """Something that the nominal model leaves out, as `gcode2krl diagnose --apply` writes it."""
+
+    name: str
+    target: str | None = None
+    parameters: dict[str, Finite | tuple[Finite, ...]] = Field(default_factory=dict)
+    source: str = ""

@@ -1,0 +1,51 @@
+"""Arrays that cannot be written to, in the one type for which a kernel is compiled.
+
+numba compiles a kernel anew for another element type, another order in memory, and for an array that may be
+written to. So every input is a contiguous, read-only array of floats, whatever table it came from.
+"""
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gcode2krl.arrays import Floats
+
+Array = TypeVar("Array", bound=NDArray[Any])
+
+
+def locked(array: Array) -> Array:
+    """Return a view that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def contiguous(values: ArrayLike) -> Floats:
+    """Return the values contiguous and read-only; a copy only where they are not floats in this order."""
+    return locked(np.ascontiguousarray(values, dtype=np.float64))
+
+
+def read_only(name: str, values: ArrayLike, *shape: int) -> Floats:
+    """Return the values of an argument contiguous and read-only, in the wanted shape.
+
+    Parameters
+    ----------
+    name : str
+        The argument's name, for the error.
+    values : array_like
+        The numbers.
+    *shape : int
+        The wanted shape, -1 for any length.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another one.
+    """
+    array = contiguous(values)
+    lengths = zip(array.shape, shape, strict=False)
+    if array.ndim != len(shape) or any(length not in (-1, found) for found, length in lengths):
+        wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
+        raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
+    return array

@@ -1,0 +1,37 @@
+"""Work in threads: results in the order of the tasks, no more threads than asked for, errors not lost."""
+
+import threading
+import time
+
+import pytest
+
+from gcode2krl.compiled.threads import in_threads
+
+
+def test_results_come_in_the_order_of_the_tasks():
+    def late(task):
+        time.sleep(0.02 if task == 0 else 0.0)
+        return 10 * task
+
+    assert in_threads(late, range(4), 4) == [0, 10, 20, 30]
+
+
+def test_as_many_threads_as_asked_for():
+    together = threading.Barrier(3, timeout=10.0)  # three tasks must run at once, or it breaks
+    assert len(in_threads(lambda task: together.wait(), range(3), 3)) == 3
+
+
+def test_one_thread_is_the_callers():
+    assert set(in_threads(lambda task: threading.get_ident(), range(5), 1)) == {threading.get_ident()}
+
+
+def test_an_error_comes_out():
+    def fails(task):
+        raise KeyError(task)
+
+    with pytest.raises(KeyError):
+        in_threads(fails, range(3), 2)
+
+
+def test_no_tasks_no_results():
+    assert in_threads(str, []) == []
