@@ -103,8 +103,14 @@ def with_matrices(q, force, moment):
         angles = (np.cross(seen[..., :3, 3], force_i) + moment_i) * SOFTNESS[i]  # eq. 6, 7
         bent = transforms[i] @ (elastic_matrix(angles) @ bent)  # eq. 3, 8
     turn = bent[..., :3, :3] @ to_tip
-    vector = np.stack([turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0],
-                       turn[..., 1, 0] - turn[..., 0, 1]], axis=-1)  # fmt: skip
+    vector = np.stack(
+        [
+            turn[..., 2, 1] - turn[..., 1, 2],
+            turn[..., 0, 2] - turn[..., 2, 0],
+            turn[..., 1, 0] - turn[..., 0, 1],
+        ],
+        axis=-1,
+    )
     sine = np.linalg.norm(vector, axis=-1, keepdims=True) / 2
     cosine = (np.trace(turn, axis1=-2, axis2=-1)[..., None] - 1) / 2
     return bent[..., :3, 3] - rigid[..., :3, 3], vector * np.arctan2(sine, cosine) / (2 * sine)  # eq. 9

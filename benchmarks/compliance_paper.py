@@ -100,7 +100,7 @@ def main():
     for name, column, labels in (("direction", 0, DIRECTIONS), ("position", 1, ("1", "2", "3", "4"))):
         means = (f"{label} {magnitude[index[:, column] == k].mean():.3f}" for k, label in enumerate(labels))
         print(f"by {name}: {', '.join(means)}")
-    # a share counts by what it adds along the deflection
+    # a joint counts by what it adds along the deflection
     along = np.einsum("nkj,nj->nk", shares, shares.sum(axis=1))
     part = (along / along.sum(axis=1, keepdims=True)).mean(axis=0)
     print(

@@ -1,4 +1,4 @@
-"""Fuzz what comes from outside: cells, prediction folders, run folders, meshes, telegrams.
+"""Fuzz inputs from outside: cells, prediction folders, run folders, meshes, telegrams.
 
 python benchmarks/fuzz.py predictions --count 10000 --seed 1
 """

@@ -30,7 +30,7 @@ VALUES = (
     "KR 300 R2500 ultra",
     "../x.toml", "demonstration", [], {}, [1, 2, 3], [[0, 0], [1, 1]],
     {"x_mm": 1.0}, [[[[1]]]], {"a": {"b": {}}},
-)  # fmt: skip
+)  # fmt: skip  # list of odd values, kept compact
 TEMPLATES = (
     "", "HALT", "$OUT[1]=TRUE", "$OUT[{{ spindle.run_cw_output }}]=TRUE", "$BASE=$NULLFRAME", "PTP HOME",
     "{{ cell }}",    "{{ cell.m_code.update({}) }}", "{{ 'x' * 3000000000 }}",
@@ -38,7 +38,7 @@ TEMPLATES = (
     "{{ '%999999999d' % 1 }}", "{{ " + "(" * 900 + "1" + ")" * 900 + " }}", "{% if %}", "{{", "IF X THEN",
     "GOTO A",
     "{{ cell.tool[1].teeth }}", "{{ 9**9**9 }}", "{{ rpm | round | int }}", "\r\x0b", "{{ self }}", "{{ p }}",
-)  # fmt: skip
+)  # fmt: skip  # list of odd values, kept compact
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -76,7 +76,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def use(path: Path) -> bool:
-    """Load a cell and everything that rests on it alone; False where it was refused in one of the ways."""
+    """Load a cell and everything that depends on it alone; False where it was refused with a finding."""
     try:
         cell = load_cell(path)
     except Gcode2KrlError as error:
@@ -100,7 +100,7 @@ def use(path: Path) -> bool:
 
 
 def check(error: Gcode2KrlError) -> None:
-    """Raise where a finding is no line with a code and a remedy."""
+    """Raise where a finding is not one line with a code and a remedy."""
     for issue in error.issues:
         if not (issue.code and issue.message and issue.remedy) or len(issue.text()) > 2000:
             raise AssertionError(f"no finding for a person: {issue!r:.300}")
@@ -135,7 +135,7 @@ def text_of(whole: dict, rng: random.Random) -> bytes:
 
 
 def changed(value: object, rng: random.Random, share: float) -> object:
-    """Return a value with some of what is inside replaced, renamed or left out."""
+    """Return a value with some of its contents replaced, renamed or left out."""
     if isinstance(value, dict):
         found = {}
         for key, inner in value.items():
@@ -151,7 +151,7 @@ def changed(value: object, rng: random.Random, share: float) -> object:
 
 
 def damaged(text: bytes, rng: random.Random) -> bytes:
-    """Return the text with bytes cut out, doubled, replaced, or something hostile in front or behind."""
+    """Return the text with bytes removed, doubled or replaced, or hostile text before or after it."""
     at, length = rng.randrange(len(text) + 1), rng.randrange(1, 50)
     kind = rng.randrange(6)
     if kind == 0:

@@ -1,4 +1,4 @@
-"""What all fuzz benchmarks share: cases in a child process that may hang, abort or eat memory, and a report.
+"""Common part of the fuzz benchmarks: cases in a child process that may hang or abort, and a report.
 
 A case is made from a seed and its number alone, so that each can be made again. It is *accepted*, *refused*
 (one of our errors, of one line, exit code 2) or it is a *failure*: another exception, several lines, a word
@@ -24,12 +24,12 @@ MOST_MB = 1000.0
 ADDRESS_SPACE = 16 * 2**30
 """A child that asks for more fails instead of taking the machine with it."""
 Try = Callable[[np.random.Generator, Path], str]
-"""Makes a case in a folder, tries it, and returns what it was; raises what the product raises."""
+"""Makes a case in a folder, tries it, and returns its description; raises what the package raises."""
 
 
 @dataclass
 class Tally:
-    """What became of the cases."""
+    """Results of the cases."""
 
     count: int = 0
     accepted: int = 0
@@ -39,7 +39,7 @@ class Tally:
     slowest: str = ""
     peak_mb: float = 0.0
     start_mb: float = 0.0
-    """Memory before the first case: what the imports take."""
+    """Memory before the first case, used by the imports."""
     codes: dict[str, int] = field(default_factory=dict)
 
 
@@ -104,7 +104,7 @@ def _work(
     shared: Any,
     out: Connection,
 ) -> None:
-    """Run cases in this process, and send what became of them."""
+    """Run cases in this process, and send their results."""
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     place = Path(tempfile.mkdtemp(dir=folder))

@@ -1,4 +1,4 @@
-"""Damaged and made-up meshes of a raw part: STL, PLY, 3MF, and what only has their name.
+"""Damaged and made-up meshes of a raw part: STL, PLY, 3MF, and other files with their names.
 
 python benchmarks/fuzz_meshes.py --count 10000 --seed 1
 """
@@ -28,7 +28,7 @@ COUNTS = (
 
 
 def prepare(place: Path) -> Try:
-    """Make good meshes once; return what tries a case."""
+    """Make good meshes once; return the function that tries a case."""
     import trimesh
 
     from gcode2krl.cutting.raw_part import load_mesh
@@ -83,8 +83,10 @@ def header(rng: np.random.Generator, files: dict[str, bytes]) -> tuple[str, str,
     elif kind == 1:
         lines[at:at] = [lines[int(rng.integers(len(lines)))]]
     elif kind == 2:
-        lines = [re.sub(rb"(element \w+ )\d+", rb"\g<1>" + COUNTS[int(rng.integers(len(COUNTS)))], line)
-                 for line in lines]  # fmt: skip
+        lines = [
+            re.sub(rb"(element \w+ )\d+", rb"\g<1>" + COUNTS[int(rng.integers(len(COUNTS)))], line)
+            for line in lines
+        ]
     elif kind == 3:
         kinds = (b"double", b"uchar", b"list uint uint", b"list uchar double", b"foo", b"")
         lines[at] = re.sub(rb"float|int|uchar", kinds[int(rng.integers(len(kinds)))], lines[at])
@@ -148,18 +150,26 @@ def tricks(rng: np.random.Generator, files: dict[str, bytes]) -> tuple[str, str,
     """Nothing, random bytes, or one thing without end."""
     ending = str(rng.choice(ENDINGS[:3]))
     choices = (
-        b"", b"\n" * 1000, rng.bytes(int(rng.integers(2000))), b"solid a\n" * int(rng.integers(1, 5000)),
-        b"solid\n" + b"facet normal 0 0 1\nouter loop\n" * 500, b"ply\n" + b"element vertex 1\n" * 500,
+        b"",
+        b"\n" * 1000,
+        rng.bytes(int(rng.integers(2000))),
+        b"solid a\n" * int(rng.integers(1, 5000)),
+        b"solid\n" + b"facet normal 0 0 1\nouter loop\n" * 500,
+        b"ply\n" + b"element vertex 1\n" * 500,
         b"ply\nformat ascii 1.0\n" + b"property float x\n" * 500 + b"end_header\n",
         b"PK\x03\x04" + rng.bytes(200),
-        bytes(80) + b"\xff\xff\xff\xff" + bytes(50), bytes(84), b"PK\x05\x06" + bytes(18),
-        b"solid a\nendsolid a\n" * 2000, b"<" * 5000, b"solid " + b"facet " * 4000 + b"endsolid",
-    )  # fmt: skip
+        bytes(80) + b"\xff\xff\xff\xff" + bytes(50),
+        bytes(84),
+        b"PK\x05\x06" + bytes(18),
+        b"solid a\nendsolid a\n" * 2000,
+        b"<" * 5000,
+        b"solid " + b"facet " * 4000 + b"endsolid",
+    )
     return "trick", ending, choices[int(rng.integers(len(choices)))]
 
 
 def misnamed(rng: np.random.Generator, files: dict[str, bytes]) -> tuple[str, str, bytes]:
-    """One kind by the name of another."""
+    """A mesh of one kind named as another."""
     return "misnamed", str(rng.choice(ENDINGS)), files[str(rng.choice(sorted(files)))]
 
 

@@ -38,7 +38,7 @@ DEPTHS = ("[" * 100_000, "{a=" * 20_000, "a." * 20_000 + "a=1", "[a" + ".a" * 20
 
 
 def prepare(place: Path) -> Try:
-    """Make a good prediction once; return what tries a case."""
+    """Make a good prediction once; return the function that tries a case."""
     from gcode2krl import Prediction, predict
 
     part = place / "part.nc"
@@ -72,7 +72,7 @@ def prepare(place: Path) -> Try:
 
 
 def _used(prediction: object) -> None:
-    """Look at what a command looks at."""
+    """Read everything that a command reads."""
     from gcode2krl import Prediction
 
     assert isinstance(prediction, Prediction)

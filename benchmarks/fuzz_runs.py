@@ -68,7 +68,7 @@ Files = dict[str, bytes]
 
 
 def prepare(place: Path) -> Try:
-    """Make good files once; return what tries a case."""
+    """Make good files once; return the function that tries a case."""
     from gcode2krl.runs import check_against, load_run
 
     files = good_files(place)
@@ -133,12 +133,31 @@ def _rsi_log(position: np.ndarray) -> str:  # type: ignore[type-arg]
 
 def _trace_head() -> str:
     lines = ["DIAEXTENDED  {@:ENGLISH", "#BEGINGLOBALHEADER", "102,KR 300", "#ENDGLOBALHEADER"]
-    lines += ["#BEGINCHANNELHEADER", "200,Zeit", "202,s", "210,IMPLIZIT", f"220,{ROWS}", "240,0", "241,0.012",
-              "#ENDCHANNELHEADER"]  # fmt: skip
+    lines += [
+        "#BEGINCHANNELHEADER",
+        "200,Zeit",
+        "202,s",
+        "210,IMPLIZIT",
+        f"220,{ROWS}",
+        "240,0",
+        "241,0.012",
+        "#ENDCHANNELHEADER",
+    ]
     for number, axis in enumerate("XYZ", start=1):
-        lines += ["#BEGINCHANNELHEADER", f"200,{axis}_CmdIpo", "202,mm", "210,EXPLIZIT", "211,a_KRCIpo.r64",
-                  "213,BLOCK", "214,REAL64", f"220,{ROWS}", f"221,{number}", "240,0", "241,1",
-                  "#ENDCHANNELHEADER"]  # fmt: skip
+        lines += [
+            "#BEGINCHANNELHEADER",
+            f"200,{axis}_CmdIpo",
+            "202,mm",
+            "210,EXPLIZIT",
+            "211,a_KRCIpo.r64",
+            "213,BLOCK",
+            "214,REAL64",
+            f"220,{ROWS}",
+            f"221,{number}",
+            "240,0",
+            "241,1",
+            "#ENDCHANNELHEADER",
+        ]
     return "\r\n".join(lines) + "\r\n"
 
 
@@ -276,8 +295,15 @@ def odd_folder(rng: np.random.Generator, folder: Path, chosen: Files, files: Fil
 
 
 CASES: tuple[Callable[[np.random.Generator, Path, Files, Files], str], ...] = (
-    damage, damage, footer, cells, cells, head, table, odd_folder,
-)  # fmt: skip
+    damage,
+    damage,
+    footer,
+    cells,
+    cells,
+    head,
+    table,
+    odd_folder,
+)
 main = main_of("run folders", prepare, __doc__, 10_000)
 
 if __name__ == "__main__":

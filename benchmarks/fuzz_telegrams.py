@@ -53,7 +53,7 @@ TRICKS = (
 
 
 def prepare(place: Path) -> Try:
-    """Start sessions; return what tries a case."""
+    """Start sessions; return the function that tries a case."""
     from gcode2krl import load_cell
     from gcode2krl.cell.sections.online import Online, Probe
     from gcode2krl.errors import input_error

@@ -1,4 +1,4 @@
-"""Is `diagnose` right on runs of a robot that it has never seen, and how often does it cry wolf?
+"""How often `diagnose` is right on runs of a robot that it has never seen, and its false alarms.
 
 ``python benchmarks/gap_blind.py --cases 200 --seed N`` makes cases with the independent plant of
 ``tests/plant``, diagnoses each without its label, and prints the table of metrics, the confusions, simple
@@ -66,7 +66,7 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
 
 
 def counts_of(options: argparse.Namespace) -> dict[str, int]:
-    """Return how many cases of each kind are asked for."""
+    """Return the requested number of cases of each kind."""
     counts = dict.fromkeys(KINDS, 0)
     if options.small:
         counts |= {"null": 1, "single": 1, "open": 1}
@@ -146,9 +146,12 @@ def main(given: Sequence[str] | None = None) -> int:
             records = [record for case in cases if (record := done(case, folder, None)) is not None]
         else:
             how = How(
-                not options.no_oracle, not options.no_baselines, options.keep, fingerprint(),
+                not options.no_oracle,
+                not options.no_baselines,
+                options.keep,
+                fingerprint(),
                 predictions(folder / "predictions"),
-            )  # fmt: skip
+            )
             records = run(cases, folder, how, options.jobs)
     return _print(records, options, time.perf_counter() - start)
 

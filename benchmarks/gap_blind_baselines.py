@@ -1,4 +1,4 @@
-"""Simple methods on the same cases: what a diagnosis must beat.
+"""Simple methods on the same cases, for comparison.
 
 All see the whole signals, scaled by the noise of each column and without a split of the chain, at 20 samples
 a second, and the signatures of all effects by finite differences at the nominal prediction. The
@@ -14,7 +14,7 @@ import numpy as np
 
 STEP_s = 0.05
 LEAST_GAIN = 0.02
-"""Share of the power that must go, or nothing is named."""
+"""Fraction of the power that a method must remove to name a cause."""
 LASSO_STEPS, LASSO_SWEEPS, LASSO_NAMED = 12, 40, 0.25
 
 
@@ -154,7 +154,7 @@ def _columns(signals: Any, grid: np.ndarray) -> np.ndarray:
 
 
 def _clocks(base: dict, use: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return (k·m, c) orthonormal: what a clock of tracker, force, controller or load encoders does."""
+    """Return (k·m, c) orthonormal: the effect of a clock of tracker, force, controller or load encoders."""
     rate = np.gradient(base["all"], STEP_s, axis=0)
     rate[:, 18:] = rate[:, 6:12]
     tables = [range(3), range(3, 6), range(6, 12), range(18, 24)]

@@ -36,14 +36,22 @@ KINDS = ("null", "single", "slip", "open", "pair", "deleted")
 MIXED = {"null": 0.15, "single": 0.55, "slip": 0.08, "open": 0.10, "pair": 0.07, "deleted": 0.05}
 FULL = {"null": 300, "single": 400}
 DELETED = (
-    "backlash", "friction", "transmission", "mastering", "stiffness", "servo_lag", "force_delay", "tool_wear",
-    "thermal", "vibration",
-)  # fmt: skip
+    "backlash",
+    "friction",
+    "transmission",
+    "mastering",
+    "stiffness",
+    "servo_lag",
+    "force_delay",
+    "tool_wear",
+    "thermal",
+    "vibration",
+)
 """Effects that are also tried with themselves taken out of the library."""
 
 
 NOT_SIMULATED = ("other_program",)
-"""What can be found but not predicted: no oracle can."""
+"""Causes that can be found but not predicted, so there is no oracle."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class Case:
 
 @dataclass(frozen=True)
 class How:
-    """What is done with every case besides the diagnosis."""
+    """Further computations for every case."""
 
     oracle: bool = True
     baselines: bool = True
@@ -123,14 +131,14 @@ def _case(kind: str, seed: int, i: int, names: Sequence[str]) -> Case:
 
 
 def mixed(count: int) -> dict[str, int]:
-    """Return how many cases of each kind a mixed check of so many has."""
+    """Return how many cases of each kind a mixed check has."""
     counts = {kind: round(share * count) for kind, share in MIXED.items()}
     counts["single"] += count - sum(counts.values())
     return counts
 
 
 def fingerprint() -> str:
-    """Return a digest of the code that a diagnosis rests on."""
+    """Return a digest of the code that a diagnosis depends on."""
     digest = hashlib.sha256()
     for room in ("gap", "effects"):
         for file in sorted((ROOT / "gcode2krl" / room).rglob("*.py")):
@@ -197,7 +205,7 @@ def _diagnose(case: Case, place: Path, how: How, record: dict[str, Any]) -> None
 
 
 def _beside(case: Case, place: Path, how: How, record: dict[str, Any]) -> None:
-    """Add what an oracle and simple methods make of the same case."""
+    """Add the results of an oracle and of simple methods on the same case."""
     label = record["label"]
     names = [run["run"] for run in label["runs"]]
     first = label["effects"][0] if label["effects"] else {"effect": "", "ratio": 0.0}

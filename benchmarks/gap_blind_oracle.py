@@ -1,4 +1,4 @@
-"""How far the gap shrinks for one who knows the effect, its target and its parameters.
+"""How far the gap shrinks if the effect, its target and its parameters are known.
 
 The effect is put into the model by the library's own implementation and with the true parameters. Where the
 plant's effect has another form than the library's, the oracle takes the size that fits best instead, normal
@@ -14,9 +14,13 @@ from typing import Any
 import numpy as np
 
 LINK = {
-    "timing": "path", "joint_commanded": "path", "joint_actual": "servo", "joint_load": "gear",
-    "force": "force", "tcp": "mechanics",
-}  # fmt: skip
+    "timing": "path",
+    "joint_commanded": "path",
+    "joint_actual": "servo",
+    "joint_load": "gear",
+    "force": "force",
+    "tcp": "mechanics",
+}
 RENAMED = {"kg": "mass_kg", "frame_off_mm": ("x_mm", "y_mm", "z_mm"), "h0_N": ("h0_x_N", "h0_y_N", "h0_z_N")}
 RENAMED |= {"direction": ("direction_x", "direction_y", "direction_z")}
 RENAMED |= {"H_N_rad": tuple(f"H_{row}{column}_N_rad" for row in "xyz" for column in "xyz")}
@@ -89,7 +93,7 @@ def _applied(entry: dict, inputs: Any) -> Any:
 
 
 def _times(one: Any, nominal: dict[str, float], size: float) -> Any:
-    """Return an effect with its deviations from nominal so many times as large; shapes as they are."""
+    """Return an effect with its deviations from nominal multiplied by a factor; shapes unchanged."""
     values = {
         name: value if one.effect.parameter(name).is_shape else nominal[name] + size * (value - nominal[name])
         for name, value in one.values.items()
@@ -115,7 +119,7 @@ def _left(parts: Sequence[Any], one: Any) -> float:
 
 
 def _mismatch(part: Any, one: Any) -> np.ndarray:
-    """Return what of the residual (n, k) with an effect in the model the nuisance explains."""
+    """Return the part of the residual (n, k) with an effect in the model that the nuisance explains."""
     residual = (part.measured - part.sample([one])).T.ravel()
     wide = _nuisance(part)
     return (wide @ np.linalg.lstsq(wide, residual, rcond=None)[0]).reshape(part.shape[1], -1).T

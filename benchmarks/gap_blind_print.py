@@ -153,11 +153,16 @@ def _effects(cases: Sequence[Judged]) -> list[tuple[str, ...]]:
         least = smallest_seen(mine)
         exact, declared = rate(e.exact for e in seen), rate(e.declared for e in seen)
         row = (
-            name, str(len(mine)), str(len(seen)),
-            f"{exact.count}/{exact.of}", f"{declared.count}/{declared.of}",
-            _short(x for e in seen for x in e.errors), _short(e.relative_shrink for e in seen),
-            _short(e.overlap for e in seen), "-" if least is None else f"{least:.2f} x noise",
-        )  # fmt: skip
+            name,
+            str(len(mine)),
+            str(len(seen)),
+            f"{exact.count}/{exact.of}",
+            f"{declared.count}/{declared.of}",
+            _short(x for e in seen for x in e.errors),
+            _short(e.relative_shrink for e in seen),
+            _short(e.overlap for e in seen),
+            "-" if least is None else f"{least:.2f} x noise",
+        )
         rows.append((declared.value if seen else 2.0, row))
     return [row for _, row in sorted(rows, key=lambda each: each[0])]
 

@@ -1,4 +1,4 @@
-"""Scores of records: one judgement a case, then the figures of the whole check.
+"""Scores of records: one judgement for each case, then the figures of the whole check.
 
 A cause counts as named from probability 0.5. *Exact*: the named causes are the truth, no more and no less.
 *Declared*: each named cause or one that it declares indistinguishable is a truth, and every truth is covered.
@@ -18,24 +18,56 @@ UNKNOWN = ("unexplained", "partly_explained")
 VERDICTS = {"null": ("no_gap",), "open": UNKNOWN, "deleted": UNKNOWN}
 """The right verdicts where no cause is right."""
 LEAST_REMOVED = 0.1
-"""An oracle that takes less of the power than this shows nothing about shrink."""
+"""An oracle that removes less of the power than this gives no figure for shrink."""
 HALF = (0.35, 0.71)
 """Ratios that count as half the noise."""
 ANY_TARGET = frozenset({"tool_number", "swapped_tool"})
 """The plant's target is a way of being wrong, not one of the library's targets."""
-EVERYWHERE = frozenset({
-    "mastering", "link_length", "base_frame", "tool_frame", "thermal", "gravity", "load", "wrist_coupling",
-    "force_offset", "force_drift", "tool_weight", "hose_pack", "tool_number", "base_number",
-    "absolute_accuracy", "unit", "swapped_tool", "other_program",
-})  # fmt: skip
-"""Effects that are there all the time: their place in time says nothing and is not scored."""
+EVERYWHERE = frozenset(
+    {
+        "mastering",
+        "link_length",
+        "base_frame",
+        "tool_frame",
+        "thermal",
+        "gravity",
+        "load",
+        "wrist_coupling",
+        "force_offset",
+        "force_drift",
+        "tool_weight",
+        "hose_pack",
+        "tool_number",
+        "base_number",
+        "absolute_accuracy",
+        "unit",
+        "swapped_tool",
+        "other_program",
+    }
+)
+"""Effects that act all the time: their place in time is not scored."""
 NOMINAL = {"scale": 1.0, "factor": 1.0}
 OWN_SIZE = frozenset({"k_s", "acc_cp_m_s2", "cdis_mm", "percent"})
-"""Parameters whose error is a share of the value itself, not of its deviation from nominal."""
-SHAPES = frozenset({
-    "decay_s", "harmonic", "phase", "time_constant_h", "hz", "damping", "torque_Nm", "skew", "count",
-    "cx_mm", "cy_mm", "cz_mm", "direction_x", "direction_y", "direction_z",
-})  # fmt: skip
+"""Parameters whose error is relative to the value itself, not of its deviation from nominal."""
+SHAPES = frozenset(
+    {
+        "decay_s",
+        "harmonic",
+        "phase",
+        "time_constant_h",
+        "hz",
+        "damping",
+        "torque_Nm",
+        "skew",
+        "count",
+        "cx_mm",
+        "cy_mm",
+        "cz_mm",
+        "direction_x",
+        "direction_y",
+        "direction_z",
+    }
+)
 VECTORS = (("x_mm", "y_mm", "z_mm"), ("fx_N", "fy_N", "fz_N"), ("h0_x_N", "h0_y_N", "h0_z_N"))
 TURNS = ("a_deg", "b_deg", "c_deg")
 
@@ -76,17 +108,17 @@ class Judged:
 
     @property
     def name(self) -> str:
-        """Return what was wrong."""
+        """Return the true causes."""
         return " + ".join(_text(one) for one in self.truths) or "none"
 
     @property
     def answer(self) -> str:
-        """Return what was said."""
+        """Return the named causes."""
         return " + ".join(_text(one) for one in self.named) or self.verdict
 
 
 def judge(record: dict[str, Any]) -> Judged:
-    """Return what a record is worth; one without a result counts as wrong."""
+    """Return the judgement of a record; one without a result counts as wrong."""
     label, result, case = record["label"], record.get("result"), record["case"]
     entries = label["effects"]
     truths = tuple((entry["effect"], entry["target"]) for entry in entries)
@@ -99,13 +131,18 @@ def judge(record: dict[str, Any]) -> Judged:
         form="other" if any(entry["form"] == "other" for entry in entries) else "same",
         ratio=min((entry["ratio"] for entry in entries), default=0.0),
         verdict="failed" if result is None else result["verdict"],
-        named=(), exact=False, declared=False, hit=False, set_size=0.0, probabilities=[],
+        named=(),
+        exact=False,
+        declared=False,
+        hit=False,
+        set_size=0.0,
+        probabilities=[],
         seconds=record.get("diagnosis_s", 0.0),
         cpu_s=record.get("diagnosis_cpu_s", 0.0),
         plant_s=record.get("plant_s", 0.0),
         failed=record.get("error") is not None,
         baselines=_baselines(record, truths),
-    )  # fmt: skip
+    )
     if result is not None:
         _judge_causes(judged, result)
         if one is not None:
@@ -130,7 +167,7 @@ def _judge_causes(judged: Judged, result: dict[str, Any]) -> None:
 
 
 def _covered(truths: Sequence[tuple], named: Sequence[dict], says: Callable[[dict, tuple], bool]) -> bool:
-    """Tell whether each truth can be given a cause of its own that says it."""
+    """Tell whether each truth can be matched with a different cause that names it."""
     if not truths:
         return True
     return any(
@@ -247,33 +284,33 @@ def _text(one: tuple[str, str | None]) -> str:
 
 @dataclass(frozen=True)
 class Rate:
-    """A share of cases, with its one-sided 95 % bounds (Clopper and Pearson 1934)."""
+    """A fraction of cases, with its one-sided 95 % bounds (Clopper and Pearson 1934)."""
 
     count: int
     of: int
 
     @property
     def value(self) -> float:
-        """Return the share, NaN of none."""
+        """Return the fraction, NaN without cases."""
         return self.count / self.of if self.of else float("nan")
 
     @property
     def lower(self) -> float:
-        """Return what the true rate is at least."""
+        """Return the lower bound of the true rate."""
         from scipy.stats import beta
 
         return float(beta.ppf(0.05, self.count, self.of - self.count + 1)) if self.count else 0.0
 
     @property
     def upper(self) -> float:
-        """Return what the true rate is at most."""
+        """Return the upper bound of the true rate."""
         from scipy.stats import beta
 
         return float(beta.ppf(0.95, self.count + 1, self.of - self.count)) if self.count < self.of else 1.0
 
 
 def rate(flags: Iterable[bool]) -> Rate:
-    """Return the share of true flags."""
+    """Return the fraction of true flags."""
     flags = list(flags)
     return Rate(sum(flags), len(flags))
 

@@ -59,8 +59,10 @@ def _runs(folder: Path) -> float:
     rng = np.random.default_rng(1)
     how = replace(
         instruments.drawn(rng, frozenset({"controller", "tracker", "force", "q_load"})),
-        tracker_hz=100.0, controller_s=0.012, scan=False,
-    )  # fmt: skip
+        tracker_hz=100.0,
+        controller_s=0.012,
+        scan=False,
+    )
     fault = cases._fault(EFFECT, "same", 1)
     robot = cases._robot_mismatch(rng)
     for number in range(3):

@@ -1,4 +1,4 @@
-"""Do the 90 % intervals of `gcode2krl identify controller` hold? Coverage over random controllers.
+"""Coverage of the 90 % intervals of `gcode2krl identify controller` over random controllers.
 
 Each draw is a controller with another k (whole cycles of 12 ms), CDIS and law that runs the program of
 `make-test controller`; its trace has another noise, rounding and start. The traces are made here by brute
@@ -50,7 +50,7 @@ class Leg:
 
 
 def turning_leg(start_mm, end_mm, angle_deg, vel_ori_deg_s, acc_ori_deg_s2, speed_mm_s, dwell_s) -> Leg:
-    """A line on which the tool turns: the share of the angle done is the share of the way done."""
+    """A line on which the tool turns: angle and path progress by the same fraction."""
     points = np.array([start_mm, end_mm], dtype=float)
     mm_per_deg = np.linalg.norm(points[1] - points[0]) / angle_deg
     speed = min(speed_mm_s, vel_ori_deg_s * mm_per_deg)
@@ -165,9 +165,14 @@ def place(leg: Leg, way: np.ndarray, cdis_mm: float) -> np.ndarray:
 
 
 def simulate(
-    legs: list[Leg], controller: Controller, rng: np.random.Generator,
-    *, noise_mm: float = 0.0, rounding_mm: float = 0.001, cycle_s: float = CYCLE_S,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    legs: list[Leg],
+    controller: Controller,
+    rng: np.random.Generator,
+    *,
+    noise_mm: float = 0.0,
+    rounding_mm: float = 0.001,
+    cycle_s: float = CYCLE_S,
+) -> tuple[np.ndarray, np.ndarray]:
     """Return sample times and recorded positions; the first sample falls anywhere in a cycle."""
     times, positions = [np.zeros(1)], [legs[0].points_mm[:1]]
     now = 0.2 + rng.uniform(0.0, cycle_s)
@@ -226,25 +231,36 @@ def main() -> None:
         k, cdis = found.k_s, found.cdis_mm
         rows.append(
             (
-                k.contains(controller.k_s), k.value - controller.k_s, (k.high - k.low) / 2,
+                k.contains(controller.k_s),
+                k.value - controller.k_s,
+                (k.high - k.low) / 2,
                 cdis is not None and cdis.contains(controller.cdis_mm),
                 cdis.value - controller.cdis_mm if cdis else np.nan,
                 (cdis.high - cdis.low) / 2 if cdis else np.nan,
-                found.law == controller.law, found.k_best_s == controller.k_s,
+                found.law == controller.law,
+                found.k_best_s == controller.k_s,
             )
-        )  # fmt: skip
+        )
     table = np.array(rows, dtype=float)
     covered_k, covered_cdis = table[:, 0].mean(), table[:, 3].mean()
     print(f"{arguments.draws} draws, {len(t)} samples a trace (the last), {failed} without a result")
-    print(f"  90 % interval of k     covers {covered_k:6.1%}   bias {table[:, 1].mean() * 1e6:+8.2f} us"
-          f"   half-width {np.median(table[:, 2]) * 1e6:8.2f} us (median)")  # fmt: skip
-    print(f"  90 % interval of CDIS  covers {covered_cdis:6.1%}   bias {table[:, 4].mean() * 1e3:+8.2f} um"
-          f"   half-width {np.median(table[:, 5]) * 1e3:8.2f} um (median)")  # fmt: skip
+    print(
+        f"  90 % interval of k     covers {covered_k:6.1%}   bias {table[:, 1].mean() * 1e6:+8.2f} us"
+        f"   half-width {np.median(table[:, 2]) * 1e6:8.2f} us (median)"
+    )
+    print(
+        f"  90 % interval of CDIS  covers {covered_cdis:6.1%}   bias {table[:, 4].mean() * 1e3:+8.2f} um"
+        f"   half-width {np.median(table[:, 5]) * 1e3:8.2f} um (median)"
+    )
     z_k, z_cdis = (1.6449 * table[:, i] / table[:, i + 1] for i in (1, 4))
-    print(f"  errors in sigma        k {z_k.mean():+.2f} +- {z_k.std():.2f}, "
-          f"CDIS {z_cdis.mean():+.2f} +- {z_cdis.std():.2f} (right: 0 +- 1)")  # fmt: skip
-    print(f"  right law {table[:, 6].mean():.1%}, right whole cycles applied {table[:, 7].mean():.1%}, "
-          f"warnings {warned}, {np.median(seconds):.3f} s a fit")  # fmt: skip
+    print(
+        f"  errors in sigma        k {z_k.mean():+.2f} +- {z_k.std():.2f}, "
+        f"CDIS {z_cdis.mean():+.2f} +- {z_cdis.std():.2f} (right: 0 +- 1)"
+    )
+    print(
+        f"  right law {table[:, 6].mean():.1%}, right whole cycles applied {table[:, 7].mean():.1%}, "
+        f"warnings {warned}, {np.median(seconds):.3f} s a fit"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Does `gcode2krl identify sensor` find weight, centre and offsets again, and do its intervals hold?
+"""Does `gcode2krl identify sensor` recover weight, centre and offsets, and are its intervals right?
 
 Simulated by the script of ``examples/identify``, which shares no code with the package: 27 orientations with
 noise of 0.5 N and 60 N·mm, without a hose pack for the coverage, with one for what the ten terms leave over.
@@ -59,12 +59,14 @@ def coverage(name: str, draws: int, rng: np.random.Generator) -> None:
         )
     for at, what in enumerate(NAMES):
         error = np.array(values)[:, at] - TRUTH[at]
-        print(f"    {what:<12} {TRUTH[at]:9.2f}   mean error {error.mean():+8.3f}, rms {error.std():8.3f}, "
-              f"90 % half-width {np.median(half, axis=0)[at]:8.3f}")  # fmt: skip
+        print(
+            f"    {what:<12} {TRUTH[at]:9.2f}   mean error {error.mean():+8.3f}, rms {error.std():8.3f}, "
+            f"90 % half-width {np.median(half, axis=0)[at]:8.3f}"
+        )
 
 
 def hose(rng: np.random.Generator) -> None:
-    """What is left at other orientations, with and without the ten terms."""
+    """Residuals at other orientations, with and without the ten terms."""
     found = identify_sensor(poses_of(make.orientations(), rng))
     between = [(a, b, c) for a in (-45, -15, 30, 60) for b in (50, 75, 115) for c in (-50, -20, 15, 45)]
     new = poses_of(between, rng, force_noise_N=0.0, moment_noise_Nmm=0.0)

@@ -1,4 +1,4 @@
-"""Does `gcode2krl identify stiffness` find table 1 again, and how often do its intervals hold the truth?
+"""Does `gcode2krl identify stiffness` recover table 1, and how often do its intervals contain the truth?
 
 The robot of Hähn & Weigold 2020 with the stiffness of table 1 is simulated by the script of
 ``examples/identify``, which shares no code with the package: eight pairs of cubes, four poses, six loads, and
@@ -78,8 +78,10 @@ def coverage(rows: list[list], cell, arguments: argparse.Namespace, folder: Path
         counted = inside[:, number][~np.isnan(inside[:, number])]
         by_stiffness = np.nanmean(inside[:, number], axis=0)
         spread = 2 * np.sqrt(level * (1 - level) / len(counted))
-        print(f"  {level:.0%} intervals cover {counted.mean():6.2%} of {len(counted)} true values "
-              f"(right: {level:.0%} +- {spread:.2%})")  # fmt: skip
+        print(
+            f"  {level:.0%} intervals cover {counted.mean():6.2%} of {len(counted)} true values "
+            f"(right: {level:.0%} +- {spread:.2%})"
+        )
         print(f"      by stiffness {by_stiffness.min():.1%} .. {by_stiffness.max():.1%}")
     refused = np.count_nonzero(np.isnan(inside[:, 0]))
     print(f"  not determined {refused} of {inside[:, 0].size}; {np.median(seconds) * 1e3:.0f} ms a fit")
@@ -102,7 +104,7 @@ def worst(rows: list[list], cell, folder: Path, cubes=None) -> str:
 
 
 def not_covered(rows: list[list], cell, folder: Path) -> None:
-    """What the intervals do not hold: errors that are the same in every reading."""
+    """Errors that the intervals do not cover: those equal in every reading."""
     print("  largest error without laser noise (distances written to 0.1 um)")
     print(f"    nothing else wrong                {worst(rows, cell, folder)}")
     low = [[*row[:7], *(0.99 * x for x in row[7:13]), *row[13:]] for row in rows]

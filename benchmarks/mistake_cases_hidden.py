@@ -1,4 +1,4 @@
-"""Mistakes that an interpreter does not see: somebody else's cell, slips that set their own scale, nonsense.
+"""Mistakes that an interpreter does not see: values of another cell, slips that hide themselves, nonsense.
 
 Written down before the translator was run on them, in two lists: `REPORTED` are mistakes that people found
 with earlier states of this program, `FURTHER` are others thought of for this benchmark. ``severity`` is the
@@ -12,7 +12,7 @@ OWN_CELL = CELL_HEAD.replace('based_on = "demonstration"\n', "")
 FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
 AFTER_T7 = 6
 TWO_RAPIDS = {14: "@N110 G0 X60. Y40.", 15: "N120 G1 X110. Y80."}
-"""A rapid at cutting depth; the move behind it leads to where the next arc begins."""
+"""A rapid at cutting depth; the move after it leads to the start of the next arc."""
 T9 = {6: "N30 T9 M6", 10: "N70 G43 Z25. H9"}
 BIG_STOCK = "[stock]\nbox_mm = [[-30.0, -30.0, -20.0], [150.0, 110.0, 0.0]]\n"
 
@@ -173,7 +173,7 @@ REPORTED = (
     ),
     Mistake("NUL byte", r"(?i)NUL|0x00|byte|character", {13: "@N100 Y70.\0 F1200."}),
 )
-"""What independent checks had found."""
+"""Found by independent checks."""
 
 FURTHER = (
     Mistake("F in mm/s", r"(?i)chip|feed|F", {13: "@N100 Y70. F20.", 12: "@", 15: "@"}, severity="warning"),
@@ -438,4 +438,4 @@ FURTHER = (
         or_whole=True,
     ),
 )
-"""Thought of here; in no list before. The last five can hardly be told from what somebody may want."""
+"""New cases, in no list before. The last five can hardly be distinguished from intended programs."""

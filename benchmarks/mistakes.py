@@ -1,4 +1,4 @@
-"""Seeded real mistakes: does ``gcode2krl translate`` refuse or warn of each, with the line and a remedy?
+"""Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
 ``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py`` and of
 ``mistake_cases_hidden.py`` through the command line's own entry, in a temporary folder, then clean programs
@@ -43,7 +43,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run of the command line did."""
+    """Result of a run of the command line."""
 
     exit_code: int
     findings: tuple[Finding, ...]
@@ -139,9 +139,10 @@ def judge(case: Mistake, folder: Path) -> Verdict:
     errors = [finding for finding in outcome.findings if finding.severity in least]
     internal = "internal error" in outcome.printed or "Traceback" in outcome.printed
     fitting = [
-        error for error in errors
+        error
+        for error in errors
         if error.line in expected and re.search(case.about, f"{error.message} {error.code}")
-    ]  # fmt: skip
+    ]
     best = max(fitting, key=lambda error: bool(error.remedy), default=errors[0] if errors else None)
     return Verdict(
         title=case.title,

@@ -1,4 +1,4 @@
-"""How long `online serve` takes for an answer, at 4 ms over UDP on loopback.
+"""Answer times of `online serve`, at 4 ms over UDP on loopback.
 
 The controller is a process of its own. It sends a telegram every cycle by its clock, as a KRC4 does, whether
 it was answered or not, and applies what comes back. Printed are what the server needs from a telegram to its
@@ -104,7 +104,7 @@ def burn(seconds):
 
 
 def measure(options):
-    """Return what the controller and the server saw."""
+    """Return the records of controller and server."""
     from gcode2krl import load_cell
     from gcode2krl.cell.sections.online import Online, RobotLink
     from gcode2krl.online.compensator import build_compensator

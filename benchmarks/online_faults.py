@@ -35,14 +35,18 @@ ROUNDING = 1e-9
 AS_TEXT = 0.02
 START_MM = np.array([50.0, 0.0, 40.0])
 GARBAGE = (
-    b"", b"\x00\xff" * 300, b"<Rob", b'<Rob Type="KUKA"><RIst X="1"/></Rob>',
-    b'<!DOCTYPE x [<!ENTITY a "aaaa">]><Rob>&a;</Rob>', b"<Rob>" + b"<A/>" * 2000 + b"</Rob>",
-)  # fmt: skip
+    b"",
+    b"\x00\xff" * 300,
+    b"<Rob",
+    b'<Rob Type="KUKA"><RIst X="1"/></Rob>',
+    b'<!DOCTYPE x [<!ENTITY a "aaaa">]><Rob>&a;</Rob>',
+    b"<Rob>" + b"<A/>" * 2000 + b"</Rob>",
+)
 
 
 @dataclass
 class Robot:
-    """A controller: its program, and what it makes of corrections."""
+    """A controller: its program, and its reaction to corrections."""
 
     device: Compensator
     jacobian: Floats
@@ -70,19 +74,26 @@ class Robot:
         return round(1000.0 * self.device.settings.cycle_s)
 
     def telegram(self) -> Telegram:
-        """Return what is said in this cycle."""
+        """Return the telegram of this cycle."""
         shift = self.applied if len(self.applied) == 3 else self.jacobian @ self.applied
         noise = self.rng.normal(0.0, self.noise_mm, 3) if self.noise_mm else 0.0
         nan = np.full(6, np.nan)
         told = {"knot": np.nan, "checksum": np.nan, "override_percent": np.nan, "t1": np.nan, **self.told}
         return Telegram(
-            ipoc=self.ipoc, position_mm=self.position_mm + shift + noise, command_mm=self.position_mm.copy(),
-            q_rad=self.q_rad, q_command_rad=self.q_rad, late=0.0,
-            monitor_mm=shift.copy() if self.reports else nan[:3], values=nan[:4], load=nan, **told,
-        )  # fmt: skip
+            ipoc=self.ipoc,
+            position_mm=self.position_mm + shift + noise,
+            command_mm=self.position_mm.copy(),
+            q_rad=self.q_rad,
+            q_command_rad=self.q_rad,
+            late=0.0,
+            monitor_mm=shift.copy() if self.reports else nan[:3],
+            values=nan[:4],
+            load=nan,
+            **told,
+        )
 
     def take(self, answer: Answer | None) -> None:
-        """Take an answer, None where none came (what was asked for stays), and go on to the next cycle."""
+        """Take an answer, None if there is none (the last correction stays), and go on to the next cycle."""
         if answer is not None and answer.ipoc == self.ipoc:
             self.asked = answer.correction.copy()
         self.waiting.append(np.zeros_like(self.asked) if self.ignores else self.asked)
@@ -93,7 +104,7 @@ class Robot:
             self.position_mm = self.position_mm + np.array([25.0, 0.0, 0.0]) * self.device.settings.cycle_s
 
     def start_anew(self, ipoc: int) -> None:
-        """RSI begins anew: nothing is corrected."""
+        """RSI restarts: no correction."""
         self.asked, self.applied = np.zeros_like(self.asked), np.zeros_like(self.applied)
         self.waiting = deque([np.zeros_like(self.asked)] * len(self.waiting))
         self.ipoc = ipoc
@@ -101,18 +112,18 @@ class Robot:
 
 @dataclass
 class Report:
-    """What all episodes together came to."""
+    """Sum of all episodes."""
 
     cycles: int = 0
     answers: int = 0
     largest_step: float = 0.0
-    """Of the limit."""
+    """Largest step relative to the limit."""
     largest_rate: float = 0.0
-    """Of the limit, over the controller's time between two answers."""
+    """The same over the controller's time between two answers."""
     largest_sum: float = 0.0
     ended: Counter[str] = field(default_factory=Counter)
     met: set[tuple[str, str]] = field(default_factory=set)
-    """(phase, fault) that really met."""
+    """(phase, fault) that really coincided."""
     violations: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
 
@@ -324,24 +335,36 @@ def settings_at_random(rng: np.random.Generator, axis: bool) -> Online:
     """Return settings of every kind."""
     rate, step = float(rng.choice([50.0, 20.0, 200.0])), float(rng.choice([0.25, 0.05, 1.0]))
     cycle = float(rng.choice([0.004, 0.012]))
-    gains = Gains(p=float(rng.choice([1.0, 0.5, 3.0, -2.0])), i_1_s=float(rng.choice([0.0, 0.0, 20.0])),
-                  d_s=float(rng.choice([0.0, 0.0, 0.02])))  # fmt: skip
+    gains = Gains(
+        p=float(rng.choice([1.0, 0.5, 3.0, -2.0])),
+        i_1_s=float(rng.choice([0.0, 0.0, 20.0])),
+        d_s=float(rng.choice([0.0, 0.0, 0.02])),
+    )
     probe = Probe(amplitude_mm=min(0.1, step, rate * cycle), rest_cycles=5, settle_cycles=8, most_cycles=12)
     return Online(
-        cycle_s=cycle, mode="axis" if axis else "cartesian", rate_mm_s=rate, step_mm=step,
-        most_mm=float(rng.choice([2.5, 0.5, 10.0])), gains=gains, axis_gains=(gains,) * 6, probe=probe,
+        cycle_s=cycle,
+        mode="axis" if axis else "cartesian",
+        rate_mm_s=rate,
+        step_mm=step,
+        most_mm=float(rng.choice([2.5, 0.5, 10.0])),
+        gains=gains,
+        axis_gains=(gains,) * 6,
+        probe=probe,
         link=RobotLink(lost_cycles=int(rng.choice([5, 1, 50]))),
-    )  # fmt: skip
+    )
 
 
 def pilot() -> tuple[Knots, PilotHeader]:
     """Return a sidecar whose force steps."""
     time_s = np.array([0.1, 0.25, 0.9, 1.0])
     knots = Knots(
-        line=np.ones(4, dtype=np.int32), path_mm=25.0 * time_s, time_s=time_s, lead_s=np.full(4, 0.04),
+        line=np.ones(4, dtype=np.int32),
+        path_mm=25.0 * time_s,
+        time_s=time_s,
+        lead_s=np.full(4, 0.04),
         force_N=np.array([[0, 0, 0], [0, 300, -50], [0, -310, -50], [0, 0, 0.0]]),
         deflection_mm=np.zeros((4, 3)),
-    )  # fmt: skip
+    )
     return knots, PilotHeader("base", "index", "$SEN_PINT[1]", 0.04, 12345)
 
 
@@ -367,8 +390,14 @@ class Episodes:
         own = settings_at_random(rng, axis)
         knots, header = pilot() if rng.random() < 0.5 else (None, None)
         device = build_compensator(self.cell, own, load_frame="base", knots=knots, header=header)
-        peer = Robot(device, self.jacobian, self.q_rad, rng, lag=float(rng.choice([1.0, 0.3])),
-                     reports=bool(rng.random() < 0.5))  # fmt: skip
+        peer = Robot(
+            device,
+            self.jacobian,
+            self.q_rad,
+            rng,
+            lag=float(rng.choice([1.0, 0.3])),
+            reports=bool(rng.random() < 0.5),
+        )
         peer.relative = target is Phase.ZERO
         watch = Watch(device, report, f"{target.value}, {', '.join(names)}{' (axis)' if axis else ''}")
         session, force = begin(device), rng.normal(0.0, 300.0, 6) * [1, 1, 1, 0, 0, 0]
@@ -445,7 +474,7 @@ _SHORT = (Phase.RESTING, Phase.PROBING, Phase.SETTLING)
 
 
 def _refused(rng: np.random.Generator) -> None:
-    """Parse what is no telegram."""
+    """Parse data that is not a telegram."""
     data = (
         GARBAGE[int(rng.integers(len(GARBAGE)))] if rng.random() < 0.5 else rng.bytes(int(rng.integers(300)))
     )
@@ -457,7 +486,7 @@ def _refused(rng: np.random.Generator) -> None:
 
 
 def _through_text(telegram: Telegram) -> Telegram:
-    """Return a telegram as it is after it was written and read; as it is where it cannot be written."""
+    """Return a telegram after writing and reading it; unchanged if it cannot be written."""
     whole = np.concatenate(
         [telegram.position_mm, telegram.command_mm, telegram.q_rad, telegram.q_command_rad]
     )
@@ -473,12 +502,18 @@ def _through_text(telegram: Telegram) -> Telegram:
         f"<IPOC>{telegram.ipoc}</IPOC></Rob>"
     )
     read = parse(text.encode("ascii"))
-    return replace(read, monitor_mm=telegram.monitor_mm, knot=telegram.knot, checksum=telegram.checksum,
-                   override_percent=telegram.override_percent, t1=telegram.t1)  # fmt: skip
+    return replace(
+        read,
+        monitor_mm=telegram.monitor_mm,
+        knot=telegram.knot,
+        checksum=telegram.checksum,
+        override_percent=telegram.override_percent,
+        t1=telegram.t1,
+    )
 
 
 def drive(cycles: int, seed: int = 1, say: Callable[[str], None] | None = None) -> Report:
-    """Run episodes until so many cycles are through; every pair of phase and fault in turn."""
+    """Run episodes for ``cycles`` cycles; every pair of phase and fault in turn."""
     episodes = Episodes(load_cell(), np.random.default_rng(seed))
     names, rng, report = list(FAULTS), episodes.rng, episodes.report
     pairs = list(itertools.product(PHASES, names))

@@ -1,4 +1,4 @@
-"""Material removal with engagement and forces: how fast, how much memory, how exact.
+"""Material removal with engagement and forces: speed, memory and accuracy.
 
 Rates are samples a second with kernels compiled before; each line of the growth table is a process of its
 own, so that its peak memory is its own. Nothing is judged here: the figures are printed.
@@ -69,9 +69,15 @@ def rate(tool, cell_mm, samples, threads, step_mm=1.0, stepover_mm=8.0, wavy=Fal
 def cut(field, position, tool, threads):
     count = len(position)
     engage(
-        field, position, np.zeros(count, np.int32), np.zeros(count, bool), np.full(count, 0.1), [tool],
-        scenes.LAW, threads,
-    )  # fmt: skip
+        field,
+        position,
+        np.zeros(count, np.int32),
+        np.zeros(count, bool),
+        np.full(count, 0.1),
+        [tool],
+        scenes.LAW,
+        threads,
+    )
 
 
 def print_rates(samples, rounds):
@@ -161,9 +167,14 @@ def print_scenes(cell_mm, most):
         position, way = scene.samples()
         count = len(way)
         found = engage(
-            scene.field(cell_mm), position, np.zeros(count, np.int32), np.zeros(count, bool),
-            np.full(count, scenes.F_Z_MM), [FLAT], scenes.LAW,
-        ).force_N  # fmt: skip
+            scene.field(cell_mm),
+            position,
+            np.zeros(count, np.int32),
+            np.zeros(count, bool),
+            np.full(count, scenes.F_Z_MM),
+            [FLAT],
+            scenes.LAW,
+        ).force_N
         rows = np.arange(1, count, max(1, count // most))
         wanted = np.array([scene.exact(way[row]) for row in rows])
         step = position[rows] - position[rows - 1]

@@ -1,4 +1,4 @@
-"""Programs that others wrote: which are translated at once, which after one round of remedies, which not.
+"""Programs from elsewhere: translated at once, after one round of remedies, or not at all.
 
 ``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--json]`` runs the command line on every G-code
 file below the folders, each in a process of its own with a time limit, as a user would type it: the built-in
@@ -60,7 +60,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one program."""
+    """Result for one program."""
 
     name: str
     verdict: str
@@ -73,7 +73,7 @@ class Result:
 
 
 def attempt(part: Path, folder: Path, arguments: tuple[str, ...], limit_s: float) -> Attempt:
-    """Run ``translate`` on a program in a process of its own."""
+    """Run ``translate`` on a program in a separate process."""
     started = time.perf_counter()
     command = [sys.executable, "-m", "gcode2krl", "translate", str(part), "-o", str(folder / "PART.src")]
     try:
@@ -110,12 +110,19 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
             f'M{number} = "; M{number} does nothing here"\n' for number in sorted(unmapped, key=int)
         )
         yield "m-code-unmapped", f"[m_code]\n{lines}", ()
-    unknown = {t for code in ("tool-unknown", "tool-undeclared") for text in messages.get(code, ())
-               for t in re.findall(r"\bT(\d+)\b|tool (\d+)", text)}  # fmt: skip
+    unknown = {
+        t
+        for code in ("tool-unknown", "tool-undeclared")
+        for text in messages.get(code, ())
+        for t in re.findall(r"\bT(\d+)\b|tool (\d+)", text)
+    }
     for number in sorted({int(a or b) for a, b in unknown}):
         yield "tool-unknown", f"[tool.{number}]\ndiameter_mm = 6.0\nteeth = 2\nlength_mm = 100.0\n", ()
-    offsets = {m for text in messages.get("work-offset-unknown", ())
-               for m in re.findall(r"\bG5[4-9](?:\.[123])?(?![\d.])", text)}  # fmt: skip
+    offsets = {
+        m
+        for text in messages.get("work-offset-unknown", ())
+        for m in re.findall(r"\bG5[4-9](?:\.[123])?(?![\d.])", text)
+    }
     for offset in sorted(offsets):
         place = f"x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, {NOT_TURNED}"
         yield "work-offset-unknown", f'[work_offsets]\n"{offset}" = {{ {place} }}\n', ()
@@ -239,7 +246,7 @@ def programs(folders: list[Path], most: int | None, seed: int) -> list[Path]:
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run the programs and print what became of each, then the counts."""
+    """Run the programs and print the result of each, then the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--most", type=int, help="At most so many programs of each folder, drawn by --seed.")

@@ -1,4 +1,4 @@
-"""A raster of a million lines: what each stage and the whole process cost, beside other programs.
+"""A raster of a million lines: time and memory of each stage and the whole process, beside other programs.
 
 The yardstick is LinuxCNC's stand-alone interpreter, ``rs274 -g``, which reads the same file in the same run.
 Every figure is a whole process, start-up included, unless the table says otherwise; kernels are compiled
@@ -75,7 +75,7 @@ write_krl(prediction, {out!r}, pilot="none")
 
 
 class Run(NamedTuple):
-    """What one process took; ``problem`` is empty where it ended well."""
+    """Time and memory of one process; ``problem`` is empty if it ended well."""
 
     seconds: float
     peak_mb: float
@@ -170,7 +170,7 @@ def rs274_command(binary: str, part: Path, output: str) -> list[str]:
 
 
 def rs274_problem(binary: str, folder: Path) -> str:
-    """Return why rs274 is no yardstick here: it must report each move of a short raster ('' = it does)."""
+    """Return why rs274 cannot be compared here: it must report each move of a short raster ('' = it does)."""
     short = folder / f"raster_{WARM_UP_LINES}.nc"
     once = run(rs274_command(binary, short, "moves.txt"), folder)
     if once.problem:
@@ -352,7 +352,7 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
 
 
 def print_scaling(largest: int, repeats: int, folder: Path) -> None:
-    """Print best time and peak memory over size, and what each further line costs."""
+    """Print best time and peak memory over size, and the cost of each further line."""
     print("\ngrowth: best s, us and bytes for each line more than in the row above")
     before: dict[str, tuple[int, float, float]] = {}
     size = SMALLEST_SCALE

@@ -1,4 +1,4 @@
-"""What the four figures of `online simulate` depend on: one thing changed at a time, then filters and delays.
+"""Sensitivity of the four figures of `online simulate`: one parameter at a time, then filters and delays.
 
 The defaults are stated, plausible values; none was fitted to a figure. The last table runs over all plausible
 filters and delays together and prints the range beside the defaults' figures; `--plot FILE` draws the first.
@@ -83,7 +83,7 @@ def row(label, values, mark=""):
 
 
 def table(prediction, defaults, small):
-    """Print what each change costs; returns name -> (values, figures)."""
+    """Print the effect of each change; returns name -> (values, figures)."""
     drawn = {}
     for name, key, values, kind in ONE_AT_A_TIME:
         print(name)

@@ -250,11 +250,21 @@ def cam_style() -> list[str]:
     """Facing, contour and pecked holes, blocks numbered by tens."""
     lines = [
         *blocks(CAM_HEAD),
-        *cam_tool("FACE1", 10, 6, 8000, "X-22. Y-.5"), *cam_face(), *CAM_RETRACT, "M1",
-        *cam_tool("2D CONTOUR1", 6, 4, 12000, "X-15. Y30."), *cam_contour(), *CAM_RETRACT, "M1",
-        *cam_tool("PECKED HOLES1", 4, 10, 6000, CAM_HOLES[0]), *cam_pecks(), *CAM_RETRACT,
-        "G28 G91 X0. Y0.", "G90", "M30",
-    ]  # fmt: skip
+        *cam_tool("FACE1", 10, 6, 8000, "X-22. Y-.5"),
+        *cam_face(),
+        *CAM_RETRACT,
+        "M1",
+        *cam_tool("2D CONTOUR1", 6, 4, 12000, "X-15. Y30."),
+        *cam_contour(),
+        *CAM_RETRACT,
+        "M1",
+        *cam_tool("PECKED HOLES1", 4, 10, 6000, CAM_HOLES[0]),
+        *cam_pecks(),
+        *CAM_RETRACT,
+        "G28 G91 X0. Y0.",
+        "G90",
+        "M30",
+    ]
     number = iter(range(10, 10 * len(lines) + 10, 10))
     return ["%", *(line if line[:1] in ("", "(") else f"N{next(number)} {line}" for line in lines), "%"]
 

@@ -1,4 +1,4 @@
-"""What a user is told: findings with a line and a remedy, and the exceptions that carry them."""
+"""What a user reads: findings with a line and a remedy, and the exceptions that carry them."""
 
 import re
 from collections import Counter
@@ -10,13 +10,13 @@ from gcode2krl.codes import all_codes, follows
 
 Severity = Literal["error", "warning", "note"]
 MOST_LINES = 20
-"""Findings that are printed, a line each; the rest is counted."""
+"""Most findings that are printed, a line each; the rest is counted."""
 MOST_PLACES = 1000
-"""Places of one kind that a check lists."""
+"""Most places of one kind that a check lists."""
 _MOST_OF_A_CODE = 8
-"""Lines of one code that are printed, so that one cause never fills the screen."""
+"""Most lines of one code that are printed, so that one cause never fills the screen."""
 _MOST_ALIKE = 5
-"""Where a code has more sentences, those that differ in their figures only are one line."""
+"""If a code has more different messages, those that differ only in their figures are one line."""
 _LINES_NAMED = 3
 _RANK: dict[Severity, int] = {"error": 0, "warning": 1, "note": 2}
 _FIGURE = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -39,7 +39,7 @@ class Issue:
     excerpt: str = ""
 
     def advice(self) -> str:
-        """Return the remedy; where the finding has none of its own, that of its code in the table."""
+        """Return the remedy of the finding, or else that of its code in the table."""
         entry = None if self.remedy else all_codes().get(self.code)
         if entry is None:
             return self.remedy
@@ -49,7 +49,7 @@ class Issue:
     def text(self, source: str = "", also: str = "") -> str:
         """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.
 
-        ``also`` says behind the message where else the same was found.
+        ``also`` follows the message: where else the same was found.
         """
         place = f"{source}:{self.line}" if self.line > 0 and source else source
         if not source and self.line > 0:
@@ -64,13 +64,13 @@ class Issue:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Equal findings, or findings that differ in their figures only, told on one line."""
+    """Equal findings, or findings that differ only in their figures, printed on one line."""
 
     issues: tuple[Issue, ...]
 
     @property
     def first(self) -> Issue:
-        """The one that stands for all."""
+        """The finding that represents all of them."""
         return self.issues[0]
 
     def text(self, source: str = "") -> str:
@@ -93,13 +93,13 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a person is told of many findings: errors first, one cause once, at most `MOST_LINES`."""
+    """What is printed of many findings: errors first, each cause once, at most `MOST_LINES`."""
 
     findings: tuple[Finding, ...]
     left_out: tuple[Issue, ...]
-    """What did not fit."""
+    """Findings that did not fit."""
     consequences: tuple[Issue, ...]
-    """What follows from a finding that is there (`follows` in ``codes.toml``)."""
+    """Findings that another one may cause (`follows` in ``codes.toml``)."""
 
     def counts(self) -> tuple[str, ...]:
         """Return the lines that count what is not printed."""
@@ -118,7 +118,7 @@ class Told:
 def told(issues: Iterable[Issue]) -> Told:
     """Return what to print of findings: equal ones as one, consequences counted only."""
     ordered = sorted(issues, key=lambda issue: _RANK[issue.severity])
-    causes, consequences = _parted(ordered)
+    causes, consequences = _split_consequences(ordered)
     findings: list[Finding] = []
     left_out: list[Issue] = []
     of_code: Counter[str] = Counter()
@@ -131,8 +131,8 @@ def told(issues: Iterable[Issue]) -> Told:
     return Told(tuple(findings), tuple(left_out), tuple(consequences))
 
 
-def _parted(issues: Sequence[Issue]) -> tuple[list[Issue], list[Issue]]:
-    """Return causes and consequences: a cause is no milder and stands in no later line."""
+def _split_consequences(issues: Sequence[Issue]) -> tuple[list[Issue], list[Issue]]:
+    """Return causes and consequences; a cause is at least as severe and not in a later line."""
     if len({issue.code for issue in issues}) < 2:
         return list(issues), []
     first_line: dict[tuple[str, int], int] = {}
@@ -151,7 +151,7 @@ def _parted(issues: Sequence[Issue]) -> tuple[list[Issue], list[Issue]]:
 
 
 def _joined(issues: Sequence[Issue]) -> list[Finding]:
-    """Join equal findings; where a code has many sentences, those that differ in their figures only."""
+    """Join equal findings; if a code has many messages, also those that differ only in their figures."""
     equal = _grouped(issues, lambda issue: (issue.severity, issue.code, issue.message, issue.remedy))
     sentences = Counter(group[0].code for group in equal)
     many = {code for code, count in sentences.items() if count > _MOST_ALIKE}

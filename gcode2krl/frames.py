@@ -97,7 +97,7 @@ def angle_between(quaternion_a: ArrayLike, quaternion_b: ArrayLike) -> Floats:
 
 
 def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
-    """Return the rotations between quaternions (n, 4) and (n, 4) at shares (n,), by the shorter way."""
+    """Return the rotations between quaternions (n, 4) and (n, 4) at fractions (n,), along the shorter arc."""
     b = np.where(np.sum(a * b, axis=1, keepdims=True) < 0, -b, b)
     half = np.arccos(np.clip(np.sum(a * b, axis=1), -1.0, 1.0))
     sine = np.sin(half)

@@ -46,10 +46,10 @@ def predict(
     """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
 
     ``dt_s`` is the sample time, by default the controller's cycle; ``forces`` False leaves out material
-    removal and what rests on it. A stage that cannot run (no material, unknown stiffness) leaves None and a
-    note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; a folder of
-    own effects is named in ``effect_folders``. Raises `NotUnderstoodError` where the
-    G-code, the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
+    removal and what depends on it. A stage that cannot run (no material, unknown stiffness) leaves None and a
+    note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
+    ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
+    the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
     """
     cell = cell if cell is not None else load_cell()
     toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
@@ -95,7 +95,7 @@ def predict_toolpath(
     targets: Targets | None = None,
     forces: bool = True,
 ) -> Prediction:
-    """Run every stage behind the G-code; see `predict`. ``targets`` where they are known already."""
+    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already."""
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     if targets is None:
         targets = set_targets(toolpath, cell, tolerance_mm)
@@ -138,15 +138,15 @@ def forces_and_deflection(
         return None, None, (*forces.issues, absurd)
     cuts = np.zeros(len(toolpath), dtype=np.bool_)
     cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
-    found = (
+    issues = (
         *result_limits.force_findings(forces, line, cell),
         *program.feeds_per_tooth(toolpath, cell, cuts),
     )
-    forces = replace(forces, issues=(*forces.issues, *found))
+    forces = replace(forces, issues=(*forces.issues, *issues))
     missing = compliance.missing_stiffness(cell)
     if missing is not None:
         return forces, None, (replace(missing, severity="note"),)
-    with np.errstate(all="ignore"):  # what comes out beyond all sense is a finding
+    with np.errstate(all="ignore"):  # an absurd result becomes a finding
         deflection = compliance.deflect(joints, forces, cell)
     reached = np.asarray(np.isfinite(joints.q_rad).all(axis=1))
     absurd = result_limits.absurd_deflection(deflection, reached, line)
@@ -186,12 +186,12 @@ def targets_and_joints(
 
 
 def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
-    """Return the targets with what robot (reach, limits, singularities) and table find, and the joints."""
+    """Return targets with the findings on reach, limits, singularities and table, and their joints."""
     joints, findings = robot.follow(targets, cell, conditioning=False)
-    found = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
+    judged = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
     rows = np.flatnonzero(targets.ptp)
-    _PTP_KNOWN[found] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
-    return found, replace(joints, issues=findings)
+    _PTP_KNOWN[judged] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
+    return judged, replace(joints, issues=findings)
 
 
 def controller_test_targets(
@@ -210,8 +210,8 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     """Return the path the controller will command, sampled every ``dt_s`` (12 ms, or 4 ms under RSI).
 
     Corners, time law and look-ahead by `krc4`; where a joint would exceed its speed limit the move is slowed
-    down (assumption: to exactly that limit). ``issues`` say where time is lost and how much; what rests on a
-    hypothesis about the controller says "unverified". Spindle start, tool changes and M-codes take no time
+    down (assumption: to exactly that limit). ``issues`` say where time is lost and how much; what depends on
+    a hypothesis about the controller says "unverified". Spindle start, tool changes and M-codes take no time
     here.
 
     Raises
@@ -248,9 +248,9 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
 
 def _lines(targets: Targets, motion: Motion) -> Ints32:
     """Return the G-code line of each sample (m,)."""
-    own = targets.move >= 0
+    programmed = targets.move >= 0
     line = np.zeros(int(max(targets.move.max(), motion.move.max(initial=0))) + 1, dtype=np.int32)
-    line[targets.move[own]] = targets.source_line[own]
+    line[targets.move[programmed]] = targets.source_line[programmed]
     return line[motion.move]
 
 
@@ -260,12 +260,12 @@ def corner_errors(
     """Return the corner error (n,) in mm at the end of each move, and where a tolerance is not kept.
 
     A tolerance is asked for by ``G64 P``, by ``tolerance_mm`` or by the cell, in this order; ``G64 P`` does
-    not speak of motions that are added (approach, retract).
+    not apply to motions that are added (approach, retract).
     """
     chain = krc4.build_chain(targets, cell)
     error_mm = chain.corner_error_mm()
-    own = cell.controller.tolerance_mm
-    below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+    of_cell = cell.controller.tolerance_mm
+    below = tolerance_mm if tolerance_mm is not None else (of_cell if of_cell is not None else np.nan)
     move = targets.move[chain.first + 1 : chain.first + 1 + len(error_mm)]
     programmed = np.where(move >= 0, toolpath.tolerance_mm[move], np.nan)
     allowed = np.where(np.isnan(programmed), below, programmed)
@@ -312,7 +312,7 @@ def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
 def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
     """Return the joints at the PTP targets alone, which is what a program needs; other rows are NaN.
 
-    Those of targets that were planned here are remembered as long as the targets live.
+    The joints of targets that were planned here are cached as long as the targets live.
     """
     known = _PTP_KNOWN.get(targets)
     if known is None or known[0] is not cell:
@@ -343,7 +343,7 @@ def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats 
 
 
 def _motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
-    """Return angles and speeds (m, 6) of a Motion, remembered as long as it lives."""
+    """Return angles and speeds (m, 6) of a Motion, cached as long as it lives."""
     known = _ANGLES_KNOWN.get(motion)
     if known is None or known[0] is not cell:
         known = (cell, *robot.motion_angles(motion, cell))
@@ -387,7 +387,7 @@ def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
 def _bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, cell: Cell) -> Floats:
     """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
 
-    The root mean square over all directions across the axis; NaN where a branch cannot be.
+    The root mean square over all directions across the axis; NaN where a branch has no solution.
     """
     across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     across /= np.linalg.norm(across, axis=1, keepdims=True)

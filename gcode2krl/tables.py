@@ -21,7 +21,7 @@ class Event(NamedTuple):
     ``kind`` is ``tool`` (values: ``tool``), ``spindle`` (``rpm``, signed, 0 = off), ``coolant`` (``mist``,
     ``flood``: what is on afterwards) or ``message`` (``text``, ``p`` where given). All but ``tool`` have
     ``m``, the M number (-1 for a mere text), and every event has ``line``; ``implied`` marks what a tool
-    change or the program's end does without a word of its own, ``dwell_s`` is the part of the row's dwell
+    change or the program's end does without its own word, ``dwell_s`` is the part of the row's dwell
     that lies before the event.
     """
 
@@ -189,7 +189,7 @@ class Forces(Table):
     peak_N: Floats = _column(np.float64)
     """(m,) largest force of a revolution; for warnings."""
     torque_Nmm: Floats = _column(np.float64)
-    """(m,) about the tool axis that the spindle must bring."""
+    """(m,) about the tool axis; the spindle must supply it."""
     a_p_mm: Floats = _column(np.float64)
     """(m,) axial depth of cut."""
     a_e_mm: Floats = _column(np.float64)

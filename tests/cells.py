@@ -1,4 +1,4 @@
-"""Cells for tests: one that states everything itself, and parts of cells over the demonstration."""
+"""Cells for tests: one that states everything itself, and partial cells over the demonstration."""
 
 from gcode2krl.cell import Cell, library, resolve_cell
 

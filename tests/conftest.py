@@ -20,7 +20,7 @@ def pytest_xdist_auto_num_workers(config):
 
 
 def pytest_configure(config):
-    """Processes beside each other, so none of them needs threads of its own for linear algebra."""
+    """Several processes run at once, so linear algebra needs only one thread in each."""
     if getattr(config.option, "numprocesses", None):
         for library in ("OMP", "OPENBLAS", "MKL"):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
@@ -28,7 +28,7 @@ def pytest_configure(config):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run of the command line left."""
+    """Result of a run of the command line."""
 
     code: int
     out: str

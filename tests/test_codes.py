@@ -1,4 +1,4 @@
-"""The table of finding codes holds what the source uses, no more and no less, and says it truthfully."""
+"""The table of finding codes holds exactly the codes that the source uses, with their severities."""
 
 import ast
 import importlib.util
@@ -17,12 +17,25 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
-    "bull-nose", "kilograms-force", "latin-1", "make-test", "on-tool", "pounds-force", "steps-post",
-    "stiffness-map", "utf-8", "utf-8-sig",
+    "bull-nose",
+    "kilograms-force",
+    "latin-1",
+    "make-test",
+    "on-tool",
+    "pounds-force",
+    "steps-post",
+    "stiffness-map",
+    "utf-8",
+    "utf-8-sig",
     # reasons of the online session's states, which its log explains
-    "adds-up", "ipoc-cycle", "ipoc-jump", "ipoc-restart", "probe-not-seen", "telegrams-lost",
-}  # fmt: skip
-"""Words with a hyphen in the source that are no codes of findings; add yours where a test says so."""
+    "adds-up",
+    "ipoc-cycle",
+    "ipoc-jump",
+    "ipoc-restart",
+    "probe-not-seen",
+    "telegrams-lost",
+}
+"""Words with a hyphen in the source that are not codes of findings; add yours if the test reports it."""
 
 
 @cache
@@ -41,7 +54,7 @@ def _code_places(tree: ast.AST) -> dict[str, int]:
     """Return callable → position of its code: `Issue`, `input_error`, and own functions that take one."""
     places = {"Issue": 1, "input_error": 0}
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and not node.decorator_list:  # a command is none
+        if isinstance(node, ast.FunctionDef) and not node.decorator_list:  # a command is not one
             names = [one.arg for one in node.args.args if one.arg not in ("self", "cls")]
             if "code" in names:
                 places[node.name] = names.index("code")

@@ -92,15 +92,20 @@ def traced(folder, run):
 
 
 def names_of(prediction):
-    """Return what the short examples take for granted."""
+    """Return the names that the short examples use."""
     load_N = np.zeros_like(prediction.motion.position_mm)
     load_N[:, 0] = 100.0
     return {
-        "cell": prediction.cell, "toolpath": prediction.toolpath, "targets": prediction.targets,
-        "motion": prediction.motion, "forces": prediction.forces, "q_rad": prediction.joints.q_rad,
-        "force_root_N": load_N, "moment_root_Nmm": 50.0 * load_N,
+        "cell": prediction.cell,
+        "toolpath": prediction.toolpath,
+        "targets": prediction.targets,
+        "motion": prediction.motion,
+        "forces": prediction.forces,
+        "q_rad": prediction.joints.q_rad,
+        "force_root_N": load_N,
+        "moment_root_Nmm": 50.0 * load_N,
         "feed": np.gradient(prediction.motion.position_mm, axis=0),
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("code", PYTHON)
@@ -124,7 +129,7 @@ def test_commands(command, folder, run):
 
 @pytest.mark.parametrize("command", SHOWN)
 def test_what_the_readme_shows_is_what_is_printed(command, folder):
-    """Word for word but for figures: a computer's last digits may differ."""
+    """Equal except for figures: the last digits of a computer may differ."""
     words = shlex.split(command.replace("{tmp}", "."))[1:]
     done = subprocess.run([sys.executable, "-m", "gcode2krl", *words], capture_output=True, text=True)
     block = re.escape(f"<!-- output: {command} -->\n```text\n") + r"(.*?)\n```"

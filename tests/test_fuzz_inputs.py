@@ -1,4 +1,4 @@
-"""Some hundred damaged inputs of each kind, in a process of their own; benchmarks/fuzz.py runs 10,000."""
+"""Some hundred damaged inputs of each kind, in a separate process; benchmarks/fuzz.py runs 10,000."""
 
 import sys
 from importlib import import_module

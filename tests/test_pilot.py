@@ -1,4 +1,4 @@
-"""Knots of the pilot force against brute force and known polylines; the sidecar and what is wrong with it."""
+"""Knots of the pilot force against brute force and known polylines; the sidecar and its errors."""
 
 from dataclasses import replace
 
@@ -153,7 +153,7 @@ def test_knots_are_those_of_a_plain_recursion():
 
 
 def test_what_changes_within_a_cycle_is_stated():
-    """At 4 ms a step of 500 N takes a third of a cycle: the ramp is off by 2/3 of it, and says so."""
+    """At 4 ms a step of 500 N takes a third of a cycle: the ramp is off by 2/3 of it, which is reported."""
     time_s = np.arange(300) * 0.004
     force = np.zeros((300, 3))
     force[100:200, 0] = 500.0

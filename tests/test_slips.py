@@ -1,4 +1,5 @@
-"""Slips in a cell file or a program that once passed in silence: each is said, and its neighbour is not."""
+"""Slips in a cell file or a program that once passed silently: each is reported, similar sound ones are
+not."""
 
 import datetime
 import io
@@ -108,7 +109,7 @@ def test_sizes_of_a_tool_that_fit_are_taken(tool):
         ({"material": {"linear_edge": IN_KN}}, "cell-doubtful", "Ktc"),
         ({"material": {"kienzle": {"kc11": 0.7, "mc": 0.25}}}, "cell-doubtful", "kc11"),
     ],
-)  # fmt: skip
+)
 def test_doubtful_values_of_what_the_program_uses_are_said(stated, code, key):
     (message,) = cell_warnings(cell_with(**stated), code)
     assert key in message
@@ -123,7 +124,7 @@ def test_doubtful_values_of_what_the_program_uses_are_said(stated, code, key):
         ({"spindle": {"start_s": 0.05}, "m_code": SWITCHES}, "spindle-wait"),
         ({"material": {"kienzle": {"kc11": 31.25, "mc": 0.5}}}, "cell-doubtful"),
     ],
-)  # fmt: skip
+)
 def test_values_that_are_usual_or_unused_are_not(stated, code):
     assert not cell_warnings(cell_with(**stated), code)
 

@@ -1,4 +1,4 @@
-"""Cells of strangers: templates that never end, KRL behind KRL, subprograms of the controller, pulses."""
+"""Cells from elsewhere: templates that never end, KRL after KRL, subprograms of the controller, pulses."""
 
 import subprocess
 import sys
@@ -25,8 +25,11 @@ except TemplateError as error:
 def test_rounding_ends(template):
     done = subprocess.run(
         [sys.executable, "-c", ENDLESS.format(template=template)],
-        capture_output=True, text=True, timeout=20, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=True,
+    )
     assert done.stdout.startswith("refused: round")
 
 

@@ -172,8 +172,19 @@ def laser_distances(unloaded: np.ndarray, loaded: np.ndarray) -> np.ndarray:
     return np.array(result)
 
 
-def cube_rows(pairs, cubes, poses_deg, loads, *, stiffness=TABLE_1, noise_mm=MEAN_NOISE_MM, rng=None,
-              point_mm=LOAD_POINT_MM, along="root", tracked_deg=TRACKED_DEG) -> list[list]:  # fmt: skip
+def cube_rows(
+    pairs,
+    cubes,
+    poses_deg,
+    loads,
+    *,
+    stiffness=TABLE_1,
+    noise_mm=MEAN_NOISE_MM,
+    rng=None,
+    point_mm=LOAD_POINT_MM,
+    along="root",
+    tracked_deg=TRACKED_DEG,
+) -> list[list]:
     """Readings: pair, q, force, moment, then lower unloaded, lower loaded, upper unloaded, upper loaded."""
     tracked = bodies(tracked_deg)
     on_body = {
@@ -200,10 +211,21 @@ def cube_rows(pairs, cubes, poses_deg, loads, *, stiffness=TABLE_1, noise_mm=MEA
 
 
 CUBE_HEADER = [
-    "pair", *(f"q{axis}_deg" for axis in range(1, 7)), "fx_N", "fy_N", "fz_N", "mx_Nmm", "my_Nmm", "mz_Nmm",
-    *(f"{cube}_{state}_{laser}_mm" for cube in ("lower", "upper") for state in ("unloaded", "loaded")
-      for laser in range(1, 7)),
-]  # fmt: skip
+    "pair",
+    *(f"q{axis}_deg" for axis in range(1, 7)),
+    "fx_N",
+    "fy_N",
+    "fz_N",
+    "mx_Nmm",
+    "my_Nmm",
+    "mz_Nmm",
+    *(
+        f"{cube}_{state}_{laser}_mm"
+        for cube in ("lower", "upper")
+        for state in ("unloaded", "loaded")
+        for laser in range(1, 7)
+    ),
+]
 
 
 def cube_csv(rows: list[list]) -> str:
@@ -214,8 +236,18 @@ def cube_csv(rows: list[list]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def cube_head(pairs, cubes, *, tracked_deg=TRACKED_DEG, point_mm=LOAD_POINT_MM, along="root",
-              noise_mm=MEAN_NOISE_MM, known=None, note="", extra="") -> str:  # fmt: skip
+def cube_head(
+    pairs,
+    cubes,
+    *,
+    tracked_deg=TRACKED_DEG,
+    point_mm=LOAD_POINT_MM,
+    along="root",
+    noise_mm=MEAN_NOISE_MM,
+    known=None,
+    note="",
+    extra="",
+) -> str:
     """The head of a measurement."""
     point, angles = (", ".join(f"{x:g}" for x in values) for values in (point_mm, tracked_deg))
     lines = [f'note = "{note}"', *([extra] if extra else [])]
@@ -317,8 +349,9 @@ def pose_csv(rows) -> str:
     """Readings of the sensor as CSV."""
     lines = ["a_deg,b_deg,c_deg,fx_N,fy_N,fz_N,mx_Nmm,my_Nmm,mz_Nmm"]
     for row in rows:
-        lines.append(",".join([*(f"{x:g}" for x in row[:3]), *(f"{x:.2f}" for x in row[3:6]),
-                               *(f"{x:.0f}" for x in row[6:])]))  # fmt: skip
+        angles, force, moment = row[:3], row[3:6], row[6:]
+        values = [f"{x:g}" for x in angles] + [f"{x:.2f}" for x in force] + [f"{x:.0f}" for x in moment]
+        lines.append(",".join(values))
     return "\n".join(lines) + "\n"
 
 
@@ -331,16 +364,25 @@ def files(seed: int = 2020) -> dict[str, str]:
     made = "simulated: table 1 of Haehn & Weigold 2020, laser noise 5 um, 16 samples a distance"
     robot = cube_rows(PAIRS, CUBES, POSES_DEG, LOADS, rng=rng)
     bench = bench_cubes()
-    holder = cube_rows(BENCH_PAIRS, bench, ((0,) * 6,) * 2, BENCH_LOADS, rng=rng, point_mm=BENCH_POINT_MM,
-                       along="flange", tracked_deg=(0,) * 6)  # fmt: skip
+    holder = cube_rows(
+        BENCH_PAIRS,
+        bench,
+        ((0,) * 6,) * 2,
+        BENCH_LOADS,
+        rng=rng,
+        point_mm=BENCH_POINT_MM,
+        along="flange",
+        tracked_deg=(0,) * 6,
+    )
     return {
         "robot.toml": cube_head(PAIRS, CUBES, known={"sensor": TABLE_1["sensor"]}, note=made),
         "robot.csv": cube_csv(robot),
-        "holder.toml": cube_head(BENCH_PAIRS, bench, tracked_deg=(0,) * 6, point_mm=BENCH_POINT_MM,
-                                 along="flange", note=made),
+        "holder.toml": cube_head(
+            BENCH_PAIRS, bench, tracked_deg=(0,) * 6, point_mm=BENCH_POINT_MM, along="flange", note=made
+        ),
         "holder.csv": cube_csv(holder),
         "orientations.csv": pose_csv(pose_rows(orientations(), rng)),
-    }  # fmt: skip
+    }
 
 
 def main() -> None:

@@ -14,15 +14,20 @@ from gcode2krl.errors import NotUnderstoodError, input_error
 
 DEMONSTRATION = "kr300_demonstration"
 _OF_THE_FILE_ALONE = ("model", "name", "based_on", "verified")
-"""Keys that say something of one file; they are never taken over."""
+"""Keys that describe one file; they are never taken over."""
 _NO_VALUES = frozenset(["source", "sure", "note", "robot_source", "robot_sure"])
 _CUTTER_KEYS = frozenset(["model", "kind", "diameter_mm", "teeth"])
-"""A tool that states one of these is a tool of its own: nothing of the base's tool is kept."""
+"""A tool that states one of these keys is another tool: nothing of the base's tool is kept."""
 _FORCE_LAW_KEYS = frozenset(["model", "linear_edge", "kienzle"])
 _SHAPE_KEYS = frozenset(["box_mm", "mesh"])
 _JOINTS_OF_END_EFFECTOR = ("sensor", "spindle")
-_FILES = (("robot", "model"), ("controller", "model"), ("material", "model"), ("stock", "mesh"),
-          ("online", "calibration"))  # fmt: skip
+_FILES = (
+    ("robot", "model"),
+    ("controller", "model"),
+    ("material", "model"),
+    ("stock", "mesh"),
+    ("online", "calibration"),
+)
 _NUMBER_OF_FRAME = re.compile(r"frames\.base_data|tool\.\d+\.tool_data")
 """Numbers of the controller's table; the frame beside each is compared with the controller's own."""
 Table = dict[str, Any]
@@ -30,7 +35,7 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Taken:
-    """A value taken over: dotted key, value as text, whose it is, whether that file is verified."""
+    """A value taken over: dotted key, value as text, its cell, whether that cell is verified."""
 
     key: str
     value: str
@@ -49,19 +54,19 @@ class StatedCell:
 def lay_over_base(data: Table, beside: Path | None, source: str, seen: tuple[Path, ...] = ()) -> StatedCell:
     """Return ``data`` over the cell it is ``based_on``; without ``based_on`` it stands alone.
 
-    ``seen`` holds the files that led here. Raises `NotUnderstoodError` where the base is not found, is no
-    cell file or comes back to itself.
+    ``seen`` holds the files that led here. Raises `NotUnderstoodError` where the base is not found, is not
+    a cell file or is based on itself.
     """
-    own = _with_whole_paths(data, beside)
-    name = own.get("based_on", "")
+    table = _with_whole_paths(data, beside)
+    name = table.get("based_on", "")
     if not isinstance(name, str) or not name:
-        return StatedCell(own, ())
+        return StatedCell(table, ())
     base, whose = _base(name, beside, source, seen), name
     verified = isinstance(base.data.get("verified"), dict)
     below = {key: value for key, value in base.data.items() if key not in _OF_THE_FILE_ALONE}
-    merged = _merge(_without_replaced(below, own), own, ())
+    merged = _merge(_without_replaced(below, table), table, ())
     from_further = {taken.key: taken for taken in base.taken}
-    stated = dict(_leaves(own))
+    stated = dict(_leaves(table))
     taken = tuple(
         from_further.get(key, Taken(key, _text(value), whose, verified))
         for key, value in _leaves(merged)
@@ -73,7 +78,7 @@ def lay_over_base(data: Table, beside: Path | None, source: str, seen: tuple[Pat
 def split_pairs(stated: StatedCell) -> Iterator[tuple[str, str]]:
     """Yield (number, frame), dotted keys of a pair whose halves come from different files.
 
-    A number of ``BASE_DATA`` or ``TOOL_DATA`` beside a frame of somebody else's names two different places.
+    A number of ``BASE_DATA`` or ``TOOL_DATA`` and a frame from another file may be two different places.
     """
     whose = {taken.key: taken.source for taken in stated.taken}
     known = stated_keys(stated.data)
@@ -93,39 +98,41 @@ def _base(name: str, beside: Path | None, source: str, seen: tuple[Path, ...]) -
         return StatedCell(library.read_model("cells", DEMONSTRATION), ())
     if not name.endswith(".toml"):
         raise input_error(
-            "cell-base", f"based_on: found {name[:60]!r}, allowed: demonstration, or another cell file",
-            'write based_on = "demonstration" or based_on = "other.toml"', source=source,
-        )  # fmt: skip
+            "cell-base",
+            f"based_on: found {name[:60]!r}, allowed: demonstration, or another cell file",
+            'write based_on = "demonstration" or based_on = "other.toml"',
+            source=source,
+        )
     file = ((beside or Path()) / name).resolve()
     if file in seen or len(seen) > 8:
         raise input_error(
-            "cell-base", f"based_on: {name[:60]!r} leads back to itself", "name another cell", source=source
+            "cell-base", f"based_on: {name[:60]!r} is based on itself", "name another cell", source=source
         )
     try:
         data = library.read_toml(file)
     except NotUnderstoodError as error:
-        found = error.issues[0].message
+        reason = error.issues[0].message
         raise input_error(
-            "cell-base", f"based_on: {name[:60]!r}: {found}", "correct the path", source=source
+            "cell-base", f"based_on: {name[:60]!r}: {reason}", "correct the path", source=source
         ) from None
     return lay_over_base(data, file.parent, str(file), (*seen, file))
 
 
 def _with_whole_paths(data: Table, beside: Path | None) -> Table:
-    """Return the file with the paths it names made whole, so that they hold wherever it is read from."""
-    found = dict(data)
+    """Return the file with its relative paths joined to its folder, so that they hold from anywhere."""
+    table = dict(data)
     if beside is None:
-        return found
+        return table
     for section, key in _FILES:
-        if isinstance(found.get(section), dict):
-            found[section] = _whole_path(found[section], key, beside)
-    tools = found.get("tool")
+        if isinstance(table.get(section), dict):
+            table[section] = _whole_path(table[section], key, beside)
+    tools = table.get("tool")
     if isinstance(tools, dict):
-        found["tool"] = {
+        table["tool"] = {
             number: _whole_path(tool, "model", beside) if isinstance(tool, dict) else tool
             for number, tool in tools.items()
         }
-    return found
+    return table
 
 
 def _whole_path(section: Table, key: str, beside: Path) -> Table:
@@ -137,7 +144,7 @@ def _whole_path(section: Table, key: str, beside: Path) -> Table:
 
 
 def _without_replaced(base: Table, own: Table) -> Table:
-    """Return the base without what an own value makes meaningless."""
+    """Return the base without the values that a value of the file itself makes meaningless."""
     kept = dict(base)
     if _states(own, "robot", {"model", "geometry"}):  # another arm: nothing of the base's is true of it
         kept.pop("robot", None)
@@ -157,8 +164,8 @@ def _without_replaced(base: Table, own: Table) -> Table:
 
 
 def _states(table: Table, section: str, keys: frozenset[str] | set[str]) -> bool:
-    found = table.get(section)
-    return isinstance(found, dict) and bool(found.keys() & keys)
+    value = table.get(section)
+    return isinstance(value, dict) and bool(value.keys() & keys)
 
 
 def _end_effector_only(compliance: Any) -> Any:

@@ -1,6 +1,6 @@
 """The date on which a person confirmed the cell, against today's.
 
-Only commands ask this, and only for a finding: nothing that is written may depend on the day.
+Only commands check this, and only for a finding: no written file may depend on the date.
 """
 
 import datetime
@@ -9,11 +9,11 @@ from gcode2krl.cell.definition import Cell
 from gcode2krl.errors import Issue
 
 _TIME_ZONES = datetime.timedelta(days=1)
-"""Elsewhere it is tomorrow already."""
+"""In other time zones it may already be tomorrow."""
 
 
 def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple[Issue, ...]:
-    """Return a warning where ``verified`` names a day to come; ``today`` is by default that of the clock."""
+    """Return a warning where ``verified`` names a future day; ``today`` is by default the clock's."""
     if cell.verified is None:
         return ()
     today = today if today is not None else datetime.datetime.now(datetime.UTC).date()

@@ -1,9 +1,9 @@
 """The cell: robot, controller, tools, frames and outputs, read from ``cell.toml`` over ``models/``.
 
-A cell is its own: what its file does not name is missing, and a stage that needs it says so by raising
-`RefusedError` with the key's name. ``based_on`` takes over from another cell by name; each value taken over
-is in ``taken_over``. Without a file, the demonstration cell serves: the KR 300 R2500 ultra of Hähn & Weigold
-2020. Every key carries its unit; `sections` has the tables.
+Nothing is assumed: what a cell file does not state is missing, and a stage that needs it raises
+`RefusedError` with the key's name. ``based_on`` names a cell whose values are taken over; each value taken
+over is listed in ``taken_over``. Without a file, the demonstration cell serves: the KR 300 R2500 ultra of
+Hähn & Weigold 2020. Every key carries its unit; `sections` has the tables.
 """
 
 import re
@@ -64,7 +64,7 @@ CODES_WITHOUT_SIGNALS = {
     "M2": "; program end (M2)",
     "M30": "; program end (M30)",
 }
-"""What these M-codes become where the cell does not say otherwise: nothing of theirs depends on a cell."""
+"""KRL of the M-codes that switch no signal of a cell; a cell file may replace it."""
 
 
 class Cell(Section):
@@ -72,7 +72,7 @@ class Cell(Section):
 
     name: OneLine = ""
     based_on: OneLine = ""
-    """The cell that this one takes over from: ``demonstration`` or another cell file."""
+    """The cell whose values are taken over: ``demonstration`` or another cell file."""
     verified: Verified | None = None
     robot: Robot = Robot()
     controller: Controller = Controller()
@@ -98,7 +98,7 @@ class Cell(Section):
     guard_inputs: tuple[GuardInput, ...] = ()
     program: Program = Program()
     m_code: dict[Annotated[str, Field(pattern=r"^M(0|[1-9][0-9]{0,3})$")], str] = Field(default_factory=dict)
-    """KRL (Jinja2) for each M-code, ``M3 = "…"``; what has no entry is refused."""
+    """KRL (Jinja2) for each M-code, ``M3 = "…"``; an M-code without an entry is refused."""
     tool_change: str = ""
     """KRL (Jinja2) that changes the tool on the clearance plane."""
     taken_over: tuple[TakenOver, ...] = ()
@@ -108,7 +108,7 @@ class Cell(Section):
 
     @property
     def is_confirmed(self) -> bool:
-        """True where a person confirmed every value: ``verified`` never covers what is taken over."""
+        """True if a person confirmed every value; ``verified`` never covers values that were taken over."""
         return self.verified is not None and not self.taken_over
 
     @property
@@ -146,7 +146,7 @@ class Cell(Section):
         return frame.matrix() @ shift
 
     def missing_of_tool(self, number: int) -> tuple[str, ...]:
-        """Return the keys without which a tool's tip is not known; empty where it is."""
+        """Return the missing keys that the position of a tool's tip depends on; empty if none is missing."""
         tool = self.tool.get(number)
         if tool is None:
             return (f"tool.{number}",)
@@ -187,7 +187,7 @@ def controller_axes(axis: Axis) -> Floats:
 
 
 def load_cell(path: str | Path | None = None) -> Cell:
-    """Read a cell file, over the cell it is ``based_on`` if it says so; without a path, the demonstration.
+    """Read a cell file and the cell it is ``based_on``, if any; without a path, the demonstration cell.
 
     Raises `NotUnderstoodError` that names file, key, what was found and what is allowed.
     """
@@ -266,19 +266,19 @@ def _fill_in(section: Any, kind: str) -> Any:
     """Lay a section's own keys over the model it names."""
     if not isinstance(section, dict) or not isinstance(section.get("model"), str) or not section["model"]:
         return section
-    found = library.read_model(kind, section["model"])
+    model = library.read_model(kind, section["model"])
     if kind == "materials" and section.keys() & {"linear_edge", "kienzle"}:
-        found = {key: value for key, value in found.items() if key not in ("linear_edge", "kienzle")}
-    return {**library.merge(found, section), "model": found.get("model", section["model"])}
+        model = {key: value for key, value in model.items() if key not in ("linear_edge", "kienzle")}
+    return {**library.merge(model, section), "model": model.get("model", section["model"])}
 
 
 def _fill_in_tool(tool: Any) -> Any:
-    """Lay a tool over its model; one whose cutter differs from the model's says so in its name."""
+    """Lay a tool over its model; if its cutter differs from the model's, its name gets '(changed)'."""
     filled = _fill_in(tool, "tools")
     if filled is tool or not isinstance(filled, dict):
         return filled
-    found = library.read_model("tools", tool["model"])
-    if any(key in tool and tool[key] != found.get(key) for key in _CUTTER):
+    model = library.read_model("tools", tool["model"])
+    if any(key in tool and tool[key] != model.get(key) for key in _CUTTER):
         filled["model"] = f"{filled['model']} (changed)"
     return filled
 
@@ -286,7 +286,7 @@ def _fill_in_tool(tool: Any) -> Any:
 def _refuse_keys_of_tools(data: Mapping[str, Any]) -> None:
     """Raise where a key is one that only a resolved cell has, or a tool's number is not written plainly.
 
-    ``[tool.01]`` beside ``[tool.1]`` would be the same tool twice, and one of them lost.
+    ``[tool.01]`` beside ``[tool.1]`` would be the same tool twice, and one of them would be lost.
     """
     for key in _RESOLVED:
         if key in data:
@@ -295,12 +295,12 @@ def _refuse_keys_of_tools(data: Mapping[str, Any]) -> None:
     for number in tools if isinstance(tools, dict) else ():
         if not re.fullmatch(r"[1-9][0-9]{0,4}", str(number), re.ASCII):
             raise NotUnderstoodError(
-                _key_issue(f"tool.{str(number)[:40]}: found no tool number, allowed: 1 to 99999")
+                _key_issue(f"tool.{str(number)[:40]}: not a tool number, allowed: 1 to 99999")
             )
 
 
 def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
-    """Yield what no single key shows: impossible sizes, halves of pairs, double meanings."""
+    """Yield errors that only several keys together show: impossible sizes, half pairs, double meanings."""
     from gcode2krl.cell import ranges, switching
 
     yield from (issue for issue in ranges.range_issues(cell) if issue.severity == "error")
@@ -317,18 +317,18 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
 def _split_pairs(stated: StatedCell) -> Iterator[Issue]:
     whose = {taken.key: taken.source for taken in stated.taken}
     for number, frame in split_pairs(stated):
-        own, other = (number, frame) if number not in whose else (frame, number)
+        stated_key, other = (number, frame) if number not in whose else (frame, number)
         yield Issue(
             "error",
             "frame-split",
             0,
-            f"{own} is stated here, and {other}, which belongs to it, comes from {whose[other]!r}",
+            f"{stated_key} is stated here, and {other}, which belongs to it, comes from {whose[other]!r}",
             f"state {number} and {frame} in one file, as the controller has them",
         )
 
 
 def _named_outputs(cell: Cell, stated: frozenset[str]) -> dict[str, int | None]:
-    """Return key → output of all outputs that keys name; those of the online side where they are stated."""
+    """Return key → output of all keys that name one; those of ``[online.link]`` only if it is stated."""
     spindle, link = cell.spindle, cell.online.link
     named = {
         f"spindle.{key}": getattr(spindle, key)
@@ -347,7 +347,7 @@ def _named_inputs(cell: Cell) -> dict[str, int | None]:
 
 
 def _defaults(cell: Cell, stated: frozenset[str]) -> Iterator[str]:
-    """Yield the dotted keys of documented defaults, of the sections that a program rests on."""
+    """Yield the dotted keys of documented defaults, in the sections that a program depends on."""
     record = cell.model_dump(mode="json", include=set(_REACHING), exclude_none=True)
     for key in sorted(stated_keys(record)):
         value = key.rpartition(".")[2]
@@ -374,9 +374,9 @@ def _take_compliance_of_robot(merged: dict[str, Any]) -> None:
     robot = dict(robot)
     below = robot.pop("compliance")
     merged["robot"] = robot
-    own = merged.get("compliance", {})
-    if isinstance(below, dict) and isinstance(own, dict):
-        merged["compliance"] = library.merge(below, own)
+    section = merged.get("compliance", {})
+    if isinstance(below, dict) and isinstance(section, dict):
+        merged["compliance"] = library.merge(below, section)
 
 
 def _validation_issues(error: ValidationError) -> Iterator[Issue]:

@@ -1,4 +1,4 @@
-"""Which key of a cell a mistyped one most likely means: the nearest of those that its section knows."""
+"""The key of a cell that a mistyped one most likely means: the closest key of its section."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, get_args
@@ -12,7 +12,7 @@ NOT_OF_A_FILE = ("taken_over", "defaults")
 
 
 def meant_key(cell: type[BaseModel], place: Sequence[str | int]) -> str:
-    """Return the whole key that ``place``, the steps to an unknown key, most likely means; empty if none."""
+    """Return the dotted key that an unknown key at ``place`` most likely means; empty if none is close."""
     *above, last = place
     kinds: list[type[BaseModel]] = [cell]
     written: list[str] = []

@@ -11,7 +11,7 @@ from typing import Any
 from gcode2krl.errors import input_error
 
 MOST_BYTES = 4_000_000
-"""A cell with 1,000 tools has 0.2 MB."""
+"""Largest file; a cell with 1,000 tools has 0.2 MB."""
 MOST_LEVELS = 32
 """The deepest table of a cell has 5 levels; the time of `tomllib` grows with the square of a key's parts."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"]*+"|'[^']*+')"""
@@ -38,7 +38,7 @@ def _names(folder: Path) -> dict[str, Path]:
 
 @lru_cache(maxsize=256)
 def _of_library(file: Path) -> dict[str, Any]:
-    """Return a file of the library, which does not change while a command runs."""
+    """Return a file of the library; it is read once, as it does not change while a command runs."""
     return read_toml(file)
 
 
@@ -54,9 +54,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         ) from None
     if len(data) > MOST_BYTES:
         raise input_error(
-            "file-too-large", f"more than {MOST_BYTES // 1_000_000} MB is no model or cell file",
-            "name the right file", source=str(path),
-        )  # fmt: skip
+            "file-too-large",
+            f"more than {MOST_BYTES // 1_000_000} MB: not a model or cell file",
+            "name the right file",
+            source=str(path),
+        )
     try:
         return parse_toml(data.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
@@ -66,25 +68,25 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """Parse TOML in bounded time; raises `NotUnderstoodError` where it is none, or is nested too deeply."""
+    """Parse TOML in bounded time; raises `NotUnderstoodError` if it is not TOML or nested too deeply."""
     remedy = "see docs/cell.md for the format"
     for number, line in enumerate(text.split("\n"), start=1):
         if _MANY_DOTS.search(line):
             sentence = f"line {number}: a key of more than {MOST_LEVELS} parts: nested too deeply"
             raise input_error("not-toml", sentence, remedy, source=source)
     try:
-        found = tomllib.loads(text)
+        tables = tomllib.loads(text)
     except RecursionError:
         raise input_error("not-toml", "nested too deeply", remedy, source=source) from None
     except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
         raise input_error("not-toml", str(error)[:200], remedy, source=source) from None
-    if _levels(found) > MOST_LEVELS:
+    if _levels(tables) > MOST_LEVELS:
         raise input_error("not-toml", f"more than {MOST_LEVELS} levels", remedy, source=source)
-    return found
+    return tables
 
 
 def _levels(found: dict[str, Any]) -> int:
-    """Return how deeply tables and lists are nested, counted no further than just beyond the limit."""
+    """Return how deeply tables and lists are nested, counting stops just beyond the limit."""
     level = 0
     here: list[dict[str, Any] | list[Any]] = [found]
     while here and level <= MOST_LEVELS:

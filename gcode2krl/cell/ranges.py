@@ -1,4 +1,4 @@
-"""Plausible and possible ranges of the cell's physical keys: a slip of unit or digit is seen before it moves.
+"""Plausible and possible ranges of the cell's physical keys: they catch a wrong unit or digit.
 
 ``ranges.toml`` has the table. Beyond the possible range a value is an error of the cell file, beyond the
 plausible one a warning.
@@ -23,12 +23,12 @@ _ANGLES = re.compile(
 _EIGHTH_TURN_RAD = math.pi / 4
 _NEAR_RAD = 2e-4
 _FULL_TURN = 8.01
-"""In eighths of a turn: the angles of a frame are no larger."""
+"""Largest angle of a frame, in eighths of a turn."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """What a key may be: (low, high) that is plausible and that is possible, and why."""
+    """The plausible and the possible range (low, high) of a key, and their source."""
 
     plausible: tuple[float, float]
     possible: tuple[float, float]
@@ -48,7 +48,7 @@ def all_ranges() -> dict[str, Range]:
 def range_issues(cell: BaseModel, tools: Collection[int] | None = None) -> Iterator[Issue]:
     """Yield each value of a resolved cell that is impossible (error) or hardly plausible (warning).
 
-    Of ``tools`` alone where they are given.
+    With ``tools``, keys of other tools are left out.
     """
     table = all_ranges()
     for key, value in numbers(cell):
@@ -77,7 +77,7 @@ def general(key: str) -> str:
 
 
 def numbers(cell: BaseModel) -> Iterator[tuple[str, float]]:
-    """Yield (dotted key, value) of every number in a cell; those of a list have its key."""
+    """Yield (dotted key, value) of every number in a cell; the numbers of a list have the key of the list."""
     yield from _numbers(cell, "")
 
 
@@ -86,11 +86,11 @@ def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
         for name in type(value).model_fields:
             yield from _numbers(getattr(value, name), f"{key}.{name}" if key else name)
     elif isinstance(value, dict):
-        for name, one in value.items():
-            yield from _numbers(one, f"{key}.{name}")
+        for name, item in value.items():
+            yield from _numbers(item, f"{key}.{name}")
     elif isinstance(value, tuple | list):
-        for one in value:
-            yield from _numbers(one, key)
+        for item in value:
+            yield from _numbers(item, key)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield key, float(value)
 
@@ -117,14 +117,16 @@ def _radians(cell: BaseModel) -> Iterator[Issue]:
         match = _ANGLES.fullmatch(key)
         if match:
             angles.setdefault(match[1] or key, []).append(value)
-    for key, found in angles.items():
-        eighths = [abs(angle) / _EIGHTH_TURN_RAD for angle in found]
-        whole = all(abs(turn - round(turn)) * _EIGHTH_TURN_RAD < _NEAR_RAD for turn in eighths)
-        if whole and 0.99 < max(eighths) <= _FULL_TURN:
-            shown = ", ".join(f"{angle:g}" for angle in found)
+    for key, angles_deg in angles.items():
+        eighths = [abs(angle) / _EIGHTH_TURN_RAD for angle in angles_deg]
+        all_multiples = all(abs(turn - round(turn)) * _EIGHTH_TURN_RAD < _NEAR_RAD for turn in eighths)
+        if all_multiples and 0.99 < max(eighths) <= _FULL_TURN:
+            shown = ", ".join(f"{angle:g}" for angle in angles_deg)
             name = key.rstrip(".")
             yield Issue(
-                "error", "cell-impossible", 0,
+                "error",
+                "cell-impossible",
+                0,
                 f"{name}: the angles {shown} are multiples of pi/4: radians, where degrees are meant",
                 f"write the angles of {name} in degrees",
-            )  # fmt: skip
+            )

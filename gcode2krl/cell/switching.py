@@ -8,7 +8,7 @@ from gcode2krl.cell.templates import MissingValueError, TemplateError, render
 from gcode2krl.errors import Issue, Severity
 
 _OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
-"""Of the spindle, in rpm: a template may switch by it."""
+"""Spindle speeds in rpm: what a template switches may depend on the speed."""
 SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """Which M-code switches off what another switches on."""
@@ -32,14 +32,14 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
 
 
 def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return key → KRL at several speeds of the spindle, and with what a block may say and leave out."""
-    found: dict[str, list[str]] = {}
+    """Return key → KRL at several spindle speeds, with and without the optional words of a block."""
+    texts: dict[str, list[str]] = {}
     others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
     others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
     for other in others:
         for key, text in rendered(templates, {**view, **other}).items():
-            found.setdefault(key, []).append(text)
-    return found
+            texts.setdefault(key, []).append(text)
+    return texts
 
 
 def template_issues(
@@ -50,7 +50,7 @@ def template_issues(
         try:
             what = rules.problem(render(template, {**SAMPLE, **view}), externals)
         except MissingValueError:
-            continue  # missing, not wrong: said where the program needs it
+            continue  # missing, not wrong: reported where the program needs it
         except TemplateError as error:
             what = str(error)
         if what:
@@ -58,10 +58,10 @@ def template_issues(
 
 
 def pair_issues(templates: Mapping[str, str], view: Mapping[str, Any]) -> Iterator[Issue]:
-    """Yield the halves of pairs: what switches on without its partner that switches off.
+    """Yield the outputs that one M-code switches on and its partner does not switch off.
 
-    A warning where the partner calls a subprogram, whose effect is not read. What switches by a condition of
-    its template counts as it is worst.
+    It is a warning where the partner calls a subprogram, whose effect is not read. For an output that is
+    switched under a condition the worse case counts.
     """
     texts = rendered_widely(templates, view) if any(f"m_code.{on}" in templates for on in _OFF) else {}
     for on, off in _OFF.items():
@@ -130,13 +130,13 @@ def _meanings(
 
 def signals_text(texts: Mapping[str, str], key: str) -> str:
     """Return what a template switches as a person reads it: ``$OUT[1] on, $OUT[2] off``."""
-    found = {one.name: one for one in rules.switched(texts.get(key, ""))}
+    signals = {signal.name: signal for signal in rules.switched(texts.get(key, ""))}
     text = texts.get(key, "")
     pulsed = rules.pulses(text)
     words = [
-        f"{one.name} {'on' if one.value else 'off'}{'' if one.sure else ' (perhaps)'}"
-        for one in found.values()
-        if one.name not in pulsed
+        f"{signal.name} {'on' if signal.value else 'off'}{'' if signal.sure else ' (perhaps)'}"
+        for signal in signals.values()
+        if signal.name not in pulsed
     ]
     words += [f"{name} pulsed" for name in pulsed]
     words += [line for line in rules.statements(text) if line.startswith("$ANOUT")]
@@ -153,7 +153,7 @@ def _union(on: Mapping[str, frozenset[str]], codes: tuple[str, ...]) -> frozense
 
 
 def _may_share(one: str, other: str) -> bool:
-    """One valve for flood and mist is a plain machine; all else is a mistake."""
+    """Flood and mist may share one valve; any other shared signal is a mistake."""
     return {one, other} == {"spindle.flood_output", "spindle.mist_output"}
 
 
@@ -169,7 +169,7 @@ def _same_number(named: Mapping[str, int | None], what: str, may_share: Any) -> 
 
 def _pair(key: str, text: str, severity: Severity = "error") -> Issue:
     return Issue(
-        severity, "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of that off"
+        severity, "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of them off"
     )
 
 

@@ -1,7 +1,7 @@
 """What a template of the cell may say in KRL: switch, wait, halt and call what ``externals`` declares.
 
-It may not move, jump, or change what the motions rest on (frames, load, speeds, approximation, advance). The
-list is of what is allowed: a statement that is not known here is refused.
+It may not move, jump, or change what the motions depend on (frames, load, speeds, approximation, advance).
+The list is of what is allowed: an unknown statement is refused.
 """
 
 import re
@@ -16,26 +16,34 @@ _PLANNER_DATA = re.compile(
     r"(BASE_|TOOL_|LOAD_|MACHINE_|IPO_|BAS_|DEF_|PDAT|FDAT|LDAT|XHOME|HOME|XP|GK_|POS_ACT|AXIS_ACT|P\d)"
 )
 """Names of ``$CONFIG.DAT``, of inline forms and of this program's own variables."""
-_OPEN = {"IF": "ENDIF", "WHILE": "ENDWHILE", "FOR": "ENDFOR", "LOOP": "ENDLOOP", "REPEAT": "UNTIL",
-         "SWITCH": "ENDSWITCH"}  # fmt: skip
+_OPEN = {
+    "IF": "ENDIF",
+    "WHILE": "ENDWHILE",
+    "FOR": "ENDFOR",
+    "LOOP": "ENDLOOP",
+    "REPEAT": "UNTIL",
+    "SWITCH": "ENDSWITCH",
+}
 _CLOSE = {close: begin for begin, close in _OPEN.items()}
 _MOTIONS = frozenset(["PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL", "SPLINE", "ENDSPLINE", "PTP_REL",
                       "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "ASYPTP", "ASYCONT",
-                      "ASYCANCEL", "ASYSTOP", "TIME_BLOCK", "CONST_VEL", "STOP"])  # fmt: skip
+                      "ASYCANCEL", "ASYSTOP", "TIME_BLOCK", "CONST_VEL", "STOP"])  # fmt: skip  # word list
 _JUMPS = frozenset(["GOTO", "RETURN", "RESUME", "BRAKE"])
 _ASSIGNED = re.compile(r"(\$?)([A-Z_][A-Z0-9_]*)((?:\.[A-Z0-9_]+|\[[^\]=]*\])*) ?=(?!=)")
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*) ?\(")
 _PULSE = re.compile(r"PULSE ?\( ?(\$OUT\[ ?\d+ ?\]) ?, ?(TRUE|FALSE) ?,[^()]*\)$")
 _OUTPUT = re.compile(r"(\$OUT\[ ?\d+ ?\]|[A-Z_][A-Z0-9_]*(?:\[\d+\])?) ?= ?(.+)$")
-_INTERRUPT = re.compile(r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
-                        r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$")  # fmt: skip
+_INTERRUPT = re.compile(
+    r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
+    r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$"
+)
 _OF_CONTROLLER = re.compile(
     r"(BAS|IR_STOPM|SPS|GK_.*|RSI_.*|SETVAR|CWRITE|SYNCCMD|[A-Z]*_KRLMSG|[A-Z]*_KRLDLG)"
 )
 """Subprograms of the controller that move, set frames, or belong to the program itself."""
 _WORDS_INSIDE = [*_MOTIONS, *_JUMPS, "DO", "TRIGGER", "BAS", "C_DIS", "C_PTP", "C_ORI", "C_VEL", "C_SPL"]
 _INSIDE = re.compile(rf"(?<![$.#\w])(?:{'|'.join(_WORDS_INSIDE)})(?!\w)")
-"""Words that move or jump; a controller may read a line on behind a whole statement."""
+"""Words that move or jump; a controller may read on after a complete statement."""
 _ALONE = frozenset(
     ["ENDIF", "ENDWHILE", "ENDFOR", "LOOP", "ENDLOOP", "REPEAT", "ENDSWITCH", "ELSE", "DEFAULT"]
 )
@@ -46,7 +54,7 @@ _CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
 
 @dataclass(frozen=True)
 class Switched:
-    """A signal that a template sets: ``$OUT[3]``, or the integrator's name of one.
+    """A signal that a template sets: ``$OUT[3]``, or the integrator's name for one.
 
     ``sure`` is False inside a condition or a loop, and where the value is not read as TRUE or FALSE.
     """
@@ -58,12 +66,12 @@ class Switched:
 
 def statements(text: str) -> list[str]:
     """Return the statements of KRL text: upper case, single spaces, without comments and blank lines."""
-    found = (_statement(line) for line in text.split("\n"))
-    return [line for line in found if line]
+    statement_lines = (_statement(line) for line in text.split("\n"))
+    return [line for line in statement_lines if line]
 
 
 def problem(text: str, externals: Iterable[str] = ()) -> str:
-    """Return what rendered KRL says that it must not, empty where it is good."""
+    """Return what is not allowed in rendered KRL, empty if all is."""
     if not text.isascii():
         return "a character that is not ASCII"
     if _CONTROL.search(text.replace("\t", " ")):
@@ -79,34 +87,34 @@ def problem(text: str, externals: Iterable[str] = ()) -> str:
 def external_problem(external: str) -> str:
     """Return why a subprogram may not be declared for templates, empty where it may."""
     name = external.split("(")[0].strip().upper()
-    own = name in _MOTIONS | _JUMPS | _CONDITIONS | _FUNCTIONS | {
+    is_reserved = name in _MOTIONS | _JUMPS | _CONDITIONS | _FUNCTIONS | {
         "DO",
         "TRIGGER",
         "HALT",
         "WAIT",
         "INTERRUPT",
     }
-    if own or _OF_CONTROLLER.fullmatch(name):
-        return f"{name} is of the controller or of KRL, no subprogram that a template may call"
+    if is_reserved or _OF_CONTROLLER.fullmatch(name):
+        return f"{name} belongs to the controller or to KRL: a template may not call it"
     return ""
 
 
 def switched(text: str) -> list[Switched]:
     """Return the digital outputs that KRL text sets, in order."""
-    depth, found = 0, []
+    depth, outputs = 0, []
     for statement in statements(text):
         word = _first(statement)
         depth += (word in _OPEN) - (word in _CLOSE)
         match = _OUTPUT.match(statement)
         pulse = _PULSE.match(statement)
-        if pulse:  # it ends by itself in the other state
-            found.append(Switched(pulse[1].replace(" ", ""), pulse[2] != "TRUE", depth == 0))
+        if pulse:  # a pulse ends by itself in the other state
+            outputs.append(Switched(pulse[1].replace(" ", ""), pulse[2] != "TRUE", depth == 0))
         elif match:
             known = match[2] in ("TRUE", "FALSE")
             if known or match[1].startswith("$"):
                 name = match[1].replace(" ", "")
-                found.append(Switched(name, match[2] != "FALSE", known and depth == 0))
-    return found
+                outputs.append(Switched(name, match[2] != "FALSE", known and depth == 0))
+    return outputs
 
 
 def pulses(text: str) -> list[str]:
@@ -122,22 +130,22 @@ def calls(text: str) -> list[str]:
 def may_be_on(text: str) -> frozenset[str]:
     """Return the signals that are on, or may be, after the text."""
     on: set[str] = set()
-    for one in switched(text):
-        if one.value:
-            on.add(one.name)
-        elif one.sure:
-            on.discard(one.name)
+    for signal in switched(text):
+        if signal.value:
+            on.add(signal.name)
+        elif signal.sure:
+            on.discard(signal.name)
     return frozenset(on)
 
 
 def surely_off(text: str) -> frozenset[str]:
     """Return the signals that are off after the text, whatever its conditions."""
     off: set[str] = set()
-    for one in switched(text):
-        if one.value:
-            off.discard(one.name)
-        elif one.sure:
-            off.add(one.name)
+    for signal in switched(text):
+        if signal.value:
+            off.discard(signal.name)
+        elif signal.sure:
+            off.add(signal.name)
     return frozenset(off)
 
 
@@ -173,9 +181,9 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
     if _assignments(statement) > 1:
         return "assigns twice in a line"
     if word == "PULSE":
-        return "" if _PULSE.match(statement) else "is no pulse of an output whose number is written"
+        return "" if _PULSE.match(statement) else "does not pulse an output given by its number"
     if word in _ALONE and statement != word:
-        return f"says more than {word}"
+        return f"has more than {word}"
     if word == "FOR":
         counts = _COUNTS.match(statement)
         return (
@@ -187,7 +195,7 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
         return ""
     if word == "WAIT":
         waits = re.match(r"WAIT (SEC|FOR)\b", statement) and _assignments(statement) == 0
-        return "" if waits else "is no WAIT SEC or WAIT FOR"
+        return "" if waits else "is not WAIT SEC or WAIT FOR"
     assigned = _ASSIGNED.match(statement)
     if assigned:
         return _wrong_assignment(assigned)
@@ -199,7 +207,7 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
 _CONDITIONS = frozenset([*_OPEN, *_CLOSE, "ELSE", "CASE", "DEFAULT"])
 _FUNCTIONS = frozenset(["ABS", "SIN", "COS", "SQRT", "ROUND", "STRFIND", "STRLEN", "PULSE", "AND",
                         "OR", "NOT", "EXOR", "IF", "WHILE", "UNTIL", "FOR", "CASE", "SWITCH", "SEC", "B_AND",
-                        "B_OR", "B_NOT", "TO"])  # fmt: skip
+                        "B_OR", "B_NOT", "TO"])  # fmt: skip  # word list
 """Names that may stand before a bracket without being a subprogram."""
 
 
@@ -215,9 +223,9 @@ def _assignments(statement: str) -> int:
 def _wrong_assignment(assigned: re.Match[str]) -> str:
     system, name = assigned[1] == "$", assigned[2]
     if system and name not in _SWITCHED:
-        return f"changes ${name}, on which the motions may rest"
+        return f"changes ${name}, on which the motions may depend"
     if system and name == "OUT" and not re.fullmatch(r"\[ ?\d+ ?\]", assigned[3]):
-        return "switches an output whose number is not written: it cannot be read back"
+        return "switches an output whose number is not a literal: it cannot be read back"
     if not system and _PLANNER_DATA.match(name):
         return f"changes {name}, which the controller or the program uses"
     return ""

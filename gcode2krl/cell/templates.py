@@ -16,24 +16,24 @@ from jinja2.exceptions import SecurityError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 MOST_CHARACTERS = 16_384
-"""Of a template; also of what it becomes, times 4."""
+"""Longest template; the text that it becomes may be four times as long."""
 MOST_OUTPUT = 4 * MOST_CHARACTERS
 MOST_ROUNDS = 1000
-"""Of a loop."""
+"""Most rounds of a loop."""
 MOST_TEXT = 1000
-"""Characters of a text of the cell: a template may say it a thousand times in one expression."""
+"""Longest text value of the cell: one expression of a template may repeat it a thousand times."""
 _MOST_NUMBER = 1e15
 _MOST_DECIMALS = 9
 _FILTERS = ("abs", "int", "float", "upper", "lower", "trim", "default", "d", "length")
 _ROUNDS = "_rounds"
 _TESTS = ("defined", "undefined", "none", "number", "string", "odd", "even", "eq", "ne", "lt", "le", "gt",
-          "ge", "in", "==", "!=", "<", "<=", ">", ">=")  # fmt: skip
+          "ge", "in", "==", "!=", "<", "<=", ">", ">=")  # fmt: skip  # word list, kept compact
 _NODES = (
     nodes.Template, nodes.Output, nodes.TemplateData, nodes.Name, nodes.Const, nodes.Getattr, nodes.Getitem,
     nodes.If, nodes.CondExpr, nodes.Compare, nodes.Operand, nodes.And, nodes.Or, nodes.Not, nodes.Add,
     nodes.Sub, nodes.Mul, nodes.Div, nodes.FloorDiv, nodes.Mod, nodes.Neg, nodes.Pos, nodes.Filter,
     nodes.Test, nodes.Tuple, nodes.List, nodes.For, nodes.Concat, nodes.Keyword,
-)  # fmt: skip
+)  # fmt: skip  # word list, kept compact
 _FORMAT = re.compile(r"%(?:%|[-+ 0#]{0,5}\d{0,2}(?:\.\d{1,2})?[dfgeFGEsxX])|[^%]+")
 
 
@@ -114,7 +114,7 @@ class _Environment(ImmutableSandboxedEnvironment):
             return _short(name, value) if isinstance(value, str) else value
         if isinstance(obj, tuple) and isinstance(key, int) and -len(obj) <= key < len(obj):
             return obj[key]
-        raise SecurityError(f"no {str(key)[:40]!r} of a plain value")
+        raise SecurityError(f"a plain value has no {str(key)[:40]!r}")
 
     def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
         for side in (left, right):
@@ -135,13 +135,13 @@ class _Environment(ImmutableSandboxedEnvironment):
 def render(template: str, values: Mapping[str, Any]) -> str:
     """Return a template as text, with ``values`` (numbers, text, tables of them).
 
-    Raises `MissingValueError` where a needed key is None, `TemplateError` on whatever else is wrong.
+    Raises `MissingValueError` where a needed key is None, `TemplateError` for any other mistake.
     """
     try:
-        made = _compiled(template)
+        compiled = _compiled(template)
         used = {key: _plain(key, value) for key, value in values.items()}
         text = ""
-        for piece in made.generate(used):
+        for piece in compiled.generate(used):
             text += piece
             if len(text) > MOST_OUTPUT:
                 raise TemplateError(f"becomes more than {MOST_OUTPUT // 1024} KiB")
@@ -178,7 +178,7 @@ def _plain(name: str, value: Any) -> Any:
         return _short(name, value)
     if isinstance(value, int | float):
         return value
-    raise TemplateError(f"{name} is no plain value")
+    raise TemplateError(f"{name} is not a plain value")
 
 
 def _short(name: str, value: str) -> str:
@@ -202,14 +202,14 @@ def _formatted(pattern: str, values: Any) -> str:
 
 
 def _rounds(values: Any) -> Any:
-    """Return what a loop runs over, if it is short enough; each loop is made to ask."""
+    """Return the values that a loop runs over, if they are few enough; every loop calls this."""
     if isinstance(values, range | tuple | list | str | _Table) and len(values) > MOST_ROUNDS:
         raise TemplateError(f"a loop of more than {MOST_ROUNDS} rounds")
     return values
 
 
 def _round(value: Any, precision: Any = 0, method: Any = "common") -> Any:
-    """Round as Jinja2 does; it would compute 10 to the power of any precision."""
+    """Round as Jinja2 does, with few decimals: Jinja2 itself would compute 10 to any power."""
     if not (isinstance(precision, int) and abs(precision) <= _MOST_DECIMALS):
         raise TemplateError(f"round: allowed -{_MOST_DECIMALS} to {_MOST_DECIMALS} decimals")
     return filters.do_round(value, precision, method)
@@ -229,16 +229,20 @@ def _compiled(text: str) -> jinja2.Template:
 
 @lru_cache(maxsize=1)
 def _environment() -> jinja2.Environment:
-    made = _Environment(
-        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False,
-        optimized=False, finalize=_final,
-    )  # fmt: skip
-    made.globals = {"range": range}
-    made.filters = {name: made.filters[name] for name in _FILTERS}
-    made.filters |= {"decimals": _decimals, "round": _round, _ROUNDS: _rounds}
-    made.tests = {name: made.tests[name] for name in _TESTS}
-    made.tests["none"] = lambda value: value is None or isinstance(value, _Missing)
-    return made
+    environment = _Environment(
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=False,
+        optimized=False,
+        finalize=_final,
+    )
+    environment.globals = {"range": range}
+    environment.filters = {name: environment.filters[name] for name in _FILTERS}
+    environment.filters |= {"decimals": _decimals, "round": _round, _ROUNDS: _rounds}
+    environment.tests = {name: environment.tests[name] for name in _TESTS}
+    environment.tests["none"] = lambda value: value is None or isinstance(value, _Missing)
+    return environment
 
 
 def _final(value: Any) -> Any:
@@ -248,7 +252,7 @@ def _final(value: Any) -> Any:
     if isinstance(value, jinja2.Undefined):
         return value
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise TemplateError(f"{type(value).__name__.strip('_').lower()} is no text or number")
+        raise TemplateError(f"{type(value).__name__.strip('_').lower()} is not a text or number")
     if isinstance(value, float) and not abs(value) <= _MOST_NUMBER:
         raise TemplateError("a number that is too large")
     return value
@@ -261,7 +265,7 @@ def _decimals(value: float, count: int) -> str:
 
 
 def _refuse_more(node: nodes.Node, depth: int, loops: int = 0) -> None:
-    """Raise where a template uses what this language leaves out; walks the tree."""
+    """Raise where a template uses a part of Jinja2 that is not allowed here; walks the syntax tree."""
     if depth > 100:
         raise TemplateError("nested too deeply")
     if isinstance(node, nodes.Call):

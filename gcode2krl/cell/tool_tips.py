@@ -1,4 +1,4 @@
-"""Where each motion of a chain begins: at the end of the one before, seen from the tool that moves."""
+"""Where each motion of a chain begins: at the end of the one before, as a pose of the tool that moves."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ Rows = slice | Ints
 def motion_starts(targets: Targets, cell: Cell, rows: Rows = slice(None)) -> tuple[Floats, Floats]:
     """Return position (p, 3) in mm and rotation (p, 4) at which each motion begins; row 0 where it ends.
 
-    Where the tool changes between two rows the flange rests and another tip begins the motion. ``rows``
+    At a tool change between two rows the flange rests, and the motion begins at the new tip. ``rows``
     chooses motions; the columns may be views of the targets, so they are not to be written to.
     """
     here, before = _with_predecessors(rows, len(targets))
@@ -31,7 +31,7 @@ def motion_starts(targets: Targets, cell: Cell, rows: Rows = slice(None)) -> tup
 
 
 def _with_predecessors(rows: Rows, count: int) -> tuple[Rows, Rows]:
-    """Return an index of the rows and one of those before them, as slices (no copy) where that can be."""
+    """Return an index of the rows and one of those before them, as slices (no copy) where possible."""
     if not isinstance(rows, slice):
         return rows, np.maximum(rows - 1, 0)
     start, end, _ = rows.indices(count)

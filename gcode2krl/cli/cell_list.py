@@ -66,10 +66,10 @@ def missing_keys(cell: Cell) -> list[str]:
 
 
 def findings(cell: Cell) -> list[Issue]:
-    """Return what is doubtful in the cell, and what its templates must not say."""
+    """Return what is doubtful in the cell, and what is not allowed in its templates."""
     templates = cell.templates()
-    wrong = switching.template_issues(templates, _view(cell), cell.program.externals)
-    pairs = switching.pair_issues(templates, _view(cell))
+    wrong = switching.template_issues(templates, _template_values(cell), cell.program.externals)
+    pairs = switching.pair_issues(templates, _template_values(cell))
     return [*wrong, *pairs, *range_issues(cell), *future_confirmation(cell)]
 
 
@@ -88,18 +88,18 @@ def _signals(cell: Cell) -> Iterator[Row]:
     spindle = cell.spindle
     most = f"{spindle.max_rpm:g} rpm at most" if spindle.max_rpm is not None else MISSING
     yield "spindle", most, spindle.sure
-    texts = switching.rendered(cell.templates(), _view(cell))
+    texts = switching.rendered(cell.templates(), _template_values(cell))
     for key, template in cell.templates().items():
         name = key.removeprefix("m_code.")
         if key not in texts:
             yield name, f"cannot be rendered: {' '.join(template.split())[:60]}", "assumption"
             continue
         switched = switching.signals_text(texts, key)
-        said = "; ".join(line.strip() for line in texts[key].split("\n") if line.strip())
-        yield name, f"switches {switched}" if switched else said[:100], "assumption"
+        statements = "; ".join(line.strip() for line in texts[key].split("\n") if line.strip())
+        yield name, f"switches {switched}" if switched else statements[:100], "assumption"
 
 
-def _view(cell: Cell) -> dict[str, Any]:
+def _template_values(cell: Cell) -> dict[str, Any]:
     return {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()}
 
 

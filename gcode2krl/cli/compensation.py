@@ -23,22 +23,27 @@ def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str |
     Raises
     ------
     RefusedError
-        Where there is no deflection, or it is not sure enough to move a robot by it.
+        Where there is no deflection, or it is too uncertain to move a robot by it.
     """
     from gcode2krl.compensation.iteration import compensate, keeping_forces
 
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     if motion is None or forces is None or deflection is None:
         raise RefusedError(
-            Issue("error", "no-deflection", 0, "--compensate offline: there is no predicted deflection",
-                  "state material, stock and stiffness in the cell; leave out --no-forces")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "no-deflection",
+                0,
+                "--compensate offline: there is no predicted deflection",
+                "state material, stock and stiffness in the cell; leave out --no-forces",
+            )
+        )
     toolpath, cell = prediction.toolpath, prediction.cell
     done = compensate(
         toolpath, prediction.targets, cell, keeping_forces(toolpath, prediction.targets, motion, forces, cell)
     )
     motion, joints, kept, bent = done.evaluated
-    # both are those of the intended path, place by place, and so are the findings on them
+    # forces and part are those of the intended path at equal places, and so are the findings on them
     forces, deflection = (
         replace(kept, issues=forces.issues),
         replace(bent, issues=deflection.issues),

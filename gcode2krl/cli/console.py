@@ -47,7 +47,7 @@ class Console:
             click.echo(text)
 
     def hint(self, text: str) -> None:
-        """Print a passing remark on standard error."""
+        """Print a hint on standard error."""
         if not self.quiet:
             tell(text)
 

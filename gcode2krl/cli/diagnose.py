@@ -1,4 +1,4 @@
-"""``gcode2krl diagnose prediction/ run/ [more runs]``: where reality differs, why, and what it takes away."""
+"""``gcode2krl diagnose prediction/ run/ [more runs]``: where reality differs, and why."""
 
 from pathlib import Path
 from typing import Any
@@ -12,21 +12,28 @@ from gcode2krl.errors import Gcode2KrlError, input_error
 
 @click.command("diagnose")
 @click.argument("folders", nargs=-1, required=True, metavar="[PREDICTION] RUN…")
-@click.option("--holdout", multiple=True, metavar="RUN", help="Run that only tests; may be repeated.")
+@click.option("--holdout", multiple=True, metavar="RUN", help="Run used for testing only; may be repeated.")
 @click.option(
-    "--effects", multiple=True, metavar="FOLDER", help="Folder with effects of one's own; repeatable."
+    "--effects", multiple=True, metavar="FOLDER", help="Folder with your own effects; may be repeated."
 )
-@click.option("--from-log", is_flag=True, help="No prediction: compare what the logs hold with itself.")
+@click.option("--from-log", is_flag=True, help="No prediction: compare commanded and actual values of logs.")
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the named causes into this cell file.")
 @common_options
 def command(
-    folders: tuple[str, ...], holdout: tuple[str, ...], effects: tuple[str, ...], from_log: bool,
-    apply_to: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
+    folders: tuple[str, ...],
+    holdout: tuple[str, ...],
+    effects: tuple[str, ...],
+    from_log: bool,
+    apply_to: str | None,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
     """Say where measured runs differ from their prediction, which effects explain it, and how far it shrinks.
 
-    Several runs explain by turns; those named with --holdout only test. Exit code 0 whenever a diagnosis was
-    made, whatever it found.
+    Each of several runs is held out in turn; those named with --holdout are used for testing only. Exit code
+    0 whenever a diagnosis was made, whatever it found.
     """
     console = Console(quiet, as_json)
     try:
@@ -56,18 +63,24 @@ def command(
 
 
 def _diagnosis(
-    folders: tuple[str, ...], holdout: tuple[str, ...], effects: tuple[str, ...], from_log: bool,
-    cell_path: str | None, console: Console,
-) -> Any:  # fmt: skip
+    folders: tuple[str, ...],
+    holdout: tuple[str, ...],
+    effects: tuple[str, ...],
+    from_log: bool,
+    cell_path: str | None,
+    console: Console,
+) -> Any:
     from gcode2krl.gap import diagnose, diagnose_log
     from gcode2krl.prediction import Prediction
     from gcode2krl.runs import load_run
 
     if not from_log and len(folders) < 2:
         raise input_error(
-            "no-runs", "there is no run to diagnose", "name a prediction and its runs, or use --from-log",
+            "no-runs",
+            "there is no run to diagnose",
+            "name a prediction and its runs, or use --from-log",
             source=folders[0],
-        )  # fmt: skip
+        )
     names = folders if from_log else folders[1:]
     with console.progress("reading", len(names) + len(holdout)) as advance:
         runs, held = [], []

@@ -19,7 +19,7 @@ _FIELDS = ("why", "example", "remedy", "allow")
 def command(code: str | None, as_json: bool) -> int:
     """Explain a finding by its code, as printed: spindle-off or spindle-off:12.
 
-    Says why it matters on the robot, what causes it, what to do, and when a person may release it with
+    Says why it matters on the robot, what causes it, what to do, and when a person may allow it with
     --allow. Without CODE all codes are listed.
     """
     console = Console(as_json=as_json)

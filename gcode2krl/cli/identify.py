@@ -1,4 +1,4 @@
-"""``gcode2krl identify``: what measurements at the real cell say; a file for each kind."""
+"""``gcode2krl identify``: fits the cell to measurements; a file for each kind."""
 
 from importlib import import_module
 

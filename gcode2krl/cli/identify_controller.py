@@ -34,9 +34,16 @@ _MOST_SHOWN = 20
 @click.option("--plot", metavar="FIGURE.png", help="Draw the trace with the fit over it.")
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the values into this cell file.")
 def command(
-    trace: str, part: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, plot: str | None, apply_to: str | None,
-) -> int:  # fmt: skip
+    trace: str,
+    part: str | None,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    tolerance: float | None,
+    plot: str | None,
+    apply_to: str | None,
+) -> int:
     """Fit how the controller plans to a recorded trace: k, effective CDIS, the law.
 
     TRACE is CSV with a header line, or Parquet, with t_s, x_cmd_mm, y_cmd_mm, z_cmd_mm: the commanded
@@ -85,7 +92,7 @@ def _identify(
 
 
 def _identify_test(trace: "ControllerTrace", cell: Cell, console: Console) -> "Identification":
-    """Fit a trace of the test program: with the lines that turn the tool, else without."""
+    """Fit a trace of the test program: with the lines that turn the tool if it has them, else without."""
     from gcode2krl.identify.controller import identify_controller
     from gcode2krl.pipeline import controller_test_targets
 
@@ -106,8 +113,8 @@ def _say(result: "Identification", trace: str, console: Console) -> None:
     fitted = sum(section.fitted for section in result.sections)
     console.say(f"{trace}: {len(result.sections)} sections, {fitted} fitted")
     console.say(f"  k          {k.value:.5f} s, 90 % {k.low:.5f} .. {k.high:.5f}")
-    whole = f"{result.k_cycles} cycles of {cycle_ms:g} ms = {result.k_whole_s:.3f} s"
-    console.say(f"             {whole}, {inside}; {taken} as whole cycles")
+    cycles = f"{result.k_cycles} cycles of {cycle_ms:g} ms = {result.k_whole_s:.3f} s"
+    console.say(f"             {cycles}, {inside}; {taken} as whole cycles")
     if result.cdis_mm is None:
         console.say("  CDIS       not determined")
     else:
@@ -148,23 +155,53 @@ def _corner_line(corner: "CornerFit") -> str:
 
 
 _KEYS = (
-    "k_s", "k_interval_s", "k_cycles", "k_whole_cycles_s", "k_whole_cycles_inside", "cdis_mm",
-    "cdis_interval_mm", "cdis_programmed_mm", "law", "law_evidence", "law_of_values", "acceleration_mm_s2",
-    "vel_ori_deg_s", "vel_ori_interval_deg_s", "acc_ori_deg_s2", "acc_ori_interval_deg_s2", "turning_rms_mm",
-    "noise_mm", "rms_mm", "max_mm", "sections", "corners",
-)  # fmt: skip
+    "k_s",
+    "k_interval_s",
+    "k_cycles",
+    "k_whole_cycles_s",
+    "k_whole_cycles_inside",
+    "cdis_mm",
+    "cdis_interval_mm",
+    "cdis_programmed_mm",
+    "law",
+    "law_evidence",
+    "law_of_values",
+    "acceleration_mm_s2",
+    "vel_ori_deg_s",
+    "vel_ori_interval_deg_s",
+    "acc_ori_deg_s2",
+    "acc_ori_interval_deg_s2",
+    "turning_rms_mm",
+    "noise_mm",
+    "rms_mm",
+    "max_mm",
+    "sections",
+    "corners",
+)
 
 
 def _record(result: "Identification", files: list[Path]) -> dict[str, Any]:
     values = (
-        result.k_s.value, _interval(result.k_s), result.k_cycles, result.k_whole_s,
-        result.k_s.contains(result.k_whole_s), *_value_and_interval(result.cdis_mm),
-        result.cdis_programmed_mm, result.law, result.law_evidence, result.law_fitted,
-        result.acceleration_mm_s2, *_value_and_interval(result.vel_ori_deg_s),
-        *_value_and_interval(result.acc_ori_deg_s2), result.turning_rms_mm, result.noise_mm,
-        result.rms_mm, result.max_mm, [_section_record(section) for section in result.sections],
+        result.k_s.value,
+        _interval(result.k_s),
+        result.k_cycles,
+        result.k_whole_s,
+        result.k_s.contains(result.k_whole_s),
+        *_value_and_interval(result.cdis_mm),
+        result.cdis_programmed_mm,
+        result.law,
+        result.law_evidence,
+        result.law_fitted,
+        result.acceleration_mm_s2,
+        *_value_and_interval(result.vel_ori_deg_s),
+        *_value_and_interval(result.acc_ori_deg_s2),
+        result.turning_rms_mm,
+        result.noise_mm,
+        result.rms_mm,
+        result.max_mm,
+        [_section_record(section) for section in result.sections],
         [_corner_record(corner) for corner in result.corners],
-    )  # fmt: skip
+    )
     record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
     return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
 
@@ -180,29 +217,39 @@ def _interval(estimate: "Estimate") -> list[float] | None:
 
 def _section_record(section: "Section") -> dict[str, Any]:
     return {
-        "lines": [section.first_line, section.last_line], "moves": section.moves,
-        "length_mm": section.length_mm, "speed_mm_s": section.speed_mm_s, "fitted": section.fitted,
-        "start_s": section.start_s, "rms_mm": section.rms_mm, "max_mm": section.max_mm,
-    }  # fmt: skip
+        "lines": [section.first_line, section.last_line],
+        "moves": section.moves,
+        "length_mm": section.length_mm,
+        "speed_mm_s": section.speed_mm_s,
+        "fitted": section.fitted,
+        "start_s": section.start_s,
+        "rms_mm": section.rms_mm,
+        "max_mm": section.max_mm,
+    }
 
 
 def _corner_record(corner: "CornerFit") -> dict[str, Any]:
     return {
-        "line": corner.source_line, "angle_deg": corner.angle_deg, "speed_mm_s": corner.speed_mm_s,
-        "cdis_mm": corner.cdis_mm, "programmed_d_mm": corner.programmed_d_mm,
-        "d_mm": corner.d_mm.value, "d_interval_mm": _interval(corner.d_mm),
-        "error_mm": corner.error_mm.value, "error_interval_mm": _interval(corner.error_mm),
-    }  # fmt: skip
+        "line": corner.source_line,
+        "angle_deg": corner.angle_deg,
+        "speed_mm_s": corner.speed_mm_s,
+        "cdis_mm": corner.cdis_mm,
+        "programmed_d_mm": corner.programmed_d_mm,
+        "d_mm": corner.d_mm.value,
+        "d_interval_mm": _interval(corner.d_mm),
+        "error_mm": corner.error_mm.value,
+        "error_interval_mm": _interval(corner.error_mm),
+    }
 
 
 # --- the cell file --------------------------------------------------------------------------------------
 
 
 def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path:
-    """Write k, CDIS and law into a cell file, its other keys kept; comments are lost.
+    """Write k, CDIS and law into a cell file and keep its other keys; comments are lost.
 
-    CDIS is what programs *write*; it goes into the cell only where the corners of the trace were programmed
-    with the cell's own, not with one of ``G64 P``.
+    CDIS is the value that programs *write*; it goes into the cell only if the corners of the trace were
+    programmed with the CDIS of the cell, not with one from ``G64 P``.
     """
     import tomli_w
 
@@ -218,9 +265,9 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
         values["cdis_mm"] = round(result.cdis_mm.value, 4)
     if result.law != "undecided":
         values["law"] = result.law
-    for key, found in (("vel_ori_deg_s", result.vel_ori_deg_s), ("acc_ori_deg_s2", result.acc_ori_deg_s2)):
-        if found is not None:
-            values[key] = round(found.value, 3)
+    for key, estimate in (("vel_ori_deg_s", result.vel_ori_deg_s), ("acc_ori_deg_s2", result.acc_ori_deg_s2)):
+        if estimate is not None:
+            values[key] = round(estimate.value, 3)
     values["source"] = (
         f"identified from {Path(trace).name}: k {result.k_s.value:.5f} s, 90 % "
         f"{result.k_s.low:.5f} to {result.k_s.high:.5f}, residuals {result.rms_mm:.4f} mm rms"

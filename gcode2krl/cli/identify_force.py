@@ -28,13 +28,19 @@ if TYPE_CHECKING:
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
 @click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
 def command(
-    run_folder: str, prediction: str | None, plot: str | None, apply_to: str | None, as_json: bool,
-    quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
+    run_folder: str,
+    prediction: str | None,
+    plot: str | None,
+    apply_to: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
     """Fit the six coefficients of the linear edge law to the measured force of a run.
 
     RUN is a folder with run.toml and force.csv. The cutter's engagement comes from the prediction's stock and
-    motion; zero and delay of the sensor are fitted along. What the run does not determine is refused by name.
+    motion; zero and delay of the sensor are fitted too. A coefficient that the run does not determine is
+    refused.
     """
     console = Console(quiet, as_json)
     try:
@@ -124,14 +130,19 @@ def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
         for name, value, half in zip(NAMES, fit.value, fit.half, strict=True)
     }
     return {
-        "coefficients": coefficients, "zero_N": fit.zero_N.tolist(), "delay_s": fit.delay_s,
-        "rms_N": fit.rms_N, "relative_band": fit.relative_band, "samples": fit.samples,
-        "files": [str(file) for file in files], "issues": [],
-    }  # fmt: skip
+        "coefficients": coefficients,
+        "zero_N": fit.zero_N.tolist(),
+        "delay_s": fit.delay_s,
+        "rms_N": fit.rms_N,
+        "relative_band": fit.relative_band,
+        "samples": fit.samples,
+        "files": [str(file) for file in files],
+        "issues": [],
+    }
 
 
 def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
-    """Write the coefficients as ``[material]`` into a cell file, its other keys kept; comments are lost."""
+    """Write the coefficients as ``[material]`` into a cell file, keep its other keys; comments are lost."""
     import tomli_w
 
     from gcode2krl.cell import library

@@ -35,17 +35,31 @@ if TYPE_CHECKING:
     metavar="N",
     help="Known 1-sigma of a force component.",
 )
-@click.option("--noise-Nmm", "noise_Nmm", type=click.FloatRange(min=0.0), default=0.0, metavar="N·MM",
-              help="Known 1-sigma of a moment component.")  # fmt: skip
+@click.option(
+    "--noise-Nmm",
+    "noise_Nmm",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    metavar="N·MM",
+    help="Known 1-sigma of a moment component.",
+)
 def command(
-    poses: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool, output: str | None,
-    gravity: tuple[float, float, float], noise_N: float, noise_Nmm: float,
-) -> int:  # fmt: skip
+    poses: str,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    output: str | None,
+    gravity: tuple[float, float, float],
+    noise_N: float,
+    noise_Nmm: float,
+) -> int:
     """Fit weight, centre of gravity and offsets to readings of the unloaded force sensor.
 
     POSES is CSV: fx_N, fy_N, fz_N, mx_Nmm, my_Nmm, mz_Nmm, and the orientation of the sensor in the robot
-    root as a_deg, b_deg, c_deg, as qx, qy, qz, qw, or as joint angles q1_deg to q6_deg. Three orientations
-    are the least; 20 and more (the paper takes 27) also give what remains, such as the pull of a hose pack.
+    root as a_deg, b_deg, c_deg, as qx, qy, qz, qw, or as joint angles q1_deg to q6_deg. At least three
+    orientations; 20 and more (the paper takes 27) also give the remaining offset, such as the pull of a hose
+    pack.
     """
     console = Console(quiet, as_json)
     files: list[Path] = []
@@ -54,7 +68,7 @@ def command(
         from gcode2krl.identify.sensor_poses import read_poses
 
         if output is not None:
-            calibration = read_cell(cell_path).online.calibration  # is measured anew
+            calibration = read_cell(cell_path).online.calibration  # will be measured again
             others = (file for file in cell_files(cell_path) if str(file.resolve()) != calibration)
             require_other(Path(output), poses, *others)
         result = identify_sensor(read_poses(poses, read_cell(cell_path)), gravity, noise_N, noise_Nmm)
@@ -113,22 +127,42 @@ def _words(estimate: "Estimate", digits: int) -> str:
 
 
 _KEYS = (
-    "weight_N", "weight_interval_N", "centre_mm", "centre_interval_mm", "force_offset_N",
-    "force_offset_interval_N", "moment_offset_Nmm", "moment_offset_interval_Nmm", "poses", "level",
-    "force_noise_N", "moment_noise_Nmm", "force_rms_N", "moment_rms_Nmm", "force_left_out_N",
-    "moment_left_out_Nmm", "calibration",
-)  # fmt: skip
+    "weight_N",
+    "weight_interval_N",
+    "centre_mm",
+    "centre_interval_mm",
+    "force_offset_N",
+    "force_offset_interval_N",
+    "moment_offset_Nmm",
+    "moment_offset_interval_Nmm",
+    "poses",
+    "level",
+    "force_noise_N",
+    "moment_noise_Nmm",
+    "force_rms_N",
+    "moment_rms_Nmm",
+    "force_left_out_N",
+    "moment_left_out_Nmm",
+    "calibration",
+)
 
 
 def _record(result: "SensorIdentification", files: list[Path]) -> dict[str, Any]:
     triples = (result.centre_mm, result.force_offset_N, result.moment_offset_Nmm)
     values = (
-        result.weight_N.value, _interval(result.weight_N),
+        result.weight_N.value,
+        _interval(result.weight_N),
         *(item for triple in triples for item in ([e.value for e in triple], [_interval(e) for e in triple])),
-        result.poses, result.level, result.force_noise_N, result.moment_noise_Nmm, list(result.force_rms_N),
-        list(result.moment_rms_Nmm), result.force_left_out_N, result.moment_left_out_Nmm,
+        result.poses,
+        result.level,
+        result.force_noise_N,
+        result.moment_noise_Nmm,
+        list(result.force_rms_N),
+        list(result.moment_rms_Nmm),
+        result.force_left_out_N,
+        result.moment_left_out_Nmm,
         result.calibration.model_dump(mode="json"),
-    )  # fmt: skip
+    )
     record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
     return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
 

@@ -25,13 +25,19 @@ if TYPE_CHECKING:
 )
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the stiffness into this cell file.")
 def command(
-    measurements: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    plot: str | None, apply_to: str | None,
-) -> int:  # fmt: skip
+    measurements: str,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    plot: str | None,
+    apply_to: str | None,
+) -> int:
     """Fit the stiffness of the robot's joints and links to distances of measuring cubes.
 
     MEASUREMENTS is the TOML head that describes cubes, lasers and load, or the CSV with the readings beside
-    it; docs/identification.md has the format. What the readings do not determine is named, not applied.
+    it; docs/identification.md has the format. A stiffness that the readings do not determine is named, not
+    applied.
     """
     console = Console(quiet, as_json)
     try:
@@ -89,9 +95,9 @@ def _say(result: "StiffnessIdentification", cell: Cell, console: Console) -> Non
 def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -> str:
     from gcode2krl.identify.stiffness import AXES, KEYS, in_cell
 
-    own = in_cell(cell, fit.joint, KEYS[axis])
+    in_file = in_cell(cell, fit.joint, KEYS[axis])
     head = f"  {fit.joint if axis == 0 else '':<11} {AXES[axis]} {KEYS[axis]}  "
-    tail = f"{own:11.3e}" if own else f"{'-':>11}"
+    tail = f"{in_file:11.3e}" if in_file else f"{'-':>11}"
     if estimate is None:
         return f"{head}{'not determined':<37} {tail}"
     counts = f"  {len(fit.row):8d}  {fit.noise_mm * UM_PER_MM:8.2f}" if axis == 0 else ""

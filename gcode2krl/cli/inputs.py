@@ -1,4 +1,4 @@
-"""Reading the inputs that several commands share: the part, the cell, and the words about the first run."""
+"""Reading the inputs that several commands share: the part, the cell, and the hint on the first run."""
 
 import sys
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ def gcode_options(function: Any) -> Any:
             default=0.01,
             show_default=True,
             metavar="MM",
-            help="Arcs to chords within this.",
+            help="Largest error of the chords of an arc.",
         ),
         click.option(
             "--tolerance", type=float, metavar="MM", help="Blend corners within this (below G64 P)."
@@ -66,9 +66,13 @@ def read_part(
                 raise input_error("file-unreadable", "standard input is closed", "name a file")
             try:
                 return read_stream(
-                    sys.stdin.buffer, "stdin", cell,
-                    chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance,
-                )  # fmt: skip
+                    sys.stdin.buffer,
+                    "stdin",
+                    cell,
+                    chord_tolerance_mm=chord_tolerance_mm,
+                    block_delete=block_delete,
+                    progress=advance,
+                )
             except OSError as error:
                 sentence = f"cannot read standard input: {error.strerror}"
                 raise input_error("file-unreadable", sentence, "name a file") from None
@@ -83,7 +87,7 @@ def read_cell(path: str | None) -> Cell:
 
 
 def _say_first_run(console: Console) -> None:
-    """One line where the compiled kernels are not on this machine yet."""
+    """Print a line if the kernels are not compiled on this machine yet."""
     from gcode2krl.gcode import machine
 
     folder = machine.run.stats.cache_path
@@ -97,7 +101,7 @@ def require_other(output: Path, *inputs: str | Path | None) -> None:
 
 
 def require_outputs(outputs: list[Path], *inputs: str | Path | None) -> None:
-    """Refuse outputs of which one is an input, or another of them, or has no folder, or is one."""
+    """Refuse an output that is an input, another output or a folder, or whose folder does not exist."""
     for output in outputs:
         if not output.parent.is_dir():
             sentence = f"cannot write: the folder {str(output.parent)!r} does not exist"
@@ -109,7 +113,7 @@ def require_outputs(outputs: list[Path], *inputs: str | Path | None) -> None:
 
 
 def require_folder(folder: str | Path | None, names: Iterable[str], inputs: Iterable[Path]) -> None:
-    """Refuse a folder to write into that cannot be one, or in which an input has the name of an output."""
+    """Refuse an output folder that cannot be made, or in which an input has the name of an output."""
     if folder is None:
         return
     place = Path(folder)
@@ -129,7 +133,7 @@ def require_figure(name: str | None) -> None:
 
 
 def require_fit_outputs(plot: str | None, apply_to: str | None, cell: str | None, *data: str | None) -> None:
-    """Refuse outputs of a fit: a figure over any input, a cell file over the data; the cell is rewritten."""
+    """Refuse outputs of a fit: a figure over any input, a cell file over the data (over the cell it may)."""
     require_figure(plot)
     if apply_to is not None:
         require_other(Path(apply_to), *data)
@@ -141,7 +145,7 @@ def require_part(part: str) -> None:
     """Refuse a folder where G-code is wanted."""
     if part != STANDARD and Path(part).is_dir():
         raise input_error(
-            "file-unreadable", "this is a folder, no G-code", "name the file", source=part or "the input"
+            "file-unreadable", "this is a folder, not G-code", "name the file", source=part or "the input"
         )
 
 
@@ -158,18 +162,18 @@ def effect_files(folders: Iterable[str]) -> list[Path]:
 def cell_files(path: str | None) -> list[Path]:
     """Return a cell file and every file that it names, however deep: models, bases, meshes, calibration.
 
-    What cannot be read is left out: whoever reads the cell says so.
+    A file that cannot be read is left out: reading the cell reports it.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     waiting = [Path(path)] if path is not None else []
     while waiting:
         file = waiting.pop()
-        if file in found:
+        if file in files:
             continue
-        found.append(file)
-        if file.suffix.lower() == ".toml" or len(found) == 1:
+        files.append(file)
+        if file.suffix.lower() == ".toml" or len(files) == 1:
             waiting += (file.parent / name for name in _names_in(file) if (file.parent / name).is_file())
-    return found
+    return files
 
 
 def _names_in(file: Path) -> list[str]:

@@ -29,9 +29,9 @@ def load_lines(prediction: Prediction) -> Iterator[str]:
         f"  force      up to {force_N:.0f} N +- {forces.relative_band:.0%} (90 %), "
         f"torque {torque_Nm:.2f} Nm{name}"
     )
-    share = np.count_nonzero(cutting) / max(len(cutting), 1)
+    fraction = np.count_nonzero(cutting) / max(len(cutting), 1)
     depth_mm, width_mm = forces.a_p_mm.max(initial=0.0), forces.a_e_mm.max(initial=0.0)
-    yield f"  cut        {share:.0%} of the time, a_p up to {depth_mm:.2f} mm, a_e up to {width_mm:.2f} mm"
+    yield f"  cut        {fraction:.0%} of the time, a_p up to {depth_mm:.2f} mm, a_e up to {width_mm:.2f} mm"
     if deflection is None:
         yield "  deflection not known"
         return

@@ -51,7 +51,7 @@ class _Commands(click.Group):
 
 
 def _refuse_mistyped(word: str) -> None:
-    """Raise where a first word is no command and cannot be a part: no option, no ending, no such file."""
+    """Raise if a first word is neither a command nor a part: no option, no ending, no such file."""
     if word.startswith("-") or Path(word).suffix or _is_there(word):
         return
     near = closest(word.lower(), _COMMANDS)
@@ -73,8 +73,8 @@ def _is_there(word: str) -> bool:
 def commands() -> None:
     """G-code in, a verified KUKA KRL program out.
 
-    `gcode2krl part.nc -o part.src` translates; `gcode2krl COMMAND --help` tells more. The program and what
-    it writes are not safety functions.
+    `gcode2krl part.nc -o part.src` translates; `gcode2krl COMMAND --help` explains a command. The program and
+    what it writes are not safety functions.
     """
 
 
@@ -98,7 +98,7 @@ def _run(args: list[str] | None) -> int:
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
     except click.exceptions.NoArgsIsHelpError as error:
-        return console.failed(_which(error), 2)
+        return console.failed(_missing_subcommand(error), 2)
     except click.ClickException as error:
         return console.failed(f"{error.format_message()} -> `gcode2krl --help` lists the options", 2)
     except BrokenPipeError:
@@ -108,7 +108,7 @@ def _run(args: list[str] | None) -> int:
         return console.failed(f"{place}{error.strerror or error} -> check path, rights and space", 2)
     except (MemoryError, RecursionError) as error:
         return console.failed(f"not enough memory for this input ({type(error).__name__})", 2)
-    except Exception as error:  # a defect of ours: one line for the user, the rest on request
+    except Exception as error:  # a defect of the program: one line for the user, the rest on request
         if "-v" in words or "--verbose" in words:
             raise
         return console.failed(
@@ -117,8 +117,8 @@ def _run(args: list[str] | None) -> int:
         )
 
 
-def _which(error: click.exceptions.NoArgsIsHelpError) -> str:
-    """Return the line for a command that lacks the word behind it."""
+def _missing_subcommand(error: click.exceptions.NoArgsIsHelpError) -> str:
+    """Return the error line for a command without its subcommand."""
     context = error.ctx
     path = context.command_path if context is not None else "gcode2krl"
     command = context.command if context is not None else commands

@@ -13,22 +13,33 @@ from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 @click.command("make-test")
 @click.argument("what", type=click.Choice(["controller"]))
 @click.option(
-    "-o", "--output", metavar="TEST.src|TEST.nc", required=True,
+    "-o",
+    "--output",
+    metavar="TEST.src|TEST.nc",
+    required=True,
     help="Output: a KRL program, or its G-code. - is standard output (G-code).",
-)  # fmt: skip
+)
 @common_options
 @click.option(
-    "--at", nargs=3, type=float, metavar="X Y Z",
+    "--at",
+    nargs=3,
+    type=float,
+    metavar="X Y Z",
     help="Where the lines begin in $BASE, mm; default: 100 0 and 40 below the clearance plane.",
-)  # fmt: skip
+)
 def command(
-    what: str, output: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
+    what: str,
+    output: str,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
     at: tuple[float, float, float] | None,
-) -> int:  # fmt: skip
-    """Write a test program: air moves whose trace tells how the controller plans.
+) -> int:
+    """Write a test program: air moves whose trace shows how the controller plans.
 
-    As .src it is complete. As .nc it is to be translated and lacks the lines that turn the tool, which
-    three-axis G-code cannot say. Run it with nothing below the tool and override 100 %, record the commanded
+    A .src is complete. A .nc must be translated and lacks the lines that turn the tool, which three-axis
+    G-code cannot express. Run it with nothing below the tool and override 100 %, record the commanded
     position, and hand the trace to `gcode2krl identify controller`.
     """
     console = Console(quiet or output == STANDARD, as_json)

@@ -20,11 +20,11 @@ def command() -> None:
 def list_models(kind: str | None, as_json: bool) -> None:
     """List the models of the library."""
     kinds = [kind] if kind else list(library.KINDS)
-    found = {k: list(library.names(k)) for k in kinds}
+    models = {k: list(library.names(k)) for k in kinds}
     if as_json:
-        click.echo(json.dumps(found, indent=2))
+        click.echo(json.dumps(models, indent=2))
         return
-    for k, names in found.items():
+    for k, names in models.items():
         click.echo(f"{k}:")
         for name in names:
             click.echo(f"  {name}")
@@ -33,7 +33,7 @@ def list_models(kind: str | None, as_json: bool) -> None:
 @command.command("show")
 @click.argument("name")
 def show(name: str) -> None:
-    """Print a model's file: its values, each with source and how sure."""
+    """Print a model's file: its values with their source and reliability."""
     for kind in library.KINDS:
         for known, file in library.names(kind).items():
             if "".join(known.split()).casefold() == "".join(name.split()).casefold():
@@ -65,8 +65,8 @@ def check(cell_path: str | None, as_json: bool) -> int:
         console.json({"valid": False, "issues": issue_dicts(error.issues)})
         return error.exit_code
     rows = list(to_confirm(cell))
-    lacking, found = missing_keys(cell), findings(cell)
-    wrong = any(issue.severity == "error" for issue in found)
+    lacking, issues = missing_keys(cell), findings(cell)
+    wrong = any(issue.severity == "error" for issue in issues)
     if as_json:
         console.json(
             {
@@ -76,13 +76,13 @@ def check(cell_path: str | None, as_json: bool) -> int:
                 "taken_over": [taken.model_dump() for taken in cell.taken_over],
                 "defaults": default_values(cell),
                 "missing": lacking,
-                "issues": issue_dicts(found),
+                "issues": issue_dicts(issues),
             }
         )
         return 1 if wrong else 0
     name = cell_path or "the demonstration cell"
     console.say(f"{name}: {'refused' if wrong else 'valid'}")
-    console.findings(tuple(found), name)
+    console.findings(tuple(issues), name)
     _say_verified(console, cell)
     width = max(len(what) for what, _, _ in rows)
     for what, value, sure in rows:
@@ -104,7 +104,7 @@ def _say_verified(console: Console, cell: Cell) -> None:
 
 
 def _say_provenance(console: Console, cell: Cell, lacking: list[str]) -> None:
-    """Say what was taken over from whom, which defaults nobody stated, and what is missing."""
+    """List values taken over and their cells, defaults that nobody stated, and what is missing."""
     from gcode2krl.krl.provenance import default_values
 
     for taken in cell.taken_over:

@@ -24,7 +24,7 @@ from gcode2krl.files import make_folder, write_together
 from gcode2krl.prediction import Prediction
 
 TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
-"""As the test piece's file states it."""
+"""Stock of the test piece, as its file states it."""
 _MS = 1000.0
 _FIGURES = ("deviation", "signals")
 _RUN_FILES = ("run.toml", "rsi.log", "force.csv", "events.csv")
@@ -42,9 +42,9 @@ def command() -> None:
 @click.argument("part", required=False)
 @common_options
 @gcode_options
-@click.option("--lead-ms", type=float, metavar="MS", help="How far ahead the pilot force is taken.")
-@click.option("--threshold-N", "threshold_N", type=float, metavar="N", help="Trust the measurement below.")
-@click.option("--blend-ms", type=float, metavar="MS", help="Time to go over to the pilot.")
+@click.option("--lead-ms", type=float, metavar="MS", help="How far ahead the pilot force is read.")
+@click.option("--threshold-N", "threshold_N", type=float, metavar="N", help="Use the pilot above this error.")
+@click.option("--blend-ms", type=float, metavar="MS", help="Time of the blend to the pilot.")
 @click.option("--filter-ms", type=float, metavar="MS", help="Delay of low-pass and average together.")
 @click.option("--robot-delay-ms", type=float, metavar="MS", help="Dead time and lag of the robot together.")
 @click.option("--feed-scale", type=float, default=1.0, show_default=True, help="Real speed over predicted.")
@@ -55,12 +55,20 @@ def command() -> None:
 @click.option("--backlash-deg", type=float, metavar="DEG", help="Play of every drive.")
 @click.option("--plot", type=click.Path(), metavar="FOLDER", help="Draw deviation maps and force signals.")
 def simulate_command(
-    part: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool, plot: str | None, **options: Any,
-) -> int:  # fmt: skip
+    part: str | None,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    tolerance: float | None,
+    chord_tolerance: float,
+    block_delete: bool,
+    plot: str | None,
+    **options: Any,
+) -> int:
     """Run a part on the twin: how much of the deflection the compensator takes away.
 
-    Predicted forces are the truth; what the compensator knows of it is late, noisy and a little wrong.
+    The predicted forces are the truth; the compensator gets them late, noisy and slightly wrong.
     Without PART the test piece of Haehn & Weigold 2020.
     """
     console = Console(quiet, as_json)
@@ -117,10 +125,10 @@ def _changed(settings: Online, options: dict[str, Any]) -> Online:
     if options["threshold_N"] is not None:
         changes["threshold_N"] = options["threshold_N"]
     if options["filter_ms"] is not None:
-        share = options["filter_ms"] / (_MS * settings.filter_s)
-        if not share > 0.0:
+        ratio = options["filter_ms"] / (_MS * settings.filter_s)
+        if not ratio > 0.0:
             raise input_error("option-value", f"--filter-ms {options['filter_ms']:g}: allowed above 0")
-        changes |= {"lowpass_hz": settings.lowpass_hz / share, "average_s": settings.average_s * share}
+        changes |= {"lowpass_hz": settings.lowpass_hz / ratio, "average_s": settings.average_s * ratio}
     if options["robot_delay_ms"] is not None and settings.lead_s is None and "lead_s" not in changes:
         changes["robot_delay_s"] = options["robot_delay_ms"] / _MS
     return _valid(settings, changes)
@@ -135,13 +143,13 @@ def _valid(settings: Online, changes: dict[str, Any]) -> Online:
         detail = error.errors(include_url=False)[0]
         key = ".".join(str(step) for step in detail["loc"])
         words = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-        said = detail["type"] == "value_error"
-        text = words if said else f"found {detail['input']}, allowed: {words}"
+        is_sentence = detail["type"] == "value_error"
+        text = words if is_sentence else f"found {detail['input']}, allowed: {words}"
         raise input_error("option-value", f"{key}: {text}") from None
 
 
 def _world_values(options: dict[str, Any]) -> dict[str, Any]:
-    """Return what the options say of the twin's world."""
+    """Return the options that describe the twin's world."""
     named = ("feed_scale", "pilot_scale", "sensor_gain", "noise_N", "backlash_deg")
     values = {name: float(options[name]) for name in named if options[name] is not None}
     if options["robot_delay_ms"] is not None:
@@ -157,10 +165,15 @@ def _world_values(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _predicted(
-    part: str | None, cell: Cell, settings: Online, console: Console,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool,
-) -> Prediction:  # fmt: skip
-    """Return the prediction of a part at the cycle of the settings; of a prediction's folder, as it is."""
+    part: str | None,
+    cell: Cell,
+    settings: Online,
+    console: Console,
+    tolerance: float | None,
+    chord_tolerance: float,
+    block_delete: bool,
+) -> Prediction:
+    """Predict a part at the cycle of the settings; a prediction's folder is loaded unchanged."""
     if part is not None and Path(part).is_dir():
         return Prediction.load(part)
     if part is None:
@@ -181,21 +194,26 @@ def _predicted(
 
 
 def _test_piece() -> Path:
-    """Return the test piece: that of the installed package, or of the checkout."""
+    """Return the file of the test piece, from the installed package or the checkout."""
     from gcode2krl.cell.library import models_folder
 
     models = models_folder()
     places = (models / "test_piece.nc", models.parent / "examples" / "test_piece.nc")
-    found = [place for place in places if place.is_file()]
-    if not found:
+    files = [place for place in places if place.is_file()]
+    if not files:
         raise input_error("file-unreadable", "the test piece is not installed", "name a part")
-    return found[0]
+    return files[0]
 
 
 def _draw(
-    prediction: Prediction, twin: Any, runs: Any, judged: Any, outcome: dict[str, Any], folder: Path,
+    prediction: Prediction,
+    twin: Any,
+    runs: Any,
+    judged: Any,
+    outcome: dict[str, Any],
+    folder: Path,
     inputs: list[Path],
-) -> list[Path]:  # fmt: skip
+) -> list[Path]:
     from gcode2krl.online.surface import surface_of
     from gcode2krl.report.figures import save_figures
     from gcode2krl.report.twin_figures import Map, Signals, deviation_figure, signal_figure
@@ -209,9 +227,16 @@ def _draw(
     run = runs["pilot"]
     device = run.device
     signals = Signals(
-        run.time_s, run.force_N, device.measured[:, :3], device.estimate_N, device.load[:, :3], device.weight,
-        run.needed_mm, np.linalg.norm(run.shift_mm, axis=1), twin.settings.threshold_N,
-    )  # fmt: skip
+        run.time_s,
+        run.force_N,
+        device.measured[:, :3],
+        device.estimate_N,
+        device.load[:, :3],
+        device.weight,
+        run.needed_mm,
+        np.linalg.norm(run.shift_mm, axis=1),
+        twin.settings.threshold_N,
+    )
     worst = np.where(judged.counts, runs["cartesian"].normal_mm, 0.0)
     around_s = float(run.time_s[int(np.argmax(worst))]) if len(worst) else 0.0
     drawn = (deviation_figure(maps), signal_figure(signals, around_s))
@@ -223,12 +248,18 @@ def _draw(
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that ran.")
 @click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")
-@click.option("-o", "--output", type=click.Path(), metavar="FILE", help="Write a row a cycle as CSV.")
+@click.option("-o", "--output", type=click.Path(), metavar="FILE", help="Write a row for each cycle as CSV.")
 def replay_command(
-    run: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    sidecar: str | None, tool: int, output: str | None,
-) -> int:  # fmt: skip
-    """Send a recorded run through the compensator: what would it have done?"""
+    run: str,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    sidecar: str | None,
+    tool: int,
+    output: str | None,
+) -> int:
+    """Run the compensator on a recorded run: which corrections would it have sent?"""
     console = Console(quiet, as_json)
     inputs = existing(run, sidecar, *cell_files(cell_path))
     if output is not None:
@@ -240,25 +271,30 @@ def replay_command(
 
     knots, header = _pilot(sidecar)
     result = replay(
-        load_run(run), cell, cell.online, tool=tool, calibration=_calibration(cell.online), knots=knots,
+        load_run(run),
+        cell,
+        cell.online,
+        tool=tool,
+        calibration=_calibration(cell.online),
+        knots=knots,
         header=header,
-    )  # fmt: skip
-    found = replay_json(result)
+    )
+    record = replay_json(result)
     if output is not None:
         import polars as pl
 
         write_together({Path(output): pl.DataFrame(columns(result)).write_csv}, inputs)
     if as_json:
-        console.json({**found, "issues": issue_dicts(result.issues)})
+        console.json({**record, "issues": issue_dicts(result.issues)})
         return 0
     console.findings(result.issues, run, notes=False)
-    console.say(f"{run}: {found['cycles']} cycles, {found['time_s']:.1f} s")
-    most_mm, most_N = found["max_correction_mm"], found["max_force_N"]
+    console.say(f"{run}: {record['cycles']} cycles, {record['time_s']:.1f} s")
+    most_mm, most_N = record["max_correction_mm"], record["max_force_N"]
     console.say(f"  largest correction {most_mm:.3f} mm, largest force {most_N:.0f} N")
-    if found["before_mm"] is not None:
-        before, after = found["before_mm"], found["after_mm"]
+    if record["before_mm"] is not None:
+        before, after = record["before_mm"], record["after_mm"]
         console.say(f"  deviation normal to the feed {before:.3f} mm, left {after:.3f} mm")
-    console.say(f"  pilot in {found['pilot_cycles']} cycles; {_gates(found['gate_cycles'])}")
+    console.say(f"  pilot in {record['pilot_cycles']} cycles; {_gates(record['gate_cycles'])}")
     return 0
 
 
@@ -278,9 +314,17 @@ def replay_command(
 @click.option("--files", type=click.Path(), metavar="FOLDER", help="Write the controller's files, and end.")
 @click.option("--name", default="GK_RSI", show_default=True, help="Name of the controller's files.")
 def serve_command(
-    cell_path: str | None, as_json: bool, quiet: bool, verbose: bool, sidecar: str | None, tool: int,
-    output: str | None, files: str | None, name: str, **options: Any,
-) -> int:  # fmt: skip
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    sidecar: str | None,
+    tool: int,
+    output: str | None,
+    files: str | None,
+    name: str,
+    **options: Any,
+) -> int:
     """Answer a controller's RSI telegrams with corrections. Not a safety function, not hard real time.
 
     Listens on loopback unless [online.link] or --address says otherwise, talks to one controller (that of
@@ -311,23 +355,30 @@ def serve_command(
     from gcode2krl.online.session import Phase
 
     device = build_compensator(
-        cell, settings, tool=tool, load_frame="sensor", calibration=_calibration(settings), knots=knots,
+        cell,
+        settings,
+        tool=tool,
+        load_frame="sensor",
+        calibration=_calibration(settings),
+        knots=knots,
         header=header,
-    )  # fmt: skip
+    )
     with open_socket(device) as socket, Recorder(Path(output) if output else None, _RUN_HEAD) as recorder:
         address, port = socket.getsockname()
         console.hint(f"listening on {address}:{port}; Ctrl-C ends it. This is not a safety function.")
         if settings.link.robot_address is None and not address.startswith("127."):
-            console.hint("whoever sends a telegram first is the controller: robot_address names it")
+            console.hint("the first sender of a telegram is taken as the controller: set robot_address")
         try:
             session, statistics = serve(
-                device, socket, recorder,
+                device,
+                socket,
+                recorder,
                 told=lambda now: console.hint(f"  {now.phase.value} {now.reason}".rstrip()),
-            )  # fmt: skip
+            )
         except KeyboardInterrupt:
             console.hint("stopped: the controller's own time-out stops the robot")
             return 130
-    found = {
+    record = {
         **statistics.as_dict(),
         "phase": session.phase.value,
         "reason": session.reason,
@@ -337,11 +388,11 @@ def serve_command(
         "log_unwritten": recorder.unwritten,
     }
     if as_json:
-        console.json(found)
+        console.json(record)
     else:
-        console.say("\n".join(f"  {key} {value}" for key, value in found.items()))
-    whole = recorder.dropped == recorder.unwritten == 0
-    return 0 if session.phase is Phase.CLOSED and session.reason == "silence" and whole else 1
+        console.say("\n".join(f"  {key} {value}" for key, value in record.items()))
+    is_complete = recorder.dropped == recorder.unwritten == 0
+    return 0 if session.phase is Phase.CLOSED and session.reason == "silence" and is_complete else 1
 
 
 _RUN_HEAD = """\
@@ -391,7 +442,7 @@ def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
 
 
 def _controller_files(cell: Cell, form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:
-    """Write what belongs into the controller's folder ``SensorInterface``."""
+    """Write the files for the controller's folder ``SensorInterface``."""
     from gcode2krl.krl.rsi_files import rsi_texts
 
     if cell.online.link.address == "0.0.0.0":

@@ -33,9 +33,15 @@ if TYPE_CHECKING:
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
 _FIGURES = (
-    "path", "kinematics", "joints",
-    "force", "force_path", "deflection", "deflection_path", "deflection_joints",
-)  # fmt: skip
+    "path",
+    "kinematics",
+    "joints",
+    "force",
+    "force_path",
+    "deflection",
+    "deflection_path",
+    "deflection_joints",
+)
 
 
 @click.command("predict")
@@ -48,7 +54,7 @@ _FIGURES = (
 )
 @click.option("--csv", is_flag=True, help="Write the tables as CSV too.")
 @click.option("--plot", is_flag=True, help="Draw path, speed, joints, forces and deflection as PNG.")
-@click.option("--part", "part_mesh", metavar="OUT.stl", help="Write what is left of the stock as a mesh.")
+@click.option("--part", "part_mesh", metavar="OUT.stl", help="Write the machined stock as a mesh.")
 @click.option(
     "--effect",
     "effects",
@@ -56,14 +62,26 @@ _FIGURES = (
     metavar="NAME:key=value,…",
     help="Add an effect that the nominal model leaves out; may be repeated.",
 )
-@click.option("--effects", "effect_folders", multiple=True, metavar="FOLDER", help="Folder of own effects.")
+@click.option("--effects", "effect_folders", multiple=True, metavar="FOLDER", help="Folder of your effects.")
 @click.option("--no-forces", is_flag=True, help="Leave out material removal, forces and deflection.")
 def command(
-    part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool,
-    dt_s: float | None, csv: bool, plot: bool, part_mesh: str | None, no_forces: bool,
-    effects: tuple[str, ...], effect_folders: tuple[str, ...],
-) -> int:  # fmt: skip
+    part: str,
+    output: str | None,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    tolerance: float | None,
+    chord_tolerance: float,
+    block_delete: bool,
+    dt_s: float | None,
+    csv: bool,
+    plot: bool,
+    part_mesh: str | None,
+    no_forces: bool,
+    effects: tuple[str, ...],
+    effect_folders: tuple[str, ...],
+) -> int:
     """Predict what the robot will do: path, timing, joints, cutting forces, deflection.
 
     Findings that would refuse a program are only reported here.
@@ -137,7 +155,7 @@ def command(
 
 
 def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) -> None:
-    """Raise where an output is an input, has no folder, or the folder is somebody else's."""
+    """Raise where an output is an input, has no folder, or its folder has foreign files."""
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
     names = [*tables, RECORD, _CORNERS, *(f"{name}.png" for name in _FIGURES)]
@@ -152,7 +170,7 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 
 
 def _save_part(prediction: Prediction, file: Path, inputs: list[Path]) -> Path:
-    """Write the part that is left as a mesh."""
+    """Write the machined stock as a mesh."""
     from gcode2krl.cutting import remove
     from gcode2krl.cutting.raw_part import to_mesh
 
@@ -230,7 +248,7 @@ def _load_figures(prediction: Prediction) -> "dict[str, Figure]":
 
 
 def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], Floats]":
-    """Return the virtual joints and how much of the deflection (m, 10) each causes, along the whole."""
+    """Return the virtual joints and how much each adds along the deflection (m, 10)."""
     from gcode2krl.cell.sections import VIRTUAL_JOINTS
     from gcode2krl.compliance import joint_shares
 
@@ -245,6 +263,6 @@ def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], Floats]":
         prediction.cell,
         forces.tool,
     )
-    whole = deflection.deflection_base_mm @ base.T
-    size = np.linalg.norm(whole, axis=1, keepdims=True)
-    return VIRTUAL_JOINTS, np.einsum("mjk,mk->mj", shares, whole / np.where(size > 0.0, size, 1.0))
+    total = deflection.deflection_base_mm @ base.T
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    return VIRTUAL_JOINTS, np.einsum("mjk,mk->mj", shares, total / np.where(size > 0.0, size, 1.0))

@@ -10,7 +10,7 @@ from gcode2krl.errors import NotUnderstoodError, input_error
 
 
 def reserve_standard_files() -> None:
-    """Keep the numbers of closed standard files from the files we open; let any text be printed somehow."""
+    """Keep closed standard files' numbers from files we open; replace characters that cannot be printed."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
@@ -22,7 +22,7 @@ def reserve_standard_files() -> None:
 
 
 def write_bytes(content: bytes) -> None:
-    """Write to standard output; raises `NotUnderstoodError` where that cannot be."""
+    """Write to standard output; raises `NotUnderstoodError` where that fails."""
     if sys.stdout is None:
         raise closed("standard output")
     try:
@@ -42,14 +42,14 @@ def closed(name: str) -> NotUnderstoodError:
 
 
 def tell(text: str) -> None:
-    """Print a line on standard error; where that is not possible, the exit code has to do."""
+    """Print a line on standard error; where that is not possible, only the exit code tells."""
     with contextlib.suppress(OSError):
         click.echo(text, err=True)
 
 
 def flushed() -> bool:
-    """Flush standard output and error; tell whether all was written, and keep the interpreter from trying."""
-    whole = True
+    """Flush standard output and error; return whether all was written, and prevent a second attempt."""
+    all_written = True
     for stream in (sys.stdout, sys.stderr):
         if stream is None:
             continue
@@ -57,8 +57,8 @@ def flushed() -> bool:
             stream.flush()
         except OSError as error:
             if stream is sys.stdout:
-                whole = False
+                all_written = False
                 if not isinstance(error, BrokenPipeError):
                     tell(f"error: standard output: cannot write: {error.strerror}")
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-    return whole
+    return all_written

@@ -1,4 +1,4 @@
-"""Writing identified stiffness into a cell file, with where it comes from and how sure it is."""
+"""Writing identified stiffness into a cell file, with its source and reliability."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,14 +15,14 @@ _OTHERS = "; others: "
 
 
 def apply(result: StiffnessIdentification, file: Path, cell: Cell) -> Path:
-    """Write the virtual joints into a cell file, its other keys kept; comments are lost.
+    """Write the virtual joints into a cell file and keep its other keys; comments are lost.
 
-    What was stated as known goes with what was split off by it: only the sum of both was measured.
+    A stiffness stated as known is written with the one split from it: only their sum was measured.
 
     Raises
     ------
     NotUnderstoodError
-        The file is no cell file, or cannot be written.
+        The file is not a cell file, or cannot be written.
     """
     import tomli_w
 
@@ -51,30 +51,30 @@ def _robot(result: StiffnessIdentification, section: dict[str, Any], cell: Cell)
     """Return source and sure of the robot's joints, where one of them was identified."""
     names = [name for name in VIRTUAL_JOINTS if name not in _OF_END_EFFECTOR]
     before = section.get("robot_source", cell.compliance.robot_source)
-    text, whole = _source(result, names, str(before))
+    text, complete = _source(result, names, str(before))
     sure = section.get("robot_sure", cell.compliance.robot_sure)
-    return {"robot_source": text, "robot_sure": "checked" if whole else str(sure)} if text else {}
+    return {"robot_source": text, "robot_sure": "checked" if complete else str(sure)} if text else {}
 
 
 def _end_effector(result: StiffnessIdentification, section: dict[str, Any], cell: Cell) -> dict[str, str]:
     """Return source and sure of sensor and spindle, where one of them was identified or stated."""
-    text, whole = _source(result, _OF_END_EFFECTOR, str(section.get("source", cell.compliance.source)))
+    text, complete = _source(result, _OF_END_EFFECTOR, str(section.get("source", cell.compliance.source)))
     sure = section.get("sure", cell.compliance.sure)
-    return {"source": text, "sure": "checked" if whole else str(sure)} if text else {}
+    return {"source": text, "sure": "checked" if complete else str(sure)} if text else {}
 
 
 def _source(
     result: StiffnessIdentification, names: list[str] | tuple[str, ...], before: str
 ) -> tuple[str, bool]:
-    """Return where a group's joints come from, empty if none is new, and whether all were identified."""
+    """Return the source of a group's joints, empty if none is new, and whether all were identified."""
     fits = [fit for fit in result.joints if fit.joint in names]
     stated = [name for name, (_, origin) in result.known.items() if origin == "stated" and name in names]
     file = Path(result.source).name
     words = []
     if fits:
-        found = ", ".join(fit.joint for fit in fits)
+        names_fitted = ", ".join(fit.joint for fit in fits)
         words.append(
-            f"{found} identified from {file}, {result.level:.0%} intervals within {_widest(fits):.0%}"
+            f"{names_fitted} identified from {file}, {result.level:.0%} intervals within {_widest(fits):.0%}"
         )
     split = [f"{fit.joint} split from {', '.join(fit.known)}" for fit in fits if fit.known]
     words += split
@@ -87,6 +87,6 @@ def _source(
 
 
 def _widest(fits: list[JointFit]) -> float:
-    """Return how far the widest interval reaches from its value, as a share of it."""
-    found = [k for fit in fits for k in fit.k_Nmm_rad if k is not None]
-    return max(max(k.high - k.value, k.value - k.low) / k.value for k in found)
+    """Return the half-width of the widest interval relative to its value."""
+    estimates = [k for fit in fits for k in fit.k_Nmm_rad if k is not None]
+    return max(max(k.high - k.value, k.value - k.low) / k.value for k in estimates)

@@ -63,12 +63,12 @@ def _draw_intervals(axes: Axes, result: StiffnessIdentification, cell: Cell) -> 
     labels: list[str] = []
     for fit in result.joints:
         for key, estimate in zip(KEYS, fit.k_Nmm_rad, strict=True):
-            place, own = len(labels), in_cell(cell, fit.joint, key)
+            place, in_file = len(labels), in_cell(cell, fit.joint, key)
             labels.append(f"{fit.joint} {key}")
             if estimate is None:
                 axes.text(place, 1.0, "?", ha="center", va="center", color=VERMILION)
                 continue
-            unit = own or estimate.value
+            unit = in_file or estimate.value
             middle = estimate.value / unit
             reach = [[middle - estimate.low / unit], [estimate.high / unit - middle]]
             axes.errorbar([place], [middle], yerr=reach, fmt=".", color=BLUE, capsize=2.0)

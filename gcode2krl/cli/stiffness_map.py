@@ -18,7 +18,7 @@ from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 Three = tuple[float, float, float]
 MOST_LOAD_N = 1e6
-"""No robot holds it: a slip of the unit."""
+"""A larger load is taken for a wrong unit: no robot holds it."""
 LATERAL_N = 100.0
 """Size of the load where none is given."""
 _AXIS = np.array([[0.0, 0.0, 1.0]])
@@ -32,24 +32,43 @@ _TABLES = ("workspace", "spin", "joints")
 @click.command("stiffness-map")
 @common_options
 @click.option(
-    "--load", type=float, nargs=3, metavar="FX FY FZ",
+    "--load",
+    type=float,
+    nargs=3,
+    metavar="FX FY FZ",
     help="Force on the tool in N along $BASE; default: 100 N across the tool, wherever it bends most.",
-)  # fmt: skip
+)
 @click.option(
-    "--feed", type=float, nargs=3, metavar="X Y Z",
+    "--feed",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
     help="Feed direction: only what is normal to it counts; default: all of the deflection.",
-)  # fmt: skip
+)
 @click.option(
-    "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar="X Y Z", show_default=True,
+    "--at",
+    type=float,
+    nargs=3,
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    show_default=True,
     help="Point in $BASE of the spin map and of the joints; its Z is the height of the workspace map.",
-)  # fmt: skip
+)
 @click.option("--tool", type=int, help="Tool number; default: the mounted one, else the first.")
 @click.option("--step", type=float, metavar="MM", help="Grid of the workspace map; default: reach/25.")
 @click.option("-o", "--output", default="stiffness-map", show_default=True, metavar="FOLDER")
 def command(
-    cell_path: str | None, as_json: bool, quiet: bool, verbose: bool, load: Three | None, feed: Three | None,
-    at: Three, tool: int | None, step: float | None, output: str,
-) -> int:  # fmt: skip
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    load: Three | None,
+    feed: Three | None,
+    at: Three,
+    tool: int | None,
+    step: float | None,
+    output: str,
+) -> int:
     """Draw how far the robot bends under a load: over $BASE's plane, over the spin, and joint by joint.
 
     The tool axis is Z of $BASE. Pose and branch are those of a program there: one branch, nearest to HOME,
@@ -100,7 +119,7 @@ class Case:
 
     @classmethod
     def of(cls, cell: Cell, load: Three | None, feed: Three | None, tool: int | None) -> "Case":
-        """Return the case of a command's options; raises `NotUnderstoodError` where one makes no sense."""
+        """Return the case of a command's options; raises `NotUnderstoodError` for an impossible option."""
         number = tool if tool is not None else cell.mounted_tool
         number = number if number is not None else min(cell.tool)
         if number not in cell.tool:
@@ -119,7 +138,7 @@ class Case:
 
     @property
     def spin_deg(self) -> float:
-        """Spin of the cell; 0 where it searches one."""
+        """Spin of the cell; 0 where the cell has it searched."""
         spin = self.cell.frames.spin
         return 0.0 if isinstance(spin, str) else float(spin)
 
@@ -134,7 +153,7 @@ class Case:
     def poses(self, position_mm: Floats, spin_deg: Floats) -> tuple[Floats, Floats]:
         """Return joints (n, 6) of poses (n, 3) at spins (n,) and their distance (n,) to the limits in rad.
 
-        In one branch, chosen as for a program that goes to each of them from HOME.
+        All in one branch, chosen as for a program that goes from HOME to each pose.
         """
         from gcode2krl.program import tool_rotation
         from gcode2krl.robot.branch import Path as Poses
@@ -151,8 +170,8 @@ class Case:
     def worst_load(self, q_rad: Floats) -> tuple[Floats, Floats]:
         """Return the loads (n, 3) along ``$BASE`` and how far they bend poses (n, 6) in mm; NaN as the pose.
 
-        Without a load of its own the one across the tool that bends most: the deflections under two loads at
-        right angles span all others (linear: within 0.03 % at 100 N), the largest is their singular value.
+        If no load is given, the load across the tool that bends most: the deflections under two perpendicular
+        loads span all others (linear within 0.03 % at 100 N), and their singular value is the largest.
         """
         from gcode2krl.compliance import deflection_magnitude, deflection_of, project_normal
 
@@ -167,14 +186,14 @@ class Case:
             for way in _ACROSS
         ]
         both = np.stack(bent, axis=2)
-        there: Bools = np.asarray(np.isfinite(both).all(axis=(1, 2)))
-        _, size, directions = np.linalg.svd(np.where(there[:, None, None], both, 0.0), full_matrices=False)
-        return LATERAL_N * directions[:, 0] @ _ACROSS, np.where(there, size[:, 0], np.nan)
+        reached: Bools = np.asarray(np.isfinite(both).all(axis=(1, 2)))
+        _, size, directions = np.linalg.svd(np.where(reached[:, None, None], both, 0.0), full_matrices=False)
+        return LATERAL_N * directions[:, 0] @ _ACROSS, np.where(reached, size[:, 0], np.nan)
 
 
 @dataclass(frozen=True)
 class PlaneMap:
-    """Deflection (j, i) over X (i) and Y (j) of a plane; NaN where no program can be."""
+    """Deflection (j, i) over X (i) and Y (j) of a plane; NaN where no program can go."""
 
     x_mm: Floats
     y_mm: Floats
@@ -186,7 +205,7 @@ class PlaneMap:
 
 @dataclass(frozen=True)
 class SpinMap:
-    """Deflection (n,) over the spin, and where the arm cannot or should not stand."""
+    """Deflection (n,) over the spin, and where the pose is impossible or singular."""
 
     spin_deg: Floats
     deflection_mm: Floats
@@ -259,9 +278,14 @@ def pose_cost(case: Case, at_mm: Three) -> tuple[dict[str, Any], dict[str, float
 
 
 def _save(
-    case: Case, at: Three, plane: PlaneMap, spins: SpinMap, shares: dict[str, float], folder: Path,
+    case: Case,
+    at: Three,
+    plane: PlaneMap,
+    spins: SpinMap,
+    shares: dict[str, float],
+    folder: Path,
     inputs: list[Path],
-) -> list[Path]:  # fmt: skip
+) -> list[Path]:
     """Write figures and CSV; returns the files."""
     import polars as pl
 
@@ -275,26 +299,35 @@ def _save(
             plane.x_mm, plane.y_mm, plane.deflection_mm, f"Deflection at Z {plane.z_mm:g} mm: {case.words}"
         ),
         "spin": spin_figure(
-            spins.spin_deg, spins.deflection_mm, spins.beyond, spins.singular, chosen,
+            spins.spin_deg,
+            spins.deflection_mm,
+            spins.beyond,
+            spins.singular,
+            chosen,
             f"Deflection over the spin at {place}: {case.words}",
         ),
         "joints": joint_cost_figure(
             list(shares), np.array(list(shares.values())), f"Which joint bends at {place}: {case.words}"
         ),
-    }  # fmt: skip
+    }
     x, y = np.meshgrid(plane.x_mm, plane.y_mm)
     angles = {f"a{axis + 1}_deg": plane.q_rad[:, axis] * DEG_PER_RAD for axis in range(6)}
     tables: dict[str, dict[str, Any]] = {
         "workspace": {
-            "x_mm": x.ravel(), "y_mm": y.ravel(), "z_mm": np.full(x.size, plane.z_mm),
-            "deflection_mm": plane.deflection_mm.ravel(), **angles,
+            "x_mm": x.ravel(),
+            "y_mm": y.ravel(),
+            "z_mm": np.full(x.size, plane.z_mm),
+            "deflection_mm": plane.deflection_mm.ravel(),
+            **angles,
         },
         "spin": {
-            "spin_deg": spins.spin_deg, "deflection_mm": spins.deflection_mm,
-            "limit_margin_deg": spins.margin_rad * DEG_PER_RAD, "usable": spins.usable,
+            "spin_deg": spins.spin_deg,
+            "deflection_mm": spins.deflection_mm,
+            "limit_margin_deg": spins.margin_rad * DEG_PER_RAD,
+            "usable": spins.usable,
         },
         "joints": {"joint": list(shares), "share_mm": list(shares.values())},
-    }  # fmt: skip
+    }
     drawn = save_figures(figures, folder, inputs)
     written = {folder / f"{name}.csv": pl.DataFrame(columns).write_csv for name, columns in tables.items()}
     write_together(written, inputs)

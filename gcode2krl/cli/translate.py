@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     "--allow",
     multiple=True,
     metavar="CODE[:LINE]",
-    help="Release one finding, or all of a kind; may be repeated.",
+    help="Allow one finding, or all of a code; may be repeated.",
 )
 @click.option("--strict", is_flag=True, help="Warnings refuse the program too.")
 @click.option("--no-guard", is_flag=True, help="Leave out the checks at the program's start.")
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     type=click.Choice(["defs", "files"]),
     default="defs",
     show_default=True,
-    help="Parts of a long program.",
+    help="How a long program is split.",
 )
 @click.option("--max-lines", type=click.IntRange(100), help="Motions in a part; default: the cell's.")
 @click.option(
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 )
 @click.option("--compensate-plot", metavar="FIGURE.png", help="Draw the path before and after it.")
 @click.option(
-    "--no-forces", is_flag=True, help="Leave out material removal, forces, deflection and what rests on them."
+    "--no-forces", is_flag=True, help="Leave out material removal, forces, deflection and their findings."
 )
 @click.option(
     "--pilot",
@@ -81,18 +81,33 @@ if TYPE_CHECKING:
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
 )
 @click.option(
-    "--comment-every", type=click.IntRange(0, 10**9), help="A G-code line number every so many motions."
+    "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
 def command(
-    part: str, output: str | None, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool,
-    name: str | None, allow: tuple[str, ...], strict: bool, no_guard: bool,
-    split: Literal["defs", "files"], max_lines: int | None, no_forces: bool,
-    compensate: Literal["offline"] | None, compensate_plot: str | None,
-    pilot: Literal["index", "values", "none"] | None, online: str | None, both: bool,
+    part: str,
+    output: str | None,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    tolerance: float | None,
+    chord_tolerance: float,
+    block_delete: bool,
+    name: str | None,
+    allow: tuple[str, ...],
+    strict: bool,
+    no_guard: bool,
+    split: Literal["defs", "files"],
+    max_lines: int | None,
+    no_forces: bool,
+    compensate: Literal["offline"] | None,
+    compensate_plot: str | None,
+    pilot: Literal["index", "values", "none"] | None,
+    online: str | None,
+    both: bool,
     comment_every: int | None,
-) -> int:  # fmt: skip
-    """Translate G-code into a KRL program, verify it, and say what it is.
+) -> int:
+    """Translate G-code into a KRL program, verify it, and print a summary.
 
     Exit code 0: written (warnings allowed); 1: understood and refused; 2: not understood.
     """
@@ -174,7 +189,7 @@ def command(
 
 
 def _refuse_online(online: str | None, both: bool, compensate: str | None, file: Path | None) -> None:
-    """Raise where ``--online`` cannot be, or must not be together with another option."""
+    """Raise where ``--online`` is not possible or not allowed with another option."""
     if both and (online is None or compensate is None):
         sentence = "--both: there are no two compensations"
         raise input_error("option-value", sentence, "give --online NAME and --compensate offline too")
@@ -225,7 +240,7 @@ def _place(part: str, output: str | None, name: str | None) -> Path | None:
 def _outputs(
     place: Path | None, name: str | None, part: str, cell: Cell, online: str | None, plot: str | None
 ) -> list[Path]:
-    """Return what will be written, but for the parts of a long program; raises where a name is bad."""
+    """Return the files to write, without the parts of a long program; raises where a name is bad."""
     from gcode2krl.krl import output_files, program_file
 
     outputs = [Path(plot)] if plot is not None else []
@@ -252,7 +267,7 @@ def _words(**options: Any) -> str:
 
 
 def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: str | None) -> None:
-    """Refuse what cannot move at all, or not be corrected online, before its motion is planned."""
+    """Refuse targets that cannot move, or not be corrected online, before their motion is planned."""
     from gcode2krl.krl.release import matching, released
     from gcode2krl.krl.rsi_refusals import online_issues
 
@@ -262,7 +277,7 @@ def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: 
 
 
 def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:
-    """Return the figures of the contract that the stages give."""
+    """Return the figures of the JSON contract that the stages compute."""
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     return {
         "moves": len(prediction.toolpath) - 1,
@@ -281,7 +296,7 @@ def _result(
     verify: dict[str, Any] | None = None,
     pilot: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the object of the contract; a figure whose stage did not run is null."""
+    """Return the object of the JSON contract; a figure whose stage did not run is null."""
     known = figures or {}
     return {
         "files": [str(file) for file in files],

@@ -19,10 +19,17 @@ from gcode2krl.errors import Gcode2KrlError
     "--compensate", type=click.Choice(["offline"]), help="The program was made with --compensate offline."
 )
 def command(
-    program: str, part: str, cell_path: str | None, as_json: bool, quiet: bool, verbose: bool,
-    tolerance: float | None, chord_tolerance: float, block_delete: bool,
+    program: str,
+    part: str,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    tolerance: float | None,
+    chord_tolerance: float,
+    block_delete: bool,
     compensate: Literal["offline"] | None,
-) -> int:  # fmt: skip
+) -> int:
     """Read a KRL program back and compare it with its G-code.
 
     Use the cell and the tolerances the program was made with. Exit code 1 where it differs.

@@ -16,7 +16,7 @@ from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Evaluated, Placed, Ways
 
 SETTLED_MM = 1e-3
-"""Change of the targets at which the rounds end; a smaller difference is none."""
+"""Change of the targets below which the rounds end; smaller differences are ignored."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Shift:
     row: Rows
     """(q,) line that is divided."""
     along_mm: Floats
-    """(q,) where, from its start; rising in each line."""
+    """(q,) place of the division, from the start of the line; rising within a line."""
     piece_mm: Floats
     """(q, 3) the shift there."""
 
@@ -39,7 +39,7 @@ class Shift:
         return cls(np.zeros_like(ways.unit), nothing.astype(np.int64), nothing, np.zeros((0, 3)))
 
     def change_mm(self, other: "Shift") -> float:
-        """Return how far the targets are from those of another shift; infinite where lines divide anew."""
+        """Return the distance of the targets from another shift's; infinite if lines divide differently."""
         if len(self.row) != len(other.row):
             return math.inf
         pieces = np.linalg.norm(self.piece_mm - other.piece_mm, axis=1).max(initial=0.0)
@@ -53,7 +53,7 @@ class Shift:
 class Contact(NamedTuple):
     """Where the intended path is in air, up to the first loaded sample and from the last one.
 
-    Kept for all rounds: that is where the tool shall cut.
+    Kept for all rounds: the intended path says where the tool is to cut.
     """
 
     path_mm: Floats
@@ -67,7 +67,7 @@ class Contact(NamedTuple):
         motion, _, forces, _ = evaluated
         path_mm, sample = ways.place(motion).distinct()
         air: Bools = np.append(False, ~np.asarray(forces.force_base_N[sample].any(axis=1)))
-        beside = air | np.roll(air, 1) | np.roll(air, -1)  # nobody knows where in between contact begins
+        beside = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
         return cls(path_mm, _distance(path_mm, beside[1:]))
 
     def air_at(self, path_mm: Floats) -> Floats:
@@ -81,7 +81,7 @@ class Field(NamedTuple):
     shift: Shift
     placed: Placed
     ramped: Bools
-    """(m,) True where the correction is ramped, and not what the deflection there asks for."""
+    """(m,) True where a ramp replaces the correction that the deflection there asks for."""
 
 
 @dataclass
@@ -112,8 +112,8 @@ def wanted_correction(
 ) -> Field:
     """Return the shift that a deflection asks for.
 
-    Lines stay divided where ``before`` divides them, and with ``divides`` divide anew where the
-    correction is off a straight one by more than half of ``tolerance_mm``.
+    Lines stay divided where ``before`` divides them; with ``divides`` they are also divided where the
+    correction differs from a straight line by more than half of ``tolerance_mm``.
     """
     motion, _, _, deflection = evaluated
     placed = ways.place(motion, before.target_mm)
@@ -126,11 +126,11 @@ def wanted_correction(
     rows, alongs, pieces = [before.row[:0]], [before.along_mm[:0]], [before.piece_mm[:0]]
     for run in runs:
         _tie(run, ways, target_mm)
-        own = run.sample >= 0
+        sampled = run.sample >= 0
         off = compliance.project_normal(
-            (run.value_mm - run.asked_mm)[own], ways.unit[placed.row[run.sample[own]]]
+            (run.value_mm - run.asked_mm)[sampled], ways.unit[placed.row[run.sample[sampled]]]
         )
-        ramped[run.sample[own]] = np.linalg.norm(off, axis=1) > SETTLED_MM
+        ramped[run.sample[sampled]] = np.linalg.norm(off, axis=1) > SETTLED_MM
         inner = np.arange(run.first, run.last)
         value = interpolated(ways.end_mm[inner], run.path_mm, run.value_mm)
         target_mm[inner] = _on_curve(ways, inner, value, tolerance_mm)
@@ -155,19 +155,26 @@ def _with_neighbours(ways: Ways, placed: Placed, ramped: Bools) -> Bools:
 
 
 def _stretch(ways: Ways, target_mm: Floats, row: Rows, along_mm: Floats) -> Floats:
-    """Return how far places on lines (q, 3) move along them with what moves their ends along."""
+    """Return how far places on lines (q, 3) move along the lines when the ends of the lines do."""
     head, tail, _ = ways.stretched(target_mm)
-    share = along_mm / ways.length_mm[row]
-    return np.asarray((head[row] + share * (tail - head)[row])[:, None] * ways.unit[row])
+    fraction = along_mm / ways.length_mm[row]
+    return np.asarray((head[row] + fraction * (tail - head)[row])[:, None] * ways.unit[row])
 
 
 def _run(
-    ways: Ways, first: int, last: int,
-    path_mm: Floats, against: Floats, sample: Rows, corner: Bools, contact: Contact, divided_mm: Floats,
-) -> Run:  # fmt: skip
+    ways: Ways,
+    first: int,
+    last: int,
+    path_mm: Floats,
+    against: Floats,
+    sample: Rows,
+    corner: Bools,
+    contact: Contact,
+    divided_mm: Floats,
+) -> Run:
     """Return minus the deflection along a run and at its ends, without the samples in the corners there.
 
-    Values stand at the samples, at the targets, and at ``divided_mm``, where lines are divided already.
+    There are values at the samples, at the targets, and at ``divided_mm``, where lines are divided already.
     """
     begin, end = ways.begin_mm[first], ways.end_mm[last]
     low, high = np.searchsorted(path_mm, [begin, end])
@@ -177,7 +184,7 @@ def _run(
     keep = ~(corner[low:high] & ((at - begin < head) | (end - at < ways.blend_mm[last])))
     keep &= (at > begin) & (at < end)
     rows = low + np.flatnonzero(keep)
-    if len(rows) == 0:  # shorter than a sample: what its neighbour wants
+    if len(rows) == 0:  # shorter than a sample: the correction of its neighbour
         near = min(low, len(path_mm) - 1)
         places, ends = np.array([begin, end]), np.repeat(against[near : near + 1], 2, axis=0)
         run = Run(first, last, places, ends, contact.air_at(places), np.array([-1, -1]))
@@ -197,13 +204,13 @@ def _run(
 
 
 def _outwards(path_mm: Floats, value: Floats, air_mm: Floats) -> Floats:
-    """Return the value (3,) at the first place, from the line through the next two; without two, the next."""
+    """Return the value (3,) at the first place: extrapolated from the next two, or the next one alone."""
     if air_mm[0] == 0.0:
         return np.zeros(3)
     if len(path_mm) < 4 or air_mm[1] == 0.0 or air_mm[2] == 0.0:
         return np.asarray(value[1])
-    share = max(-2.0, (path_mm[0] - path_mm[1]) / (path_mm[2] - path_mm[1]))
-    return np.asarray(value[1] + share * (value[2] - value[1]))
+    fraction = max(-2.0, (path_mm[0] - path_mm[1]) / (path_mm[2] - path_mm[1]))
+    return np.asarray(value[1] + fraction * (value[2] - value[1]))
 
 
 def _distance(path_mm: Floats, marked: Bools) -> Floats:
@@ -214,11 +221,11 @@ def _distance(path_mm: Floats, marked: Bools) -> Floats:
 
 
 def _tie(run: Run, ways: Ways, target_mm: Floats) -> None:
-    """Lead the values of a run to those of the targets at its ends, no steeper than its lines allow."""
+    """Ramp the values of a run to those of the targets at its ends, no steeper than its lines allow."""
     start = target_mm[run.first - 1] if ways.follows[run.first] else np.zeros(3)
-    own = run.value_mm[[0, -1]]
-    ends = own + compliance.project_normal(
-        np.stack([start, target_mm[run.last]]) - own, ways.unit[[run.first, run.last]]
+    at_ends = run.value_mm[[0, -1]]
+    ends = at_ends + compliance.project_normal(
+        np.stack([start, target_mm[run.last]]) - at_ends, ways.unit[[run.first, run.last]]
     )
     path, room = run.path_mm, run.slope * run.air_mm[:, None]
     from_start, from_end = run.slope * (path - path[0])[:, None], run.slope * (path[-1] - path)[:, None]
@@ -230,7 +237,7 @@ def _tie(run: Run, ways: Ways, target_mm: Floats) -> None:
 
 
 def _no_steeper(path_mm: Floats, value: Floats, slope: float) -> Floats:
-    """Return the middle of the nearest curves above and below that are no steeper; itself where it is not."""
+    """Return the mean of the closest curves above and below that keep to the slope."""
     rise = slope * path_mm[:, None]
     above = np.maximum(
         np.maximum.accumulate(value + rise) - rise, np.maximum.accumulate((value - rise)[::-1])[::-1] + rise
@@ -245,9 +252,9 @@ def _no_steeper(path_mm: Floats, value: Floats, slope: float) -> Floats:
 def _corners(ways: Ways, runs: list[Run]) -> Floats:
     """Return the shifts (p, 3) of the targets at the ends of runs; at a sharp corner that of both lines.
 
-    There the shifted lines meet: w with N1·w = c1 and N2·w = c2, N taking away what is along the line. What
-    the two want differently at right angles to both is shared. A shift along a line that would take more than
-    a third of it is not made in full.
+    There the shifted lines meet: the shift w solves N1·w = c1 and N2·w = c2, where N removes the component
+    along the line. Normal to both lines it is the mean of the two corrections. Where w would shift the corner
+    along a line by more than a third of its length, it is blended with the mean of the two corrections.
     """
     target = np.zeros_like(ways.unit)
     for run, after in zip(runs, [*runs[1:], None], strict=False):
@@ -263,23 +270,23 @@ def _corners(ways: Ways, runs: list[Run]) -> Floats:
         across = np.eye(3) - lines[:, :, None] * lines[:, None, :]
         both = np.linalg.lstsq(across.reshape(6, 3), np.concatenate([own, other]), rcond=1e-2)[0]
         most = ways.length_mm[[run.last, after.first]].min() / 3.0
-        share = min(1.0, most / max(float(np.abs(lines @ both).max()), 1e-9))
-        target[run.last] = share * both + (1.0 - share) * (own + other) / 2.0
+        weight = min(1.0, most / max(float(np.abs(lines @ both).max()), 1e-9))
+        target[run.last] = weight * both + (1.0 - weight) * (own + other) / 2.0
     return target
 
 
 def _on_curve(ways: Ways, row: Rows, value: Floats, tolerance_mm: float) -> Floats:
     """Return the shifts (k, 3) of targets on a curve: normal to it, and along it only what its chords need.
 
-    Without its part s along the curve a value misses those normal to the two chords by s·sin(turn/2); of s
-    remains what keeps that within a quarter of the tolerance.
+    Without its component s along the curve a value misses the normals of the two chords by s·sin(turn/2); as
+    much of s is kept as brings that down to a quarter of the tolerance.
     """
     mean = ways.unit[row] + ways.unit[row + 1]
     normal = compliance.project_normal(value, mean)
     along = value - normal
     missed = np.linalg.norm(along, axis=1) * np.sqrt(np.maximum(1.0 - ways.cos_turn[row], 0.0) / 2.0)
-    share = np.maximum(0.0, 1.0 - tolerance_mm / 4.0 / np.where(missed > 0.0, missed, 1e-9))
-    result: Floats = normal + share[:, None] * along
+    kept = np.maximum(0.0, 1.0 - tolerance_mm / 4.0 / np.where(missed > 0.0, missed, 1e-9))
+    result: Floats = normal + kept[:, None] * along
     return result
 
 
@@ -290,26 +297,26 @@ def _on_line(ways: Ways, row: int, run: Run, along_mm: Floats) -> Floats:
 
 
 def _division(ways: Ways, row: int, run: Run, fixed: Floats, tolerance_mm: float) -> Floats:
-    """Return where (q,) a line divides: at ``fixed``, and where the correction is not straight in between."""
+    """Return the places (q,) that divide a line: ``fixed``, and where the correction between is curved."""
     begin, length, least = ways.begin_mm[row], ways.length_mm[row], ways.piece_mm[row]
     inside = slice(*np.searchsorted(run.path_mm, [begin, begin + length]))
     at = run.path_mm[inside] - begin
     value = compliance.project_normal(run.value_mm[inside], ways.unit[row])
-    found = [0.0, *fixed.tolist(), float(length)]
-    spans = list(itertools.pairwise(found)) if math.isfinite(tolerance_mm) else []
+    places = [0.0, *fixed.tolist(), float(length)]
+    spans = list(itertools.pairwise(places)) if math.isfinite(tolerance_mm) else []
     while spans:
         low, high = spans.pop()
         if high - low < 2.0 * least:
             continue
         between = slice(*np.searchsorted(at, [low, high]))
         ends = _on_line(ways, row, run, np.array([low, high]))
-        share = ((at[between] - low) / (high - low))[:, None]
-        off = np.linalg.norm(value[between] - ends[0] - share * (ends[1] - ends[0]), axis=1)
+        fraction = ((at[between] - low) / (high - low))[:, None]
+        off = np.linalg.norm(value[between] - ends[0] - fraction * (ends[1] - ends[0]), axis=1)
         if len(off) and off.max() > tolerance_mm / 2.0:
             cut = min(max(float(at[between][off.argmax()]), low + least), high - least)
-            found.append(cut)
+            places.append(cut)
             spans += [(low, cut), (cut, high)]
-    return np.array(sorted(found)[1:-1])
+    return np.array(sorted(places)[1:-1])
 
 
 def interpolated(at: Floats, path_mm: Floats, value: Floats) -> Floats:

@@ -1,7 +1,7 @@
-"""The intended path of a program as straight lines: where samples are on it, how far the bent tool is off.
+"""The intended path as straight lines: the place of samples on it, the deviation of the bent tool.
 
-Everything is told by the place on this path: a correction normal to a line leaves the place along it as it
-was, so forces, corrections and deviations of different Motions compare place by place.
+Every quantity is a function of the place along this path: a correction normal to a line does not change that
+place, so forces, corrections and deviations of different Motions are compared at equal places.
 """
 
 import math
@@ -27,7 +27,7 @@ SHARP_COS = math.cos(20.0 * RAD_PER_DEG)
 """A larger turn is a corner of two lines, each with its own correction; a smaller one belongs to a curve."""
 _LEAST_PIECE_MM = 0.5
 _PLANNED_AHEAD = 3
-"""Motions that the controller is taken to plan ahead where the cell calls it unlimited."""
+"""Motions that the controller is assumed to plan ahead where the cell calls it unlimited."""
 _NEWTON_STEPS = 6
 
 
@@ -37,7 +37,7 @@ class Placed(NamedTuple):
     row: Rows
     """(m,) row of Targets whose straight line the sample is on, -1 = none of the cutting lines."""
     path_mm: Floats
-    """(m,) the place on the intended path, never falling."""
+    """(m,) the place on the intended path, never decreasing."""
 
     def distinct(self) -> tuple[Floats, Rows]:
         """Return the different places (k,) and the last sample (k,) at each."""
@@ -58,7 +58,7 @@ class Ways:
     cuts: Bools
     """(p,) True where the correction may go: LIN at feed."""
     follows: Bools
-    """(p,) True where a line and the one before it both may."""
+    """(p,) True where the correction may go on both a line and the line before it."""
     row_of: Rows
     """Row of Targets of a row of the Toolpath, -1 = none that may be corrected."""
     blend_mm: Floats
@@ -69,7 +69,7 @@ class Ways:
     """(p,) shortest piece that each line may be divided into."""
     piece_cdis_mm: Floats
     slope: Floats
-    """(p,) largest change of the correction per path."""
+    """(p,) largest change of the correction per path length."""
     source_line: Ints32
     arc: Ints32
     """(p,) number of the arc that each is a chord of, -1 = none."""
@@ -94,9 +94,21 @@ class Ways:
         turn[:-1] = np.einsum("ij,ij->i", unit[:-1], unit[1:])
         piece, cdis, slope = _pieces(targets, cell)
         return cls(
-            start, unit, length, np.cumsum(length) - length, cuts, follows, row_of, blend, turn,
-            piece, cdis, slope, targets.source_line, np.where(cuts, toolpath.arc[move], -1),
-        )  # fmt: skip
+            start,
+            unit,
+            length,
+            np.cumsum(length) - length,
+            cuts,
+            follows,
+            row_of,
+            blend,
+            turn,
+            piece,
+            cdis,
+            slope,
+            targets.source_line,
+            np.where(cuts, toolpath.arc[move], -1),
+        )
 
     @property
     def end_mm(self) -> Floats:
@@ -106,7 +118,7 @@ class Ways:
     def place(self, motion: Motion, shift_mm: Floats | None = None) -> Placed:
         """Return where samples are, the targets moved by ``shift_mm`` (p, 3); added moves have no place.
 
-        What of a shift is along its line stretches the line.
+        The component of a shift along its line stretches the line.
         """
         row = np.where(motion.move >= 0, self.row_of[motion.move], -1)
         away = motion.position_mm - self.start_mm[row]
@@ -143,15 +155,15 @@ class Ways:
 def _pieces(targets: Targets, cell: Cell) -> tuple[Floats, Floats, Floats]:
     """Return (p,) the shortest piece, its approximation distance, and the steepest correction of each line.
 
-    As many pieces as the controller plans ahead hold the way to stop from the speed, v·(v/a + k)/2, so that
-    dividing a line does not slow it down; the approximation at the line's own ends stays as it was. With the
-    distance d of the approximation between pieces, a kink by an angle takes v²·angle/(2·d) <= a.
+    The pieces that the controller plans ahead are together as long as the stopping distance v·(v/a + k)/2, so
+    that dividing a line does not slow it down; the approximation at the ends of the line does not change.
+    With an approximation distance d between pieces a kink takes the acceleration v²·angle/(2·d) <= a.
     """
     controller = cell.controller
     a_mm_s2 = controller.acc_cp_m_s2 * MM_PER_M
     v = np.nan_to_num(targets.speed_mm_s)
     ahead = _PLANNED_AHEAD if controller.advance == "unlimited" else int(controller.advance)
-    if ahead == 0:  # every target is an exact stop: a piece more is a stop more
+    if ahead == 0:  # every target is an exact stop: each piece adds a stop
         return np.full(len(v), np.inf), np.zeros(len(v)), np.full(len(v), MOST_SLOPE)
     own = np.maximum(targets.cdis_mm, np.append(0.0, targets.cdis_mm[:-1]))
     piece = np.maximum(
@@ -173,7 +185,7 @@ class Deviation:
     cuts: Bools
     """(m,) True where the tool is loaded on a cutting move."""
     steady: Bools
-    """(m,) of these, away from corners and from where the correction is still being ramped."""
+    """(m,) the samples of ``cuts`` away from corners and from ramps of the correction."""
     source_line: Ints32
 
     @property

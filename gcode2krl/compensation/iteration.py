@@ -1,8 +1,9 @@
 """Offline compensation: targets moved against the deflection, so that the bent robot cuts the intended path.
 
 The correction is minus the deflection without its component along the feed (Haehn & Weigold 2020, eq. 10),
-here of the intended straight line. Everything is told by the place on the intended path: a correction normal
-to a line leaves the place along it as it was, so forces, corrections and rounds compare place by place.
+here the direction of the intended line. Every quantity is a function of the place along the intended path:
+a correction normal to a line does not change that place, so forces, corrections and rounds are compared at
+equal places.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,19 +28,20 @@ Evaluate = Callable[[Targets], Evaluated]
 MOST_BAND = 0.5
 """Half-width of the 90 % band over the deflection above which a correction may do more harm than good."""
 MOST_CORRECTION_MM = 10.0
-"""A larger correction is none: no robot that cuts bends that far, and lines would lose their shape."""
+"""A larger correction is refused: no robot that cuts bends that far, and lines would lose their shape."""
 _MOST_ROUNDS = 15
 _DIVIDING_ROUNDS = 3
-"""After so many rounds lines divide no more, so that the targets of two rounds compare row by row."""
+"""After this many rounds lines are divided no further, so that the targets of two rounds compare row by
+row."""
 _IDENTIFIED = ("verified", "checked")
 
 
 @dataclass(frozen=True)
 class Compensated:
-    """Targets with the correction in them, and what it brings."""
+    """Targets with the correction in them, and the deviation before and after."""
 
     targets: Targets
-    """What to write; a moved line that is not straight any more is several rows of the same ``move``."""
+    """The targets to write; a moved line that is no longer straight is several rows of the same ``move``."""
     intended: Targets
     """The same rows without the correction."""
     before: Deviation
@@ -56,9 +58,9 @@ def compensate(
     """Return targets moved by the correction, found in rounds until they change by less than 1 µm.
 
     Assumption: the deflection is a function of the place on the path; it may depend on the correction itself
-    as long as it grows more slowly than that. Rapids, approaches and moves in air are not touched. Where the
-    correction jumps (contact, a change of engagement) it is ramped with the slope that speed, acceleration
-    and approximation allow, at most `MOST_SLOPE`.
+    as long as it grows more slowly than the correction. Rapids, approaches and moves in air are not touched.
+    Where the correction jumps (contact, a change of engagement) it is ramped with the slope that speed,
+    acceleration and approximation allow, at most `MOST_SLOPE`.
 
     Parameters
     ----------
@@ -94,7 +96,7 @@ def compensate(
     now = deviation_from(ways, evaluated, field.placed, field.ramped)
     issues = (
         *_settled(change_mm, tolerance_mm, targets.source),
-        *_rest(now, tolerance_mm),
+        *_remaining(now, tolerance_mm),
         *_new_findings(moved, targets, cell),
     )
     figures = {
@@ -115,9 +117,9 @@ def compensate(
 def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
     """Raise `RefusedError` where the 90 % band's half-width exceeds half the correction.
 
-    Unless coefficients and stiffness were measured: the stiffness of robot and end effector is "verified" or
-    "checked", and so is the material, whose source says that it was identified. A published set of
-    coefficients may be "verified" too, but as a quotation: it is no measurement of this material.
+    Measured coefficients and stiffness are exempt: the stiffness of robot and end effector must be "verified"
+    or "checked", and so must the material, whose source must say that it was identified. A published set of
+    coefficients may be "verified" as a quotation, which is not a measurement of this material.
     """
     if deflection.relative_band <= MOST_BAND or identified(cell):
         return
@@ -142,7 +144,7 @@ def identified(cell: Cell) -> bool:
 
 
 def refuse_twice(online: bool, both: bool) -> None:
-    """Raise `RefusedError` where the online compensation would correct again what the targets correct."""
+    """Raise `RefusedError` where the online compensation would repeat the correction in the targets."""
     if online and not both:
         sentence = "offline and online compensation together correct the same deflection twice"
         remedy = "choose one; --both where the server knows of the offset, which `online serve` does not"
@@ -184,7 +186,7 @@ def _shift_of(moved: Targets, targets: Targets, ways: Ways) -> Floats:
 
 
 def _forces_at(forces: Forces, path_mm: Floats, last: Rows, placed: "Placed", tool: Ints32) -> Forces:
-    """Return forces at other samples: vectors in between, the rest of the nearest; none off the ways."""
+    """Return forces at other samples: interpolated vectors, other columns of the nearest; 0 off the lines."""
     rows = np.flatnonzero(placed.row >= 0)
     at_mm = placed.path_mm[rows]
     middle = (path_mm[1:] + path_mm[:-1]) / 2.0
@@ -204,24 +206,24 @@ def _forces_at(forces: Forces, path_mm: Floats, last: Rows, placed: "Placed", to
 def _with_rows(targets: Targets, ways: Ways, shift: Shift, cell: Cell) -> tuple[Targets, Targets]:
     """Return the targets with the lines divided, without and with the shift; events go with their rows."""
     order = np.repeat(np.arange(len(targets)), np.bincount(shift.row, minlength=len(targets)) + 1)
-    own = np.flatnonzero(np.diff(order, append=len(targets)))
+    intended_rows = np.flatnonzero(np.diff(order, append=len(targets)))
     new = np.ones(len(order), dtype=np.bool_)
-    new[own] = False
+    new[intended_rows] = False
     copied = ("ptp", "home", "speed_mm_s", "move", "source_line", "tool")
     columns = {name: getattr(targets, name)[order] for name in copied}
     position, moved = targets.position_mm[order], targets.position_mm + shift.target_mm
     rotation, cdis, wait = (getattr(targets, name)[order] for name in ("rotation", "cdis_mm", "wait_s"))
     position[new] = ways.start_mm[shift.row] + shift.along_mm[:, None] * ways.unit[shift.row]
-    share = shift.along_mm / ways.length_mm[shift.row]
+    fraction = shift.along_mm / ways.length_mm[shift.row]
     _, from_rotation = motion_starts(targets, cell, shift.row)
-    rotation[new] = fr.slerp(np.asarray(from_rotation), targets.rotation[shift.row], share)
+    rotation[new] = fr.slerp(np.asarray(from_rotation), targets.rotation[shift.row], fraction)
     cdis[new], wait[new] = ways.piece_cdis_mm[shift.row], 0.0
-    events = tuple(event._replace(row=int(own[event.row])) for event in targets.events)
+    events = tuple(event._replace(row=int(intended_rows[event.row])) for event in targets.events)
     plain = replace(
         targets, position_mm=position, rotation=rotation, cdis_mm=cdis, wait_s=wait, events=events, **columns
     )
     shifted = position.copy()
-    shifted[own], shifted[new] = moved, position[new] + shift.piece_mm
+    shifted[intended_rows], shifted[new] = moved, position[new] + shift.piece_mm
     return plain, replace(plain, position_mm=shifted)
 
 
@@ -236,7 +238,7 @@ def _refuse_large(largest_mm: float, source: str) -> None:
 
 
 def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Issue]:
-    """Yield what there is to say about rounds that did not settle; raise where they are no use."""
+    """Yield a warning for rounds that did not settle; raise where their result is of no use."""
     if change_mm <= SETTLED_MM:
         return
     sentence = f"the targets still change by {change_mm:.4f} mm after {_MOST_ROUNDS} rounds"
@@ -246,8 +248,8 @@ def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Iss
     yield Issue("warning", "compensation-unsettled", 0, sentence, "compare the residual with your tolerance")
 
 
-def _rest(after: Deviation, tolerance_mm: float) -> Iterator[Issue]:
-    """Yield where more than the tolerance remains."""
+def _remaining(after: Deviation, tolerance_mm: float) -> Iterator[Issue]:
+    """Yield a finding where more than the tolerance remains."""
     if after.max_mm <= tolerance_mm:
         return
     size = np.linalg.norm(np.where(after.cuts[:, None], after.offset_mm, 0.0), axis=1)
@@ -262,7 +264,7 @@ def _rest(after: Deviation, tolerance_mm: float) -> Iterator[Issue]:
 
 
 def _new_findings(moved: Targets, targets: Targets, cell: Cell) -> Iterator[Issue]:
-    """Yield what the robot finds in the moved targets and not in the intended ones."""
-    found, _ = checked(replace(moved, issues=()), cell)
+    """Yield the findings of the robot stage that only the moved targets have."""
+    judged, _ = checked(replace(moved, issues=()), cell)
     known = {(issue.code, issue.line) for issue in targets.issues}
-    yield from (issue for issue in found.issues if (issue.code, issue.line) not in known)
+    yield from (issue for issue in judged.issues if (issue.code, issue.line) not in known)

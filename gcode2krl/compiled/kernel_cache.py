@@ -2,8 +2,8 @@
 
 numba notices a change of the file a kernel stands in, but not of a file whose functions it calls or whose
 numbers it uses. After an edit or a pull in a checkout, or another version installed over the old one, an old
-kernel would go on moving the robot. So a package whose kernels use other files names these; beside its
-kernels stands a digest of them, and where that differs the kernels are thrown away and compiled again.
+kernel would still be used. So a package whose kernels use other files names these; a digest of them is kept
+beside its kernels, and where it differs the kernels are deleted and compiled again.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ def drop_stale(folder: Path, *used: str) -> int:
 
     digest = hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in used)).hexdigest()
     for cache in cache_folders(folder):
-        with contextlib.suppress(OSError):  # cannot be written: numba takes the next one, too
+        with contextlib.suppress(OSError):  # not writable: numba takes the next folder, too
             return _renew(cache, digest)
     return 0
 
@@ -58,10 +58,10 @@ def _renew(cache: Path, digest: str) -> int:
         return 0
     kernels = list(cache.glob("*.nb[ic]"))
     for kernel in kernels:
-        kernel.unlink(missing_ok=True)  # another process may have been quicker
+        kernel.unlink(missing_ok=True)  # another process may have deleted it already
     fresh = cache / f"{_DIGEST}.{os.getpid()}"
     fresh.write_text(digest, encoding="ascii")
-    fresh.replace(record)  # last: whoever is interrupted begins anew
+    fresh.replace(record)  # written last: after an interruption the next process starts again
     return len(kernels)
 
 
@@ -69,8 +69,8 @@ def load_numba() -> None:
     """Import what numba needs for its first kernel, but not SciPy's linear algebra, which takes 0.2 s.
 
     numba's array functions import that only to know whether it is there, for the sake of ``np.correlate``
-    and ``np.convolve``, which then are plain loops. A kernel with ``np.dot`` or ``np.linalg`` asks again when
-    it is compiled, and finds it.
+    and ``np.convolve``, which then are plain loops. A kernel with ``np.dot`` or ``np.linalg`` looks for it
+    again when it is compiled, and finds it.
     """
     if _ARRAY_FUNCTIONS in sys.modules or _LINEAR_ALGEBRA in sys.modules:
         return
@@ -84,7 +84,7 @@ def load_numba() -> None:
 
 @contextlib.contextmanager
 def _without_garbage_collection() -> Iterator[None]:
-    """Thousands of functions and no garbage: collecting while they are imported finds nothing, slowly."""
+    """Switch garbage collection off: importing thousands of functions leaves nothing to collect."""
     was_on = gc.isenabled()
     gc.disable()
     try:

@@ -1,13 +1,13 @@
 """The elastic chain of Haehn & Weigold 2020, eq. 1-9: compiled loops over rows of joints and loads.
 
 A frame follows from the one before by T_i = Rx(alpha)·Tx(a)·Tz(d)·Rz(theta) (eq. 1; their Ty(b) is zero on
-every frame used here), alpha a multiple of 90 degrees. Frames 1 to 10 carry a virtual joint each; behind the
-tenth everything is rigid, so only the tip counts there. The load is walked outwards into each frame (eq. 5),
-then tip, shift and turn are walked inwards, from frame 10 to the root.
+every frame used here), alpha a multiple of 90 degrees. Frames 1 to 10 carry a virtual joint each; beyond
+the tenth everything is rigid, so only the tip matters there. The load is carried outwards into each frame
+(eq. 5), then tip, shift and turn are carried inwards, from frame 10 to the root.
 
-Rows are taken in blocks, a quantity an array, so that each line below is one vector instruction for several
-rows. Every row passes through the same operations wherever it stands: results do not depend on how rows are
-cut into chunks.
+Rows are taken in blocks, one array for each quantity, so that each line below is one vector instruction for
+several rows. Every row passes through the same operations wherever it is: results do not depend on how
+rows are cut into chunks.
 """
 
 import math
@@ -27,10 +27,10 @@ AXIS_ZERO = (0.0, 0.0, -math.pi / 2, 0.0, 0.0, math.pi)
 
 BLOCK = 256
 TIP, SHIFT, TURN_W, TURN = 0, 3, 6, 7
-"""Rows of ``state``: r_i (eq. 2), its change by the load, and the quaternion of R̂_i·R_iᵀ, in frame i."""
+"""Rows of ``state``: r_i (eq. 2), its change under the load, and the quaternion of R̂_i·R_iᵀ, in frame i."""
 
 QUARTER_HIGH = math.floor(math.pi / 2 * 2**29) / 2**29
-"""pi/2 in 30 bits: a product with a small whole number is exact (Cody and Waite 1980)."""
+"""pi/2 in 30 bits: its product with a small integer is exact (Cody and Waite 1980)."""
 QUARTER_LOW = (math.pi / 2 - QUARTER_HIGH) + 6.123233995736766e-17
 S3, S5, S7, S9, S11, S13, S15 = (1.0 / math.factorial(k) for k in range(3, 17, 2))
 C2, C4, C6, C8, C10, C12, C14, C16 = (1.0 / math.factorial(k) for k in range(2, 17, 2))

@@ -1,4 +1,4 @@
-"""How far the tool tip bends away under a load, and what it costs joint by joint.
+"""How far the tool tip bends away under a load, and how much each joint adds.
 
 Elastic model: Haehn & Weigold 2020, eq. 1-11, the exact finite product of all frames. The load acts on the
 undeformed arm (no iteration on the bent shape), stiffness does not depend on pose or load, there is no
@@ -16,7 +16,7 @@ from gcode2krl.compliance.projection import project_rows
 from gcode2krl.compliance.rows import rows_of
 
 STANDSTILL_MM_S = 1e-6
-"""A tip slower than this has no feed direction: rounding of the joint speeds alone looks like 1e-7 mm/s."""
+"""A tip slower than this has no feed direction: rounding of the joint speeds alone gives 1e-7 mm/s."""
 NOTHING = np.zeros(3)
 ROOT = np.eye(3)
 
@@ -46,7 +46,7 @@ def displace(
     tool : int or (n,), optional
         Tool number; by default the mounted tool, else the first.
     threads : int, optional
-        Most threads; by default one a core.
+        Most threads; by default one for each core.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def joint_shares(
     cell: Cell,
     tool: npt.ArrayLike | None = None,
 ) -> Floats:
-    """Return what each virtual joint alone costs: displacements (n, 10, 3) in mm along the root's axes.
+    """Return the displacement (n, 10, 3) in mm by each virtual joint alone, along the root's axes.
 
     The order is that of `gcode2krl.cell.sections.VIRTUAL_JOINTS`; all other joints are rigid. The sum is
     that of `displace` to second order in the elastic angles. Parameters and errors as there.
@@ -173,7 +173,7 @@ def feed_direction(
 ) -> Floats:
     """Return the unit vector of the tip's velocity (n, 3) along ``$BASE``; zero at a standstill.
 
-    Where no path is at hand but the joints (n, 6) in rad and their speeds (n, 6) in rad/s.
+    For use where there is no path, only joints (n, 6) in rad and their speeds (n, 6) in rad/s.
     """
     velocity = tip_velocity(q_rad, qd_rad_s, cell, tool)
     speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, None]
@@ -204,9 +204,17 @@ def _displaced(
     def work(start: int, end: int) -> None:
         rows = slice(start, end)
         chain.displaced_rows(
-            q[rows], force[rows], moment[rows], frames, softness, base, tip.position_mm, tip.tool[rows],
-            shift[rows], turn[rows],
-        )  # fmt: skip
+            q[rows],
+            force[rows],
+            moment[rows],
+            frames,
+            softness,
+            base,
+            tip.position_mm,
+            tip.tool[rows],
+            shift[rows],
+            turn[rows],
+        )
 
     in_chunks(work, chunk_borders(len(q)), threads)
     return shift, turn

@@ -10,8 +10,8 @@ from gcode2krl.tables import Deflection, Forces, Joints
 def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
     """Return how far the tool tip bends away under the forces, and the correction normal to the feed.
 
-    The feed direction is that of the tip's velocity, from the joints and their speeds. The band joins those
-    of forces and stiffness as independent (root of the sum of squares; an assumption).
+    The feed direction is that of the tip's velocity, from the joints and their speeds. The band combines
+    those of forces and stiffness as independent (root of the sum of squares; an assumption).
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def missing_stiffness(cell: Cell) -> Issue | None:
 
 
 def softness(cell: Cell) -> Floats:
-    """Return 1/k_C, 1/k_B, 1/k_A (10, 3) in rad/(N·mm); raise what `missing_stiffness` finds."""
+    """Return 1/k_C, 1/k_B, 1/k_A (10, 3) in rad/(N·mm); raises what `missing_stiffness` finds."""
     issue = missing_stiffness(cell)
     if issue is not None:
         raise NotUnderstoodError(issue)
@@ -71,7 +71,7 @@ def softness(cell: Cell) -> Floats:
 
 
 def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
-    """Return the tips of so many rows: one tool number for all, one a row (n,), or None = the mounted one.
+    """Return the tips of ``count`` rows: one tool number for all, one a row (n,), or None = the mounted one.
 
     Raises
     ------

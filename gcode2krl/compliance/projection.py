@@ -9,10 +9,10 @@ from gcode2krl.compliance.rows import rows_of
 
 
 def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
-    """Return what of r is normal to v, eq. 10-11.
+    """Return the component of r normal to v, eq. 10-11.
 
-    At a standstill there is no feed direction: rows with |v| = 0 come back unchanged. Any other length of v
-    does, however small, because v is scaled by its largest component before it is squared.
+    At a standstill there is no feed direction: rows with |v| = 0 come back unchanged. Any other v
+    is projected out, however short, because it is scaled by its largest component before it is squared.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def project_rows(r: Floats, v: Floats, factor: float, normal: Floats) -> None:
-    """Write ``factor`` times what of each row of r (n, 3) is normal to that of v (n, 3)."""
+    """Write ``factor`` times the component of each row of r (n, 3) normal to that of v (n, 3)."""
     for i in range(len(r)):
         rx, ry, rz = r[i]
         vx, vy, vz = v[i]

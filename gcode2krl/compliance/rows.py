@@ -8,7 +8,7 @@ from gcode2krl.compiled.inputs import read_only
 
 
 def rows_of(name: str, values: npt.ArrayLike, width: int, count: int | None = None) -> Floats:
-    """Return (n, width) contiguous and read-only; a single row is repeated where ``count`` are wanted.
+    """Return (n, width) contiguous and read-only; a single row is repeated ``count`` times.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a force sensor at the flange shows, freed from offset, weight and hose pack, and taken to the TCP.
+"""Readings of a force sensor at the flange without offset, weight and hose pack, transferred to the TCP.
 
 Signs: the sensor states the load on its tool side along its own axes; R is the rotation of the sensor frame S
 in the robot root, v_root = R·v_S. With gravity along the unit vector g, weight W and centre r (from the
@@ -6,9 +6,10 @@ sensor's origin) a sensor without process force shows (Hähn & Weigold 2020, sec
 
     F = W·Rᵀ·g + F_SI + F_app(q),      M = r x (W·Rᵀ·g) + M_SI + M_app(q)
 
-with constant offsets F_SI, M_SI and what remains, F_app, M_app: ten quadratic terms in the quaternion. The
-paper's polynomial has 15 (eq. 17), but |q| = 1 makes its constant the sum of the squares and q = -q, the same
-orientation, leaves no room for the linear ones. The ten terms span the constant and the nine entries of R.
+with constant offsets F_SI, M_SI and the remaining offset, F_app, M_app: ten quadratic terms in the
+quaternion. The paper's polynomial has 15 (eq. 17), but |q| = 1 makes its constant the sum of the squares and
+q = -q, the same orientation, rules out the linear ones. The ten terms span the constant and the nine entries
+of R.
 """
 
 from pathlib import Path
@@ -26,24 +27,23 @@ from gcode2krl.errors import input_error
 
 Three = tuple[Finite, Finite, Finite]
 _PAIRS = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+_NO_TERMS = ((0.0, 0.0, 0.0),) * 10
 
 
 class Calibration(Section):
-    """What is taken off the sensor's reading; along the sensor's axes, moments about its origin."""
+    """What is subtracted from the sensor's reading; along the sensor's axes, moments about its origin."""
 
     gravity_root: Three = (0.0, 0.0, -1.0)
     """Unit vector downwards in the robot root."""
     weight_N: Finite
-    """Of everything on the tool side; below 0 where the sensor states the reaction."""
+    """Weight of everything on the tool side; below 0 where the sensor states the reaction."""
     centre_mm: Three
     """Centre of gravity from the sensor's origin."""
     force_offset_N: Three
     moment_offset_Nmm: Three
-    force_terms_N: Annotated[tuple[Three, ...], Field(min_length=10, max_length=10)] = ((0.0, 0.0, 0.0),) * 10
+    force_terms_N: Annotated[tuple[Three, ...], Field(min_length=10, max_length=10)] = _NO_TERMS
     """F_app: coefficients of x², y², z², w², xy, xz, xw, yz, yw, zw of the sensor's quaternion."""
-    moment_terms_Nmm: Annotated[tuple[Three, ...], Field(min_length=10, max_length=10)] = (
-        ((0.0, 0.0, 0.0),) * 10
-    )  # fmt: skip
+    moment_terms_Nmm: Annotated[tuple[Three, ...], Field(min_length=10, max_length=10)] = _NO_TERMS
     source: str = ""
 
     @model_validator(mode="after")
@@ -79,7 +79,7 @@ def unloaded(rotation: ArrayLike, calibration: Calibration) -> tuple[Floats, Flo
 def compensate(
     force_N: ArrayLike, moment_Nmm: ArrayLike, rotation: ArrayLike, calibration: Calibration
 ) -> tuple[Floats, Floats]:
-    """Return the process load at the sensor: readings less weight, offset and what remains, eq. 18.
+    """Return the process load at the sensor: readings minus weight, offset and remaining offset, eq. 18.
 
     Eq. 18 states the force; the moment follows by the same balance about the sensor's origin.
 
@@ -90,7 +90,8 @@ def compensate(
     rotation : (n, 4)
         Unit quaternions x, y, z, w of the sensor frame in the robot root; q and -q give the same.
     calibration : Calibration
-        See `identify_sensor`. It holds between the orientations it was measured in; inertia is not in it.
+        See `identify_sensor`. It is valid between the orientations it was measured in; inertia is not
+        included.
 
     Returns
     -------
@@ -139,6 +140,8 @@ def read_calibration(path: str | Path) -> Calibration:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(step) for step in first["loc"])
         raise input_error(
-            "calibration-key", f"{key}: found {first['input']!r:.60}, allowed: {first['msg']}",
-            "write it with `gcode2krl identify sensor -o`", source=str(path),
-        ) from None  # fmt: skip
+            "calibration-key",
+            f"{key}: found {first['input']!r:.60}, allowed: {first['msg']}",
+            "write it with `gcode2krl identify sensor -o`",
+            source=str(path),
+        ) from None

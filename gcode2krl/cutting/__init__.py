@@ -9,7 +9,13 @@ from gcode2krl.cutting.milling import Removal, cut, force_basis, no_forces, remo
 # compiled kernels are looked up when they are first called
 drop_stale(
     Path(__file__).parent,
-    "edge.py", "kernels.py", "removal.py", "rings.py", "slices.py", "sweep.py", "walls.py",
-)  # fmt: skip
+    "edge.py",
+    "kernels.py",
+    "removal.py",
+    "rings.py",
+    "slices.py",
+    "sweep.py",
+    "walls.py",
+)
 
 __all__ = ["Load", "Removal", "cut", "cutting_load", "force_basis", "mean_force", "no_forces", "remove"]

@@ -15,7 +15,7 @@ from gcode2krl.units import RAD_PER_DEG
 DRILL_POINT_DEG = 118.0
 """Point angle of a drill that states none: the usual twist drill."""
 FLUTE_PER_DIAMETER = 10.0
-"""Flute length of a tool that states no length at all: none is longer."""
+"""Flute length over diameter of a tool that states no length: no flute is longer."""
 _ARC_POINTS = 65
 _NOTHING_MM = 1e-9
 
@@ -24,7 +24,7 @@ _NOTHING_MM = 1e-9
 class Shape:
     """Outline of a cutter from the tip up, lengths in mm, z = 0 at the tip.
 
-    ``bottom_mm`` radius of the flat bottom · ``corner_mm`` radius of the corner arc whose centre stands above
+    ``bottom_mm`` radius of the flat bottom · ``corner_mm`` radius of the corner arc whose centre is above
     the bottom's rim · ``kappa_rad`` edge angle of the side above it (90° = cylinder) up to ``side_mm`` ·
     from there a cylinder up to ``flute_mm``.
     """
@@ -37,12 +37,12 @@ class Shape:
 
     @property
     def arc_top_mm(self) -> float:
-        """Height at which the corner arc goes over into the side."""
+        """Height at which the corner arc meets the side."""
         return self.corner_mm * (1.0 - math.cos(self.kappa_rad))
 
     @property
     def arc_radius_mm(self) -> float:
-        """Radius at which the corner arc goes over into the side."""
+        """Radius at which the corner arc meets the side."""
         return self.bottom_mm + self.corner_mm * math.sin(self.kappa_rad)
 
     @property
@@ -61,8 +61,8 @@ class CutterSlices:
     """Edges of one tooth in slices, one row each, from the tip up; `radius_mm` and kappa at their middle.
 
     ``z_low_mm``, ``z_high_mm``, ``radius_mm``, ``sin_kappa``, ``cos_kappa``, ``db_mm`` (s,); ``db_mm`` is the
-    contact width of the whole slice, dz/sin kappa; a slice engaged over a part of its height counts by that
-    part.
+    contact width of the whole slice, dz/sin kappa; a slice engaged over a fraction of its height counts with
+    that fraction.
     """
 
     z_low_mm: Floats
@@ -79,9 +79,9 @@ class CutterSlices:
 def shape_of(tool: Tool) -> Shape:
     """Return the outline of a tool.
 
-    A ball is a corner of half the diameter. The corner of a tapered mill sits where a cylinder of
-    `diameter_mm` would have it, so a tapered ball's diameter is that of its ball. A mill without flute length
-    is taken to cut over its whole length.
+    A ball is a corner of half the diameter. The corner of a tapered mill is that of a cylinder of
+    `diameter_mm`, so a tapered ball's diameter is that of its ball. A mill without flute length
+    is assumed to cut over its whole length.
     """
     radius = tool.diameter_mm / 2.0
     flute = tool.flute_length_mm or tool.length_mm or FLUTE_PER_DIAMETER * tool.diameter_mm
@@ -131,8 +131,9 @@ def bottom_of(tool: Tool, count: int = 6) -> CutterSlices:
 def outline(tool: Tool) -> tuple[Floats, Floats]:
     """Return radii and heights above the tip (k,) in mm of the lower outline, both from the axis outwards.
 
-    Straight between the points; on a corner arc they stand close enough for 0.1 µm a millimetre of its
-    radius. The last radius is the largest, so of a tapered mill the one at the top of its flutes.
+    Straight between the points, which are so close on a corner arc that the error is 0.1 µm for each
+    millimetre of its radius. The last radius is the largest: on a tapered mill the one at the top of its
+    flutes.
     """
     shape = shape_of(tool)
     kappa_rad = np.linspace(0.0, shape.kappa_rad, _ARC_POINTS if shape.corner_mm > 0 else 1)

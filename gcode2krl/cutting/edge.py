@@ -1,7 +1,7 @@
-"""The force along the cutter's edge at one sample, from the material that stands before it: compiled.
+"""The force along the cutter's edge at one sample, from the material in front of it: compiled.
 
 The edge is divided into bands; the material is read on the rings between them, and between two rings its
-thickness changes evenly. An upright band (a cylinder) is read along its rim. Angles phi run from the feed
+thickness changes linearly. An upright band (a cylinder) is read along its rim. Angles phi run from the feed
 normal in the sense of rotation; their bins start at -90°, so that the front of the cutter, 0 to 180°, lies in
 the middle.
 """
@@ -30,7 +30,7 @@ _LOW, _HIGH, _R_LOW, _R_HIGH, _SIN, _COS, _WIDTH = range(BAND_COLUMNS)
 _MOST_ARCS = 64
 _MOST_BINS = 1024
 _JUMP = 0.1  # change of depth, relative, at which an arc is split
-_COARSE_JUMP = 0.25  # the same for one of many bands, absolute share
+_COARSE_JUMP = 0.25  # the same for one of many bands, as an absolute fraction
 _TURN = 2.0 * math.pi
 _WALL_TURN, _RING_TURN = np.int64(0), np.int64(2)  # rows of `Work.turn`
 _NONE = np.int64(0)
@@ -38,7 +38,7 @@ _LOWER, _LOWER_TOP, _UPPER, _UPPER_TOP, _SHARE = range(5)  # rows of `Work.rows`
 
 
 class Cutters(NamedTuple):
-    """What the kernels need of each tool, a row each."""
+    """What the kernels need to know of each tool, one row a tool."""
 
     bands: Floats
     """(t, s, 7) stretches of the edge from the tip up: z low and high, r low and high, sin and cos of the
@@ -51,7 +51,7 @@ class Cutters(NamedTuple):
     """(t,) points all around a ring between two bands, a multiple of 4."""
     teeth: Floats
     lag_mm: Floats
-    """(t,) way by which the field lags behind."""
+    """(t,) distance by which the field lags behind the cutter."""
     above: Floats
     """(t, 4) shank: radius, height of its lower end; holder: the same; radius 0 = not checked."""
 
@@ -65,7 +65,8 @@ class Work(NamedTuple):
     heading: Floats
     """(2, bins) x and y of the directions of the bins."""
     rows: Floats
-    """(5, bins) thickness above a band's lower and upper ring, each with the material's top; share."""
+    """(5, bins) thickness above a band's lower and upper ring, each with the material's top; engaged
+    fraction."""
     reach: Floats
     """(2, bins) largest radius of the edge that is engaged, 0 = none; largest height of material there."""
     recent: Ints
@@ -105,7 +106,7 @@ def fill_turn(turn, wall_bins, ring_bins):
 def add_bands(grid, path, cutters, law, i, outline, heading, chip, top, recent, work):
     """Add the force of every band of the edge to ``work.total``; return the number of arcs in ``work.arcs``.
 
-    No material stands more than ``top`` above the tip.
+    No material is more than ``top`` above the tip.
     """
     tool, bands, position, part, total = path.tool[i], cutters.bands, path.position_mm, work.part, work.total
     lower, lower_top, upper, upper_top, share = _rows(work.rows)
@@ -170,9 +171,14 @@ def _rows(rows):
 @kernel
 def _band_of(bands, tool, b):
     return (
-        bands[tool, b, 0], bands[tool, b, 1], bands[tool, b, 2], bands[tool, b, 3],
-        bands[tool, b, 4], bands[tool, b, 5], bands[tool, b, 6],
-    )  # fmt: skip
+        bands[tool, b, 0],
+        bands[tool, b, 1],
+        bands[tool, b, 2],
+        bands[tool, b, 3],
+        bands[tool, b, 4],
+        bands[tool, b, 5],
+        bands[tool, b, 6],
+    )
 
 
 @kernel
@@ -206,7 +212,7 @@ def _turn(turn, east, north, which, bins, heading, turned):
 
 @kernel
 def _share(bottom, band, first, bins, lower, upper, share):
-    """Write the share of a band that is engaged: between its rings the thickness changes evenly.
+    """Write the fraction of a band that is engaged: between its rings the thickness changes linearly.
 
     ``bottom`` is the height of the material's bottom above the tip.
     """
@@ -295,7 +301,7 @@ def _sum(width, radius, z, part, total):
 
 @kernel
 def _wall(grid, path, law, i, outline, band, chip, recent, work, bins, arcs):
-    """Add a cylindrical band: its depth may change along the rim, by steps whose places are looked for."""
+    """Add a cylindrical band: its depth may change along the rim in steps, whose places are searched."""
     position, total, part, depths = path.position_mm, work.total, work.part, work.rows[_SHARE]
     east, north = work.heading[0], work.heading[1]
     x, y, z = position[i, 0], position[i, 1], position[i, 2]

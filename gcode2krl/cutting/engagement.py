@@ -1,7 +1,7 @@
 """Engagement and mean force along a motion, by cutting it out of a height field.
 
-The field is divided into strips, one a thread. Each strip removes every sweep that comes near it, in the
-order of time, and reads the samples that stand in it; what a sample reads never depends on the division, so
+The field is divided into strips, one for each thread. Each strip removes every sweep that comes near it, in
+the order of time, and reads the samples in it. The reading of a sample does not depend on the division, so
 any number of threads gives the same result to the last bit.
 """
 
@@ -30,14 +30,20 @@ _BOTTOM_BANDS = 4
 _MARGIN_CELLS = 4
 _SPARE_CELLS = 64
 _FEW_SAMPLES = 2000
-"""So few samples are not worth a second thread."""
+"""Samples below which a second thread does not pay."""
 
 
 def engage(
-    field: HeightField, position_mm: Floats, tool: Ints32, rapid: Bools, f_z_mm:
-    Floats, tools: Sequence[Tool], law: Floats, threads: int | None = None,
-) -> Result:  # fmt: skip
-    """Cut a motion out of a field, which changes; return engagement and mean force of every sample.
+    field: HeightField,
+    position_mm: Floats,
+    tool: Ints32,
+    rapid: Bools,
+    f_z_mm: Floats,
+    tools: Sequence[Tool],
+    law: Floats,
+    threads: int | None = None,
+) -> Result:
+    """Cut a motion out of a field (in place); return engagement and mean force of every sample.
 
     Each sample is read at its own position, before the sweep that leads to it is removed. Forces are means
     over a revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge;
@@ -46,7 +52,7 @@ def engage(
     Parameters
     ----------
     position_mm : (n, 3) tips in the frame of the field, whose z is the tool axis.
-    tool : (n,) row of ``tools``; where it changes no sweep leads on.
+    tool : (n,) row of ``tools``; no sweep joins two samples of different tools.
     rapid : (n,) True where the sweep that leads to the sample must not meet material.
     f_z_mm : (n,) feed per tooth along the path.
     law : (8,) force law as in `slices.arc_force`.
@@ -55,8 +61,8 @@ def engage(
     Notes
     -----
     Material is a height field: exact heights over the middle of cells, walls left by a cutter's rim to a
-    twentieth of a cell, edges of a mesh to half a cell. The tool axis does not tilt. Ways between samples are
-    straight.
+    twentieth of a cell, edges of a mesh to half a cell. The tool axis does not tilt. The path between
+    samples is straight.
     """
     position = np.ascontiguousarray(position_mm, dtype=np.float64)
     tool = np.ascontiguousarray(tool, dtype=np.int32)
@@ -74,7 +80,7 @@ def engage(
     longest_mm = float(steps.max(initial=0.0)) + 2.0 * float(path.outlines[:, 0].max())
     index = np.arange(int(longest_mm / field.cell_mm.min()) + _SPARE_CELLS, dtype=np.float32)
     widest_mm = float(max(path.outlines[:, 0].max(), cutters.above[:, ::2].max()))
-    halo_mm = widest_mm + _MARGIN_CELLS * cell_mm  # how far a sample looks
+    halo_mm = widest_mm + _MARGIN_CELLS * cell_mm  # how far around itself a sample reads
     axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))
     bounds = _bounds(position[:, axis], halo_mm, threads)
 
@@ -114,7 +120,7 @@ _Piece = tuple[Grid, int, int, int, Floats]
 
 
 def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:
-    """Return the borders of strips with equally many samples each, none narrower than sense makes."""
+    """Return the borders of strips with equally many samples each, none narrower than useful."""
     strips = min(threads or os.cpu_count() or 1, max(1, int(np.ptp(along_mm) / (2.0 * halo_mm))))
     if threads is None and len(along_mm) < _FEW_SAMPLES:
         strips = 1
@@ -134,21 +140,27 @@ def _outline(shape: Shape) -> tuple[float, ...]:
     ball = shape.bottom_mm == 0.0 and shape.corner_mm > 0.0 and not widens
     kind = BALL if ball else FLAT if shape.corner_mm == 0.0 and not widens else OTHER
     return (
-        shape.radius_mm, shape.bottom_mm, shape.corner_mm, shape.arc_radius_mm, shape.arc_top_mm, steep, kind
-    )  # fmt: skip
+        shape.radius_mm,
+        shape.bottom_mm,
+        shape.corner_mm,
+        shape.arc_radius_mm,
+        shape.arc_top_mm,
+        steep,
+        kind,
+    )
 
 
 def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
     """Return what the kernels need of tools on a field of a cell size."""
     listed = [_bands(tool, cell_mm) for tool in tools]
-    bands = np.zeros((len(tools), max(len(one) for one in listed), BAND_COLUMNS))
-    for row, one in zip(bands, listed, strict=True):
-        row[: len(one)] = one
+    bands = np.zeros((len(tools), max(len(edge) for edge in listed), BAND_COLUMNS))
+    for row, edge in zip(bands, listed, strict=True):
+        row[: len(edge)] = edge
     radius = outlines_of(tools)[:, 0]
     around = 2.0 * math.pi * radius / cell_mm
     return Cutters(
         bands=bands,
-        used=np.array([len(one) for one in listed], dtype=np.int64),
+        used=np.array([len(edge) for edge in listed], dtype=np.int64),
         wall_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_WALL_BINS)),
         ring_bins=_round_up(np.clip(around, _FEWEST_BINS, _MOST_RING_BINS)),
         teeth=np.array([float(tool.teeth) for tool in tools]),
@@ -162,7 +174,7 @@ def _round_up(bins: Floats) -> Ints:
 
 
 def _bands(tool: Tool, cell_mm: float) -> Floats:
-    """Return the edge in bands (s, 7) from the axis outwards, as fine as cells can tell."""
+    """Return the edge in bands (s, 7) from the axis outwards, as fine as the cells resolve."""
     shape = shape_of(tool)
     long_mm = shape.corner_mm * shape.kappa_rad
     if shape.radius_mm > shape.arc_radius_mm + 1e-9:

@@ -1,4 +1,4 @@
-"""What the removal of material finds: collisions, cuts that the tool or the spindle cannot take."""
+"""Findings of the material removal: collisions, and cuts beyond the limits of tool or spindle."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,21 +15,22 @@ from gcode2krl.tables import Forces
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
 _CONTACT_MM = 0.01
-"""Material thinner than this that rapid, shank or holder meet is rounding of path and cells."""
+"""Thinner material that rapid, shank or holder meet is rounding of path and cells."""
 _GRAZE_MM = 3.0
-"""Way, a little more than a sample takes at 0.2 m/s, within which a rapid may meet what a corner has left."""
+"""Longest way, a little more than that of a sample at 0.2 m/s, on which a rapid may meet material that a
+rounded corner has left."""
 _THIN_MM = 0.3
-"""What is thicker is never passed over as the rest of a rounded corner."""
+"""Thicker material is never ignored as the rest of a rounded corner."""
 _PLUNGE_RAD = 20.0 * RAD_PER_DEG
 """Descent above which a mill that does not cut at its centre cannot follow: assumed, ramps are flatter."""
 _WIDE_PLUNGE_MM = 32.0
-"""Diameter above which a mill whose cell entry does not say so is not taken to cut at its centre: assumed;
+"""Diameter above which a mill is assumed not to cut at its centre unless the cell states that it does;
 solid end mills end there, face mills begin at 40 to 50 mm (ISO 6462) and leave a core."""
 _NEAR_MODE = 0.15
-"""Share of a mode's frequency within which a spindle or tooth harmonic is noted."""
+"""Fraction of a mode's frequency within which a spindle or tooth harmonic is noted."""
 _HARMONICS = 3
 _SHORT_S = 0.1
-"""A chip that is too thin for less than this is an entry, an exit or a corner."""
+"""A thin chip that lasts less than this is an entry, an exit or a corner."""
 
 
 @dataclass(frozen=True)
@@ -47,17 +48,18 @@ class Cut:
     overlap_mm: Floats
     """(m, 3) how far rapid, shank and holder are in the material."""
     step_mm: Floats
-    """Way from the sample before."""
+    """Distance from the sample before."""
     descent_mm: Floats
     """(m,) part of it down the tool axis, 0 where the tool rises."""
     blend_mm: float
-    """Largest CDIS: a rounded corner leaves material as thick as that on the rim, where the tool went in."""
+    """Largest CDIS: a rounded corner leaves material up to that thickness on the rim, where the tool went
+    in."""
 
 
 def findings_of(cut: Cut, forces: Forces, cell: Cell, guessed: bool) -> tuple[Issue, ...]:
     """Return the findings, by line. Collisions are errors, warnings where the stock is guessed."""
     severity: Literal["error", "warning"] = "warning" if guessed else "error"
-    found = [
+    issues = [
         *_collisions(cut, forces, cell, severity),
         *_spindle(cut, forces, severity),
         *_plunges(cut, forces, cell, severity),
@@ -68,8 +70,8 @@ def findings_of(cut: Cut, forces: Forces, cell: Cell, guessed: bool) -> tuple[Is
     if guessed:
         remedy = "give [stock] box_mm or mesh in the cell"
         sentence = "the stock is guessed from the feed moves: its findings are warnings"
-        found.append(Issue("note", "stock-guessed", 0, sentence, remedy))
-    return tuple(sorted(found, key=lambda issue: issue.line))
+        issues.append(Issue("note", "stock-guessed", 0, sentence, remedy))
+    return tuple(sorted(issues, key=lambda issue: issue.line))
 
 
 def _collisions(
@@ -102,7 +104,7 @@ def _collisions(
 def _below_surface(cut: Cut, depth: Floats) -> Floats:
     """Return how far (m,) rapids are below the surface that they met.
 
-    What one sample cuts off, the next does not find any more: its descent is added.
+    Material that one sample has cut off is missing for the next, so the descent is added.
     """
     met = depth > _CONTACT_MM
     begins = met & ~np.concatenate([[False], met[:-1]])
@@ -113,7 +115,7 @@ def _below_surface(cut: Cut, depth: Floats) -> Floats:
 
 
 def _grazes(cut: Cut, depth: Floats) -> Bools:
-    """Return where a rapid only meets what a rounded corner left: thin, and soon over."""
+    """Return where a rapid meets only the rest of a rounded corner: thin and short."""
     met = depth > _CONTACT_MM
     stretch = np.cumsum(met & ~np.concatenate([[False], met[:-1]])) * met
     way_mm = np.bincount(stretch, cut.step_mm)
@@ -127,7 +129,7 @@ def _grazes(cut: Cut, depth: Floats) -> Bools:
 def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) -> Iterator[Issue]:
     engaged = np.isfinite(forces.phi_rad[:, 0]) & ~cut.rapid
     for row in _starts(engaged & (cut.spindle_rad_s == 0.0)):
-        sentence = f"T{forces.tool[row]} cuts material while the spindle stands"
+        sentence = f"T{forces.tool[row]} cuts material while the spindle is stopped"
         yield Issue(severity, "spindle-off", int(cut.source_line[row]), sentence, "M3 with S before the cut")
     for row in _starts(engaged & (cut.spindle_rad_s < 0.0)):
         sentence = f"T{forces.tool[row]} cuts with M4: a right-hand tool turns the wrong way"
@@ -141,8 +143,8 @@ def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "w
         doubtful = _wide_and_silent(tool)
         if tool.centre_cutting and not doubtful:
             continue
-        own = forces.tool == number
-        into = own & (cut.centre_mm > _CONTACT_MM) & (cut.ramp_rad > _PLUNGE_RAD)
+        with_tool = forces.tool == number
+        into = with_tool & (cut.centre_mm > _CONTACT_MM) & (cut.ramp_rad > _PLUNGE_RAD)
         for row in _starts(into)[: 1 if doubtful else None]:
             line = int(cut.source_line[row])
             if doubtful:
@@ -150,15 +152,20 @@ def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "w
                     f"T{number}, {tool.diameter_mm:g} mm wide, plunges into material: mills that wide hardly "
                     "ever cut at their centre"
                 )
-                yield Issue("warning", "plunge-wide", line, sentence, f"{remedy}; or state "
-                            f"tool.{number}.centre_cutting = true")  # fmt: skip
+                yield Issue(
+                    "warning",
+                    "plunge-wide",
+                    line,
+                    sentence,
+                    f"{remedy}; or state tool.{number}.centre_cutting = true",
+                )
             else:
                 sentence = f"T{number} plunges into material and does not cut at its centre"
                 yield Issue(severity, "plunge", line, sentence, remedy)
 
 
 def _wide_and_silent(tool: Tool) -> bool:
-    """Tell whether a tool is too wide to be taken as centre-cutting, and does not say that it is."""
+    """Tell whether a tool is too wide to be assumed centre-cutting, and the cell does not state it."""
     return (
         tool.kind != "drill"
         and tool.diameter_mm > _WIDE_PLUNGE_MM
@@ -170,32 +177,49 @@ def _limits(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
     size = np.linalg.norm(forces.force_base_N, axis=1)
     for number in _tools(forces).tolist():
         tool: Tool = cell.tool[number]
-        own = forces.tool == number
+        with_tool = forces.tool == number
         deepest = tool.max_depth_mm
         if deepest is not None:
             yield from _beyond(
-                cut, own, forces.a_p_mm, deepest * (1.0 + 1e-6) + _CONTACT_MM, "depth-limit",
-                f"T{number} cuts {{value:.2f}} mm deep, allowed {deepest:g}", "cut in shallower steps",
-            )  # fmt: skip
+                cut,
+                with_tool,
+                forces.a_p_mm,
+                deepest * (1.0 + 1e-6) + _CONTACT_MM,
+                "depth-limit",
+                f"T{number} cuts {{value:.2f}} mm deep, allowed {deepest:g}",
+                "cut in shallower steps",
+            )
         if tool.max_force_N is not None:
             yield from _beyond(
-                cut, own, size, tool.max_force_N, "force-limit",
+                cut,
+                with_tool,
+                size,
+                tool.max_force_N,
+                "force-limit",
                 f"T{number} is loaded with {{value:.0f}} N, allowed {tool.max_force_N:g}",
                 "lower F or the depth of cut",
-            )  # fmt: skip
+            )
     spindle = cell.spindle
     if spindle.max_torque_Nm is not None:
         yield from _beyond(
-            cut, None, forces.torque_Nmm / MM_PER_M, spindle.max_torque_Nm, "spindle-torque",
+            cut,
+            None,
+            forces.torque_Nmm / MM_PER_M,
+            spindle.max_torque_Nm,
+            "spindle-torque",
             f"cutting takes {{value:.2f}} Nm, the spindle has {spindle.max_torque_Nm:g}",
             "lower F or the depth of cut",
-        )  # fmt: skip
+        )
     if spindle.max_power_W is not None:
         yield from _beyond(
-            cut, None, spindle_power(forces.torque_Nmm, cut.spindle_rad_s), spindle.max_power_W,
-            "spindle-power", f"cutting takes {{value:.0f}} W, the spindle has {spindle.max_power_W:g}",
+            cut,
+            None,
+            spindle_power(forces.torque_Nmm, cut.spindle_rad_s),
+            spindle.max_power_W,
+            "spindle-power",
+            f"cutting takes {{value:.0f}} W, the spindle has {spindle.max_power_W:g}",
             "lower F or the depth of cut",
-        )  # fmt: skip
+        )
 
 
 def _beyond(
@@ -208,7 +232,7 @@ def _beyond(
 
 
 def _chips(cut: Cut, forces: Forces) -> Iterator[Issue]:
-    """Chips outside the range of the coefficients: once each, with the share of the time in cut."""
+    """Yield chips outside the range of the coefficients: once each, with the fraction of the time in cut."""
     cutting = np.flatnonzero(np.isfinite(forces.phi_rad[:, 0]) & (cut.f_z_mm > 0.0))
     if not len(cutting):
         return
@@ -224,8 +248,8 @@ def _chips(cut: Cut, forces: Forces) -> Iterator[Issue]:
         if np.count_nonzero(wrong) * cut.cycle_s < max(_SHORT_S, 0.05 * len(cutting) * cut.cycle_s):
             continue
         row = int(cutting[np.argmax(wrong)])
-        share = np.count_nonzero(wrong) / len(cutting)
-        sentence = f"{words}, in {share:.0%} of the time in cut, first at this line"
+        fraction = np.count_nonzero(wrong) / len(cutting)
+        sentence = f"{words}, in {fraction:.0%} of the time in cut, first at this line"
         yield Issue("note", code, int(cut.source_line[row]), sentence, "change F or the spindle speed")
 
 
@@ -242,11 +266,13 @@ def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
                     row = int(np.argmax(cutting & (np.abs(cut.spindle_rad_s) == speed)))
                     what = "the spindle" if order % teeth else "tooth passing"
                     yield Issue(
-                        "note", "near-mode", int(cut.source_line[row]),
+                        "note",
+                        "near-mode",
+                        int(cut.source_line[row]),
                         f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{int(number)} ({what}) is near "
                         f"the mode at {mode:g} Hz; stability is not predicted",
                         "change the spindle speed",
-                    )  # fmt: skip
+                    )
                     break
 
 
@@ -261,6 +287,6 @@ def _starts(wrong: Bools) -> list[int]:
 
 
 def _end(wrong: Bools, start: int) -> int:
-    """Return the row behind a stretch."""
+    """Return the row after a stretch."""
     length = int(np.argmin(wrong[start:]))  # stops at the first False
     return start + length if not wrong[start + length] else len(wrong)

@@ -25,7 +25,7 @@ _ROUNDING_RAD = 1e-9
 
 @dataclass(frozen=True)
 class Load:
-    """What cutting does to the tool, n samples."""
+    """Load on the tool, n samples."""
 
     force_N: Floats
     """(n, 3) feed, normal, axial; mean over a revolution."""
@@ -50,8 +50,8 @@ def mean_force(
     Parameters
     ----------
     phi_rad : (n, 2k)
-        Entry and exit pairs in rad from the feed normal; NaN pairs are no arc. Arcs hold for all edges
-        below a_p; where a ramp would leave no chip, nothing cuts: (0, 2·pi) stands for full material.
+        Entry and exit pairs in rad from the feed normal; NaN pairs are no arc. Arcs apply to all edges
+        below a_p; edges that have no chip on a ramp do not cut; (0, 2·pi) is full material.
     a_p_mm : (n,)
         Axial depth from the tip up in mm.
     f_z_mm : (n,)
@@ -97,10 +97,10 @@ def cutting_load(
 ) -> Load:
     """Return mean force, torque and peak force (n) of any cutter of the library under a law of `law_array`.
 
-    Arguments as in `mean_force`. Edges end at the flute length. The peak counts all teeth with their helix of
-    constant lead, without run-out; it is within 3 % of the exact one (up-hill on a corner radius: 11 %). What
-    a drill's chisel edge adds to the thrust (up to about as much again) is not in the law: its axial force is
-    a lower bound.
+    Arguments as in `mean_force`. Edges end at the flute length. The peak includes all teeth with their helix
+    of constant lead, without run-out; it is within 3 % of the exact one (up-hill on a corner radius: 11 %).
+    The thrust of a drill's chisel edge (up to about as much again) is not in the law: its axial force is a
+    lower bound.
     """
     shape = shape_of(tool)
     columns = _columns(phi_rad, a_p_mm, f_z_mm, ramp_rad)
@@ -156,10 +156,10 @@ def _columns(
     count = lengths.pop() if lengths else 1
     ramp = np.clip(ramp, -math.pi / 2, math.pi / 2)
     return (
-        _own(arcs, (count, arcs.shape[1])),
-        _own(depth, (count,)),
-        _own(feed, (count,)),
-        _own(ramp, (count,)),
+        _writable(arcs, (count, arcs.shape[1])),
+        _writable(depth, (count,)),
+        _writable(feed, (count,)),
+        _writable(ramp, (count,)),
     )
 
 
@@ -190,7 +190,7 @@ def _numbers(name: str, values: ArrayLike) -> Floats:
         raise _wrong(f"{name}: found {type(values).__name__} that is not numbers, allowed: numbers") from None
 
 
-def _own(values: Floats, shape: tuple[int, ...]) -> Floats:
+def _writable(values: Floats, shape: tuple[int, ...]) -> Floats:
     """Return the values as compiled code takes them: of full shape, contiguous, writeable."""
     return np.require(np.broadcast_to(values, shape), requirements=["C", "W"])
 

@@ -2,18 +2,19 @@
 
 In the plane it is the box of the feed moves, widened by the tool's radius; its underside is the lowest feed
 point. Its top follows from what the feed moves cut and from where they are entered; a rapid at cutting depth
-never lowers it, because that rapid may be the mistake that the stock has to show:
+never lowers it, because that rapid may be the mistake that the stock is to reveal:
 
-- The *cutting height* is the height that 95 % of the feed travel across the tool axis keeps below, without
+- The *cutting height* is the height below which 95 % of the feed travel across the tool axis runs, without
   the descents that a feed run begins with, the rises it ends with, and travel at the highest entry's height.
-- Zero is the top where cuts lie below it, skimming at zero itself apart: posts put Z0 on top of the stock or
+- Zero is the top where cuts lie below it, ignoring skimming at zero itself: posts put Z0 on top of the stock
+or
   on its underside. (Not where the cut would be deeper than the edges are long: that zero lies elsewhere.)
 - Otherwise the top is the highest entry, where a feed run begins after a rapid, or the height of most level
-  rapids if that is lower; but the first pass is not taken to be deeper than the step from the highest level
+  rapids if that is lower; but the first pass is assumed to be no deeper than the step from the highest level
   of the cuts to the next, or, where all have one level, than the largest tool is wide.
 
 A program at zero or above that never rises above its cutting height moves in the air: no stock is left then.
-All of it is an assumption, so what it finds is a warning.
+All of it is an assumption, so its findings are warnings.
 """
 
 from dataclasses import dataclass
@@ -24,12 +25,12 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.tables import Toolpath
 
 FLAT_MM = 1e-6
-"""Moves that rise or go across by less are rounding of the G-code's numbers."""
+"""Shorter rises and travels are rounding of the G-code's numbers."""
 _MOST = 0.95
 _SAME_LEVEL = 0.02
-"""Share of the largest tool's radius by which two levels differ at least: less is one level."""
+"""Least difference of two levels, as a fraction of the largest tool's radius."""
 _SOME = 0.1
-"""Share of the feed travel that has to remain without entries and exits; else all of it counts."""
+"""Fraction of the feed travel that must remain without entries and exits; else all of it counts."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,9 @@ class _Feed:
     start_mm: Floats
     end_mm: Floats
     entry: Bools
-    """A rapid, or nothing, comes before."""
+    """(f,) True where a rapid, or nothing, comes before."""
     exit: Bools
-    """A rapid, or nothing, comes behind."""
+    """(f,) True where a rapid, or nothing, follows."""
 
     @property
     def across_mm(self) -> Floats:
@@ -66,14 +67,14 @@ def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_
     position = toolpath.position_mm @ to_field.T
     feed = _feed_moves(toolpath, position, known)
     if not len(feed.end_mm):
-        here = position[known][:1] if known.any() else np.zeros((1, 3))
-        return np.array([here[0] - radius_mm, here[0] + [radius_mm, radius_mm, 0.0]])
+        start = position[known][:1] if known.any() else np.zeros((1, 3))
+        return np.array([start[0] - radius_mm, start[0] + [radius_mm, radius_mm, 0.0]])
     points = np.concatenate([feed.start_mm, feed.end_mm])
     low, high = points[:, :2].min(axis=0) - radius_mm, points[:, :2].max(axis=0) + radius_mm
     bottom = float(feed.end_mm[:, 2].min())
     deepest_mm = (
         deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf
-    )  # zero means nothing along a tilt
+    )  # zero has no meaning along a tilted axis
     rapids = _level_rapids(toolpath, position)
     highest = float(position[known & ~toolpath.machine, 2].max())
     top = max(_top(feed, rapids, highest, radius_mm, deepest_mm), bottom)
@@ -122,13 +123,13 @@ class _Cuts:
     """Where the feed moves cut."""
 
     height_mm: float
-    """95 % of the travel keeps below."""
+    """95 % of the travel is below."""
     middle_mm: float
-    """Half of the travel keeps below."""
+    """Half of the travel is below."""
     levels_mm: Floats
     """Heights of the level cuts, from below."""
     across: bool = True
-    """False where there are holes only."""
+    """False if there are only holes."""
 
     @classmethod
     def of(cls, feed: _Feed, highest_entry: float) -> "_Cuts":
@@ -152,7 +153,7 @@ class _Cuts:
         return cls(most, half, np.unique(middle[level]))
 
     def first_pass_mm(self, radius_mm: float) -> float:
-        """Return how deep the first pass may be; infinite where there are holes only."""
+        """Return how deep the first pass may be; infinite if there are only holes."""
         if not self.across:
             return np.inf
         steps = self.levels_mm[-1:] - self.levels_mm

@@ -1,7 +1,7 @@
 """The material as a height field: one height per cell of a grid normal to the tool axis.
 
-A field belongs to one direction of the tool, its z; 3+2 machining has one field per set-up. What is below the
-highest surface counts as solid down to one flat bottom, so undercuts are filled.
+A field belongs to one direction of the tool, its z; 3+2 machining has one field per set-up. Everything below
+the highest surface counts as solid down to one flat bottom, so undercuts are filled.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from gcode2krl.cutting.sweep import BLOCK, LANES, Grid, refresh
 CELLS_PER_DIAMETER = 160.0
 """Default resolution: 0.1 mm for a cutter of 16 mm."""
 MAX_CELLS = 16_000_000
-"""Default limit of a field: 128 MB, and as much again while it is worked on."""
+"""Default limit of a field: 128 MB, and as much again while it is cut."""
 MESH_CELLS = 250_000
 """Default limit of the cells of a mesh that is made from a field."""
 _EMPTY_MM = 1e-3
@@ -75,11 +75,11 @@ class HeightField:
 
     def take_back(self, grid: Grid, axis: int, first: int, after: int, skip: int) -> None:
         """Copy columns or rows back from a grid that begins ``skip`` cells before ``first``."""
-        own = slice(skip + 1, skip + 1 + after - first)
+        inner = slice(skip + 1, skip + 1 + after - first)
         if axis == 0:
-            self.height_mm[:, first:after] = grid.height[1 : 1 + self.height_mm.shape[0], own]
+            self.height_mm[:, first:after] = grid.height[1 : 1 + self.height_mm.shape[0], inner]
         else:
-            self.height_mm[first:after] = grid.height[own, 1 : 1 + self.height_mm.shape[1]]
+            self.height_mm[first:after] = grid.height[inner, 1 : 1 + self.height_mm.shape[1]]
 
 
 @kernel

@@ -7,8 +7,8 @@ from numba import njit
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 
 kernel: Any = njit(**_OPTIONS)
-"""For functions that only use arrays they are given: without numba's reference counts, which would cost more
-than these short functions do. They cannot make arrays."""
+"""For functions that only use arrays passed to them: compiled without numba's reference counts, which would
+cost more than these short functions themselves. They cannot make arrays."""
 
 inlined: Any = njit(**_OPTIONS, inline="always")
 """The same for functions with one caller: compiled as a part of it, once."""

@@ -14,7 +14,7 @@ from gcode2krl.units import MM_PER_M, RAD_PER_REV
 THIN_CHIP_MM = 0.005
 """Below this largest chip an edge rubs and ploughs rather than cuts: an assumption, about the edge radius of
 a sharp carbide mill; the smallest chip that still comes off is 0.2-0.4 of that radius. Linear edge
-coefficients, fitted above it, then overestimate what cuts and say nothing about heat and wear."""
+coefficients, fitted above it, then overestimate the force and say nothing about heat and wear."""
 
 THICK_CHIP_MM = 0.2
 """Above this largest chip the linear edge sets of the library are extrapolated: fitted at 0.025-0.2 mm a
@@ -51,10 +51,10 @@ def linear_edge_law(coefficients: ArrayLike) -> Floats:
 
 
 def feed_per_tooth(speed_mm_s: ArrayLike, spindle_rad_s: ArrayLike, teeth: int) -> Floats:
-    """Return the feed per tooth f_z = 2·pi·v/(N·|omega|) in mm (n,), 0 where the spindle stands.
+    """Return the feed per tooth f_z = 2·pi·v/(N·|omega|) in mm (n,), 0 where the spindle is stopped.
 
     `speed_mm_s` is the predicted speed along the path, plunges included, not the programmed feed. Without
-    rotation there is no chip, so no force; moving through material then is a collision, found elsewhere.
+    rotation there is no chip, so no force; moving through material then is a collision, reported elsewhere.
     """
     speed, omega = np.broadcast_arrays(
         np.abs(np.asarray(speed_mm_s, dtype=float)), np.abs(np.asarray(spindle_rad_s, dtype=float))
@@ -68,8 +68,8 @@ def contact_feed(f_z_mm: ArrayLike, advance_mm: ArrayLike) -> Floats:
     """Return the feed per tooth (n,) limited to what the tool has advanced into virgin stock.
 
     ``advance_mm`` (n,) is the path since the first contact; inf in a running cut. The tooth that meets
-    untouched material cannot take more than the tool has entered it: that is the real advance, never the
-    distance between two samples, which is many teeth long.
+    untouched material cannot take more than the tool has entered it. That is the real advance, not the
+    distance between two samples, which spans many teeth.
     """
     advance = np.maximum(np.asarray(advance_mm, dtype=float), 0.0)
     return np.asarray(np.minimum(np.asarray(f_z_mm, dtype=float), advance))
@@ -85,9 +85,7 @@ def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.
     start, end = arcs[:, 0::2], arcs[:, 1::2]
     with np.errstate(invalid="ignore"):
         engaged = end > start
-        crest = start + np.mod(
-            math.pi / 2 - start, 2.0 * math.pi
-        )  # first angle behind the start with sin = 1
+        crest = start + np.mod(math.pi / 2 - start, 2.0 * math.pi)  # first angle after the start with sin = 1
         sine = np.where(crest <= end, 1.0, np.maximum(np.sin(start), np.sin(end)))
     sine = np.where(engaged, sine, -np.inf).max(axis=1, initial=-np.inf)
     gamma = np.asarray(ramp_rad, dtype=float)

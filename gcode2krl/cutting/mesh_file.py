@@ -1,4 +1,4 @@
-"""A mesh file of a raw part, looked through before a library reads it: what it is, and how large it gets.
+"""Checks the mesh file of a raw part before a library reads it: its format, and its size when unpacked.
 
 STL (3D Systems 1989), PLY (Turk 1994) and 3MF (core specification 1.3). The header may announce more than the
 file holds, a zipped file may unfold to terabytes, an object may contain itself: all of it is refused here.
@@ -15,24 +15,39 @@ KINDS = ("stl", "ply", "3mf")
 REMEDY = "export a closed solid as STL, PLY or 3MF in mm"
 MOST_TRIANGLES = 1_200_000
 LARGEST_BYTES, LARGEST_TEXT_BYTES, LARGEST_XML_BYTES = 100_000_000, 50_000_000, 35_000_000
-"""Each is read in less than 1 GB, measured: 2 million triangles of a STL take 1.3 GB, 28 MB of XML 0.7 GB."""
+"""Largest files. Reading each takes some 1 GB, measured: 2 million triangles of a STL take 1.3 GB, 28 MB of
+XML 0.7 GB."""
 MOST_INSTANCES, MOST_FILES = 10_000, 1000
 _LONGEST_HEADER = 65_536
 _SIZES = {
-    "char": 1, "int8": 1, "uchar": 1, "uint8": 1, "short": 2, "int16": 2, "ushort": 2, "uint16": 2, "int": 4,
-    "int32": 4, "uint": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8,
-}  # fmt: skip
+    "char": 1,
+    "int8": 1,
+    "uchar": 1,
+    "uint8": 1,
+    "short": 2,
+    "int16": 2,
+    "ushort": 2,
+    "uint16": 2,
+    "int": 4,
+    "int32": 4,
+    "uint": 4,
+    "uint32": 4,
+    "float": 4,
+    "float32": 4,
+    "double": 8,
+    "float64": 8,
+}
 _XML_TRICKS = re.compile(rb"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 class MeshError(ValueError):
-    """The file is no mesh that may be read; the text says why, in words without the file's name."""
+    """The file is not a mesh or may not be read; the text says why, without the file's name."""
 
 
 def read_mesh_file(file: Path) -> tuple[bytes, str]:
     """Return the bytes of a mesh file and what it is (one of `KINDS`).
 
-    Raises `MeshError` where its ending, its content, or what it announces does not fit, `OSError` where it
+    Raises `MeshError` where its ending, its content and its header do not fit each other, `OSError` where it
     cannot be read.
     """
     ending = file.suffix.lower().lstrip(".")
@@ -50,7 +65,7 @@ def read_mesh_file(file: Path) -> tuple[bytes, str]:
 
 
 def _content(data: bytes) -> str:
-    """Return what a file is by its first bytes, "" where it is none of `KINDS`; binary STL has no mark."""
+    """Return the kind of a file by its first bytes, "" if none of `KINDS`; binary STL has no mark."""
     if data.startswith(b"PK\x03\x04"):
         return "3mf"
     if re.match(rb"ply\s", data):
@@ -89,8 +104,8 @@ def _check_ply(data: bytes) -> None:
     if text:
         _check_text(data)
     announced = sum(count * (1 if text else size) for count, size in elements.values())
-    there = data.count(b"\n", body) + 1 if text else len(data) - body
-    if announced > there:
+    available = data.count(b"\n", body) + 1 if text else len(data) - body
+    if announced > available:
         raise MeshError("the file is cut off, or its header announces more than it holds")
     if "vertex" not in elements or "face" not in elements:
         raise MeshError("no vertices or no faces")
@@ -106,7 +121,7 @@ def _ply_elements(header: str) -> tuple[bool, dict[str, tuple[int, int]]]:
             text = words[1:2] == ["ascii"]
         elif words[:1] == ["element"]:
             if len(words) != 3 or not re.fullmatch(r"\d{1,18}", words[2], re.ASCII) or words[1] in elements:
-                raise MeshError(f"{line[:60]!r} is no element of a PLY file")
+                raise MeshError(f"{line[:60]!r} is not an element of a PLY file")
             last = words[1]
             elements[last] = (int(words[2]), 0)
         elif words[:1] == ["property"]:
@@ -118,7 +133,7 @@ def _ply_elements(header: str) -> tuple[bool, dict[str, tuple[int, int]]]:
                 else ""
             )
             if not last or kind not in _SIZES or (len(words) == 5 and words[3] not in _SIZES):
-                raise MeshError(f"{line[:60]!r} is no property of a PLY file")
+                raise MeshError(f"{line[:60]!r} is not a property of a PLY file")
             elements[last] = (elements[last][0], elements[last][1] + _SIZES[kind])
     if text is None:
         raise MeshError("the PLY header names no format")
@@ -134,7 +149,7 @@ class _Solid:
 
 
 def _check_3mf(data: bytes) -> None:
-    """Raise where the file unfolds to more than may be read, or has objects in objects without end."""
+    """Raise where the file unfolds to more than may be read, or an object contains itself."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             files = archive.infolist()

@@ -1,4 +1,4 @@
-"""The stage: Motion and stock to Forces, and what the removal of material finds."""
+"""The stage: Motion and stock to Forces, and the findings of the material removal."""
 
 from dataclasses import dataclass, replace
 
@@ -28,7 +28,7 @@ _CDIS_OF_TOLERANCE = 2.0 * 2.0**0.5
 
 @dataclass(frozen=True)
 class Removal:
-    """What `remove` returns."""
+    """The result of `remove`."""
 
     forces: Forces
     part: HeightField
@@ -38,9 +38,9 @@ class Removal:
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
     """Return the force that the cutter feels at every sample, from removing the stock along the motion.
 
-    Means over one spindle revolution (Altintas' linear edge model, or Kienzle), read where the sample stands
-    before its sweep is removed; feed per tooth from the predicted speed. ``issues`` name collisions and cuts
-    that tool or spindle cannot take, with their lines. Not predicted: run-out, chatter, dynamics.
+    Means over one spindle revolution (Altintas' linear edge model, or Kienzle), read at the place of the
+    sample before its sweep is removed; feed per tooth from the predicted speed. ``issues`` name collisions
+    and cuts that tool or spindle cannot take, with their lines. Not predicted: run-out, chatter, dynamics.
 
     Raises
     ------
@@ -53,16 +53,16 @@ def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
 
 
 def force_basis(toolpath: Toolpath, motion: Motion, cell: Cell) -> Floats:
-    """Return the force (m, 3, 6) along ``$BASE`` that each coefficient of the linear edge law brings.
+    """Return the force (m, 3, 6) along ``$BASE`` for a unit of each coefficient of the linear edge law.
 
-    The force is their sum, each times Ktc, Krc, Kac (N/mm²), Kte, Kre, Kae (N/mm). Errors as for `cut`.
+    The force is their sum, multiplied by Ktc, Krc, Kac (N/mm²), Kte, Kre, Kae (N/mm). Errors as for `cut`.
     """
     parts = [remove(toolpath, motion, cell, linear_edge_law(unit)).forces.force_base_N for unit in np.eye(6)]
     return np.stack(parts, axis=2)
 
 
 def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = None) -> Removal:
-    """Return what `cut` does, with the part that is left; ``law`` (8,) stands for that of the material."""
+    """Return the result of `cut` and the machined part; ``law`` (8,) replaces that of the material."""
     if cell.material is None:
         raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
     law = law_array(cell.material) if law is None else law
@@ -78,29 +78,37 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     programmed_f_z_mm = feed_per_tooth(np.where(rapid, 0.0, toolpath.feed_mm_s[row]), spindle, 1) / teeth
     position = np.ascontiguousarray(motion.position_mm @ to_field.T)
     field = height_field_of(toolpath, cell, to_field, tools, len(motion))
-    before = _as_it_is(field)
+    before = _uncut(field)
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
     engaged = engage(field, position, tool, wholly_rapid, f_z_mm, [_with_shank(one) for one in tools], law)
     overlap_mm = np.array(engaged.overlap_mm, dtype=np.float64)
     flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
     overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
-    # a rapid through material is a collision, which is found, and no cut
+    # a rapid through material is reported as a collision, and is not a cut
     force_N, moment_Nmm = (
         np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm)
     )
     forces = Forces(
         force_base_N=force_N @ to_field,
         moment_base_Nmm=moment_Nmm @ to_field,
-        peak_N=_peaks(engaged.phi_rad, engaged.a_p_mm, f_z_mm, engaged.ramp_rad, tool, tools, law,
-                      np.linalg.norm(force_N, axis=1)),
+        peak_N=_peaks(
+            engaged.phi_rad,
+            engaged.a_p_mm,
+            f_z_mm,
+            engaged.ramp_rad,
+            tool,
+            tools,
+            law,
+            np.linalg.norm(force_N, axis=1),
+        ),
         torque_Nmm=np.where(rapid, 0.0, engaged.torque_Nmm),
         a_p_mm=engaged.a_p_mm,
         a_e_mm=engaged.a_e_mm,
         phi_rad=engaged.phi_rad,
         tool=motion.tool,
         relative_band=cell.material.relative_band,
-    )  # fmt: skip
+    )
     steps = np.diff(position, axis=0, prepend=position[:1])
     seen = Cut(
         source_line=toolpath.source_line[row],
@@ -134,12 +142,12 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:
-    """Return the largest CDIS that tolerances ask for at corners of 90° and wider, or the cell's."""
-    asked = np.append(toolpath.tolerance_mm, cell.controller.tolerance_mm or 0.0)
-    return max(cell.controller.cdis_mm, _CDIS_OF_TOLERANCE * float(np.nanmax(asked)))
+    """Return the largest CDIS that tolerances need at corners of 90° and wider, or the cell's."""
+    tolerances = np.append(toolpath.tolerance_mm, cell.controller.tolerance_mm or 0.0)
+    return max(cell.controller.cdis_mm, _CDIS_OF_TOLERANCE * float(np.nanmax(tolerances)))
 
 
-def _as_it_is(field: HeightField) -> HeightField:
+def _uncut(field: HeightField) -> HeightField:
     """Return the field before it is cut; a block is one number."""
     low, high = field.height_mm.min(), field.height_mm.max()
     if low != high:
@@ -152,14 +160,19 @@ def no_forces(motion: Motion) -> Forces:
     """Return the Forces of a motion that cuts nothing."""
     count = len(motion)
     return Forces(
-        force_base_N=np.zeros((count, 3)), moment_base_Nmm=np.zeros((count, 3)), peak_N=np.zeros(count),
-        torque_Nmm=np.zeros(count), a_p_mm=np.zeros(count), a_e_mm=np.zeros(count),
-        phi_rad=np.full((count, _ARC_COLUMNS), np.nan), tool=motion.tool,
-    )  # fmt: skip
+        force_base_N=np.zeros((count, 3)),
+        moment_base_Nmm=np.zeros((count, 3)),
+        peak_N=np.zeros(count),
+        torque_Nmm=np.zeros(count),
+        a_p_mm=np.zeros(count),
+        a_e_mm=np.zeros(count),
+        phi_rad=np.full((count, _ARC_COLUMNS), np.nan),
+        tool=motion.tool,
+    )
 
 
 def _with_shank(tool: Tool) -> Tool:
-    """Return a tool whose edges reach a little up a cylindrical shank, so that cuts deeper than they show."""
+    """Return a tool whose edges reach a little up a cylindrical shank, so that deeper cuts become visible."""
     if tool.kind in ("tapered", "drill") or tool.flute_length_mm is None:
         return tool
     return tool.model_copy(update={"flute_length_mm": tool.flute_length_mm + _SHANK_MM})
@@ -172,9 +185,14 @@ def _set_up(motion: Motion) -> Floats:
     turned = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
     if np.abs(turned - axis).max() > 1e-6:
         raise RefusedError(
-            Issue("error", "axis-changes", 0, "the tool axis changes: material removal knows one direction",
-                  "split the program by its set-up directions")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "axis-changes",
+                0,
+                "the tool axis changes: material removal needs one direction",
+                "split the program by its set-up directions",
+            )
+        )
     if axis[2] > 1.0 - _SAME_AXIS:
         return np.eye(3)
     helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -184,9 +202,15 @@ def _set_up(motion: Motion) -> Floats:
 
 
 def _peaks(
-    phi_rad: Floats, a_p_mm: Floats, f_z_mm: Floats, ramp_rad: Floats, tool: Ints32,
-    tools: list[Tool], law: Floats, mean_N: Floats,
-) -> Floats:  # fmt: skip
+    phi_rad: Floats,
+    a_p_mm: Floats,
+    f_z_mm: Floats,
+    ramp_rad: Floats,
+    tool: Ints32,
+    tools: list[Tool],
+    law: Floats,
+    mean_N: Floats,
+) -> Floats:
     """Return the largest force of a revolution (m,), at least the mean; zero in air."""
     peak = np.zeros(len(a_p_mm))
     for number, one in enumerate(tools):

@@ -29,7 +29,7 @@ _METRES_MM = 1.0
 """A mesh smaller than this in every direction is taken to be in metres."""
 _LARGEST_MM = 20_000.0
 _COARSEST_OF_DIAMETER = 20.0
-"""Cells across the smallest tool below which a field is too coarse to mean anything."""
+"""Cells across the smallest tool below which a field is too coarse to be useful."""
 
 
 def height_field_of(
@@ -74,7 +74,7 @@ def _edges_mm(tool: Tool) -> float:
 
 
 def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:
-    """Return a block (2, 3) as a field whose cells of about ``cell_mm`` fill it without rest."""
+    """Return a block (2, 3) as a field whose cells of about ``cell_mm`` fill it exactly."""
     low, high = box_mm
     count = np.maximum(1, np.ceil((high[:2] - low[:2]) / cell_mm - 1e-9)).astype(np.int64)
     size = (high[:2] - low[:2]) / count
@@ -85,7 +85,7 @@ def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:
 def load_mesh(file: Path) -> "trimesh.Trimesh":
     """Return the mesh of a raw part in mm.
 
-    Raises `NotUnderstoodError` where there is no file, it is no mesh, it has holes or its unit is not mm.
+    Raises `NotUnderstoodError` where the file is missing, not a mesh, has holes or is not in mm.
     """
     if not file.is_file():
         raise input_error("file-unreadable", "cannot read the stock: no such file", REMEDY, source=str(file))
@@ -109,9 +109,10 @@ def load_mesh(file: Path) -> "trimesh.Trimesh":
 
 
 def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
-    """Return the mesh of a file that was looked through; raises `MeshError` where there is none in it.
+    """Return the mesh of a checked file; raises `MeshError` where it holds none.
 
-    From its bytes, so that it cannot name other files, and without a word of the reader's own.
+    It is read from bytes, so that it cannot refer to other files, and the reader's own warnings are
+    suppressed.
     """
     import trimesh
 
@@ -119,9 +120,9 @@ def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            warnings.simplefilter("error", DeprecationWarning)  # a text that is no number ends its reading
+            warnings.simplefilter("error", DeprecationWarning)  # text that is not a number ends its reading
             mesh: Any = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh")
-    except Exception as error:  # what a reader of a foreign format raises is not known
+    except Exception as error:  # a foreign reader may raise anything
         why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise MeshError(f"not a mesh: {why}") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
@@ -135,7 +136,7 @@ def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
 
 
 def to_mesh(field: HeightField, most_cells: int = 250_000) -> "trimesh.Trimesh":
-    """Return what is left as a closed mesh, in the frame of the field.
+    """Return the remaining material as a closed mesh, in the frame of the field.
 
     Its surface runs from cell middle to cell middle, so a wall leans by one cell. A field of more than
     ``most_cells`` cells is made coarser first (the highest of joined cells counts). Undercuts are filled.
@@ -203,7 +204,7 @@ def _turned_box(box: Floats, to_field: Floats) -> "trimesh.Trimesh":
 
 
 def _from_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> HeightField:
-    """Return the field of what is seen from above: each triangle raises the cells whose middle it covers."""
+    """Return the field of the surface from above: each triangle raises the cells whose middle it covers."""
     field = block(np.array(mesh.bounds), cell_mm)
     height = np.full(field.height_mm.shape, -np.inf)
     _raise_to(np.ascontiguousarray(mesh.triangles, dtype=np.float64), field.origin_mm, field.cell_mm, height)
@@ -235,7 +236,7 @@ def _raise_to(triangles: Floats, origin_mm: Floats, cell_mm: Floats, height: Flo
 
 
 def _resolution(bounds: Floats, tools: list[Tool], own_mm: float | None, per_diameter: float) -> float:
-    """Return the cell size: the user's, else a share of the smallest tool, if need be a larger one."""
+    """Return the cell size: the user's, else a fraction of the smallest tool, larger if necessary."""
     width, depth = (float(size) for size in bounds[1, :2] - bounds[0, :2])
     smallest = min(tool.diameter_mm for tool in tools)
     least = math.sqrt(max(width * depth, 1e-12) / MAX_CELLS)

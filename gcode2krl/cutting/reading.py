@@ -2,8 +2,8 @@
 
 The engagement of a sample is read at its own position, before its sweep is removed. The field lags a little
 behind the cutter (`edge.Cutters.lag_mm`): cells near the rim of the last sweeps would be read as cut or as
-uncut by chance. What has been cut since is evaluated exactly at each point that is read, and on a straight
-way that is nothing: no point in front of a convex cutter was inside it before.
+uncut by chance. The sweeps that the field does not show yet are evaluated exactly at each point that is read.
+On a straight path there are none: no point in front of a convex cutter was inside it before.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-untyped-calls=False
@@ -18,7 +18,7 @@ from gcode2krl.cutting.removal import remove_sweep
 from gcode2krl.cutting.sweep import FEEL_MM, cells_between, highest, outline_of
 from gcode2krl.cutting.walls import draw_walls, height_at
 
-_STRAIGHT = 0.03  # sine of the angle in plan below which a way counts as straight
+_STRAIGHT = 0.03  # sine of the angle in plan below which a path counts as straight
 _LEVEL = 0.15  # the same up or down, where it only moves the angle at which the chip begins
 _TURN = 2.0 * math.pi
 STRAIGHT_ON = 0.985
@@ -51,9 +51,10 @@ def cut_strip(
 ):
     """Cut all samples one after the other; read those whose coordinate `axis` lies in [low, high).
 
-    Sweeps farther than ``reach_mm`` from there are left out: the field outside is another strip's. What a
-    sample reads depends on the samples before it alone, not on how the field is divided. ``index`` is that
-    of `removal.remove_sweep`, ``work`` a `new_work`; ``rapid_mm`` (n,) gets the height that rapids cut off.
+    Sweeps farther than ``reach_mm`` from there are left out: the field outside is another strip's. The
+    reading of a sample depends only on the samples before it, not on how the field is divided. ``index`` is
+    as in `removal.remove_sweep`, ``work`` a `new_work`; ``rapid_mm`` (n,) gets the height that rapids cut
+    off.
     """
     n = len(way_mm)
     done, lag, tool = 0, 0, -1
@@ -140,7 +141,7 @@ def _read(grid, path, cutters, law, f_z_mm, i, lag, work, result):
 
 @kernel
 def _step(position, first, i):
-    """Return the way that leads to sample i, and its length; zero where none does."""
+    """Return the step that leads to sample i, and its length; zero where there is none."""
     if i >= first.size or first[i]:
         return 0.0, 0.0, 0.0, 0.0
     dx, dy = position[i, 0] - position[i - 1, 0], position[i, 1] - position[i - 1, 1]
@@ -150,9 +151,9 @@ def _step(position, first, i):
 
 @kernel
 def _heading(position, first, i):
-    """Return the direction of the way at a sample: unit vector in plan, sine and cosine of the descent.
+    """Return the direction of the path at a sample: unit vector in plan, sine and cosine of the descent.
 
-    From the sample before to the one after; from the one before only where the way has a corner or ends.
+    From the sample before to the one after; only from the one before where the path has a corner or ends.
     """
     bx, by, bz, before = _step(position, first, i)
     ax, ay, az, after = _step(position, first, i + 1)
@@ -171,7 +172,7 @@ def _heading(position, first, i):
 
 @kernel
 def _recent(position, i, lag, dx, dy, dz, recent):
-    """List the sweeps that the field does not show yet and that were not on a straight way to sample i.
+    """List the sweeps that the field does not show yet and that were not on a straight path to sample i.
 
     The sweep that ends at the sample itself is not one of them: its engagement comes before its removal.
     """

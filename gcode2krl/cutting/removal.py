@@ -26,7 +26,7 @@ from gcode2krl.cutting.sweep import (
     refresh,
 )
 
-_REFRESH = 48  # visits after which the bound of a block is looked up again
+_REFRESH = 48  # visits after which the bound of a block is computed again
 
 
 @kernel
@@ -59,7 +59,7 @@ def remove_sweep(grid, path, k, index):
     else:
         length, az = 0.0, min(az, bz)
     chained = k > 1 and not path.first[k - 1]
-    behind = -math.inf  # what lies farther back was cut when the cutter stood at the start
+    behind = -math.inf  # cells farther back were cut when the cutter was at the start
     if chained and length > 0.0:
         behind = 0.0 if slope >= 0.0 else sink * radius if kind == BALL else -radius
     hollow = chained and length > 0.0 and kind == FLAT and slope >= 0.0  # the whole disc at the start was cut
@@ -102,7 +102,7 @@ def remove_sweep(grid, path, k, index):
 
 @kernel
 def _visit(height, bound, visits, ja, jb, ia, ib):
-    """Count a visit of every block of a range of cells; now and then look its bound up."""
+    """Count a visit of every block of a range of cells; refresh its bound every `_REFRESH` visits."""
     for i in range(ia // BLOCK, (ib - 1) // BLOCK + 1):
         for j in range(ja // BLOCK, (jb - 1) // BLOCK + 1):
             visits[i, j] += 1
@@ -148,7 +148,7 @@ def _lower_to(height, wall, i, ja, jb, z):
 
 @kernel
 def _lower_ramp(height, wall, i, ja, jb, begin, index, start, z, slope, length, radius):
-    """Lower cells below a flat cutter that rises or sinks: as where it reaches or leaves a cell."""
+    """Lower cells below a flat cutter that rises or sinks: its height where it reaches or leaves a cell."""
     u, v, du, dv = np.float32(start[0]), np.float32(start[1]), np.float32(start[2]), np.float32(start[3])
     z, rise, length = np.float32(z), np.float32(slope), np.float32(length)
     square, zero = np.float32(radius * radius), np.float32(0.0)
@@ -170,7 +170,7 @@ def _lower_ramp(height, wall, i, ja, jb, begin, index, start, z, slope, length, 
 
 @kernel
 def _lower_ball(height, wall, i, ja, jb, begin, index, start, z, slope, sink, length, radius):
-    """Lower cells below a ball: its lowest point over a cell belongs to the nearest point of its way."""
+    """Lower cells below a ball: its lowest point over a cell belongs to the nearest point of its path."""
     u, v, du, dv = np.float32(start[0]), np.float32(start[1]), np.float32(start[2]), np.float32(start[3])
     centre, slope, sink = np.float32(z + radius), np.float32(slope), np.float32(sink)
     length, square, zero, far = (
@@ -261,7 +261,7 @@ def _height32(square, shape):
 
 @kernel
 def _measure(height, i, ja, jb, begin, start, z, slope, length, outline):
-    """Return the largest height that a sweep cuts off a row."""
+    """Return the largest height that a sweep cuts off in a row of cells."""
     worst = 0.0
     for j in range(ja, jb):
         along, beside = start[0] + (j - begin) * start[2], start[1] + (j - begin) * start[3]

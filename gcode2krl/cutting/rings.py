@@ -1,6 +1,6 @@
 """Material along a ring of the cutter, before the sweep that is about to cut it: compiled.
 
-A ring is the circle that a point of the edge turns on; it is read in bins. Loops over bins have no branches
+A ring is the circle on which a point of the edge turns; it is read in bins. Loops over bins have no branches
 and unsigned indices (signed ones would be tried for negative), so that the compiler takes eight bins at once.
 """
 
@@ -32,7 +32,7 @@ def tops_on_ring(place, shift, height, wall, x, y, r, first, after, east, north,
 
 @kernel
 def correct_at_walls(grid, path, x, y, r, level, first, after, east, north, tops, above):
-    """Replace the tops, and what is above a level, of cells with a wall by those of the point's side."""
+    """Replace the tops of cells with a wall, and what is above a level, by those of the point's side."""
     place, shift, height, wall, position = grid.place, grid.shift, grid.height, grid.wall, path.position_mm
     for j in range(first, after):
         qx, qy = x + r * east[j], y + r * north[j]
@@ -60,8 +60,8 @@ def take_off_recent(position, outline, x, y, r, level, first, after, past, east,
 def stand_above_cutter(place, outline, x, y, z, r, level, first, after, east, north, tops, above):
     """Write how far the tops stand above the cutter's surface.
 
-    A cell's height is that of its middle: exact against the cutter's surface there, which also is the better
-    figure for a layer so thin that it is parallel to the cutter.
+    A cell's height is that of its middle, so it is compared with the cutter's surface there. This is also
+    better for a layer so thin that it is parallel to the cutter.
     """
     ax, ay, rx, ry = (x - place[0]) / place[2], (y - place[1]) / place[3], r / place[2], r / place[3]
     dx, dy, radius, bottom, corner = place[2], place[3], outline[0], outline[1], outline[2]

@@ -1,4 +1,4 @@
-"""Force of one tooth while it sweeps an arc, per mm of engaged edge: the integral every mean is a sum of.
+"""Force of one tooth while it sweeps an arc, per mm of engaged edge: the integral behind all means.
 
 The angle phi runs from the feed normal in the sense of rotation of a right-hand cutter (clockwise seen from
 the holder): the tooth stands at (sin phi, cos phi) in (feed, normal). The edge angle kappa is 90° on a
@@ -16,9 +16,9 @@ from numba import njit
 LINEAR_EDGE = 0.0
 KIENZLE = 1.0
 NOT_ENGAGED = 1e-6
-"""Below this share of the feed per tooth an edge only slides along the wall: rounding of a direction."""
+"""A chip below this fraction of the feed per tooth is rounding of a direction: the edge only slides along."""
 _TURN = 2.0 * math.pi
-_SHARP_RAD = 1e-3  # a straight edge is spread over so much, so that one rule holds for all
+_SHARP_RAD = 1e-3  # a straight edge is spread over this angle, so that one rule applies to all
 _CORNER_EDGES = 4  # a peak is for warnings: four edges on a corner are within 1 %
 _EDGES = _CORNER_EDGES + 3
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -69,7 +69,7 @@ def arc_force(phi_a, phi_b, sin_kappa, cos_kappa, f_z_mm, sin_gamma, cos_gamma, 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out):
-    """Add the integral over an arc on which h = swing·sin phi + offset is nowhere negative."""
+    """Add the integral over an arc on which h = swing·sin phi + offset is not negative."""
     if law[0] == LINEAR_EDGE:
         _linear_edge(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out)
     else:
@@ -98,7 +98,7 @@ def _linear_edge(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _kienzle(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out):
-    """Gauss-Legendre quadrature of F_t = kc11·h^(1 - mc)·db; radial and axial are shares of it."""
+    """Gauss-Legendre quadrature of F_t = kc11·h^(1 - mc)·db; radial and axial are fractions of it."""
     half, middle = 0.5 * (b - a), 0.5 * (b + a)
     one, sin, cos = 0.0, 0.0, 0.0
     for node in range(_NODES.size):
@@ -123,8 +123,7 @@ def mean_rows(phi_rad, a_p_mm, f_z_mm, ramp_rad, teeth, shape, law, out):
     """Write the mean feed, normal and axial force in N and the torque in N·mm, ``out`` (n, 4), of n samples.
 
     ``phi_rad`` (n, 2k) arcs, NaN pairs are none · ``a_p_mm``, ``f_z_mm``, ``ramp_rad`` (n,) · ``shape`` (5,)
-    and
-    ``law`` (8,) as of `cutter.Shape.array` and `arc_force`. The arcs hold for every edge below a_p.
+    and ``law`` (8,) as of `cutter.Shape.array` and `arc_force`. The arcs apply to every edge below a_p.
     """
     part = np.empty(4)
     for row in range(out.shape[0]):
@@ -191,8 +190,8 @@ def _edge(arcs, sin_kappa, cos_kappa, width, radius, chip, law, part, total):
 def peak_rows(phi_rad, a_p_mm, f_z_mm, ramp_rad, teeth, lag_rad_mm, shape, law, out):
     """Write the largest force in N, ``out`` (n,), on all teeth together over a revolution, helix included.
 
-    ``lag_rad_mm``: how much an edge lags behind the tip per mm of height. Sampled where a whole tooth is in
-    the cut and where one begins to leave it (what jumps, jumps there) and every 15° or closer.
+    ``lag_rad_mm``: how much an edge lags behind the tip per mm of height. Sampled every 15° or
+    closer, and where a whole tooth is in the cut or begins to leave it, which is where the force jumps.
     """
     edges, force, part = np.empty((_EDGES, 5)), np.empty(3), np.empty(4)
     pitch = _TURN / teeth
@@ -220,13 +219,13 @@ def peak_rows(phi_rad, a_p_mm, f_z_mm, ramp_rad, teeth, lag_rad_mm, shape, law, 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _teeth(arcs, angle, pitch, lag, count, edges, chip, law, part, force):
-    """Set the force on all teeth, a tip at an angle and a pitch apart: each edge spreads over the arc of its
-    lag."""
+    """Set the force on all teeth, one tip at an angle, the others a pitch apart; each edge spreads over the
+    arc of its lag."""
     force[0], force[1], force[2] = 0.0, 0.0, 0.0
     for edge in range(count):
         high = angle - lag * edges[edge, 3]
         low = min(angle - lag * edges[edge, 4], high - _SHARP_RAD)
-        share = edges[edge, 2] / (high - low)
+        density = edges[edge, 2] / (high - low)
         for arc in range(0, arcs.size - 1, 2):
             start, end = arcs[arc], arcs[arc + 1]
             if not end > start:
@@ -236,9 +235,9 @@ def _teeth(arcs, angle, pitch, lag, count, edges, chip, law, part, force):
                 a, b = max(low - ahead, start), min(high - ahead, end)
                 part[0], part[1], part[2], part[3] = 0.0, 0.0, 0.0, 0.0
                 arc_force(a, b, edges[edge, 0], edges[edge, 1], chip[0], chip[1], chip[2], law, part)
-                force[0] += share * part[0]
-                force[1] += share * part[1]
-                force[2] += share * part[2]
+                force[0] += density * part[0]
+                force[1] += density * part[1]
+                force[2] += density * part[2]
                 ahead += pitch
 
 
@@ -253,7 +252,7 @@ def _list_edges(depth, gamma, shape, edges):
         count += 1
     if corner > 0.0:
         reach = kappa if depth >= arc_top else math.acos(1.0 - depth / corner)
-        lowest = min(max(-gamma, 0.0), reach)  # up-hill, what lies flatter than the path never cuts
+        lowest = min(max(-gamma, 0.0), reach)  # up-hill, edges flatter than the path never cut
         step = (reach - lowest) / _CORNER_EDGES
         for i in range(_CORNER_EDGES):
             begin = lowest + i * step

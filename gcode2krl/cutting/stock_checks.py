@@ -1,4 +1,4 @@
-"""What the raw part tells of a program: cut from the first position on, never touched, cut through, too deep.
+"""Findings from the raw part: entered by the approach, never touched, cut through, holder below its top.
 
 Findings about a stated raw part are errors, about a guessed one warnings.
 """
@@ -17,9 +17,9 @@ from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.errors import Issue
 
 _CONTACT_MM = 0.01
-"""Less is rounding of path and cells."""
+"""Less contact is rounding of path and cells."""
 _CHORDS_RAD = np.array([0.17, 0.48, 0.79, 1.09, 1.40])
-"""Corners, in the first quadrant, of the rectangles that stand for a circle; none reaches beyond it."""
+"""Corners, in the first quadrant, of the rectangles that represent a circle; none extends beyond it."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Work:
 
 
 def stock_findings(work: Work, stock: Stock | None, before: HeightField, engaged: Bools) -> Iterator[Issue]:
-    """Yield what the raw part ``before`` the first cut says; ``engaged`` (m,) is where material was met."""
+    """Yield the findings from the raw part ``before`` the first cut; ``engaged`` (m,) is True in material."""
     yield from _approach(work, before)
     yield from _above_edges(work, before)
     if before.guessed or stock is None:
@@ -55,7 +55,7 @@ def stock_findings(work: Work, stock: Stock | None, before: HeightField, engaged
 
 
 def _approach(work: Work, before: HeightField) -> Iterator[Issue]:
-    """The program reaches its first position by a rapid from the clearance plane."""
+    """Yield an error if the approach, a rapid from the clearance plane, ends in material."""
     if not len(work.position_mm):
         return
     depth_mm = standing_mm(before, work.position_mm[0], work.tools[work.tool[0]])
@@ -70,7 +70,7 @@ def _approach(work: Work, before: HeightField) -> Iterator[Issue]:
 
 
 def standing_mm(field: HeightField, tip_mm: Floats, tool: Tool) -> float:
-    """Return how far a tool that stands at a tip position (3,) is in the material of a field, 0 in air."""
+    """Return how far a tool at a tip position (3,) is in the material of a field, 0 in air."""
     radii, heights = outline(tool)
     reach = float(radii[-1])
     (j0, j1), (i0, i1) = (field.cells(axis, tip_mm[axis] - reach, tip_mm[axis] + reach) for axis in (0, 1))
@@ -85,11 +85,11 @@ def standing_mm(field: HeightField, tip_mm: Floats, tool: Tool) -> float:
 
 
 def _above_edges(work: Work, before: HeightField) -> Iterator[Issue]:
-    """Where the holder, or the spindle's nose, is below the top and its width is not known."""
+    """Yield where the holder or the spindle's nose goes below the top and its width is not known."""
     top_mm = float(before.height_mm.max(initial=-np.inf))
     for row, (tool, number) in enumerate(zip(work.tools, work.numbers, strict=True)):
         if tool.stick_out_mm is not None and tool.holder_diameter_mm is not None:
-            continue  # the removal of material looks whether it touches
+            continue  # the removal of material checks whether it touches
         reach_mm = tool.stick_out_mm if tool.stick_out_mm is not None else tool.length_mm
         if reach_mm is None:
             continue
@@ -136,7 +136,7 @@ def _underside(work: Work, stock: Stock, before: HeightField) -> Iterator[Issue]
 
 
 class Footprint:
-    """Tells whether a cutter stands over marked cells of a field, from sums over rectangles."""
+    """Tells whether a cutter is over marked cells of a field, from sums over rectangles."""
 
     def __init__(self, field: HeightField, mask: Bools) -> None:
         self.field = field
@@ -145,18 +145,18 @@ class Footprint:
 
     def below(self, position_mm: Floats, radius_mm: float) -> Bools:
         """Return (n,) True where marked cells lie within the radius of a position (n, 3), seen from above."""
-        found = np.zeros(len(position_mm), dtype=np.bool_)
+        is_over = np.zeros(len(position_mm), dtype=np.bool_)
         for angle in _CHORDS_RAD:
             half = radius_mm * np.array([np.cos(angle), np.sin(angle)])
             (j0, j1), (i0, i1) = (self._cells(position_mm[:, k], half[k], k) for k in (0, 1))
             s = self.sums
-            found |= s[i1, j1] - s[i0, j1] - s[i1, j0] + s[i0, j0] > 0
-        return found
+            is_over |= s[i1, j1] - s[i0, j1] - s[i1, j0] + s[i0, j0] > 0
+        return is_over
 
     def _cells(
         self, middle_mm: Floats, half_mm: float, axis: int
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the first cell whose middle is within ``half_mm`` and the one behind the last, (n,) each."""
+        """Return the first cell whose middle is within ``half_mm`` and the one after the last, (n,) each."""
         origin, size = self.field.origin_mm[axis], self.field.cell_mm[axis]
         count = self.sums.shape[1 - axis] - 1
         first = np.clip(np.ceil((middle_mm - half_mm - origin) / size - 0.5), 0, count)

@@ -1,6 +1,6 @@
-"""What one sweep of a cutter leaves, at one point; and the grid it is cut out of, as the kernels see it.
+"""The height that one sweep of a cutter leaves at a point, and the grid it is cut out of.
 
-A sweep is what the cutter passes on the straight way between two samples.
+A sweep is the volume that the cutter passes through on the straight line between two samples.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-untyped-calls=False
@@ -15,9 +15,9 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cutting.kernels import kernel
 
 LANES = np.uintp(16)
-"""Cells that a compiled loop takes at once; so many columns of a grid are spare."""
+"""Cells that a compiled loop takes at once; a grid has as many spare columns."""
 BLOCK = 32
-"""Cells along one side of a block that shares one bound of its height."""
+"""Cells along one side of a block with a common bound of its height."""
 FEEL_MM = 1e-3
 """Material thinner than this is rounding of the path, not material."""
 FLAT, BALL, OTHER = 0.0, 1.0, 2.0
@@ -57,17 +57,22 @@ class Path(NamedTuple):
     """(t, 7) radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
 
 
-# Small functions take numbers and the few arrays they need: to hand on a whole `Grid` costs more than they
-# do.
+# Small functions take numbers and the few arrays they need: passing a whole `Grid` costs more than the
+# function itself.
 
 
 @kernel
 def outline_of(outlines, tool):
     """Return a row of `Path.outlines` as numbers."""
     return (
-        outlines[tool, 0], outlines[tool, 1], outlines[tool, 2], outlines[tool, 3],
-        outlines[tool, 4], outlines[tool, 5], outlines[tool, 6],
-    )  # fmt: skip
+        outlines[tool, 0],
+        outlines[tool, 1],
+        outlines[tool, 2],
+        outlines[tool, 3],
+        outlines[tool, 4],
+        outlines[tool, 5],
+        outlines[tool, 6],
+    )
 
 
 @kernel
@@ -81,7 +86,7 @@ def outline_height(r, outline):
 
 @kernel
 def nearest(position, first, last, x, y):
-    """Return distance, share and height of the nearest point, in plan, between two samples."""
+    """Return distance, fraction and height of the nearest point, in plan, between two samples."""
     ax, ay, az = position[first, 0], position[first, 1], position[first, 2]
     ux, uy, uz = position[last, 0] - ax, position[last, 1] - ay, position[last, 2] - az
     square = ux * ux + uy * uy
@@ -148,7 +153,7 @@ def highest(place, shift, bound, x_low, x_high, y_low, y_high):
 
 @kernel
 def refresh(height, bound, i, j):
-    """Look up the bound of a block again."""
+    """Compute the bound of a block again."""
     top = np.float32(-np.inf)
     for row in range(i * BLOCK, min((i + 1) * BLOCK, height.shape[0])):
         for column in range(j * BLOCK, min((j + 1) * BLOCK, height.shape[1])):

@@ -1,4 +1,4 @@
-"""Cuts that a tool of its kind is not made for: a drill sideways, a mill straight down too fast."""
+"""Cuts that a kind of tool is not made for: a drill sideways, a mill straight down too fast."""
 
 from collections.abc import Iterator
 
@@ -15,34 +15,39 @@ STEEP_RAD = np.deg2rad(20.0)
 _FLAT_RAD = np.deg2rad(60.0)
 """Descent, and rise, below which a drill goes sideways: assumed."""
 _MET_MM = 0.1
-"""Less material below the tool is what a pass before has left."""
+"""Less material below the tool is the rest of an earlier pass."""
 _PLUNGE_MM, _PLUNGE_OF_DIAMETER = 0.1, 0.015
 """Feed per tooth straight down that a mill in metal takes: assumed, three times what makers of end mills
 advise, a third to a half of 0.005 to 0.01 of the diameter."""
 _SOFTER = 3.0
-"""How much faster a mill goes down in wood and foam: assumed."""
+"""How much faster a mill may plunge in wood and foam: assumed."""
 
 
 def uses(
-    line: Ints32, rapid: Bools, f_z_mm: Floats, ramp_rad: Floats, centre_mm: Floats,
-    forces: Forces, cell: Cell,
-) -> Iterator[Issue]:  # fmt: skip
-    """Yield one warning a tool: the first place where it cuts as its kind does not.
+    line: Ints32,
+    rapid: Bools,
+    f_z_mm: Floats,
+    ramp_rad: Floats,
+    centre_mm: Floats,
+    forces: Forces,
+    cell: Cell,
+) -> Iterator[Issue]:
+    """Yield one warning for each tool: the first place with a cut that its kind is not made for.
 
-    Of each sample (m,): G-code line, rapid or not, programmed feed per tooth, descent, and the material below
-    the tool's middle.
+    The columns (m,) hold G-code line, rapid or not, programmed feed per tooth, descent, and the material
+    below the tool's middle.
     """
     engaged = np.isfinite(forces.phi_rad[:, 0]) & ~rapid
     for number in np.unique(forces.tool).tolist():
-        tool, own = cell.tool[number], engaged & (forces.tool == number)
+        tool, with_tool = cell.tool[number], engaged & (forces.tool == number)
         if tool.kind == "drill":
-            wrong = own & (np.abs(ramp_rad) < _FLAT_RAD) & (forces.a_p_mm > _MET_MM)
+            wrong = with_tool & (np.abs(ramp_rad) < _FLAT_RAD) & (forces.a_p_mm > _MET_MM)
             if wrong.any():
                 yield _sideways(number, int(line[np.argmax(wrong)]))
             continue
         most_mm = plunge_limit_mm(tool, cell.material)
         down_mm = f_z_mm * np.sin(ramp_rad)
-        wrong = own & (ramp_rad > STEEP_RAD) & (centre_mm > _MET_MM) & (down_mm > most_mm)
+        wrong = with_tool & (ramp_rad > STEEP_RAD) & (centre_mm > _MET_MM) & (down_mm > most_mm)
         if wrong.any():
             row = int(np.argmax(wrong))
             yield _fast_plunge(number, tool, float(down_mm[row]), most_mm, int(line[row]))

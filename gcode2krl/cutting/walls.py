@@ -1,6 +1,6 @@
-"""Walls inside cells: drawn by the sweeps that leave them, read to a small part of a cell.
+"""Walls inside cells: drawn by the sweeps that leave them, read to a small fraction of a cell.
 
-A cell knows the height over its middle only; where the upright wall of a sweep runs through it, the number of
+A cell holds only the height over its middle; where the upright wall of a sweep runs through it, the number of
 that sweep is noted in `Grid.wall`, and a point of the cell is looked up on the side of the wall where it
 lies.
 """
@@ -24,7 +24,7 @@ from gcode2krl.cutting.sweep import (
 )
 
 WALL_SLACK = 0.05
-"""Cells by which a wall counts as cut: sweeps are chords, and joints of chords stand back a little."""
+"""Distance in cells within which a wall counts as cut: sweeps are chords, whose joints recede a little."""
 
 
 @kernel
@@ -106,7 +106,7 @@ def draw_walls(grid, path, k, after):
         (bx - ax) * (next_x - bx) + (by - ay) * (next_y - by),
     )
     if dot > 0.0 and abs(cross) * radius < 0.5 * grid.place[2] * dot:
-        return  # straight on, as far as a cell can tell
+        return  # straight on, within the resolution of a cell
     came, goes = math.atan2(by - ay, bx - ax), math.atan2(next_y - by, next_x - bx)
     start, stop = came - quarter, came + quarter
     if length == 0.0:
@@ -151,7 +151,7 @@ def _draw_round(grid, path, k, x, y, radius, floor, start, stop):
 
 @inlined
 def _draw_cell(grid, path, k, row, column, floor, nx, ny):
-    """Note the wall of sweep k in a cell, unless nothing stands behind it or a deeper one is there."""
+    """Note the wall of sweep k in a cell, unless there is no material behind it or a deeper wall is there."""
     x, y = grid.place[0] + (column + 0.5) * grid.place[2], grid.place[1] + (row + 0.5) * grid.place[3]
     column, row = column - grid.shift[1], row - grid.shift[0]
     if 0 <= column < grid.height.shape[1] and 0 <= row < grid.height.shape[0]:

@@ -1,7 +1,7 @@
-"""Writing several files that belong together, all or none; never over an input, nothing half-written left.
+"""Writing several files that belong together, all or none; never over an input, no half-written file left.
 
 All are written beside their places first, then renamed. What a killed run left beside them is removed by the
-next run that writes the same files: the names tell host and process.
+next run that writes the same files: their names state host and process.
 """
 
 import contextlib
@@ -19,12 +19,12 @@ from pathlib import Path
 from gcode2krl.errors import NotUnderstoodError, input_error
 
 Content = bytes | Callable[[Path], object]
-"""What a file holds, or what writes it to a path."""
+"""The content of a file, or a function that writes it to a path."""
 SURELY_LEFT_S = 86400.0
-"""No run writes a file for a day: one that old is a leftover, whoever wrote it."""
+"""No run takes a day to write a file: an older temporary file is a leftover of whatever process."""
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"
 _MOST_INPUTS = 10_000
-"""Files of an input folder that outputs are compared with."""
+"""Most files of an input folder that outputs are compared with."""
 
 
 def write_together(files: Mapping[Path, Content], inputs: Iterable[str | Path] = ()) -> None:
@@ -65,7 +65,7 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[str | Path]) -> None
     seen: dict[str, Path] = {}
     existing: list[Path] = []
     for output in outputs:
-        name = str(output.parent.resolve() / output.name).casefold()  # Windows knows no case
+        name = str(output.parent.resolve() / output.name).casefold()  # Windows ignores case
         other = seen.setdefault(name, output)
         if other is not output:
             sentence = f"{output.name} would be written twice, with different content"
@@ -103,7 +103,7 @@ def _is_same(output: Path, file: Path) -> bool:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if its parent exists; raises `NotUnderstoodError` where that cannot be."""
+    """Make a folder if its parent exists; raises `NotUnderstoodError` where that is not possible."""
     try:
         folder.mkdir(exist_ok=True)
     except FileExistsError:
@@ -125,21 +125,21 @@ def unwritable(target: Path, why: str) -> NotUnderstoodError:
 
 
 def leftovers(target: Path) -> list[Path]:
-    """Return what runs that live no more have left of writing a file."""
+    """Return the temporary files of a target that dead processes have left."""
     pattern = re.compile(
         rf"\.{re.escape(target.name)}\.(?:([0-9a-f]{{8}})-(\d+)-)?[0-9a-z_]{{8}}\.(?:part|old)"
     )
-    found = []
+    leftover = []
     with contextlib.suppress(OSError):
         for file in target.parent.iterdir():
             match = pattern.fullmatch(file.name)
             if match and _is_left(file, match[1], match[2]):
-                found.append(file)
-    return found
+                leftover.append(file)
+    return leftover
 
 
 def _is_left(file: Path, host: str | None, process: str | None) -> bool:
-    """Tell whether nobody writes a file any more; one of another host only by its age."""
+    """Tell whether a temporary file is a leftover; a file of another host is judged by its age."""
     if host == _HOST and process is not None and int(process) != os.getpid() and not _lives(int(process)):
         return True
     with contextlib.suppress(OSError):
@@ -148,7 +148,7 @@ def _is_left(file: Path, host: str | None, process: str | None) -> bool:
 
 
 def _lives(process: int) -> bool:
-    """Tell whether a process of this host lives, or may."""
+    """Tell whether a process of this host is alive, or may be."""
     if sys.platform == "win32":
         import ctypes
 
@@ -173,7 +173,7 @@ def _lives(process: int) -> bool:
 
 
 def _keep(target: Path, place: Path) -> Path:
-    """Keep a file under a second name: a hard link, or a copy where the disk knows none."""
+    """Keep a file under a second name: a hard link, or a copy where the disk has no links."""
     try:
         place.hardlink_to(target)
     except (OSError, NotImplementedError):

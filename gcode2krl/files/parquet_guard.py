@@ -1,8 +1,8 @@
-"""What a Parquet file says of itself, checked against its size before a library allocates by it.
+"""Checks what a Parquet file announces against its size, before a library allocates memory for it.
 
 A damaged or made-up footer may announce 10¹⁸ rows; a reader that believes it asks for as much memory, and the
-process ends. So the footer and the header of every page are read here first, by a reader that allocates by
-what is there: Parquet format 2.9 (parquet.thrift), written in Thrift's compact protocol.
+process ends. So the footer and the header of every page are read here first, by a reader that allocates no
+more than the file holds: Parquet format 2.9 (parquet.thrift), written in Thrift's compact protocol.
 """
 
 import os
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 MAGIC = b"PAR1"
 LARGEST_FOOTER = 64_000_000
 MOST_TIMES_SIZE = 200
-"""Decoded, a table takes at most so many times its file, our choice: ours take 2 to 10 times it."""
+"""Largest size of a decoded table over that of its file, our choice: our own tables take 2 to 10 times."""
 SMALL_BYTES = 64_000_000
-"""Less than this is read whatever the file's size: a constant column takes no room at all in the file."""
+"""A smaller table is read whatever the size of its file: a constant column takes almost no room there."""
 _DEEPEST = 12
 _PAGE_HEADER = 65_536
 _WIDTH = {0: 1, 1: 4, 2: 8, 3: 12, 4: 4, 5: 8, 6: 16, 7: 16}
@@ -31,7 +31,7 @@ _DATA, _INDEX, _DICTIONARY, _DATA_2 = range(4)
 
 
 class DamagedError(ValueError):
-    """The file is no whole Parquet file; the text says why, in words without the file's name."""
+    """The file is not a whole Parquet file; the text says why, without the file's name."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Outline:
 def outline_of(file: Path) -> Outline:
     """Return rows and columns of a Parquet file; raises `DamagedError`, or `OSError` where it is unreadable.
 
-    Checked are: both magic words, the length of the footer, that each column of each group of rows lies in
+    Checks both magic words, the length of the footer, that each column of each group of rows lies in
     the file and has as many values as there are rows, that each page lies in its column, and that the
     decoded table is not out of all proportion to the file.
     """
@@ -75,7 +75,7 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> "pl.DataFr
     rows = outline_of(file).rows
     wanted = None if columns is None else list(columns)
     try:
-        with _panics_unsaid():
+        with _silenced_panics():
             frame = pl.read_parquet(file, columns=wanted, use_statistics=False)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         why = str(error).splitlines() or [type(error).__name__]
@@ -86,8 +86,8 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> "pl.DataFr
 
 
 @contextmanager
-def _panics_unsaid() -> Iterator[None]:
-    """Keep back what a panic writes to standard error by itself; anything else is said afterwards."""
+def _silenced_panics() -> Iterator[None]:
+    """Suppress what a panic itself writes to standard error; anything else is written afterwards."""
     try:
         before = os.dup(2)
     except OSError:  # there is no standard error
@@ -105,19 +105,19 @@ def _panics_unsaid() -> Iterator[None]:
             os.dup2(before, 2)
             os.close(before)
             words.seek(0)
-            if not panicked and (said := words.read()):
-                os.write(2, said)
+            if not panicked and (output := words.read()):
+                os.write(2, output)
 
 
 def _footer(stream: BinaryIO, size: int) -> dict[int, Any]:
     if size < 12:
-        raise DamagedError(f"a file of {size} bytes is no Parquet file")
+        raise DamagedError(f"a file of {size} bytes is not a Parquet file")
     stream.seek(0)
     head = stream.read(4)
     stream.seek(size - 8)
     tail = stream.read(8)
     if head != MAGIC or tail[4:] != MAGIC:
-        raise DamagedError("no Parquet file, or cut off: PAR1 is missing at its start or end")
+        raise DamagedError("not a Parquet file, or cut off: PAR1 is missing at its start or end")
     length = int.from_bytes(tail[:4], "little")
     if length > min(size - 12, LARGEST_FOOTER):
         raise DamagedError(f"a footer of {length} bytes in a file of {size}")
@@ -130,22 +130,22 @@ def _columns(footer: dict[int, Any]) -> dict[str, str]:
     elements = [_struct(element) for element in _list(footer, 2)]
     if not elements:
         raise DamagedError("a footer without a schema")
-    found: dict[str, str] = {}
+    types: dict[str, str] = {}
     at = 1
     for _ in range(_whole(elements[0], 5, 0)):
         if at >= len(elements):
             raise DamagedError("the schema is cut off")
         name, nested = _text(elements[at], 4), _whole(elements[at], 5, 0) > 0
-        if name in found:
+        if name in types:
             raise DamagedError(f"column {name[:40]!r} is there twice")
-        found[name] = "nested" if nested else _type_name(elements[at])
-        at = _behind(elements, at)
+        types[name] = "nested" if nested else _type_name(elements[at])
+        at = _index_after(elements, at)
     if at != len(elements):
         raise DamagedError("the schema has more columns than it announces")
-    return found
+    return types
 
 
-def _behind(elements: list[dict[int, Any]], at: int) -> int:
+def _index_after(elements: list[dict[int, Any]], at: int) -> int:
     """Return the index behind an element and all below it."""
     open_ = 1
     while open_:
@@ -244,7 +244,7 @@ def _struct(value: Any) -> dict[int, Any]:
 
 
 class _Thrift:
-    """Thrift's compact protocol: as much of it as Parquet has, bounded by the bytes that are there."""
+    """Thrift's compact protocol: the part that Parquet uses, bounded by the bytes of the file."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at = data, 0
@@ -253,13 +253,13 @@ class _Thrift:
         """Return field number → value."""
         if depth > _DEEPEST:
             raise DamagedError("records nested too deeply")
-        found: dict[int, Any] = {}
+        record: dict[int, Any] = {}
         number = 0
         while (head := self._byte()) != 0:
             delta, kind = head >> 4, head & 15
             number = number + delta if delta else self._signed()
-            found[number] = self._value(kind, depth) if kind > 2 else kind == 1
-        return found
+            record[number] = self._value(kind, depth) if kind > 2 else kind == 1
+        return record
 
     def _value(self, kind: int, depth: int) -> Any:
         if kind in (1, 2):  # in a list; in a record it is the field's kind itself

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 LARGEST_BYTES = 16_000_000
-"""Read in 7 s; of findings and events these are more than 100,000."""
+"""Read in 7 s; it holds more than 100,000 findings and events."""
 _NAME = r"(?:[\w-]+|\"[^\"\n]*\"|'[^'\n]*')"
 _DEEP_KEY = re.compile(rf"(?<![\w-]){_NAME}(?:[ \t]*\.[ \t]*{_NAME}){{32}}")
-"""A key of 33 names: a reader takes them one below the other, in the square of the time."""
+"""A key of 33 names: the time of a reader grows with the square of their number."""
 
 
 class NotTomlError(ValueError):
-    """The file is no TOML that may be read; the text says why, in words without the file's name."""
+    """The file is not TOML or may not be read; the text says why, without the file's name."""
 
 
 def read_bounded_toml(file: Path) -> dict[str, Any]:

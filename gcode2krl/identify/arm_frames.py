@@ -32,11 +32,11 @@ def joint_frames(q_rad: ArrayLike, cell: Cell) -> Floats:
     theta = np.zeros((len(q), len(steps)))
     theta[:, AXIS_FRAME] = q * AXIS_SIGN + AXIS_ZERO
     poses = np.empty((len(q), len(steps), 4, 4))
-    here = np.broadcast_to(np.eye(4), (len(q), 4, 4))
+    frame = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     for number, (cos, sin, a_mm, d_mm) in enumerate(steps):
         tilt = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
         turn = np.zeros((len(q), 3))
         turn[:, 0] = theta[:, number]
         step = fr.transform(tilt @ np.array([a_mm, 0.0, d_mm]), tilt @ fr.rotation_from_abc(turn))
-        here = poses[:, number] = here @ step
+        frame = poses[:, number] = frame @ step
     return poses

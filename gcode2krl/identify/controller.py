@@ -1,17 +1,17 @@
-"""What a trace of the commanded position tells about the controller: k, effective CDIS, the law.
+"""Identifies the controller from a trace of the commanded position: k, effective CDIS, the law.
 
 Trace and program are cut at standstills into rest-to-rest sections, matched in order, and the closed forms of
 this package are fitted to all of them at once. Unknown are k, the ratio of effective to programmed CDIS, and
 for each section the moment it starts at (a nuisance). Gauss-Newton steps with damping; the starts are
-projected out of residuals and derivatives (Frisch-Waugh-Lovell), so that what is solved for has two unknowns.
+projected out of residuals and derivatives (Frisch-Waugh-Lovell), which leaves two unknowns to solve for.
 
-Intervals hold for independent noise of any variance (White's estimator with leverage correction, HC3,
+Intervals are valid for independent noise of any variance (White's estimator with leverage correction, HC3,
 MacKinnon & White 1985); they do not cover a controller that plans by another law, which shows as residuals
-above the noise of the standstills and is said.
+above the noise of the standstills and is reported.
 
 Assumptions: the acceleration is the programmed one and the override 100 %; the model for unequal speeds,
-which is no measurement, is judged by the fit and takes no part in it. Lines on which the tool turns take no
-part either: they give `$VEL.ORI` and `$ACC.ORI` afterwards, see `identify_turning`.
+which is an assumption, is compared with the trace but takes no part in the fit. Lines on which the tool turns
+take no part either: they give `$VEL.ORI` and `$ACC.ORI` afterwards, see `identify_turning`.
 """
 
 import math
@@ -47,9 +47,9 @@ LAWS: tuple[Law, Law] = ("averages", "trapezoid")
 
 _QUANTILE_90 = 1.6448536269514722
 _DECISIVE = 20.0
-"""Twice the difference of log-likelihoods above which a law is taken as decided."""
+"""Twice the difference of log-likelihoods above which the law counts as decided."""
 _WIDEST = 0.5
-"""A value whose interval reaches further than this share of it is not determined."""
+"""A value whose half interval is a larger fraction of it is not determined."""
 _FLOOR_MM = 1e-6
 _MISFIT = 3.0
 _MOST_CORNERS = 200
@@ -78,7 +78,7 @@ class Section:
     length_mm: float
     speed_mm_s: float
     fitted: bool
-    """False where unequal speeds meet: only judged."""
+    """False where unequal speeds meet: compared only, not fitted."""
     start_s: float
     """Fitted time on the trace's clock at which it starts."""
     time_s: Floats
@@ -89,7 +89,7 @@ class Section:
     corner_deg: float
     """Sharpest blended interior angle, 180 where there is none."""
     turns: bool = False
-    """True where the tool turns on the way."""
+    """True where the tool turns during the motion."""
 
     @property
     def rms_mm(self) -> float:
@@ -104,7 +104,7 @@ class Section:
 
 @dataclass(frozen=True)
 class CornerFit:
-    """One approximated corner, its effective d fitted on its own."""
+    """One approximated corner with its own effective d."""
 
     source_line: int
     angle_deg: float
@@ -121,7 +121,7 @@ class CornerFit:
 
 @dataclass(frozen=True)
 class Identification:
-    """What the trace says."""
+    """The result of the identification."""
 
     k_s: Estimate
     k_cycles: int
@@ -134,11 +134,11 @@ class Identification:
     law_evidence: float
     """Twice the log-likelihood of ``averages`` over ``trapezoid``."""
     law_fitted: Law
-    """The law of the values: the decided one, else the cell's."""
+    """The law that the values belong to: the decided one, else the cell's."""
     acceleration_mm_s2: float
     """Programmed, from the cell."""
     vel_ori_deg_s: Estimate | None
-    """None where no line turns the tool at that limit."""
+    """None where no line that turns the tool reaches that limit."""
     acc_ori_deg_s2: Estimate | None
     turning_rms_mm: float | None
     """Residuals of the lines on which the tool turns, one axis."""
@@ -201,7 +201,7 @@ def identify_controller(trace: ControllerTrace, targets: Targets, cell: Cell) ->
     return _result(trace, pieces, unmatched, fit, law, evidence, k_s, ratio, settings, cell)
 
 
-# --- what it means --------------------------------------------------------------------------------------
+# --- the result -----------------------------------------------------------------------------------------
 
 
 def _evidence(fits: dict[Law, Fit], pieces: list[Piece]) -> float:
@@ -213,7 +213,7 @@ def _evidence(fits: dict[Law, Fit], pieces: list[Piece]) -> float:
 
 
 def _estimates(fit: Fit, pieces: list[Piece], settings: Settings) -> tuple[Estimate, Estimate]:
-    """Return k and the CDIS ratio with 90 % intervals; infinite where the trace says nothing."""
+    """Return k and the CDIS ratio with 90 % intervals; infinite where the trace does not determine them."""
     linears = [
         linearised(piece, fit, number, settings) for number, piece in enumerate(pieces) if piece.fitted
     ]
@@ -258,19 +258,30 @@ def _require_k(k_s: Estimate, trace: ControllerTrace) -> None:
     if _determined(k_s):
         return
     raise RefusedError(
-        Issue("error", "not-determined", 0,
-              f"k is not determined: {k_s.value:.3f} s, 90 % interval {k_s.low:.3f} to {k_s.high:.3f} s; "
-              "the moves are too slow or too few for this noise",
-              "record the program of `gcode2krl make-test controller`"),
+        Issue(
+            "error",
+            "not-determined",
+            0,
+            f"k is not determined: {k_s.value:.3f} s, 90 % interval {k_s.low:.3f} to {k_s.high:.3f} s; "
+            "the moves are too slow or too few for this noise",
+            "record the program of `gcode2krl make-test controller`",
+        ),
         trace.source,
-    )  # fmt: skip
+    )
 
 
 def _result(
-    trace: ControllerTrace, pieces: list[Piece], unmatched: int, fit: Fit,
-    law: Literal["averages", "trapezoid", "undecided"], evidence: float, k_s: Estimate, ratio: Estimate,
-    settings: Settings, cell: Cell,
-) -> Identification:  # fmt: skip
+    trace: ControllerTrace,
+    pieces: list[Piece],
+    unmatched: int,
+    fit: Fit,
+    law: Literal["averages", "trapezoid", "undecided"],
+    evidence: float,
+    k_s: Estimate,
+    ratio: Estimate,
+    settings: Settings,
+    cell: Cell,
+) -> Identification:
     sections = tuple(_section(piece, fit, number, settings) for number, piece in enumerate(pieces))
     noise = _noise_at_rest(pieces, resolution_mm(trace.position_mm))
     moving = np.concatenate(
@@ -316,10 +327,10 @@ def _turning(
     """Return `$VEL.ORI`, `$ACC.ORI` and the residuals of the lines that turn the tool."""
     controller = cell.controller
     programmed = (controller.vel_ori_deg_s, controller.acc_ori_deg_s2)
-    found = fit_turning(pieces, fit, programmed, controller.acc_cp_m_s2, settings)
-    if found is None:
+    fitted = fit_turning(pieces, fit, programmed, controller.acc_cp_m_s2, settings)
+    if fitted is None:
         return None, None, None
-    values, errors, rms = found
+    values, errors, rms = fitted
     half = _QUANTILE_90 * errors
     vel, acc = (_around(float(values[at]), float(half[at])) for at in (0, 1))
     return vel if _determined(vel) else None, acc if _determined(acc) else None, rms
@@ -351,7 +362,7 @@ def _noise_at_rest(pieces: list[Piece], resolution: float) -> float:
     for piece in pieces:
         edge = int(np.argmin(piece.still))
         for rest in (piece.position_mm[:edge], piece.position_mm[len(piece.still) - 1 :: -1][: _tail(piece)]):
-            inner = rest[: max(0, len(rest) - 2)]  # the last ones may already be on their way
+            inner = rest[: max(0, len(rest) - 2)]  # the last samples may already be moving
             if len(inner) > 1:
                 squares += float(np.sum((inner - inner.mean(axis=0)) ** 2))
                 freedom += inner.size - 3
@@ -371,7 +382,7 @@ def _levels(pieces: list[Piece]) -> Floats:
 
 
 def _corners(pieces: list[Piece], fit: Fit, settings: Settings) -> Iterator[CornerFit]:
-    """Yield the corners with their own d: one Gauss-Newton step from the common ratio, k held."""
+    """Yield the corners with their own d: one Gauss-Newton step from the common ratio with fixed k."""
     done = 0
     for number, piece in enumerate(pieces):
         if not piece.fitted:
@@ -402,10 +413,10 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
     residual = residual_of(piece, fit, number, settings)
     residual = residual - start * (start @ residual) / size
     weight = float(slope @ slope)
-    own, half = d, math.inf
+    d_fitted, half = d, math.inf
     if weight > 1e-9:
-        own = d - float(slope @ residual) / weight
-        left = residual + slope * (own - d)
+        d_fitted = d - float(slope @ residual) / weight
+        left = residual + slope * (d_fitted - d)
         half = _QUANTILE_90 * math.sqrt(float(left @ left) / max(len(left) - 2, 1) / weight)
     share = float(piece.cos_half[row]) / 2.0
     return CornerFit(
@@ -414,8 +425,8 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
         speed_mm_s=float(min(piece.speed_mm_s[row], piece.speed_mm_s[row + 1])),
         cdis_mm=float(piece.cdis_mm[row]),
         programmed_d_mm=float(piece.blend_mm(piece.cdis_mm)[row]),
-        d_mm=_around(own, half),
-        error_mm=_around(own * share, half * share),
+        d_mm=_around(d_fitted, half),
+        error_mm=_around(d_fitted * share, half * share),
     )
 
 
@@ -443,29 +454,37 @@ def _issues(
     if result.rms_mm > limit + _FLOOR_MM:
         worst = max((section for section in sections if section.fitted), key=lambda section: section.rms_mm)
         yield Issue(
-            "warning", "law-misfit", worst.first_line,
+            "warning",
+            "law-misfit",
+            worst.first_line,
             f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at "
             "this line; the intervals do not cover that",
             "was the override 100 %, and $ACC.CP that of the cell?",
-        )  # fmt: skip
+        )
     if result.turning_rms_mm is not None:
         if result.turning_rms_mm > limit + _FLOOR_MM:
             yield Issue(
-                "note", "turning-misfit", 0,
+                "note",
+                "turning-misfit",
+                0,
                 f"lines that turn the tool leave (assumed model) {result.turning_rms_mm:.4f} mm rms",
-            )  # fmt: skip
+            )
         if result.vel_ori_deg_s is None:
             yield Issue(
-                "note", "not-determined", 0,
+                "note",
+                "not-determined",
+                0,
                 "$VEL.ORI is not determined: no line turns long enough to reach it",
                 "lower vel_ori_deg_s in the cell of the test program",
-            )  # fmt: skip
+            )
     for section in sections:
         if not section.fitted and not section.turns and section.rms_mm > limit + _FLOOR_MM:
             yield Issue(
-                "note", "unequal-speeds", section.first_line,
+                "note",
+                "unequal-speeds",
+                section.first_line,
                 f"the model for unequal speeds (an assumption) is {section.rms_mm:.4f} mm rms off here",
-            )  # fmt: skip
+            )
 
 
 def _why_no_cdis(result: Identification) -> str:

@@ -1,7 +1,7 @@
 """The fit of the controller's closed forms to a trace: rest-to-rest pieces, derivatives, Gauss-Newton steps.
 
-Trace and program are cut at standstills and matched in order. The start of each piece is a nuisance and is
-projected out of residuals and derivatives (Frisch-Waugh-Lovell), so that what is solved for has two unknowns:
+Trace and program are cut at standstills and matched in order. The start of each piece is a nuisance
+parameter and is projected out of residuals and derivatives (Frisch-Waugh-Lovell), which leaves two unknowns:
 k, and the ratio of effective to programmed CDIS.
 """
 
@@ -23,7 +23,7 @@ Law = Literal["averages", "trapezoid"]
 LEAST_DWELL_S = 0.15
 """Program: an exact stop with at least this dwell ends a section."""
 _LEAST_STILL_S = 0.1
-"""Trace: a rest of at least this ends a section; less than the dwell, as noise and tails take some away."""
+"""Trace: a rest of at least this ends a section; less than the dwell, because noise and tails shorten it."""
 _K_STARTS_CYCLES = (4, 8, 11, 14, 18, 24)
 _RATIO_STARTS = (0.3, 0.6, 1.0, 1.7)
 _MARGIN_SAMPLES = 8
@@ -31,7 +31,7 @@ _MARGIN_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Settings:
-    """What is not fitted."""
+    """Quantities that are not fitted."""
 
     moves_in_view: int
     cycle_s: float
@@ -39,7 +39,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Piece:
-    """A section while it is fitted: moves of the chain and samples of the trace."""
+    """A section during the fit: moves of the chain and samples of the trace."""
 
     start_mm: Floats
     end_mm: Floats
@@ -47,7 +47,7 @@ class Piece:
     speed_mm_s: Floats
     acceleration_mm_s2: Floats
     angle_rad: Floats
-    """(n,) by which the tool turns on the way."""
+    """(n,) by which the tool turns during the move."""
     wanted_mm_s: Floats
     """(n,) programmed speeds, before `$VEL.ORI`."""
     wait_s: Floats
@@ -73,9 +73,16 @@ class Piece:
     def profile(self, k_s: float, blend_mm: Floats, law: Law, settings: Settings) -> Profile:
         """Plan the section."""
         return plan_profile(
-            self.length_mm, self.speed_mm_s, blend_mm, self.stop, self.wait_s,
-            self.acceleration_mm_s2, k_s, settings.moves_in_view, law == "averages",
-        )  # fmt: skip
+            self.length_mm,
+            self.speed_mm_s,
+            blend_mm,
+            self.stop,
+            self.wait_s,
+            self.acceleration_mm_s2,
+            k_s,
+            settings.moves_in_view,
+            law == "averages",
+        )
 
 
 @dataclass(frozen=True)
@@ -197,7 +204,7 @@ def slope_of(piece: Piece, fit: Fit, number: int, what: int, settings: Settings)
 
 @dataclass(frozen=True)
 class _Linear:
-    """A section linearised: what the starts explain is projected out."""
+    """A linearised section, with its start projected out."""
 
     residual: Floats
     slopes: Floats
@@ -234,20 +241,22 @@ def sum_of_squares(pieces: list[Piece], fit: Fit, settings: Settings) -> float:
 
 
 def fit_law(pieces: list[Piece], law: Law, settings: Settings) -> Fit:
-    """Minimise the squared residuals under one law, from the best of several starts."""
+    """Minimise the squared residuals under one law, from the best of several initial values."""
     k_starts = [cycles * settings.cycle_s for cycles in _K_STARTS_CYCLES]
-    best = min((_started(pieces, law, k, 1.0, settings) for k in k_starts), key=lambda fit: fit.squares_mm2)
+    best = min(
+        (_initial_fit(pieces, law, k, 1.0, settings) for k in k_starts), key=lambda fit: fit.squares_mm2
+    )
     fit = _descend(pieces, best, settings)
     if any((~piece.stop).any() for piece in pieces if piece.fitted):
-        others = (_started(pieces, law, fit.k_s, ratio, settings) for ratio in _RATIO_STARTS)
+        others = (_initial_fit(pieces, law, fit.k_s, ratio, settings) for ratio in _RATIO_STARTS)
         better = min(others, key=lambda other: other.squares_mm2)
         if better.squares_mm2 < fit.squares_mm2:
             fit = _descend(pieces, better, settings)
     return judged_starts(pieces, fit, settings)
 
 
-def _started(pieces: list[Piece], law: Law, k_s: float, ratio: float, settings: Settings) -> Fit:
-    """Return a state whose sections lie in the middle of their motions, then shifted onto the trace."""
+def _initial_fit(pieces: list[Piece], law: Law, k_s: float, ratio: float, settings: Settings) -> Fit:
+    """Return a state whose sections are centred on their motions and then shifted onto the trace."""
     start = np.empty(len(pieces))
     for number, piece in enumerate(pieces):
         profile = piece.profile(k_s, piece.blend_mm(piece.cdis_mm * ratio), law, settings)
@@ -292,9 +301,14 @@ def _descend(pieces: list[Piece], fit: Fit, settings: Settings) -> Fit:
 
 
 def _stepped(
-    pieces: list[Piece], fit: Fit, linears: dict[int, _Linear], normal: Floats, gradient: Floats,
-    damping: float, settings: Settings,
-) -> tuple[Fit, Floats]:  # fmt: skip
+    pieces: list[Piece],
+    fit: Fit,
+    linears: dict[int, _Linear],
+    normal: Floats,
+    gradient: Floats,
+    damping: float,
+    settings: Settings,
+) -> tuple[Fit, Floats]:
     """Return the state after one damped step, and the step in k and the ratio."""
     used = np.diag(normal) > 0.0
     step = np.zeros(2)
@@ -314,7 +328,7 @@ def _stepped(
 
 
 def judged_starts(pieces: list[Piece], fit: Fit, settings: Settings) -> Fit:
-    """Shift the sections that are only judged onto the trace."""
+    """Shift the sections that are not fitted onto the trace."""
     for number, piece in enumerate(pieces):
         if piece.fitted:
             continue

@@ -1,6 +1,6 @@
-"""What a trace tells about `$VEL.ORI` and `$ACC.ORI`: lines on which the tool turns as well.
+"""Identifies `$VEL.ORI` and `$ACC.ORI` from lines on which the tool turns.
 
-k and the law are held as the other sections gave them. Position and orientation share one time law, so the
+k and the law are those that the other sections gave. Position and orientation share one time law, so the
 positions of such lines show how fast the controller turns.
 """
 
@@ -48,12 +48,17 @@ def fit_turning(
 
 
 class _Problem:
-    """Residuals of the turning sections by (`$VEL.ORI`, `$ACC.ORI`) over programmed, starts projected out."""
+    """Residuals of turning sections over (`$VEL.ORI`, `$ACC.ORI`)/programmed, starts projected out."""
 
     def __init__(
-        self, pieces: list[Piece], turning: list[int], fit: Fit, programmed_deg: Floats,
-        acc_cp_m_s2: float, settings: Settings,
-    ) -> None:  # fmt: skip
+        self,
+        pieces: list[Piece],
+        turning: list[int],
+        fit: Fit,
+        programmed_deg: Floats,
+        acc_cp_m_s2: float,
+        settings: Settings,
+    ) -> None:
         self.pieces, self.turning, self.fit = pieces, turning, fit
         self.programmed_deg, self.acc_cp_mm_s2, self.settings = (
             programmed_deg,

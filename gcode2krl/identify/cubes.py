@@ -3,7 +3,7 @@
 As in Hähn & Weigold 2020, section 2.5: the lasers stand on a frame beside the robot and see three faces of a
 cube, here in a 3-2-1 layout (three on one face, two on the next, one on the third), which just determines the
 six coordinates of a rigid motion. Points and directions are along the axes of the unloaded cube, whose origin
-is its centre. A laser tells how far the beam's way to the face has become longer.
+is its centre. A laser measures how much longer the beam's way to the face has become.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,14 @@ from gcode2krl.arrays import Floats
 EDGE_MM = 100.0
 """Edge of a measuring cube (section 2.5)."""
 POINTS_MM = (
-    (-40.0, -40.0, 50.0), (40.0, -40.0, 50.0), (0.0, 40.0, 50.0),
-    (-40.0, 50.0, 0.0), (40.0, 50.0, 0.0),
+    (-40.0, -40.0, 50.0),
+    (40.0, -40.0, 50.0),
+    (0.0, 40.0, 50.0),
+    (-40.0, 50.0, 0.0),
+    (40.0, 50.0, 0.0),
     (50.0, 0.0, 0.0),
-)  # fmt: skip
-"""Where the beams hit the unloaded cube: a choice of ours, the paper gives no layout."""
+)
+"""Where the beams hit the unloaded cube: our choice, the paper gives no layout."""
 DIRECTIONS = ((0.0, 0.0, -1.0),) * 3 + ((0.0, -1.0, 0.0),) * 2 + ((-1.0, 0.0, 0.0),)
 """Where the beams point: at right angles into the faces."""
 
@@ -43,7 +46,7 @@ class Layout:
 
     @classmethod
     def of(cls, point_mm: object = POINTS_MM, direction: object = DIRECTIONS) -> "Layout":
-        """Return the layout of points (6, 3) and beams (6, 3); the face is the one nearest to square."""
+        """Return the layout of points (6, 3) and beams (6, 3); a beam hits the face most normal to it."""
         beams = np.array(direction, dtype=float)
         beams /= np.linalg.norm(beams, axis=1, keepdims=True)
         normal = np.zeros((6, 3))
@@ -58,7 +61,7 @@ class Layout:
         return slope
 
     def determines_motion(self) -> bool:
-        """Tell whether the six beams determine the six coordinates, tilts counted at a lever of 40 mm."""
+        """Tell whether the six beams determine the six coordinates, with tilts scaled by a lever of 40 mm."""
         scaled = self.slope() / np.array([_LEVER_MM] * 3 + [1.0] * 3)
         return bool(np.linalg.cond(scaled) < _WORST_CONDITION)
 
@@ -76,7 +79,7 @@ def motion_of(longer_mm: Floats, layout: Layout) -> Floats:
     """Return the motions (n, 4, 4) of a cube from six distances, loaded minus unloaded, (n, 6) in mm.
 
     The linear solution is refined until the exact distances agree, so the motion need not be tiny; where it
-    is so large that this does not settle (some tenths of a radian) the row is NaN.
+    is too large for this to converge (some tenths of a radian) the row is NaN.
     """
     inverse = np.linalg.inv(layout.slope())
     twist = longer_mm @ inverse.T

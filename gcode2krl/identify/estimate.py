@@ -1,10 +1,10 @@
-"""A fitted value with its interval, and Student's quantile behind it."""
+"""A fitted value with its interval, and Student's quantile for it."""
 
 import math
 from dataclasses import dataclass
 
 LEVEL = 0.90
-"""Of the intervals where nothing else is asked for."""
+"""Default probability of the intervals."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def student(level: float, freedom: int) -> float:
 
 
 def chance_above(chi_squared: float, freedom: int) -> float:
-    """Return the probability that chi-squared of so many degrees of freedom is larger."""
+    """Return the probability that chi-squared with ``freedom`` degrees of freedom is larger."""
     from scipy.special import chdtrc
 
     return float(chdtrc(freedom, chi_squared)) if freedom > 0 else 1.0

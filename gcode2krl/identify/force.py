@@ -2,8 +2,8 @@
 
 Measured forces are averaged over the samples of the prediction (nothing faster than a revolution is in the
 model). The delay of the measuring chain and a constant force of each axis (zero of the sensor, weight) are
-nuisance: the delay is searched, the zero is solved for with the coefficients. Intervals hold for residuals
-that are correlated in time (Newey & West 1987, Bartlett weights).
+nuisance parameters: the delay is searched, the zero is solved for with the coefficients. Intervals are valid
+for residuals that are correlated in time (Newey & West 1987, Bartlett weights).
 """
 
 import math
@@ -19,9 +19,10 @@ LEAST_SAMPLES = 30
 LONGEST_DELAY_S = 0.25
 _QUANTILE_90 = 1.6448536269514722
 _WIDEST = 0.5
-"""A coefficient whose half interval is a larger share of the typical size of its kind is not determined."""
+"""A coefficient whose half interval is a larger fraction of the typical size of its kind is not
+determined."""
 _MEMORY_S = 0.12
-"""Residuals this far apart count as independent."""
+"""Residuals further apart in time count as independent."""
 _STEADY = 0.02
 """Relative change of the predicted force over two samples above which a sample is left out: at entries and
 exits an error of the clock or of the stock's place would count as force."""
@@ -34,11 +35,11 @@ class ForceFit:
     value: Floats
     """(6,) Ktc, Krc, Kac in N/mm² and Kte, Kre, Kae in N/mm."""
     half: Floats
-    """(6,) half-widths of the 90 % intervals; infinite where the data say nothing."""
+    """(6,) half-widths of the 90 % intervals; infinite where the data do not determine it."""
     zero_N: Floats
     """(3,) constant force of each axis."""
     delay_s: float
-    """By how much the measured force is late."""
+    """Delay of the measured force."""
     rms_N: float
     """Residual of one axis while cutting."""
     relative_band: float
@@ -55,10 +56,15 @@ class ForceFit:
             return
         missing = ", ".join(name for name, good in zip(NAMES, self.determined, strict=True) if not good)
         raise RefusedError(
-            Issue("error", "not-determined", 0, f"the data do not determine {missing}",
-                  "cut slots at three feeds per tooth at least, from 0.03 to 0.15 mm, at one depth and more"),
+            Issue(
+                "error",
+                "not-determined",
+                0,
+                f"the data do not determine {missing}",
+                "cut slots at three feeds per tooth at least, from 0.03 to 0.15 mm, at one depth and more",
+            ),
             source,
-        )  # fmt: skip
+        )
 
 
 def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: Floats) -> ForceFit:
@@ -69,7 +75,7 @@ def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: F
     time_s : (m,) times of the prediction, evenly spaced.
     basis_N : (m, 3, 6) force that each coefficient brings (`cutting.force_basis`), along the
         sensor's axes.
-    measured_s, measured_N : (n,), (n, 3) the force on the tool, on the prediction's clock.
+    sensor. measured_s, measured_N : (n,), (n, 3) the force on the tool, on the prediction's clock.
 
     Raises
     ------
@@ -82,8 +88,8 @@ def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: F
     best = int(np.argmin([trial[0] for trial in trials]))
     delay_s = float(delays[best])
     if 0 < best < len(delays) - 1:  # vertex of the parabola through the three best
-        left, here, right = (trials[best + offset][0] for offset in (-1, 0, 1))
-        bend = left - 2.0 * here + right
+        left, middle, right = (trials[best + offset][0] for offset in (-1, 0, 1))
+        bend = left - 2.0 * middle + right
         if bend > 0.0:
             delay_s += 0.5 * step_s * (left - right) / bend
     _, rows, design, wanted, solution = _solve(time_s, basis_N, measured_s, measured_N, delay_s, True)
@@ -106,10 +112,14 @@ def _solve(
     rows_in_cut = np.abs(basis_N[rows]).max(axis=(1, 2)) > 0.0
     if np.count_nonzero(rows_in_cut) < LEAST_SAMPLES:
         raise RefusedError(
-            Issue("error", "not-determined", 0,
-                  f"{np.count_nonzero(rows_in_cut)} samples in cut, at least {LEAST_SAMPLES} are needed",
-                  "record force.csv over a whole slot; do prediction and run belong together?")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "not-determined",
+                0,
+                f"{np.count_nonzero(rows_in_cut)} samples in cut, at least {LEAST_SAMPLES} are needed",
+                "record force.csv over a whole slot; do prediction and run belong together?",
+            )
+        )
     design = np.zeros((len(rows), 3, 9))
     design[:, :, :6] = basis_N[rows]
     design[:, [0, 1, 2], [6, 7, 8]] = 1.0
@@ -121,7 +131,7 @@ def _solve(
 
 
 def _steady(basis_N: Floats) -> Bools:
-    """Return (m,) True where the engagement hardly changes two samples before and behind."""
+    """Return (m,) True where the engagement hardly changes within two samples to both sides."""
     flat = basis_N.reshape(len(basis_N), -1)
     change = np.zeros(len(flat))
     for shift in (-2, -1, 1, 2):
@@ -148,9 +158,14 @@ def _averaged(time_s: Floats, measured_s: Floats, measured_N: Floats) -> tuple[I
 
 
 def _fit_of(
-    time_s: Floats, rows: Ints, design: Floats, wanted: Floats, solution: Floats,
-    delay_s: float, step_s: float,
-) -> ForceFit:  # fmt: skip
+    time_s: Floats,
+    rows: Ints,
+    design: Floats,
+    wanted: Floats,
+    solution: Floats,
+    delay_s: float,
+    step_s: float,
+) -> ForceFit:
     residual = (wanted - design @ solution).reshape(-1, 3)
     used = np.linalg.norm(design, axis=0) > 1e-9
     covariance = np.full((9, 9), np.inf)

@@ -1,7 +1,7 @@
-"""What a pair of measuring cubes says about the virtual joint between them: its angles, its moment.
+"""Angles and moment of the virtual joint between a pair of measuring cubes.
 
 The transform from the lower to the upper cube is A·B unloaded and A·R*·B loaded, with A from the lower cube
-to the joint's frame and B on to the upper cube; so R* = A⁻¹·(loaded)·B⁻¹, the transform from G_i^l to
+to the joint's frame and B from there to the upper cube; so R* = A⁻¹·(loaded)·B⁻¹, the transform from G_i^l to
 G_i^l* of Hähn & Weigold 2020, fig. 6, exact for finite angles. Joints between the same cubes whose stiffness
 is known are part of A and B, turned by the load.
 """
@@ -22,7 +22,7 @@ from gcode2krl.identify.measurements import Cube, Measurements, Setup
 from gcode2krl.units import RAD_PER_DEG
 
 Known = dict[str, tuple[VirtualJoint, str]]
-"""Stiffness taken as known, and where from."""
+"""Stiffness taken as known, and its source."""
 
 
 class Load(NamedTuple):
@@ -37,7 +37,7 @@ class Load(NamedTuple):
 
 @dataclass(frozen=True)
 class JointReadings:
-    """What one pair of cubes says about its joint; along the axes of the joint's frame."""
+    """Readings of one pair of cubes, along the axes of the joint's frame."""
 
     row: Ints
     """(m,) lines in the file."""
@@ -64,17 +64,17 @@ def joint_readings(
     Raises
     ------
     NotUnderstoodError
-        No point of the load in head and cell; six distances that are no motion.
+        No point of the load in head and cell; six distances that are not a motion.
     """
     setup = measurements.setup
     at = np.flatnonzero(measurements.pair == pair)
     frames = joint_frames(measurements.q_rad[at], cell)
     load = _load(measurements, at, frames, cell)
-    here = frames[:, VIRTUAL_JOINTS.index(joint)]
+    joint_frame = frames[:, VIRTUAL_JOINTS.index(joint)]
     cubes = setup.pair[pair]
     lower, upper = (_cube_pose(setup.cube[name], frames, setup, cell) for name in (cubes.lower, cubes.upper))
     below, above = _turns_of_known(joint, setup.joints_between(pair), known, frames, load)
-    before, after = fr.invert(lower) @ below @ here, fr.invert(here) @ above @ upper
+    before, after = fr.invert(lower) @ below @ joint_frame, fr.invert(joint_frame) @ above @ upper
     moved = [
         _motion(change[at], measurements, at) for change in (measurements.lower_mm, measurements.upper_mm)
     ]
@@ -85,14 +85,14 @@ def joint_readings(
     covariance = of_lower @ noise @ of_lower.swapaxes(1, 2) + of_upper @ noise @ of_upper.swapaxes(1, 2)
     angle = fr.abc_from_rotation(deformed[:, :3, :3])[:, ::-1]  # R* = Rz·Ry·Rx, eq. 4
     return JointReadings(
-        measurements.row[at], angle, deformed[:, :3, 3], _moment(here, load), np.asarray(covariance)
+        measurements.row[at], angle, deformed[:, :3, 3], _moment(joint_frame, load), np.asarray(covariance)
     )
 
 
 def _turns_of_known(
     joint: str, between: tuple[str, ...], known: Known, frames: Floats, load: Load
 ) -> tuple[Floats, Floats]:
-    """Return what known joints below and above the sought one move under the load, in the root (m, 4, 4)."""
+    """Return the motions (m, 4, 4) of the known joints below and above the sought one, in the root."""
     below = above = np.broadcast_to(np.eye(4), (len(frames), 4, 4))
     for name in between:  # from the root outwards: each turns what follows
         if name == joint:
@@ -118,9 +118,11 @@ def _load(measurements: Measurements, at: Ints, frames: Floats, cell: Cell) -> L
         tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=None)
         if tool is None:
             raise input_error(
-                "measurement-key", "load.point_flange_mm: missing, and the cell has no tool",
-                "state the point in the flange frame where the load acts", source=measurements.source,
-            )  # fmt: skip
+                "measurement-key",
+                "load.point_flange_mm: missing, and the cell has no tool",
+                "state the point in the flange frame where the load acts",
+                source=measurements.source,
+            )
         point = cell.tool_matrix(tool)[:3, 3]
     point_mm = flange[:, :3, :3] @ point + flange[:, :3, 3]
     force, moment = measurements.force_N[at], measurements.moment_Nmm[at]
@@ -137,7 +139,7 @@ def _moment(frame: Floats, load: Load) -> Floats:
 
 
 def _cube_pose(cube: Cube, frames: Floats, setup: Setup, cell: Cell) -> Floats:
-    """Return the pose (m, 4, 4) of an unloaded cube in the root; it rides on the body it is fixed to."""
+    """Return the pose (m, 4, 4) of an unloaded cube in the root; it moves with the body it is fixed to."""
     pose = cube.matrix()
     if cube.number() == 0:
         return np.broadcast_to(pose, (len(frames), 4, 4))
@@ -150,6 +152,11 @@ def _motion(change_mm: Floats, measurements: Measurements, at: Ints) -> Floats:
     lost = np.flatnonzero(np.isnan(motion[:, 0, 0]))
     if len(lost):
         row = int(measurements.row[at[lost[0]]])
-        raise input_error("table-change", f"row {row}: its six distances are not those of a moved cube",
-                          "check the order of the lasers", line=row, source=measurements.source)  # fmt: skip
+        raise input_error(
+            "table-change",
+            f"row {row}: its six distances are not those of a moved cube",
+            "check the order of the lasers",
+            line=row,
+            source=measurements.source,
+        )
     return motion

@@ -32,14 +32,14 @@ ANGLES = tuple(f"q{axis}_deg" for axis in range(1, 7))
 FORCE = ("fx_N", "fy_N", "fz_N")
 MOMENT = ("mx_Nmm", "my_Nmm", "mz_Nmm")
 _LARGEST_MM = 10.0
-"""A distance that changes by more is no elastic deformation but another pose, or another unit."""
+"""A larger change of a distance is not elastic deformation but another pose, or another unit."""
 
 
 class Lasers(Section):
     """Six laser triangulation sensors on a stand beside the robot, the same layout for every cube."""
 
     noise_mm: NotNegative = 0.0
-    """1-sigma of one distance; 0: only what the residuals show."""
+    """1-sigma of one distance; 0: taken from the residuals alone."""
     point_mm: SixPoints = POINTS_MM
     """Where the beams hit, along the axes of the unloaded cube."""
     direction: SixPoints = DIRECTIONS
@@ -53,8 +53,10 @@ class Lasers(Section):
         if (np.einsum("ij,ij->i", layout.normal, layout.point_mm) <= 0).any():
             raise ValueError("a beam comes out of the cube: point_mm and direction belong to opposite faces")
         if not layout.determines_motion():
-            raise ValueError("the six beams do not determine a motion: three on one face, two on the next, "
-                             "one on the third, well apart")  # fmt: skip
+            raise ValueError(
+                "the six beams do not determine a motion: three on one face, two on the next, "
+                "one on the third, well apart"
+            )
         return self
 
     def layout(self) -> Layout:
@@ -80,7 +82,7 @@ class Cube(Place):
     """A measuring cube: the pose of its centre in the robot root, and what it is fixed to."""
 
     body: Literal["root", VirtualJointName]
-    """The body behind this virtual joint and before the next one."""
+    """The body between this virtual joint and the next one."""
 
     def number(self) -> int:
         """Return how many virtual joints lie below the cube."""
@@ -156,7 +158,8 @@ def read_measurements(path: str | Path) -> Measurements:
     Raises
     ------
     NotUnderstoodError
-        Names file, key, row and column: what is missing, no number, another pair, too large a motion.
+        Names file, key, row and column: a value that is missing, not a number, of an unknown pair, or too
+        large a motion.
     """
     file = Path(path)
     head = file.with_suffix(".toml") if file.suffix.lower() == ".csv" else file

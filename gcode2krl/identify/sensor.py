@@ -1,12 +1,12 @@
 """Weight, centre of gravity and offset of a force sensor from unloaded readings in several orientations.
 
-With u = Rᵀ·g, gravity along the sensor's axes, the readings are linear in what is sought (see `sensor`):
+With u = Rᵀ·g, gravity along the sensor's axes, the readings are linear in the unknowns (see `sensor`):
 
     F = W·u + F_SI,      M = s x u + M_SI,  s = W·r
 
-so two least squares, for any orientations with three or more directions u. Then ten quadratic terms in the
-quaternion (eq. 17 less its redundant terms) are fitted to what remains, where there are enough orientations
-and where they predict a reading that was left out better than nothing does.
+so there are two least-squares fits, for any orientations with three or more directions u. Then ten quadratic
+terms in the quaternion (eq. 17 without its redundant terms) are fitted to the residuals, if there are enough
+orientations and if the terms predict readings that were left out of the fit better than zero does.
 
 The paper solves three special orientations in closed form (eq. 12-15): z of the sensor vertical, downwards
 (O2), z horizontal with the weight at 45° between x and y (O1), z horizontal with the weight along y (O3).
@@ -14,7 +14,7 @@ With F_G,z = F_O1,z - F_O2,z = -W (eq. 12) the balance gives eq. 14 and 15 as pr
 
     F_SI,x = F_O1,x + F_G,z/√2,   F_SI,y = F_O1,y + F_G,z/√2,   F_SI,z = F_O1,z
 
-where the print has -√2·F_G,z: another factor, and another sign than eq. 14 and 15 have for the same
+where the print has -√2·F_G,z: another factor, and the opposite sign of eq. 14 and 15 for the same
 orientation. In eq. 16 the print has lost the difference between sines and cosines and all signs; orientations
 are taken here as KUKA's A, B, C or as quaternions and converted by `frames`.
 """
@@ -38,9 +38,10 @@ LEAST_POSES = 3
 LEAST_FOR_TERMS = 20
 """Orientations below which the ten terms are not fitted; the paper takes 27."""
 _LEAST_SPREAD = 0.05
-"""Root mean square of the gravity directions off a point, and off a line."""
+"""Least root mean square distance of the gravity directions from a point, and from a line."""
 _LEAST_SINGULAR = 0.005
-"""Of the ten terms over the root of the number of orientations; a full turn about every axis has some 0.2."""
+"""Least singular value of the ten terms over the root of the number of orientations; a full turn about every
+axis has some 0.2."""
 _WIDEST = 0.5
 _NEAR_MM = 1.0
 
@@ -57,13 +58,13 @@ class SensorIdentification:
     level: float
     poses: int
     force_noise_N: float
-    """1-sigma of one component behind the intervals: the residuals' or the stated one, the larger."""
+    """1-sigma of one component, used for the intervals: the larger of the residuals' and the stated one."""
     moment_noise_Nmm: float
     force_rms_N: tuple[float, float]
-    """What remains of one component: after weight and offset, and after the ten terms as well."""
+    """Residual of one component: after weight and offset, and after the ten terms as well."""
     moment_rms_Nmm: tuple[float, float]
     force_left_out_N: float | None
-    """Error of the ten terms at a reading that was left out of their fit; None where they were not fitted."""
+    """Error of the ten terms at readings left out of their fit; None where they were not fitted."""
     moment_left_out_Nmm: float | None
     issues: tuple[Issue, ...]
 
@@ -81,13 +82,13 @@ def identify_sensor(
     ----------
     poses : three or more orientations, see `sensor_poses`; 20 or more for the remaining offset.
     gravity_root : direction of gravity in the robot root, of any length.
-    noise_N, noise_Nmm : stated 1-sigma of one component; the larger of it and the residuals' counts.
+    noise_N, noise_Nmm : stated 1-sigma of one component; the larger of it and that of the residuals is used.
     level : probability of the intervals (Student's t).
 
     Raises
     ------
     RefusedError
-        Orientations or noise do not determine weight, centre or offset; names which.
+        Orientations or noise do not determine weight, centre or offset; the message names which.
     """
     gravity = np.array(gravity_root, dtype=float)
     if not np.linalg.norm(gravity) > 0:
@@ -101,23 +102,41 @@ def identify_sensor(
     moment = _Fit.of(_moment_slope(down), poses.moment_Nmm, noise_Nmm, level)
     weight = force.estimate(0)
     if weight.high - weight.value > _WIDEST * abs(weight.value):
-        raise _refused(f"the weight: {weight.value:.1f} N, interval {weight.low:.1f} to {weight.high:.1f} N, "
-                       "is lost in the noise", "more orientations, further apart", poses.source)  # fmt: skip
+        raise _refused(
+            f"the weight: {weight.value:.1f} N, interval {weight.low:.1f} to {weight.high:.1f} N, "
+            "is lost in the noise",
+            "more orientations, further apart",
+            poses.source,
+        )
     centre = _centre(force, moment)
     plain = Calibration(
-        gravity_root=_three(gravity), weight_N=weight.value, centre_mm=_three([c.value for c in centre]),
-        force_offset_N=_three(force.value[1:]), moment_offset_Nmm=_three(moment.value[3:]),
+        gravity_root=_three(gravity),
+        weight_N=weight.value,
+        centre_mm=_three([c.value for c in centre]),
+        force_offset_N=_three(force.value[1:]),
+        moment_offset_Nmm=_three(moment.value[3:]),
         source=poses.source,
-    )  # fmt: skip
+    )
     calibration, left_out, issues = _with_terms(plain, poses)
     before, after = (
         compensate(poses.force_N, poses.moment_Nmm, poses.rotation, c) for c in (plain, calibration)
     )
     return SensorIdentification(
-        calibration, weight, centre, force.triple(1), moment.triple(3), level, len(down), force.noise,
-        moment.noise, (_rms(before[0]), _rms(after[0])), (_rms(before[1]), _rms(after[1])),
-        left_out[0], left_out[1], (*_doubts(weight, centre), *issues),
-    )  # fmt: skip
+        calibration,
+        weight,
+        centre,
+        force.triple(1),
+        moment.triple(3),
+        level,
+        len(down),
+        force.noise,
+        moment.noise,
+        (_rms(before[0]), _rms(after[0])),
+        (_rms(before[1]), _rms(after[1])),
+        left_out[0],
+        left_out[1],
+        (*_doubts(weight, centre), *issues),
+    )
 
 
 # --- weight, centre, offset -----------------------------------------------------------------------------
@@ -163,17 +182,20 @@ def _moment_slope(down: Floats) -> Floats:
 def _centre(force: _Fit, moment: _Fit) -> Triple:
     """Return r = s/W; the intervals of s and W, independent of each other, are carried over linearly."""
     weight, wide = float(force.value[0]), float(force.half[0])
-    found = []
+    centre = []
     for s, half in zip(moment.value[:3], moment.half[:3], strict=True):
-        found.append(around(s / weight, math.hypot(half, s / weight * wide) / abs(weight)))
-    return found[0], found[1], found[2]
+        centre.append(around(s / weight, math.hypot(half, s / weight * wide) / abs(weight)))
+    return centre[0], centre[1], centre[2]
 
 
 def _require_spread(down: Floats, source: str) -> None:
-    """Refuse orientations in which gravity points along one direction, or two, of the sensor."""
+    """Refuse orientations in which gravity has only one or two directions in the sensor."""
     if len(down) < LEAST_POSES:
-        raise _refused(f"{len(down)} orientations, at least {LEAST_POSES} are needed",
-                       "readings in three or more orientations", source)  # fmt: skip
+        raise _refused(
+            f"{len(down)} orientations, at least {LEAST_POSES} are needed",
+            "readings in three or more orientations",
+            source,
+        )
     spread = np.linalg.svd(down - down.mean(axis=0), compute_uv=False) / math.sqrt(len(down))
     if spread[0] < _LEAST_SPREAD:
         angle = (
@@ -182,15 +204,17 @@ def _require_spread(down: Floats, source: str) -> None:
         raise _refused(
             "weight, centre of gravity and offset: gravity has the same direction in the sensor in all "
             f"{len(down)} orientations (within {angle:.1f} deg)",
-            "tilt the flange; turning about the vertical changes nothing", source,
-        )  # fmt: skip
+            "tilt the flange; turning about the vertical changes nothing",
+            source,
+        )
     if spread[1] < _LEAST_SPREAD:
         axis = np.abs(down - down.mean(axis=0)).max(axis=0)
         raise _refused(
             "centre of gravity and moment offset: gravity has only two directions in the sensor, which "
             f"differ mainly along its {'xyz'[int(np.argmax(axis))]}",
-            "a third orientation, tilted about another axis", source,
-        )  # fmt: skip
+            "a third orientation, tilted about another axis",
+            source,
+        )
 
 
 def _refused(what: str, remedy: str, source: str) -> RefusedError:
@@ -203,7 +227,7 @@ def _refused(what: str, remedy: str, source: str) -> RefusedError:
 def _with_terms(
     plain: Calibration, poses: SensorPoses
 ) -> tuple[Calibration, tuple[float | None, float | None], list[Issue]]:
-    """Add the ten quadratic terms where they can be fitted and help; says what was decided."""
+    """Add the ten quadratic terms if they can be fitted and help; the issues state the decision."""
     force, moment = compensate(poses.force_N, poses.moment_Nmm, poses.rotation, plain)
     terms = quadratic_terms(poses.rotation)
     count = len(terms)
@@ -211,9 +235,12 @@ def _with_terms(
         text = f"no remaining offset fitted: {count} orientations, {LEAST_FOR_TERMS} are needed (paper: 27)"
         return plain, (None, None), [Issue("note", "remaining-offset", 0, text)]
     if np.linalg.svd(terms, compute_uv=False)[-1] < _LEAST_SINGULAR * math.sqrt(count):
-        text = "no remaining offset fitted: the orientations are too much alike for its ten terms"
-        return plain, (None, None), [Issue("warning", "remaining-offset", 0, text,
-                                           "vary A, B and C, each in three steps")]  # fmt: skip
+        text = "no remaining offset fitted: the orientations are too similar for its ten terms"
+        return (
+            plain,
+            (None, None),
+            [Issue("warning", "remaining-offset", 0, text, "vary A, B and C, each in three steps")],
+        )
     added: dict[str, tuple[tuple[float, float, float], ...]] = {}
     left_out, issues = [], []
     for key, what, unit, rest in (
@@ -252,16 +279,24 @@ def _doubts(weight: Estimate, centre: Triple) -> list[Issue]:
     issues = []
     if weight.value < 0:
         issues.append(
-            Issue("warning", "weight-sign", 0,
-                  f"the weight is {weight.value:.1f} N: the sensor states the reaction, or gravity points up",
-                  "change the sign of all six readings, or state --gravity")
-        )  # fmt: skip
+            Issue(
+                "warning",
+                "weight-sign",
+                0,
+                f"the weight is {weight.value:.1f} N: the sensor states the reaction, or gravity points up",
+                "change the sign of all six readings, or state --gravity",
+            )
+        )
     if math.hypot(*(c.value for c in centre)) < _NEAR_MM:
         issues.append(
-            Issue("warning", "moment-unit", 0,
-                  "the centre of gravity is less than 1 mm from the sensor's origin: moments in N·m?",
-                  "the columns are in N·mm")
-        )  # fmt: skip
+            Issue(
+                "warning",
+                "moment-unit",
+                0,
+                "the centre of gravity is less than 1 mm from the sensor's origin: moments in N·m?",
+                "the columns are in N·mm",
+            )
+        )
     return issues
 
 

@@ -22,7 +22,7 @@ _UNIT = 1e-3
 
 @dataclass(frozen=True)
 class SensorPoses:
-    """Readings of an unloaded sensor; a row is an orientation."""
+    """Readings of an unloaded sensor; a row for each orientation."""
 
     rotation: Floats
     """(n, 4) unit quaternions x, y, z, w of the sensor frame in the robot root."""
@@ -74,7 +74,9 @@ def _unit(table: MeasuredTable) -> Floats:
         raise input_error(
             "table-number",
             f"row {row}, columns {', '.join(QUATERNION)}: length {length[wrong[0]]:.4g}, allowed: 1",
-            "x, y, z, w of a unit quaternion", line=row, source=table.source,
-        )  # fmt: skip
+            "x, y, z, w of a unit quaternion",
+            line=row,
+            source=table.source,
+        )
     unit: Floats = quaternion / length[:, None]
     return unit

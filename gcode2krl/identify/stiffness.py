@@ -1,12 +1,12 @@
 """Stiffness of the virtual joints from pairs of measuring cubes (Hähn & Weigold 2020, section 2.5).
 
-Six distances to each cube give its motion from unloaded to loaded; what the upper cube moves relative to the
-lower one, seen in the frame of the virtual joint between them, is the joint's deformation. Its angles (eq. 4)
-over the moments of the known load (eq. 5-6) are the compliances, 1/k (eq. 7): linear, so weighted least
+Six distances to each cube give its motion from unloaded to loaded; the motion of the upper cube relative
+to the lower one, in the frame of the virtual joint between them, is the joint's deformation. Its angles (eq.
+4) over the moments of the known load (eq. 5-6) are the compliances, 1/k (eq. 7): linear, so weighted least
 squares over all loads and poses. The joint turns about the origin of its frame, so the translation there is 0
-but for noise, and that noise is correlated with the angles': taken into the fit (``use = "motion"``) it makes
-them surer, as a cube 300 mm away from the joint shows the angle at a lever of 300 mm, where the lasers on it
-are 80 mm apart.
+except for noise, which is correlated with that of the angles. Used in the fit (``use = "motion"``) it makes
+them more accurate: a cube 300 mm from the joint shows the angle with a lever of 300 mm, while the lasers on
+it are 80 mm apart.
 
 Assumptions: the noise of all distances is independent and equal; force, pose and places are without error
 (an error of 1 % in the force is one of 1 % in k); the controller holds the joint angles; the load acts on the
@@ -30,16 +30,16 @@ KEYS = ("k_c", "k_b", "k_a")
 AXES = "xyz"
 
 _WIDEST = 0.5
-"""A compliance whose interval reaches further than this share of it is not determined."""
+"""A compliance whose half interval is a larger fraction of it is not determined."""
 _IDLE = 0.01
-"""A joint is not turned about an axis where the moment stays below this share of its largest one."""
+"""A joint is not turned about an axis where the moment stays below this fraction of its largest one."""
 _IMPROBABLE = 1e-3
 _STRAY = 1e-6
 _MEDIAN_OF_SIX = 5.348
 _MOST_STRAY = 5
 _FEW = 0.25
 _FLOOR_MM = 1e-6
-"""Residuals below are rounding, not readings."""
+"""Smaller residuals are rounding, not readings."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class JointFit:
     noise_mm: float
     """1-sigma of one distance as the residuals show it."""
     noise_used_mm: float
-    """The larger of that and the stated one: behind the intervals."""
+    """The larger of that and the stated one, used for the intervals."""
 
     def complete(self) -> bool:
         """Tell whether all three stiffnesses are determined."""
@@ -82,7 +82,7 @@ class StiffnessIdentification:
     """Probability of the intervals."""
     stated_noise_mm: float
     known: Known
-    """Stiffness taken as known, and where from."""
+    """Stiffness taken as known, and its source."""
     issues: tuple[Issue, ...]
     source: str
 
@@ -105,7 +105,7 @@ def identify_stiffness(
 ) -> StiffnessIdentification:
     """Fit k_C, k_B and k_A in N·mm/rad of every virtual joint that lies between two measured cubes.
 
-    What the readings do not determine is None in the result and an issue of severity error that names it.
+    A stiffness that the readings do not determine is None, and an issue of severity error names it.
 
     Parameters
     ----------
@@ -132,10 +132,13 @@ def identify_stiffness(
         fits.append(fit)
         issues.extend(findings)
     return StiffnessIdentification(
-        tuple(fits), level, measurements.setup.lasers.noise_mm,
+        tuple(fits),
+        level,
+        measurements.setup.lasers.noise_mm,
         {name: value for others in known.values() for name, value in others.items()},
-        tuple(issues), measurements.source,
-    )  # fmt: skip
+        tuple(issues),
+        measurements.source,
+    )
 
 
 def in_cell(cell: Cell, joint: str, key: str) -> float | None:
@@ -144,13 +147,13 @@ def in_cell(cell: Cell, joint: str, key: str) -> float | None:
     return float(getattr(values[joint], key)) if joint in values else None
 
 
-# --- which joint a pair of cubes tells about ------------------------------------------------------------
+# --- which joint a pair of cubes measures ----------------------------------------------------------------
 
 
 def _unknown_joint(pair: str, measurements: Measurements, cell: Cell) -> tuple[str, Known]:
     """Return the joint that a pair is to determine, and those between the same cubes that are known.
 
-    The cell's sensor counts as known where the head leaves it and one more joint unknown.
+    The sensor's stiffness is taken from the cell where the head leaves it and one more joint unknown.
     """
     between = measurements.setup.joints_between(pair)
     if len(between) == 1:
@@ -167,10 +170,10 @@ def _unknown_joint(pair: str, measurements: Measurements, cell: Cell) -> tuple[s
         known["sensor"] = (sensor, "from the cell")
     unknown = [name for name in between if name not in known]
     if len(unknown) != 1:
-        found = ", ".join(unknown) if unknown else "none"
+        names = ", ".join(unknown) if unknown else "none"
         raise input_error(
             "pair-joints",
-            f"pair.{pair}: between its cubes lie {', '.join(between)}, unknown of them {found}, allowed: one",
+            f"pair.{pair}: between its cubes lie {', '.join(between)}, unknown of them {names}, allowed: one",
             "a cube in between, or [known.NAME] with k_c, k_b, k_a for all but one",
             source=measurements.source,
         )
@@ -203,12 +206,21 @@ def _fit(
     used_mm = max(noise_mm, stated_mm)
     with np.errstate(invalid="ignore"):
         half = student(level, freedom) * used_mm * np.sqrt(variance)
-    found = [_estimate(float(c), float(h)) for c, h in zip(compliance, half, strict=True)]
+    stiffness = [_estimate(float(c), float(h)) for c, h in zip(compliance, half, strict=True)]
     sigma = used_mm * np.sqrt(np.einsum("nii->ni", covariance))[:, :3]
     fit = JointFit(
-        joint, (found[0], found[1], found[2]), others, row, moment, angle, moment * compliance, sigma,
-        residual / max(used_mm, 1e-300), noise_mm, used_mm,
-    )  # fmt: skip
+        joint,
+        (stiffness[0], stiffness[1], stiffness[2]),
+        others,
+        row,
+        moment,
+        angle,
+        moment * compliance,
+        sigma,
+        residual / max(used_mm, 1e-300),
+        noise_mm,
+        used_mm,
+    )
     missing = [
         _not_determined(fit, axis, float(compliance[axis]), float(half[axis]), level, freedom)
         for axis in range(3)
@@ -265,16 +277,20 @@ def _not_determined(
 
 
 def _doubts(fit: JointFit, residual: Floats, stated_mm: float, freedom: int) -> list[Issue]:
-    """Say where the readings do not look like the model and the stated noise."""
+    """Return warnings where the readings do not fit the model and the stated noise."""
     squares = np.sum(residual**2, axis=1)
     issues = []
     if stated_mm > 0 and chance_above(float(squares.sum()) / stated_mm**2, freedom) < _IMPROBABLE:
         issues.append(
-            Issue("warning", "model-misfit", 0,
-                  f"{fit.joint}: residuals are those of {fit.noise_mm * 1e3:.1f} µm a distance, "
-                  f"{stated_mm * 1e3:.1f} µm are stated; the intervals are widened",
-                  'look at the rows named; a joint that turns about another point: use = "rotation"')
-        )  # fmt: skip
+            Issue(
+                "warning",
+                "model-misfit",
+                0,
+                f"{fit.joint}: residuals are those of {fit.noise_mm * 1e3:.1f} µm a distance, "
+                f"{stated_mm * 1e3:.1f} µm are stated; the intervals are widened",
+                'look at the rows named; a joint that turns about another point: use = "rotation"',
+            )
+        )
     return issues + (_stray(fit, squares, stated_mm, residual.shape[1]) if len(squares) > 2 else [])
 
 
@@ -284,10 +300,14 @@ def _stray(fit: JointFit, squares: Floats, stated_mm: float, freedom: int) -> li
     off = squares / max(noise_mm, _FLOOR_MM) ** 2
     stray = [i for i in np.argsort(-off) if chance_above(float(off[i]), freedom) < _STRAY]
     if len(stray) > _FEW * len(off):
-        return []  # no fault of single readings
+        return []  # single readings are not the cause
     return [
-        Issue("warning", "stray-reading", int(fit.row[i]),
-              f"{fit.joint}: this reading is off by {math.sqrt(off[i]):.0f} sigma",
-              "a cube that was touched, a load noted wrongly, lasers mixed up?")
+        Issue(
+            "warning",
+            "stray-reading",
+            int(fit.row[i]),
+            f"{fit.joint}: this reading is off by {math.sqrt(off[i]):.0f} sigma",
+            "a cube that was touched, a load noted wrongly, lasers mixed up?",
+        )
         for i in stray[:_MOST_STRAY]
-    ]  # fmt: skip
+    ]

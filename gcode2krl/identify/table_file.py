@@ -1,4 +1,5 @@
-"""Reading a measured table from CSV: what is missing or no number is an error with row and column."""
+"""Reading a measured table from CSV: a missing value, or one that is not a number, is an error with row and
+column."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ class MeasuredTable:
     """A CSV file with a header line, its columns as text."""
 
     def __init__(self, path: str | Path) -> None:
-        """Read the file; raises `NotUnderstoodError` where it is missing, empty or no table."""
+        """Read the file; raises `NotUnderstoodError` where it is missing, empty or not a table."""
         self.source = str(path)
         self._frame = _read(Path(path))
 
@@ -49,7 +50,7 @@ class MeasuredTable:
             )
 
     def texts(self, name: str) -> list[str]:
-        """Return a column (n,) of words without blanks around them."""
+        """Return a column (n,) of words, stripped of blanks."""
         self.require([name])
         return [(word or "").strip() for word in self._frame[name].to_list()]
 

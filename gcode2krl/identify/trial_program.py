@@ -2,7 +2,7 @@
 
 Rest-to-rest sections, each ended by an exact stop and a dwell, so that a trace can be cut at its standstills:
 single lines of 1-50 mm at three speeds (they decide k and the law), two lines at unequal speeds, and
-corners of 30-170° (they decide the effective CDIS). Lines on which the tool turns cannot be said in
+corners of 30-170° (they decide the effective CDIS). Lines on which the tool turns cannot be written in
 three-axis G-code: `with_turning_lines` adds them to the targets, for a program that is written as KRL.
 """
 
@@ -79,10 +79,10 @@ def with_turning_lines(targets: Targets, cell: Cell) -> Targets:
     position = np.repeat(targets.position_mm[last : last + 1], count, axis=0)
     position[away, 0] += turns[:, 0]
     rotation = np.repeat(targets.rotation[last : last + 1], count, axis=0)
-    own = fr.rotation_from_quaternion(rotation[away])
+    turned = fr.rotation_from_quaternion(rotation[away])
     abc = np.zeros((len(turns), 3))
     abc[:, 1] = -turns[:, 1] * RAD_PER_DEG
-    rotation[away] = fr.quaternion_from_rotation(fr.rotation_from_abc(abc) @ own)
+    rotation[away] = fr.quaternion_from_rotation(fr.rotation_from_abc(abc) @ turned)
     speed = np.full(count, _speeds(cell)[-1])
     added: dict[str, Any] = {"position_mm": position, "rotation": rotation, "speed_mm_s": speed}
     columns: dict[str, Any] = {}
@@ -199,9 +199,14 @@ def _origin(cell: Cell, origin_mm: tuple[float, float, float] | None) -> tuple[f
     clearance = cell.clearance_z_mm
     if clearance is None:
         raise RefusedError(
-            Issue("error", "no-clearance", 0, "the cell has no clearance plane to approach and leave on",
-                  "give [clearance] z_mm in the cell")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "no-clearance",
+                0,
+                "the cell has no clearance plane to approach and leave on",
+                "give [clearance] z_mm in the cell",
+            )
+        )
     x, y, z = origin_mm if origin_mm is not None else (100.0, 0.0, clearance - BELOW_CLEARANCE_MM)
     if z > clearance:
         raise input_error(
@@ -213,21 +218,26 @@ def _origin(cell: Cell, origin_mm: tuple[float, float, float] | None) -> tuple[f
 
 
 def _tool(cell: Cell) -> int:
-    """Return the tool to call: the mounted one, so that nobody has to change it."""
+    """Return the tool to call: the mounted one, so that no tool change is needed."""
     number = cell.mounted_tool
     if number is None or number not in cell.tool:
         raise RefusedError(
-            Issue("error", "tool-missing", 0, "the cell does not say which tool is mounted",
-                  "give mounted_tool in the cell")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "tool-missing",
+                0,
+                "the cell does not say which tool is mounted",
+                "give mounted_tool in the cell",
+            )
+        )
     return number
 
 
 def _most_rpm(cell: Cell, tool: int) -> float:
-    own, most = cell.tool[tool].max_rpm, cell.spindle.max_rpm
+    of_tool, most = cell.tool[tool].max_rpm, cell.spindle.max_rpm
     if most is None:
         raise missing("spindle.max_rpm")
-    return most if own is None else min(own, most)
+    return most if of_tool is None else min(of_tool, most)
 
 
 def _speeds(cell: Cell) -> tuple[float, ...]:

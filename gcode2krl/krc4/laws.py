@@ -13,7 +13,7 @@ from gcode2krl.arrays import Floats
 
 _REVERSAL_COS = -1.0 + 1e-12
 _HALVINGS = 52
-"""Bisections that leave nothing of an interval of length 1 in double precision."""
+"""Bisections that reduce an interval of length 1 to double precision."""
 
 
 def effective_acceleration(v_mm_s: ArrayLike, a_mm_s2: ArrayLike, k_s: ArrayLike) -> Floats:
@@ -63,12 +63,12 @@ def corner(
 
 
 def parabola_distance(before_mm: Floats, after_mm: Floats, cos_half: Floats) -> Floats:
-    """Return the distance (n,) in mm of a corner to its parabola, whose distances may differ.
+    """Return the distance (n,) in mm of a corner to its parabola with different distances before and after.
 
     The parabola t²·q - (1 - t)²·p leaves the line p = ``before_mm`` ahead of the corner and joins the next
     one q = ``after_mm`` behind it (eq. 1-3 with unequal distances); ``cos_half`` = cos(alpha/2). With
     r = t/(1 - t) its nearest point is the one positive root of q²·r³ + p·q·c·r² - p·q·c·r - p², c = cosine
-    of the turn; equal distances have it in the middle.
+    of the turn; for equal distances it is in the middle.
     """
     p, q, s = before_mm, after_mm, cos_half
     distance = p * s / 2.0

@@ -18,11 +18,11 @@ from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
 _MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
-"""Share of the time above which a loss is a finding."""
+"""Fraction of the time above which a loss is reported."""
 _NO_LENGTH_MM = 1e-6
-"""What is shorter is rounding: another tool whose tip stands at the same place moves nowhere."""
+"""A shorter move is rounding, as when another tool's tip is at the same place."""
 _STRAIGHT_COS, _NEARLY_STRAIGHT_COS = 1e-7, 0.01
-"""cos(alpha/2) below which a line goes straight on and there is no corner, and below which it may."""
+"""cos(alpha/2) below which a line goes straight on without a corner, and below which it may do so."""
 _WRITTEN_MM = 1e-3
 """The last decimal of a position in the KRL text."""
 
@@ -38,11 +38,11 @@ class Chain:
     from_rotation: Floats
     to_rotation: Floats
     length_mm: Floats
-    """(n,) lengths over ``scale``; a mere reorientation counts as the way it takes the time of."""
+    """(n,) lengths over ``scale``; a mere reorientation has the length that takes as much time."""
     speed_mm_s: Floats
     """(n,) programmed speeds over ``scale``."""
     acceleration_mm_s2: Floats
-    """(n,) ``$ACC.CP``, or what ``$ACC.ORI`` leaves of it, over ``scale``."""
+    """(n,) ``$ACC.CP``, lowered where ``$ACC.ORI`` limits it, over ``scale``."""
     angle_rad: Floats
     """(n,) angle that the tool turns by."""
     blend_mm: Floats
@@ -56,8 +56,8 @@ class Chain:
     cos_half: Floats
     """(n,) cos(alpha/2) at the end of each move, alpha = interior angle."""
     scale: Floats
-    """(n,) unit of length of each move: 1, but behind a corner that takes a change of speed v1 to v2 it is
-    v2/v1 times that before. In these units such a corner has one speed and equal distances, which is a
+    """(n,) unit of length of each move: 1, but after a corner that makes a change of speed v1 to v2 it is
+    v2/v1 times the unit before. In these units such a corner has one speed and equal distances, which is a
     constant acceleration vector between v1 and v2 with d1/d2 = v1/v2."""
 
     def corner_error_mm(self) -> Floats:
@@ -70,7 +70,7 @@ class Chain:
 
 
 def build_chain(targets: Targets, cell: Cell) -> Chain:
-    """Return the chain of a program. PTP motions inside it are taken as straight, at the rapid speed."""
+    """Return the chain of a program. PTP motions inside it are modelled as straight, at the rapid speed."""
     programmed = np.flatnonzero(targets.move >= 0)
     first, last = int(programmed[0]), int(programmed[-1])
     rows = slice(first + 1, last + 1)
@@ -106,13 +106,13 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
 
 
 def _owners(move: Ints32) -> Ints32:
-    """Return the row of the Toolpath (n,) of each motion; what is added has that of the one it leads to."""
-    own = np.array(move)
+    """Return the row of the Toolpath (n,) of each motion; added motions have that of the next one."""
+    owner = np.array(move)
     added, programmed = np.flatnonzero(move < 0), np.flatnonzero(move >= 0)
     if len(added) and len(programmed):
         after = np.minimum(np.searchsorted(programmed, added), len(programmed) - 1)
-        own[added] = move[programmed[after]]
-    return own
+        owner[added] = move[programmed[after]]
+    return owner
 
 
 def _sizes(start: Floats, end: Floats) -> Floats:
@@ -159,27 +159,27 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
     if len(chain.length_mm) == 0:
         return _standstill(targets, chain)
     time = sample_times(profile, dt_s)
-    found = sample(
+    samples = sample(
         time, profile, chain.start_mm, chain.end_mm, chain.length_mm, chain.blend_mm, cell.controller.k_s
     )
-    move = chain.move[found.move]
+    move = chain.move[samples.move]
     move[0] = targets.move[chain.first]
     return Motion(
         time_s=time,
-        position_mm=found.position_mm,
-        rotation=_rotations(chain, found.move, found.part),
-        speed_mm_s=found.speed_mm_s,
-        acceleration_mm_s2=found.acceleration_mm_s2,
-        jerk_mm_s3=found.jerk_mm_s3,
-        path_mm=found.path_mm,
+        position_mm=samples.position_mm,
+        rotation=_rotations(chain, samples.move, samples.part),
+        speed_mm_s=samples.speed_mm_s,
+        acceleration_mm_s2=samples.acceleration_mm_s2,
+        jerk_mm_s3=samples.jerk_mm_s3,
+        path_mm=samples.path_mm,
         move=move,
-        corner=found.corner,
-        tool=chain.tool[found.move],
+        corner=samples.corner,
+        tool=chain.tool[samples.move],
     )
 
 
 def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
-    """Return what costs time: look-ahead on short moves, stops, and how much the two laws differ.
+    """Return findings on lost time: look-ahead on short moves, stops, and the difference of the two laws.
 
     Notes; together above ``[limits] lost_time_share`` warnings.
     """
@@ -189,8 +189,8 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
         free = plan(chain, cell, look_ahead=False)
         lost_s = lost_whole_s = profile.total_s - free.total_s
         if lost_s > _WORTH_SAYING * profile.total_s:
-            own, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))
-            worst = int(np.argmax(own - ideal))
+            planned, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))
+            worst = int(np.argmax(planned - ideal))
             sentence = (
                 f"moves too short for a look-ahead of {cell.controller.advance} cost {lost_s:.1f} s of "
                 f"{profile.total_s:.1f} s, most at this line (unverified: how the controller plans ahead)"
@@ -214,7 +214,7 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
 
 
 def _lost_by_stops(chain: Chain, cell: Cell) -> Floats:
-    """Return what exact stops between moves cost against passing them, k + (v1 + v2)/(2·a), in s each."""
+    """Return the time in s that each exact stop between moves costs against passing, k + (v1 + v2)/(2·a)."""
     stops = np.flatnonzero(chain.stop[:-1])
     speed_mm_s = chain.speed_mm_s * chain.scale
     ramps = (speed_mm_s[stops] + speed_mm_s[stops + 1]) / (2.0 * cell.controller.acc_cp_m_s2 * MM_PER_M)
@@ -222,7 +222,7 @@ def _lost_by_stops(chain: Chain, cell: Cell) -> Floats:
 
 
 def _stop_issues(chain: Chain, lost: Floats, profile: Profile) -> list[Issue]:
-    """Say what exact stops cost, dwells included."""
+    """Return the finding on the time of exact stops, dwells included."""
     if lost.sum() <= _WORTH_SAYING * profile.total_s:
         return []
     stops = np.flatnonzero(chain.stop[:-1])
@@ -241,8 +241,8 @@ def _with_orientation(
     """Return length, speed, acceleration and angle (n,) of moves, limited by ``$VEL.ORI`` and ``$ACC.ORI``.
 
     Position and orientation share one time law: an angle w over a length l limits the speed to
-    ``$VEL.ORI``·l/w and the acceleration to ``$ACC.ORI``·l/w (assumption, the paper turns nothing). A
-    reorientation on the spot gets the length that it takes the time of.
+    ``$VEL.ORI``·l/w and the acceleration to ``$ACC.ORI``·l/w (assumption, the paper has no turns). A
+    reorientation on the spot gets the length that takes as much time.
     """
     controller = cell.controller
     a_cp = np.full(len(length), controller.acc_cp_m_s2 * MM_PER_M)
@@ -283,22 +283,27 @@ def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floa
 
 
 def _goes_straight_on(d: Floats, cos_half: Floats) -> Bools:
-    """Mark the vertices (n,) that are no corners: their curve is off by less than the text can say.
+    """Mark the vertices (n,) that are not corners: they are off by less than the last decimal of the text.
 
-    So a tangent stays one when its points are rounded to the decimals of the text.
+    So a tangent remains one when its points are rounded to the decimals of the text.
     """
     near = (cos_half < _NEARLY_STRAIGHT_COS) & (d * cos_half / 2.0 < _WRITTEN_MM / 2.0)
     return np.asarray((cos_half < _STRAIGHT_COS) | near)
 
 
 def _scales(
-    length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
-    stop: Bools, cell: Cell,
-) -> Floats:  # fmt: skip
+    length: Floats,
+    speed: Floats,
+    acceleration: Floats,
+    blend: Floats,
+    cdis: Floats,
+    stop: Bools,
+    cell: Cell,
+) -> Floats:
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
-    A corner takes a change of speed where |v2 - v1|/a + k <= T, its duration (design assumption, the paper is
-    silent), and where the look-ahead lets the faster of the two be reached.
+    A corner makes a change of speed where |v2 - v1|/a + k <= T, its duration (our assumption, the paper does
+    not say), and where the look-ahead lets the faster of the two be reached.
     """
     scale = np.ones(len(length))
     rows = _wide_corners(length, speed, acceleration, blend, cdis, stop, cell)
@@ -320,10 +325,15 @@ def _scales(
 
 
 def _wide_corners(
-    length: Floats, speed: Floats, acceleration: Floats, blend: Floats, cdis: Floats,
-    stop: Bools, cell: Cell,
-) -> Ints:  # fmt: skip
-    """Return the moves with a corner behind them that is long enough for the change of speed there."""
+    length: Floats,
+    speed: Floats,
+    acceleration: Floats,
+    blend: Floats,
+    cdis: Floats,
+    stop: Bools,
+    cell: Cell,
+) -> Ints:
+    """Return the moves that end in a corner long enough for the change of speed there."""
 
     def part(first: int, behind: int) -> Ints:
         here = slice(first, behind)
@@ -340,13 +350,13 @@ def _wide_corners(
 
 
 def _widest(length: Floats, ratio: Floats, cdis: Floats, rows: Ints) -> Floats:
-    """Return the distance before the corners behind some moves, where speeds of this ratio meet there."""
+    """Return the distance before the corners at the ends of some moves whose speeds have this ratio."""
     lines = np.minimum(length[rows], length[rows + 1] / ratio) / 2
     return np.minimum(cdis[rows] / np.maximum(1.0, ratio), lines)
 
 
 def _in_view(length: Floats, rows: Ints, cell: Cell) -> Floats:
-    """Return the length of the moves behind the corners of some moves that the look-ahead knows."""
+    """Return the length of the moves after the corners of some moves, as far as the look-ahead sees."""
     way = np.concatenate([[0.0], np.cumsum(length)]) if len(rows) else np.zeros(1)
     advance = cell.controller.advance
     seen = len(length) if advance == "unlimited" else rows + 1 + advance
@@ -354,7 +364,7 @@ def _in_view(length: Floats, rows: Ints, cell: Cell) -> Floats:
 
 
 def _rotations(chain: Chain, row: Ints, part: Floats) -> Floats:
-    """Orientation goes with the position along each move (``$ORI_TYPE = #VAR``)."""
+    """Interpolate the orientation with the position along each move (``$ORI_TYPE = #VAR``)."""
     if _one_orientation(chain.from_rotation, chain.to_rotation):
         return np.broadcast_to(chain.to_rotation[0], (len(row), 4))
     return fr.slerp(chain.from_rotation[row], chain.to_rotation[row], part)
@@ -371,15 +381,21 @@ def _one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
 
 
 def _standstill(targets: Targets, chain: Chain) -> Motion:
-    """A program of one position: one sample at rest."""
+    """Return the motion of a program with one position: one sample at rest."""
     row = chain.first
     zero = np.zeros(1)
     return Motion(
-        time_s=zero, position_mm=targets.position_mm[row : row + 1], rotation=targets.rotation[row : row + 1],
-        speed_mm_s=zero, acceleration_mm_s2=zero, jerk_mm_s3=zero, path_mm=zero,
-        move=targets.move[row : row + 1], corner=np.zeros(1, dtype=np.bool_),
+        time_s=zero,
+        position_mm=targets.position_mm[row : row + 1],
+        rotation=targets.rotation[row : row + 1],
+        speed_mm_s=zero,
+        acceleration_mm_s2=zero,
+        jerk_mm_s3=zero,
+        path_mm=zero,
+        move=targets.move[row : row + 1],
+        corner=np.zeros(1, dtype=np.bool_),
         tool=targets.tool[row : row + 1],
-    )  # fmt: skip
+    )
 
 
 def with_speed(chain: Chain, speed_mm_s: Floats) -> Chain:

@@ -1,9 +1,9 @@
-"""Speed along a chain of moves: what the planner asks for before the last moving average.
+"""Speed along a chain of moves, as the planner has it before the last moving average.
 
 The programmed speeds become pieces of constant acceleration: ramps of slope a (the first average of the law),
 constant speed, standstill. The second average, of length k, is applied when the motion is sampled. Both laws
 of the controller model differ only where a move is too short to reach its speed: ``averages`` lets the ramps
-up and down overlap (their sum), ``trapezoid`` runs up with a as far as it gets.
+up and down overlap (their sum), ``trapezoid`` accelerates with a until it must brake.
 """
 
 import math
@@ -15,12 +15,12 @@ from numba import njit
 from gcode2krl.arrays import Bools, Floats, Ints
 
 _ROOM = 0.8
-"""A move that a slow place holds back over more than this share of its length runs slowly as a whole."""
+"""A move that a slow place slows down over more than this fraction of its length is slow as a whole."""
 _NEARLY, _SHORT = 0.99, 4.0
-"""So does one that is shorter than this many times the reach of a place that is only a little slower: chords
-of an arc are alike but for the micrometre they are rounded to, which must not decide how they are run."""
+"""So is a move shorter than `_SHORT` times the reach of a place that is only slightly slower: chords of an
+arc differ by the micrometre they are rounded to, which must not decide their speed."""
 UNLIMITED = -1
-"""Number of moves in view where the look-ahead model is off."""
+"""Number of moves in view if the look-ahead model is off."""
 
 
 class Profile(NamedTuple):
@@ -38,9 +38,16 @@ class Profile(NamedTuple):
 
 
 def plan_profile(
-    length_mm: Floats, speed_mm_s: Floats, blend_mm: Floats, stop: Bools, wait_s: Floats,
-    a_mm_s2: Floats | float, k_s: float, moves_in_view: int, averages: bool,
-) -> Profile:  # fmt: skip
+    length_mm: Floats,
+    speed_mm_s: Floats,
+    blend_mm: Floats,
+    stop: Bools,
+    wait_s: Floats,
+    a_mm_s2: Floats | float,
+    k_s: float,
+    moves_in_view: int,
+    averages: bool,
+) -> Profile:
     """Plan a chain of n moves that starts and ends at rest.
 
     Parameters
@@ -76,7 +83,7 @@ def plan_profile(
 
 
 def _run_ends(speed_mm_s: Floats, a_mm_s2: Floats, bound_mm_s: Floats) -> Ints:
-    """Return the last move of each run: moves of one speed whose inner vertices hold nothing back.
+    """Return the last move of each run: moves of one speed whose inner vertices do not slow it down.
 
     Such a run is one programmed rectangle to the law, however many moves it has.
     """
@@ -91,7 +98,8 @@ def _vertex_speeds(length, speed, stop, a, k, in_view):
     """Upper bound (n + 1,) of the speed at each vertex: programmed, stops, look-ahead.
 
     Look-ahead (an assumption, the controller's planning is not published): at the end of a move only the next
-    ``in_view`` moves are known, and a stop at their end must be possible: v·(v/a + k)/2 <= what is in view.
+    ``in_view`` moves are known, and a stop at their end must be possible: v·(v/a + k)/2 <= the length in
+    view.
     """
     count = len(length)
     vertex = np.zeros(count + 1)
@@ -113,11 +121,11 @@ def _vertex_speeds(length, speed, stop, a, k, in_view):
 
 @njit(cache=True)
 def _margins(length, speed, blend, stop, vertex, k):
-    """Return (head, tail, top) of each run: what it runs at the speed of its ends, and its own top speed.
+    """Return (head, tail, top) of each run: the lengths at the speeds of its ends, and its own top speed.
 
-    Slowing down ends where the corner begins, speeding up begins where it ends; v·k/2 is what the last
-    average smears across that point. A margin longer than the run reaches into the next; ``vertex`` is
-    lowered there.
+    Slowing down ends where the corner begins, speeding up begins where it ends; v·k/2 is the length over
+    which the last average spreads that point. A margin longer than the run reaches into the next; ``vertex``
+    is lowered there.
     """
     count = len(length)
     head, tail, top = np.zeros(count), np.zeros(count), speed.copy()
@@ -168,13 +176,13 @@ def _margins(length, speed, blend, stop, vertex, k):
 
 @njit(cache=True)
 def _is_alike(slow, fast, reach, length):
-    """Tell whether a short move need not distinguish its speed from that of a slow place."""
+    """Tell whether a short move may run at the speed of a slow place beside it."""
     return slow > _NEARLY * fast and length < _SHORT * reach
 
 
 @njit(cache=True)
 def _reachable(length, vertex, a):
-    """Lower the vertex speeds to what can be reached and braked with a."""
+    """Lower the vertex speeds to those that can be reached and braked with a."""
     for i in range(len(length) - 1, -1, -1):
         vertex[i] = min(vertex[i], math.sqrt(vertex[i + 1] ** 2 + 2.0 * a[i] * max(length[i], 0.0)))
     for i in range(len(length)):
@@ -237,7 +245,7 @@ def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out):
         if abs(drift) > 1e-9:
             s = start + length[i]
         if stop[i] or i == count - 1:
-            rest = k if length[i] > 0.0 else 0.0  # what does not move has nothing to smear
+            rest = k if length[i] > 0.0 else 0.0  # a standstill has nothing to smooth
             rest += wait[i] if i < count - 1 else 0.0
             if rest > 0.0:
                 out[0, used], out[1, used], out[2, used], out[3, used], out[4, used] = t, s, 0.0, 0.0, area

@@ -1,8 +1,7 @@
 """From the planned pieces to samples: the last moving average, corners, positions and their derivatives.
 
-Three passes over the samples: the time law at each (rows by themselves), the move each is in (one after the
-other, because a standstill must not fall back behind a corner by rounding), the place in space (rows by
-themselves again).
+Three passes over the samples: the time law (rows independent), the move (rows in order, because rounding
+must not move a standstill back before a corner), and the place in space (rows independent again).
 """
 
 import math
@@ -29,13 +28,13 @@ class Samples(NamedTuple):
     """(m,) arc length along the blended path."""
     move: Ints
     part: Floats
-    """(m,) share of the move that is done."""
+    """(m,) fraction of the move that is done."""
     corner: Bools
     """(m,) True inside an approximated corner."""
 
 
 def sample_times(profile: Profile, dt_s: float) -> Floats:
-    """Return the sample times (m,) in s, the last one at or behind the end of the motion."""
+    """Return the sample times (m,) in s, the last one at or after the end of the motion."""
     count = math.ceil(profile.total_s / dt_s - 1e-9) + 1
     return np.arange(count, dtype=np.float64) * dt_s
 
@@ -92,7 +91,7 @@ def _sums(values: Floats) -> Floats:
 
 
 def _way_to_moves(moves: _Moves) -> tuple[Floats, Floats]:
-    """Return the length of all moves before each move, and how much shorter their corners are, (n + 1,)."""
+    """Return the length of all moves before each move, and how much their corners shorten it, (n + 1,)."""
     count = len(moves.length)
     size, saving = np.zeros(count + 1), np.zeros(count + 1)
     in_chunks(lambda start, end: _savings(moves, start, end, size[1:], saving[1:]), chunk_borders(count))
@@ -101,7 +100,7 @@ def _way_to_moves(moves: _Moves) -> tuple[Floats, Floats]:
 
 @njit(cache=True, nogil=True)
 def arc_length(tau, uu, uw, ww):
-    """Length of the parabola's share tau, in units of 2·d: the integral of |(1 - t)·u + t·w| from 0 to tau.
+    """Length of the parabola up to tau, in units of 2·d: the integral of |(1 - t)·u + t·w| from 0 to tau.
 
     ``uu``, ``uw``, ``ww`` are the products of the tangents u before and w after the corner.
     """
@@ -159,7 +158,7 @@ def _moves(path, begins, move):
 
 @njit(cache=True, nogil=True)
 def _savings(moves, first, behind, size, saving):
-    """Write the length of moves in space (none for a turn on the spot) and what the corners behind save."""
+    """Write the length of moves in space (0 for a turn on the spot) and how much their corners shorten it."""
     start, end, length, blend = moves
     for i in range(first, behind):
         size[i] = math.sqrt(_product(start, end, i, i))
@@ -231,7 +230,7 @@ def _product(start, end, i, j):
 
 @njit(cache=True, nogil=True)
 def _short_of_vertex(moves, i, tau):
-    """Return how far the path at share tau of the corner behind move i is short of the corner's vertex."""
+    """Return how much path is left to the vertex at fraction tau of the corner after move i."""
     start, end, length, blend = moves
     uu = _product(start, end, i, i) / length[i] ** 2
     ww = _product(start, end, i + 1, i + 1) / length[i + 1] ** 2

@@ -1,12 +1,12 @@
-"""Which force to trust: the measured one, or the pilot's estimate (Haehn & Weigold 2020, section 2.3).
+"""Blends the measured force with the pilot's estimate (Haehn & Weigold 2020, section 2.3).
 
-While both differ by less than a threshold the measurement counts: it knows wear and the real material.
-Beyond, a change of direction or the cutter's exit is assumed, which the filtered measurement shows too late,
-and the signal goes over to the estimate linearly within the blend time, and back the same way.
+While both differ by less than a threshold the measurement is used: it includes wear and the real material.
+Beyond the threshold a change of direction or the cutter's exit is assumed, which the filtered measurement
+shows too late: the signal changes to the estimate linearly within the blend time, and back in the same way.
 
-What the paper leaves open: the difference is the length of the vector; the way back takes the same time; and
-an estimate that stays beyond the threshold while it does not change is a wrong estimate, not an event. It is
-then not trusted until both agree again.
+Our choices where the paper is silent: the difference is the length of the vector; blending back takes the
+same time; and an estimate that stays beyond the threshold while it does not change is a wrong estimate, not
+an event. It is then not used until both agree again.
 """
 
 from typing import NamedTuple
@@ -19,32 +19,32 @@ from gcode2krl.cell.sections.online import Online
 from gcode2krl.compiled.inputs import read_only
 
 STEADY_SHARE = 0.2
-"""An estimate is steady while it changes by less than this share of the threshold; our choice."""
+"""An estimate is steady while it changes by less than this fraction of the threshold; our choice."""
 WEIGHT, BEYOND_S, DISTRUSTED = 0, 1, 2
 ANCHOR, LAST = 3, 6
 
 
 class BlendState(NamedTuple):
-    """What the blend remembers."""
+    """State of the blend."""
 
     values: Floats
-    """(9,) weight of the estimate, time beyond the threshold in a steady cut, distrust; the estimate when
-    that began (3), and the last one there was (3)."""
+    """(9,) weight of the estimate, time beyond the threshold in a steady cut, distrust; the estimate at the
+    start of that time (3), and the last known estimate (3)."""
 
 
 class Blend(NamedTuple):
-    """The load to compensate, and how it came about."""
+    """The load to compensate, and how it was blended."""
 
     load: Floats
     """(n, 6)"""
     weight: Floats
-    """(n,) share of the estimate, 0 to 1."""
+    """(n,) weight of the estimate, 0 to 1."""
     distrusted: Bools
     """(n,) True while an estimate is not trusted."""
 
 
 def blend_start() -> BlendState:
-    """Return the state before the first sample: the measurement counts."""
+    """Return the state before the first sample: the measurement is used."""
     return BlendState(np.zeros(9))
 
 
@@ -53,8 +53,8 @@ def blended(
 ) -> tuple[BlendState, Blend]:
     """Return the superposition of measured loads (n, 6) and estimated forces (n, 3).
 
-    ``known`` (n,) is False where there is no estimate; the weight of the last one then goes back, as above.
-    The estimate has no moment: what it counts for has none.
+    ``known`` (n,) is False where there is no estimate; the last one is then blended out as above.
+    The estimate has no moment: its part of the load has none.
     """
     values = read_only("measured", measured, -1, 6)
     after = BlendState(state.values.copy())
@@ -62,24 +62,41 @@ def blended(
     patience_s = settings.pilot_lead_s + settings.blend_s + 2.0 * settings.filter_s
     estimate = read_only("estimate_N", estimate_N, len(values), 3)
     _blend(
-        values, estimate, np.ascontiguousarray(known), after.values,
-        settings.cycle_s, settings.threshold_N, settings.blend_s, patience_s, blend.load, blend.weight,
+        values,
+        estimate,
+        np.ascontiguousarray(known),
+        after.values,
+        settings.cycle_s,
+        settings.threshold_N,
+        settings.blend_s,
+        patience_s,
+        blend.load,
+        blend.weight,
         blend.distrusted,
-    )  # fmt: skip
+    )
     return after, blend
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blend(
-    measured: Floats, estimate: Floats, known: Bools, state: Floats, cycle: float, threshold: float,
-    blend_s: float, patience: float, load: Floats, weight: Floats, distrusted: Bools,
-) -> None:  # fmt: skip
+    measured: Floats,
+    estimate: Floats,
+    known: Bools,
+    state: Floats,
+    cycle: float,
+    threshold: float,
+    blend_s: float,
+    patience: float,
+    load: Floats,
+    weight: Floats,
+    distrusted: Bools,
+) -> None:
     for i in range(len(measured)):
-        apart, moved = 0.0, 0.0
+        difference2, moved = 0.0, 0.0
         for c in range(3):
-            apart += (estimate[i, c] - measured[i, c]) ** 2
+            difference2 += (estimate[i, c] - measured[i, c]) ** 2
             moved += (estimate[i, c] - state[ANCHOR + c]) ** 2
-        beyond = known[i] and apart >= threshold * threshold
+        beyond = known[i] and difference2 >= threshold * threshold
         if not beyond or moved > (STEADY_SHARE * threshold) ** 2:
             state[BEYOND_S] = 0.0
             for c in range(3):

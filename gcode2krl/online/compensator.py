@@ -34,7 +34,7 @@ LoadFrame = Literal["base", "tcp", "sensor"]
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
-    """What comes in, a row a cycle."""
+    """Inputs, a row for each cycle."""
 
     time_s: Floats
     """(n,) on the controller's clock."""
@@ -47,7 +47,7 @@ class Samples:
     position_mm: Floats
     """(n, 3) tip of the program in ``$BASE``, without correction."""
     told: Announced
-    """(n,) columns: what is reported of the pilot."""
+    """(n,) columns: what the controller reports of the pilot."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -61,20 +61,20 @@ class Samples:
 
 @dataclass(frozen=True, kw_only=True)
 class Corrections:
-    """What goes out, a row a cycle, and how it came about."""
+    """Outputs, a row for each cycle, with intermediate results."""
 
     correction: Floats
     """(n, 3) x, y, z in mm along ``$BASE``, or (n, 6) A1 to A6 in rad."""
     wanted_mm: Floats
     """(n, 3) before PID and limits."""
     load: Floats
-    """(n, 6) that it is made for, along ``$BASE``."""
+    """(n, 6) load that is compensated, along ``$BASE``."""
     measured: Floats
     """(n, 6) filtered, along ``$BASE``."""
     estimate_N: Floats
     """(n, 3) the pilot's, along ``$BASE``; zero where unknown."""
     weight: Floats
-    """(n,) share of the estimate."""
+    """(n,) weight of the estimate."""
     gate: Ints
     """(n,) `pilot_gate.Gate`: why the pilot is not used, 0 = it is."""
     distrusted: Bools
@@ -87,7 +87,7 @@ class Corrections:
 
 @dataclass(frozen=True)
 class Compensator:
-    """What does not change while it runs; made by `compensator`."""
+    """Constants of a compensator; made by `compensator`."""
 
     cell: Cell
     settings: Online
@@ -101,7 +101,7 @@ class Compensator:
 
 
 class State(NamedTuple):
-    """What every stage remembers."""
+    """States of all stages."""
 
     filter: FilterState
     gate: GateState
@@ -124,7 +124,7 @@ def build_compensator(
 
     Parameters
     ----------
-    load_frame : along which axes the load comes, and about which point its moment: ``sensor`` about the
+    load_frame : axes along which the load is stated, and the point of its moment: ``sensor`` about the
         origin of the sensor (freed from weight and offset by ``calibration``), else about the tool tip.
     knots, header : sidecar of the program that will run; None = no pilot.
 
@@ -164,9 +164,9 @@ def step(device: Compensator, state: State, sample: Samples) -> tuple[State, Cor
 def stream(
     device: Compensator, state: State, samples: Samples, held: Bools | None = None
 ) -> tuple[State, Corrections]:
-    """Return the state after all rows, and their corrections; rows that are ``held`` (n,) send the last one.
+    """Return the state after all rows, and their corrections; ``held`` rows (n,) repeat the last one.
 
-    However a recording is cut into calls, the result is the same.
+    The result does not depend on how a recording is divided into calls.
     """
     cell, settings, tool = device.cell, device.settings, device.tool
     rotation = _tool_rotation(samples.q_rad, cell, tool)
@@ -240,7 +240,7 @@ def _pilot_base(device: Compensator, pilot_N: Floats, rotation: Floats) -> Float
 
 
 def _turned(rotation: Floats, vector: Floats) -> Floats:
-    """Return R·v for each row; written out, as a matrix product rounds by the number of rows."""
+    """Return R·v for each row; written out, because the rounding of a matrix product depends on the rows."""
     x, y, z = vector[:, :1], vector[:, 1:2], vector[:, 2:]
     turned: Floats = rotation[:, :, 0] * x + rotation[:, :, 1] * y + rotation[:, :, 2] * z
     return turned
@@ -254,20 +254,20 @@ def joints_at(q_rad: Floats, shift_mm: Floats, cell: Cell) -> Floats:
     geometry = cell.robot.geometry.array()
     position, rotation = flange_pose(q_rad, geometry)
     base = np.broadcast_to(cell.base_matrix()[:3, :3], rotation.shape)
-    found = all_branches(position + _turned(base, shift_mm), rotation, geometry)
+    branches = all_branches(position + _turned(base, shift_mm), rotation, geometry)
     status, _ = status_turn(q_rad, geometry)
-    q = found[np.arange(len(found)), status]
+    q = branches[np.arange(len(branches)), status]
     nearest: Floats = q + np.rint((q_rad - q) / (2.0 * np.pi)) * (2.0 * np.pi)
     return nearest
 
 
 def _near_limit(joints: Floats, q_rad: Floats, cell: Cell, settings: Online) -> Bools:
-    """Return (n,) True where the corrected joints are too near to a limit, and nearer than the program's."""
+    """Return (n,) True where the corrected joints are too close to a limit, and closer than the program's."""
     if cell.robot.limits.q_deg is None:
         return np.isnan(joints[:, 0])
     low, high = np.array(cell.robot.limits.q_deg).T * RAD_PER_DEG
     margin = np.minimum(joints - low, high - joints)
-    own = np.minimum(q_rad - low, high - q_rad)
+    program_margin = np.minimum(q_rad - low, high - q_rad)
     least = settings.limit_margin_deg * RAD_PER_DEG
-    near: Bools = ((margin < least) & (margin < own)).any(axis=1) | np.isnan(joints[:, 0])
+    near: Bools = ((margin < least) & (margin < program_margin)).any(axis=1) | np.isnan(joints[:, 0])
     return near

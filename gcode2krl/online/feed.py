@@ -1,4 +1,4 @@
-"""Which way the tool is being fed, from where it was commanded to be."""
+"""Direction of feed, from the commanded positions."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from gcode2krl.cell.sections.online import Online
 from gcode2krl.compiled.inputs import read_only
 
 WINDOW_S = 0.020
-"""Positions come with few decimals: over this time the direction is right to 1° at 25 mm/s and 0.01 mm."""
+"""Positions have few decimals: over this time the direction is accurate to 1° at 25 mm/s and 0.01 mm."""
 LEAST_MM = 0.02
-"""Less than this within the window is a standstill, which has no direction: the last one stays, so that
-stopping does not itself move the tool along."""
+"""A shorter movement within the window is a standstill, which has no direction: the last one is kept, so that
+stopping does not itself move the tool."""
 
 
 class FeedState(NamedTuple):
-    """What the direction comes from."""
+    """State of the direction."""
 
     positions: Floats
     """(k, 3) the last commanded positions in mm."""

@@ -1,6 +1,6 @@
 """The quasi-static part of a sensor's signal: low-pass, moving average (Haehn & Weigold 2020, section 2.2).
 
-A filter is one compiled loop over rows that carries its memory from call to call, so a stream in one call and
+A filter is one compiled loop over rows that carries its state from call to call, so that a whole stream and
 the same stream sample by sample give the same bits.
 """
 
@@ -19,7 +19,7 @@ WIDTH = 6
 
 
 class FilterState(NamedTuple):
-    """What the filter remembers."""
+    """State of the filter."""
 
     low: Floats
     """(6,) output of the low-pass."""
@@ -30,7 +30,7 @@ class FilterState(NamedTuple):
 
 
 def filter_start(settings: Online) -> FilterState:
-    """Return the memory before the first sample, which then fills it: no transient at the start."""
+    """Return the state before the first sample, which then fills it: no transient at the start."""
     length = max(1, round(settings.average_s / settings.cycle_s))
     return FilterState(np.zeros(WIDTH), np.zeros((length, WIDTH)), np.zeros(2, dtype=np.int64))
 
@@ -39,8 +39,9 @@ def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[Filter
     """Return the filtered loads (n, 6), and (n,) True where the sensor is lost.
 
     First-order low-pass, exact for an input that is held over a cycle, then the mean of the last
-    ``average_s``. A sample that is not a number, or above ``most_force_N``, leaves the output as it was; more
-    of them in a row than ``sensor_hold_s`` is a lost sensor, and so is at once a force that is no cut.
+    ``average_s``. A sample that is not a number, or above ``most_force_N``, leaves the output unchanged;
+    more of them in a row than ``sensor_hold_s`` mean a lost sensor, and so does, at once, a force that is too
+    large for a cut.
     """
     values = read_only("load", load, -1, WIDTH)
     after = FilterState(state.low.copy(), state.window.copy(), state.counts.copy())
@@ -53,9 +54,16 @@ def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[Filter
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _filter(
-    values: Floats, low: Floats, window: Floats, count: Ints, share: float, allowed: int, most: float,
-    out: Floats, lost: Bools,
-) -> None:  # fmt: skip
+    values: Floats,
+    low: Floats,
+    window: Floats,
+    count: Ints,
+    share: float,
+    allowed: int,
+    most: float,
+    out: Floats,
+    lost: Bools,
+) -> None:
     length = window.shape[0]
     for i in range(len(values)):
         finite, size = True, 0.0

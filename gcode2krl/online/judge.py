@@ -1,4 +1,4 @@
-"""Where an error of the tip counts: on what stays on the part, and where the forces are to be believed."""
+"""Where an error of the tip counts: on surfaces that stay on the part, where the forces are reliable."""
 
 from typing import NamedTuple
 
@@ -11,17 +11,17 @@ from gcode2krl.cutting.law import feed_per_tooth
 from gcode2krl.prediction import Prediction
 
 SIDE_RAD = 0.05
-"""An engagement arc that begins or ends so near to the feed's normal leaves a wall."""
+"""An engagement arc that begins or ends this close to the normal of the feed leaves a wall."""
 CELL_MM = 0.5
 DEEPER_MM = 0.05
-"""What another pass cuts deeper by more than this does not stay."""
+"""A surface that another pass cuts deeper by more than this does not stay."""
 LEAST_CHIP_MM = 0.005
-"""Below this the bottom edges plough; the force law does not hold there (docs/cutting.md)."""
+"""Below this the bottom edges plough; the force law is not valid there (docs/cutting.md)."""
 _SINKS = 1e-3
 
 
 class Judged(NamedTuple):
-    """Samples (n,) on which errors are judged, and those that are left out although they stay."""
+    """Samples (n,) on which errors are judged, and those that are left out although their surface stays."""
 
     counts: Bools
     ploughs: Bools
@@ -31,10 +31,10 @@ class Judged(NamedTuple):
 def judged(prediction: Prediction, memory_s: float, late_s: float = 0.0) -> Judged:
     """Return where an error of the tip stays on the part.
 
-    It does where an edge passes the side of the cut: there the wall is made, which at entry and exit of a
-    slot is where the tool's centre is over the part. And it does where no other pass goes deeper. What the
-    edges' ploughing does is kept apart, and so is all that a compensator with a memory of ``memory_s`` makes
-    of it. Where the cutter really enters and leaves ``late_s`` later than predicted, so is what counts.
+    It stays where an edge passes the side of the cut and makes a wall; at entry and exit of a slot this is
+    where the tool's centre is over the part. It also stays where no other pass goes deeper. Samples with
+    ploughing edges, and those that a compensator with a memory of ``memory_s`` derives from them, are marked
+    separately. If the cutter enters and leaves ``late_s`` later than predicted, the samples shift with it.
     """
     motion, forces, cell = prediction.motion, prediction.forces, prediction.cell
     if motion is None or forces is None:
@@ -55,11 +55,11 @@ def judged(prediction: Prediction, memory_s: float, late_s: float = 0.0) -> Judg
     ploughs = stays & _lasting(ploughing, motion.time_s, memory_s)
     step_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 1.0
     later = round(late_s / step_s)
-    return Judged(_later(stays & ~ploughs, later), _later(ploughs, later))
+    return Judged(_shifted(stays & ~ploughs, later), _shifted(ploughs, later))
 
 
-def _later(where: Bools, samples: int) -> Bools:
-    """Return (n,) the same so many samples later, before 0 earlier."""
+def _shifted(where: Bools, samples: int) -> Bools:
+    """Return (n,) the mask shifted by a number of samples: later, or earlier if negative."""
     moved = np.zeros_like(where)
     kept = len(where) - abs(samples)
     if kept > 0:
@@ -91,7 +91,7 @@ def floor_over(position_mm: Floats, radius_mm: Floats, low_mm: Floats, shape: tu
 
 
 def _lasting(happens: Bools, time_s: Floats, memory_s: float) -> Bools:
-    """Return (n,) True where something happens, and for so long after it."""
+    """Return (n,) True where something happens, and for ``memory_s`` after it."""
     last_s = np.maximum.accumulate(np.where(happens, time_s, -np.inf))
     lasting: Bools = time_s - last_s <= memory_s
     return lasting

@@ -1,4 +1,4 @@
-"""The last word on every correction: its sum, its rate, its step; and the controller in front of it."""
+"""The limits of every correction (sum, rate, step) and the PID controller before them."""
 
 import math
 from typing import NamedTuple
@@ -12,25 +12,25 @@ from gcode2krl.compiled.inputs import read_only
 from gcode2krl.units import RAD_PER_DEG
 
 NO_CORRECTION = 1e6
-"""mm or rad: from here on a wanted value is no number to reckon with."""
+"""mm or rad: a wanted value of this size or more is treated as invalid."""
 
 
 class Bounds(NamedTuple):
-    """What a correction is held in."""
+    """Limits of a correction, and the gains."""
 
     most: Floats
     """(w,) largest value of each component; of a vector its length."""
     step: Floats
     """(w,) largest change from one cycle to the next; of a vector its length."""
     is_vector: bool
-    """True: the length of the vector counts, and its direction is kept."""
+    """True: the limits apply to the length of the vector, and its direction is kept."""
     gains: Floats
     """(w, 3) P, I in 1/s, D in s."""
     cycle_s: float
 
 
 class LimitState(NamedTuple):
-    """What the controller remembers."""
+    """State of the controller."""
 
     sent: Floats
     """(w,) the last correction."""
@@ -65,25 +65,33 @@ def limit_start(width: int) -> LimitState:
 
 
 def limited(state: LimitState, wanted: Floats, held: Bools, bounds: Bounds) -> tuple[LimitState, Floats]:
-    """Return the corrections (n, w) that are sent for those that are wanted, (n, w).
+    """Return the corrections (n, w) that are sent for the wanted ones (n, w).
 
-    u = P·r + I·∫(r - u)dt + D·dr/dt with r scaled into the sum; then u is, into sum and step. The integral
-    takes what was really sent, so it neither winds up nor changes a correction that is reached. Where
-    ``held`` (n,), or where r is not a number or beyond `NO_CORRECTION`, the correction stays as it is.
+    u = P·r + I·∫(r - u)dt + D·dr/dt, with r limited to the largest correction; then u is limited to the
+    largest correction and step. The integral uses the correction that was sent, so it neither winds up nor
+    changes a correction that is reached. Where ``held`` (n,), or where r is NaN or beyond `NO_CORRECTION`,
+    the correction does not change.
     """
     width = len(bounds.most)
     values = read_only("wanted", wanted, -1, width)
     after = LimitState(*(part.copy() for part in state))
     out = np.empty(values.shape)
     _limit(
-        values, np.ascontiguousarray(held), *after, bounds.most, bounds.step, bounds.is_vector, bounds.gains,
-        bounds.cycle_s, out,
-    )  # fmt: skip
+        values,
+        np.ascontiguousarray(held),
+        *after,
+        bounds.most,
+        bounds.step,
+        bounds.is_vector,
+        bounds.gains,
+        bounds.cycle_s,
+        out,
+    )
     return after, out
 
 
 def towards(sent: Floats, wanted: Floats, bounds: Bounds) -> Floats:
-    """Return the correction (w,) one step nearer to a wanted one (w,): the way of whatever has no force."""
+    """Return the correction (w,) one step closer to a wanted one (w,), for moves without a force."""
     change = wanted - sent
     _shrink(change, bounds.step, bounds.is_vector)
     return sent + change
@@ -91,9 +99,18 @@ def towards(sent: Floats, wanted: Floats, bounds: Bounds) -> Floats:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _limit(
-    wanted: Floats, held: Bools, sent: Floats, integral: Floats, before: Floats, most: Floats, step: Floats,
-    is_vector: bool, gains: Floats, cycle: float, out: Floats,
-) -> None:  # fmt: skip
+    wanted: Floats,
+    held: Bools,
+    sent: Floats,
+    integral: Floats,
+    before: Floats,
+    most: Floats,
+    step: Floats,
+    is_vector: bool,
+    gains: Floats,
+    cycle: float,
+    out: Floats,
+) -> None:
     width = len(most)
     r, u = np.empty(width), np.empty(width)
     for i in range(len(wanted)):
@@ -122,7 +139,7 @@ def _limit(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _shrink(u: Floats, most: Floats, is_vector: bool) -> None:
-    """Scale a vector into its bounds; its direction stays."""
+    """Scale a vector into its bounds, keeping its direction."""
     share = 0.0
     for c in range(len(u)):
         share = share + (u[c] / most[c]) ** 2 if is_vector else max(share, abs(u[c]) / most[c])

@@ -1,4 +1,4 @@
-"""What the compensator would have done in a recorded run, and what it would have left.
+"""The corrections that the compensator would have sent in a recorded run, and the error left.
 
 The same stages as in the twin and on the robot; joints, commanded path and forces come from the run.
 """
@@ -24,7 +24,7 @@ from gcode2krl.runs import Run
 from gcode2krl.runs.measured import Measured
 
 _GAP_S = 0.1
-"""Between two samples of a sensor this far apart it was silent."""
+"""A sensor was silent between two samples further apart than this."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Replay:
     time_s: Floats
     corrections: Corrections
     shift_mm: Floats
-    """(n, 3) what a robot would have made of them, along ``$BASE``."""
+    """(n, 3) motion of a robot that follows them, along ``$BASE``."""
     before_mm: Floats | None
     """(n,) measured deviation normal to the feed; None without a tracker."""
     after_mm: Floats | None
-    """(n,) what would have been left of it."""
+    """(n,) deviation that would have been left."""
     issues: tuple[Issue, ...]
 
 
@@ -53,11 +53,11 @@ def replay(
     header: PilotHeader | None = None,
     world: World | None = None,
 ) -> Replay:
-    """Return what the compensator would have done in a run.
+    """Return the corrections that the compensator would have sent in a run.
 
-    Knots are taken as announced ``lead_s`` ahead of their predicted time, on the clock on which ``run.toml``
-    puts its tables. ``calibration`` is that of forces recorded in the sensor's axes. ``world`` says how late
-    the robot reacts. An error is the tip against its command.
+    Knots are assumed to be announced ``lead_s`` ahead of their predicted time, on the clock on which
+    ``run.toml`` puts its tables. ``calibration`` is that of forces recorded in the sensor's axes. ``world``
+    has the delays of the robot. An error is the tip minus its command.
 
     Raises `NotUnderstoodError` where the run has no forces, no joints, or ends at once.
     """
@@ -85,9 +85,14 @@ def replay(
         told=_announced(run, time_s, knots, header),
     )
     device = build_compensator(
-        cell, settings, tool=tool, load_frame=run.head.frames.force, calibration=calibration, knots=knots,
+        cell,
+        settings,
+        tool=tool,
+        load_frame=run.head.frames.force,
+        calibration=calibration,
+        knots=knots,
         header=header,
-    )  # fmt: skip
+    )
     _, corrections = stream(device, start(device), samples)
     world = world or World()
     moved = reaction(corrections.correction, time_s, world.dead_s, world.lag_s)
@@ -116,17 +121,19 @@ def as_json(result: Replay) -> dict[str, Any]:
 
 def columns(result: Replay) -> dict[str, Floats]:
     """Return the table of a replay, for CSV."""
-    found = {"t_s": result.time_s}
+    table = {"t_s": result.time_s}
     tables = (
-        ("correction_{}_mm", result.shift_mm), ("wanted_{}_mm", result.corrections.wanted_mm),
-        ("force_{}_N", result.corrections.load[:, :3]), ("pilot_{}_N", result.corrections.estimate_N),
-    )  # fmt: skip
+        ("correction_{}_mm", result.shift_mm),
+        ("wanted_{}_mm", result.corrections.wanted_mm),
+        ("force_{}_N", result.corrections.load[:, :3]),
+        ("pilot_{}_N", result.corrections.estimate_N),
+    )
     for pattern, values in tables:
-        found |= {pattern.format(axis): values[:, k] for k, axis in enumerate("xyz")}
-    found |= {"weight": result.corrections.weight, "gate": result.corrections.gate.astype(np.float64)}
+        table |= {pattern.format(axis): values[:, k] for k, axis in enumerate("xyz")}
+    table |= {"weight": result.corrections.weight, "gate": result.corrections.gate.astype(np.float64)}
     if result.before_mm is not None and result.after_mm is not None:
-        found |= {"before_mm": result.before_mm, "after_mm": result.after_mm}
-    return found
+        table |= {"before_mm": result.before_mm, "after_mm": result.after_mm}
+    return table
 
 
 def _at(table: Measured, values: Floats, time_s: Floats) -> Floats:
@@ -151,8 +158,7 @@ def _command_mm(run: Run, q_command: Floats, time_s: Floats, cell: Cell, tool: i
 
 
 def _announced(run: Run, time_s: Floats, knots: Knots | None, header: PilotHeader | None) -> Announced:
-    """Return what the controller would have told: knots on time, override and mode as ``run.toml`` has
-    them."""
+    """Return what the controller would have reported: knots on time, override and mode of ``run.toml``."""
     count = len(time_s)
     nothing = np.full(count, np.nan)
     if knots is None or header is None:
@@ -167,7 +173,7 @@ def _announced(run: Run, time_s: Floats, knots: Knots | None, header: PilotHeade
 
 
 def _errors(run: Run, samples: Samples, shift: Floats) -> tuple[Floats | None, Floats | None]:
-    """Return the measured deviation normal to the feed, and what the shift would have left; ends are NaN."""
+    """Return the measured deviation normal to the feed, and the rest after the shift; ends are NaN."""
     tracker = run.tracker
     if tracker is None or run.head.frames.tracker != "base":
         return None, None
@@ -180,11 +186,11 @@ def _errors(run: Run, samples: Samples, shift: Floats) -> tuple[Floats | None, F
 
 
 def _findings(run: Run, corrections: Corrections) -> list[Issue]:
-    found = list(run.issues)
+    issues = list(run.issues)
     if run.head.channels.rsi:
-        text = "run.toml: a correction was on: the joints and the error have it in them already"
-        found.append(Issue("warning", "replay-corrected", 0, text, "replay a run without correction"))
+        text = "run.toml: a correction was on: the joints and the error already include it"
+        issues.append(Issue("warning", "replay-corrected", 0, text, "replay a run without correction"))
     if corrections.sensor_lost.any():
         text = f"the force sensor was lost in {int(corrections.sensor_lost.sum())} cycles: correction held"
-        found.append(Issue("warning", "replay-sensor", 0, text, ""))
-    return found
+        issues.append(Issue("warning", "replay-sensor", 0, text, ""))
+    return issues

@@ -1,4 +1,4 @@
-"""What the twin found: the four figures of the paper, and what stands behind them."""
+"""Results of the twin: the four figures of the paper, and the details behind them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,7 +34,9 @@ def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints32) -> dict
         "reduction_percent": reduction,
         "depth_mm": {case: _depth(twin, run, judged) for case, run in runs.items()},
         "descents_mm": {case: _worst(run, judged.ploughs) for case, run in runs.items()},
-        "lines": [_of_line(int(n), runs, judged, source_line) for n in np.unique(source_line[judged.counts])],
+        "lines": [
+            _line_row(int(n), runs, judged, source_line) for n in np.unique(source_line[judged.counts])
+        ],
         "pilot": pilot_of(twin, runs),
         "max_force_N": float(np.linalg.norm(runs["uncompensated"].force_N, axis=1).max(initial=0.0)),
         "settings": as_settings(twin),
@@ -56,31 +58,31 @@ def pilot_of(twin: Twin, runs: Runs) -> dict[str, Any]:
 
 
 def findings(twin: Twin, runs: Runs, judged: Judged) -> list[Issue]:
-    """Return what a person should know of the figures."""
-    found = []
+    """Return the findings that a reader of the figures should know."""
+    issues = []
     pilot = pilot_of(twin, runs)
     closed = [
         name for name in ("checksum", "override", "mode", "order", "speed") if name in pilot["gate_cycles"]
     ]
     if closed:
         sentence = f"the pilot was refused ({', '.join(closed)}): the measured force alone is compensated"
-        found.append(Issue("warning", "pilot-refused", 0, sentence, "it holds at 100 % override only"))
+        issues.append(Issue("warning", "pilot-refused", 0, sentence, "it is valid at 100 % override only"))
     if pilot["distrusted_cycles"]:
         sentence = (
             f"the pilot was wrong by more than {twin.settings.threshold_N:g} N in steady cuts "
-            f"({pilot['distrusted_cycles']} cycles): not trusted there"
+            f"({pilot['distrusted_cycles']} cycles): not used there"
         )
-        found.append(Issue("warning", "pilot-wrong", 0, sentence, "measure the force coefficients"))
+        issues.append(Issue("warning", "pilot-wrong", 0, sentence, "measure the force coefficients"))
     if judged.ploughs.any():
         worst = max(_worst(run, judged.ploughs) or 0.0 for run in runs.values())
         sentence = (
-            f"descents with ploughing edges are judged apart (up to {worst:.2f} mm): their force is a guess"
+            f"descents with ploughing edges (up to {worst:.2f} mm) are judged separately: a guessed force"
         )
-        found.append(Issue("note", "descent", 0, sentence, ""))
+        issues.append(Issue("note", "descent", 0, sentence, ""))
     if not judged.counts.any():
         remedy = "state [stock]: a guessed one may leave nothing to cut"
-        found.append(Issue("warning", "nothing-judged", 0, "no cut leaves a wall on the part", remedy))
-    return found
+        issues.append(Issue("warning", "nothing-judged", 0, "no cut leaves a wall on the part", remedy))
+    return issues
 
 
 def _worst(run: Run, where: Any) -> float | None:
@@ -96,6 +98,6 @@ def _depth(twin: Twin, run: Run, judged: Judged) -> float | None:
     return float(np.abs(np.einsum("ij,ij->i", run.error_mm[judged.counts], axis)).max())
 
 
-def _of_line(number: int, runs: Runs, judged: Judged, source_line: Ints32) -> dict[str, float | int | None]:
-    here = judged.counts & (source_line == number)
-    return {"line": number, **{f"{case}_mm": _worst(run, here) for case, run in runs.items()}}
+def _line_row(number: int, runs: Runs, judged: Judged, source_line: Ints32) -> dict[str, float | int | None]:
+    in_line = judged.counts & (source_line == number)
+    return {"line": number, **{f"{case}_mm": _worst(run, in_line) for case, run in runs.items()}}

@@ -1,10 +1,9 @@
-"""The pilot force as the program announces it, and whether it may be used at all.
+"""The pilot force as the program announces it, and whether it may be used.
 
-The robot's program writes the number of each knot some time ahead of it; the knots themselves come from the
+The robot's program writes the number of each knot some time before it; the knots themselves come from the
 sidecar. They are used only if the program's checksum is the sidecar's, the knots count up by one from the
-program's start, the override is 100 %, the mode is not T1, and the robot moves as fast as predicted. What
-does not fit closes the gate until the program starts anew. The first knots of a program only prove the
-speed.
+program's start, the override is 100 %, the mode is not T1, and the robot moves as fast as predicted. Any
+mismatch closes the gate until the program starts again. The first knots of a program only prove the speed.
 """
 
 import enum
@@ -20,11 +19,11 @@ from gcode2krl.pilot import Knots, PilotHeader
 
 NO_KNOT_YET = -1
 SPEED_SHARE = 0.05
-"""The robot's speed may differ by so much from the predicted one."""
+"""Fraction by which the robot's speed may differ from the predicted one."""
 PROOF_S = 0.5
-"""Predicted time between knots after which their real distance says something about the speed."""
+"""Predicted time between knots from which their real distance shows the speed."""
 JITTER_S = 0.012
-"""A knot's lead is true to one cycle of the interpolator."""
+"""A knot's lead is accurate to one cycle of the interpolator."""
 REST_MM = 0.002
 """The robot stands while it moves less than this from one sample to the next …"""
 REST_S = 0.050
@@ -39,7 +38,7 @@ class Gate(enum.IntEnum):
     OPEN = 0
     NO_PILOT = 1
     NOT_STARTED = 2
-    """No program start has been seen: the server came later, or the block was selected."""
+    """No program start has been seen: the server started later, or a block was selected."""
     CHECKSUM = 3
     OVERRIDE = 4
     MODE = 5
@@ -48,7 +47,7 @@ class Gate(enum.IntEnum):
     UNPROVEN = 8
     """The first knots have yet to prove the speed."""
     STANDS = 9
-    """The robot stood where it should not: the next knot says where the program is."""
+    """The robot stood still unexpectedly: the next knot tells where the program is."""
 
 
 _OPEN, _CHECKSUM, _OVERRIDE, _MODE = int(Gate.OPEN), int(Gate.CHECKSUM), int(Gate.OVERRIDE), int(Gate.MODE)
@@ -56,7 +55,7 @@ _ORDER, _SPEED, _UNPROVEN, _STANDS = int(Gate.ORDER), int(Gate.SPEED), int(Gate.
 
 
 class GateState(NamedTuple):
-    """What the gate remembers."""
+    """State of the gate."""
 
     values: Floats
     """(12,)"""
@@ -74,7 +73,7 @@ class Announced(NamedTuple):
 
 
 class PilotTable(NamedTuple):
-    """Knots as arrays, and what they were announced with; empty without a pilot."""
+    """Knots as arrays, and the checksum and lead of their announcement; empty without a pilot."""
 
     time_s: Floats
     lead_s: Floats
@@ -107,8 +106,8 @@ def estimate(
 ) -> tuple[GateState, Floats, Bools, Ints]:
     """Return the pilot force (n, 3) in its own frame, (n,) where it is known, and (n,) the `Gate`.
 
-    Knots lie ``lead_s`` behind their announcement; the force is taken ``pilot_lead_s`` ahead of now, but not
-    beyond the knot that is to be announced next: a robot that is 3 % slow is late by that after a long cut.
+    Knots are ``lead_s`` after their announcement; the force is read ``pilot_lead_s`` ahead of now, but not
+    beyond the next knot to be announced: a robot that is 3 % slow lags by that much after a long cut.
     ``position_mm`` (n, 3) is the commanded tip.
     """
     count = len(time_s)
@@ -138,10 +137,22 @@ def estimate(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _track(
-    time: Floats, position: Floats, knot: Floats, checksum: Floats, override: Floats, t1: Floats,
-    knot_time: Floats, knot_lead: Floats, knot_force: Floats, wanted: float, lead: float,
-    state: Floats, force: Floats, known: Bools, reason: Ints,
-) -> None:  # fmt: skip
+    time: Floats,
+    position: Floats,
+    knot: Floats,
+    checksum: Floats,
+    override: Floats,
+    t1: Floats,
+    knot_time: Floats,
+    knot_lead: Floats,
+    knot_force: Floats,
+    wanted: float,
+    lead: float,
+    state: Floats,
+    force: Floats,
+    known: Bools,
+    reason: Ints,
+) -> None:
     for i in range(len(time)):
         _watch_rest(position[i], time[i], state)
         wrong = 0
@@ -172,7 +183,7 @@ def _track(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _announce(now: float, knot: float, knot_time: Floats, knot_lead: Floats, state: Floats) -> None:
-    """Take the next knot, or close the gate: not the next one, or not when it should come."""
+    """Take the next knot; close the gate if it is another one or comes at another time."""
     k = int(state[_NEXT])
     if knot != state[_NEXT] or k >= len(knot_time):  # a NaN too
         state[_STARTED], state[_REASON] = 0.0, _ORDER
@@ -193,7 +204,7 @@ def _announce(now: float, knot: float, knot_time: Floats, knot_lead: Floats, sta
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _watch_rest(position: Floats, now: float, state: Floats) -> None:
-    """Forget where the program is once the robot has stood: pauses are not predicted."""
+    """Forget the place in the program once the robot has stood still: pauses are not predicted."""
     moved = 0.0
     for c in range(3):
         moved += (position[c] - state[_POSITION + c]) ** 2
@@ -206,7 +217,7 @@ def _watch_rest(position: Floats, now: float, state: Floats) -> None:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _force_at(now: float, time: Floats, values: Floats, out: Floats) -> None:
-    """Write the polyline at a time: linear between knots, zero before the first and behind the last."""
+    """Write the polyline at a time: linear between knots, zero before the first and after the last."""
     k = np.searchsorted(time, now, side="right")
     if k == 0 or k == len(time):
         out[:] = 0.0

@@ -1,4 +1,4 @@
-"""What the robot makes of a correction: dead time, lag, and drives with backlash."""
+"""The robot's reaction to a correction: dead time, lag, and drives with backlash."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from gcode2krl.effects.operators import lag, play, since_reversal
 
 
 def reaction(sent: Floats, time_s: Floats, dead_s: float, lag_s: float) -> Floats:
-    """Return what of a correction (n, w) has become motion: dead time, then a first-order lag.
+    """Return the motion (n, w) that follows a correction: dead time, then a first-order lag.
 
-    The robot's reaction as one number each; its modes and its position controller's overshoot are not in it.
+    Structural modes and the overshoot of the position controller are not modelled.
     """
     if len(sent) == 0:
         return sent
@@ -20,11 +20,11 @@ def reaction(sent: Floats, time_s: Floats, dead_s: float, lag_s: float) -> Float
 
 
 def with_backlash(q_program_rad: Floats, q_shift_rad: Floats, time_s: Floats, gap_rad: Floats) -> Floats:
-    """Return the joints (n, 6) behind the gears where the program and a correction of the axes move them.
+    """Return the joints (n, 6) behind the gears when the program and a correction of the axes move them.
 
-    Each drive has a play of ``gap_rad`` (6,) with memory. The controller takes it up by the direction in
-    which the *program* moves an axis; of a correction sent straight to the axes it knows nothing (the
-    assumption of Haehn & Weigold 2020, section 3.3). As long as both go the same way nothing is lost.
+    Each drive has a play of ``gap_rad`` (6,) with memory. The controller compensates it by the direction in
+    which the *program* moves an axis; it does not know a correction sent directly to the axes (the
+    assumption of Haehn & Weigold 2020, section 3.3). As long as both move the same way nothing is lost.
     """
     total = q_program_rad + q_shift_rad
     behind = np.empty_like(total)
@@ -38,7 +38,7 @@ def with_backlash(q_program_rad: Floats, q_shift_rad: Floats, time_s: Floats, ga
 
 
 def tip_shift_mm(q_rad: Floats, q_program_rad: Floats, cell: Cell, tool: int) -> Floats:
-    """Return how far the tip (n, 3) in ``$BASE`` is from where the program's joints put it."""
+    """Return the offset (n, 3) in ``$BASE`` of the tip from where the program's joints put it."""
     lengths, tools = cell.robot.geometry.array(), np.full(len(q_rad), tool, dtype=np.int32)
     shift: Floats = tip_mm(q_rad, lengths, cell, tools) - tip_mm(q_program_rad, lengths, cell, tools)
     return shift

@@ -1,8 +1,8 @@
-"""What the server writes down: a run's folder, filled by another thread so that no cycle waits for a disk.
+"""Records a session as the folder of a run, in another thread so that no cycle waits for a disk.
 
-The queue between them is bounded. What does not fit, and what the disk does not take, is counted; the robot
-goes on. The folder is one that `runs.load_run` reads: ``run.toml``, ``rsi.log``, ``force.csv``;
-``events.csv`` says what happened when.
+The queue between them is bounded. Lines that do not fit, and lines that cannot be written, are counted; the
+robot goes on. `runs.load_run` reads the folder: ``run.toml``, ``rsi.log``, ``force.csv``;
+``events.csv`` records what happened when.
 """
 
 import queue
@@ -16,7 +16,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.errors import input_error
 
 MOST_WAITING = 50_000
-"""Lines between the threads: about a minute of a dead disk at 4 ms."""
+"""Lines between the threads: about a minute without the disk at 4 ms."""
 _FORCE = "force.csv"
 _HEADS = {
     "rsi.log": b"",
@@ -27,7 +27,7 @@ _NMM_PER_NM = 1000.0
 
 
 class Recorder:
-    """Takes lines at once, writes them later; use as a context manager."""
+    """Accepts lines immediately and writes them later; use as a context manager."""
 
     def __init__(self, folder: Path | None, head: str = "", most_waiting: int = MOST_WAITING) -> None:
         """Open the files of a run in ``folder`` (None: nothing is written); ``head`` is its ``run.toml``.
@@ -37,7 +37,7 @@ class Recorder:
         self.dropped = 0
         """Lines that did not fit into the queue."""
         self.unwritten = 0
-        """Lines that the disk did not take."""
+        """Lines that could not be written."""
         self.written = 0
         self.folder = folder
         self._first_ipoc: int | None = None
@@ -72,7 +72,7 @@ class Recorder:
         self._put("events.csv", f"{ipoc},{phase},{reason},{gate},{lost},{ignored}\n".encode())
 
     def close(self) -> None:
-        """Write what waits, and close the files."""
+        """Write the waiting lines, and close the files."""
         if self._thread.is_alive():
             self._queue.put(None)
             self._thread.join()
@@ -105,8 +105,8 @@ class Recorder:
         while (item := self._queue.get()) is not None:
             name, line = item
             try:
-                whole = self._files[name].write(line) == len(line)
+                is_written = self._files[name].write(line) == len(line)
             except OSError:
-                whole = False
-            self.written += whole
-            self.unwritten += not whole
+                is_written = False
+            self.written += is_written
+            self.unwritten += not is_written

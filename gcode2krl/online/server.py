@@ -1,9 +1,9 @@
-"""The UDP side of RSI: one socket, one peer, one answer a telegram, and how long each took.
+"""The UDP side of RSI: one socket, one peer, one answer for each telegram, and answer times.
 
 Python on an ordinary computer is not a hard real-time controller. A collection of garbage, another process,
-the operating system may hold an answer back for many cycles; the controller then keeps the last correction
-(``HOLDON``) and stops after ``Timeout`` cycles. Use it to try out, to measure, and as the reference of a
-PLC.
+the operating system may delay an answer by many cycles; the controller then keeps the last correction
+(``HOLDON``) and stops after ``Timeout`` cycles. Use it to try out, to measure, and as the reference for
+a PLC.
 """
 
 import gc
@@ -27,7 +27,7 @@ from gcode2krl.online.telegram import LONGEST, MalformedError, Telegram, answer_
 from gcode2krl.robot import forward
 
 ForceSource = Callable[[Telegram], Floats]
-"""What the force sensor says now, (6,) in N and N·mm; NaN where it says nothing. Called once a cycle."""
+"""Returns the force sensor's present load (6,) in N and N·mm, NaN without a value. Called once a cycle."""
 MOST_TIMES = 1_000_000
 _WAIT_S = 0.05
 
@@ -45,17 +45,17 @@ class Statistics:
     answered: int = 0
     malformed: int = 0
     foreign: int = 0
-    """Datagrams of others than the one peer."""
+    """Datagrams from other senders than the peer."""
     pilot_cycles: int = 0
     """Answers in which the pilot was used."""
     answer_s: list[float] = field(default_factory=list)
-    """From the telegram's arrival to its answer."""
+    """Times from a telegram's arrival to its answer."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the counts, and median, 99.9 % and largest answer time in ms."""
         times = np.array(self.answer_s) * 1000.0 if self.answer_s else np.full(1, np.nan)
-        found = np.quantile(times, [0.5, 0.999, 1.0]).tolist()
-        known = [value if np.isfinite(value) else None for value in found]
+        quantiles = np.quantile(times, [0.5, 0.999, 1.0]).tolist()
+        known = [value if np.isfinite(value) else None for value in quantiles]
         counts = ("telegrams", "answered", "malformed", "foreign", "pilot_cycles")
         return {**{name: getattr(self, name) for name in counts}, **dict(zip(_QUANTILES, known, strict=True))}
 
@@ -64,7 +64,7 @@ _QUANTILES = ("answer_ms_median", "answer_ms_999", "answer_ms_worst")
 
 
 def open_socket(device: Compensator) -> socket.socket:
-    """Return the bound socket of the settings; raises `NotUnderstoodError` where it cannot be had."""
+    """Return the bound socket of the settings; raises `NotUnderstoodError` where it cannot be opened."""
     link = device.settings.link
     server = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
@@ -102,7 +102,7 @@ def serve(
     collects = gc.isenabled()
     gc.collect()
     gc.freeze()
-    gc.disable()  # a collection takes longer than a cycle; a cycle leaves no cycles of references behind
+    gc.disable()  # a collection takes longer than a control cycle, and a cycle leaves no circular references
     try:
         while not stop.is_set() and session.phase is not Phase.CLOSED:
             received = _receive(server)
@@ -141,10 +141,20 @@ def warm_up(device: Compensator) -> None:
     position, _ = forward(q_rad[None], device.cell, device.tool)
     nothing = np.full(6, np.nan)
     rests = Telegram(
-        ipoc=0, position_mm=position[0], command_mm=position[0], q_rad=q_rad, q_command_rad=q_rad,
-        late=0.0, monitor_mm=nothing[:3], knot=-1.0, checksum=0.0, override_percent=100.0, t1=0.0,
-        values=nothing[:4], load=nothing,
-    )  # fmt: skip
+        ipoc=0,
+        position_mm=position[0],
+        command_mm=position[0],
+        q_rad=q_rad,
+        q_command_rad=q_rad,
+        late=0.0,
+        monitor_mm=nothing[:3],
+        knot=-1.0,
+        checksum=0.0,
+        override_percent=100.0,
+        t1=0.0,
+        values=nothing[:4],
+        load=nothing,
+    )
     step(device, start(device), sample_of(rests, np.zeros(6)))
     towards(np.zeros_like(device.bounds.most), np.zeros_like(device.bounds.most), device.bounds)
 
@@ -178,7 +188,7 @@ def _parsed(
 
 
 def _is_foreign(sender: tuple[str, int], peer: tuple[str, int] | None, robot: str | None) -> bool:
-    """Tell whether a datagram comes from somebody else than the controller, as far as it is known."""
+    """Tell whether a datagram comes from another sender than the controller, if that is known."""
     if peer is not None:
         return sender != peer
     return robot is not None and sender[0] != robot
@@ -187,7 +197,7 @@ def _is_foreign(sender: tuple[str, int], peer: tuple[str, int] | None, robot: st
 def _send(server: socket.socket, text: bytes, sender: tuple[str, int]) -> None:
     try:
         server.sendto(text, sender)
-    except OSError:  # the peer is gone: no telegrams will come, and the session ends by silence
+    except OSError:  # the peer is gone: no more telegrams will come, and the session times out
         return
 
 
@@ -202,8 +212,11 @@ def _note(
     before: Session, after: Session, recorder: Recorder, told: Callable[[Session], None] | None
 ) -> None:
     changed = (before.phase, before.reason, before.gate, before.lost) != (
-        after.phase, after.reason, after.gate, after.lost,
-    )  # fmt: skip
+        after.phase,
+        after.reason,
+        after.gate,
+        after.lost,
+    )
     if changed:
         gate = Gate(after.gate).name.lower()
         recorder.event(after.ipoc, after.phase.value, after.reason, gate, after.lost, after.ignored)

@@ -3,14 +3,13 @@
     waiting -> resting -> probing -> settling -> running -> held | zero | closed
 
 The correction is zero until the robot has shown, standing in air, that it takes corrections as absolute: a
-small correction along the tool axis moves it by as much and no more, and without it the robot goes back. A
-robot that adds corrections up is seen here, and ends in ``zero``.
-Whatever goes wrong after this proof ends in one of two states that are never left: ``held`` sends the last
-correction unchanged and tells the program to stop (a correction is never taken back in material),
-``closed`` does not answer, and the controller's own time-out stops the robot. The way into ``closed`` is
-open to a robot that gets away although the correction stands, and to one that was started anew: what is
-held would be a jump to it.
-No answer differs from the one before by more than one step of `limits.Bounds`, in any state.
+small correction along the tool axis moves it by that amount and no more, and without it the robot goes back.
+A robot that adds corrections up is recognised here, and ends in ``zero``. Any fault after this proof ends in
+one of two final states: ``held`` sends the last correction unchanged and tells the program to stop (a
+correction is never taken back in material), ``closed`` does not answer, and the controller's own time-out
+stops the robot. A robot that moves away although the correction is constant, and a controller that was
+restarted, lead to ``closed``: for them the held correction would be a jump. No answer differs from the one
+before by more than one step of `limits.Bounds`, in any state.
 """
 
 import enum
@@ -30,18 +29,18 @@ from gcode2krl.robot import forward
 
 _S_PER_MS = 1e-3
 RESTART_MS = 1000
-"""An IPOC that falls by more is a controller that was started anew; by less, a datagram that came late."""
+"""An IPOC that falls by more means that the controller was restarted; by less, that a datagram came late."""
 JUMP_MS = 60_000
 SEEN_SHARE, BACK_SHARE, ADDS_UP_SHARE = 0.4, 0.3, 1.6
-"""Of the probe: seen; back; more than was asked for."""
+"""Fractions of the probe at which the robot has moved, is back, and has moved too far."""
 SEEN_CYCLES = 2
 RUNAWAY_CYCLES = 3
 RUNAWAY_MM = 0.5
-"""How far beyond the largest correction the robot may be from the program, normal to it; our choice, above
-what a position controller overshoots. Where it is held already: beyond where it was then."""
+"""How far beyond the largest correction the robot may be from the program, normal to it; our choice, more
+than a position controller overshoots. In ``held`` it counts from the distance at the start of that phase."""
 STILL_THERE_SHARE = 0.5
-"""A robot that has less of the held correction than this has lost it; our choice, as a lag or a decimal
-does not take half of it away while the link is silent."""
+"""A robot that has less than this fraction of the held correction has lost it; our choice: lag and rounding
+do not remove half of it while the link is silent."""
 
 
 class Phase(enum.Enum):
@@ -65,19 +64,19 @@ ENDED = (Phase.HELD, Phase.ZERO, Phase.CLOSED)
 
 @dataclass(frozen=True)
 class Session:
-    """The state of a session; `begin` makes the first."""
+    """The state of a session; `begin` returns the first one."""
 
     phase: Phase
     device: State
     sent: Floats
     """The last correction."""
     reason: str = ""
-    """Why the phase is what it is."""
+    """Reason of the phase."""
     ipoc: int = -1
     cycles: int = 0
     """Telegrams in this phase."""
     rest_mm: Floats = field(default_factory=lambda: np.full(3, np.nan))
-    """(3,) where the robot rests."""
+    """(3,) position of the robot at rest."""
     probe: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) direction of the probe."""
     seen: int = 0
@@ -88,13 +87,13 @@ class Session:
     """How far from the program the robot may be, normal to it."""
     gate: int = Gate.NOT_STARTED
     knot: int = UNKNOWN_KNOT
-    """The knot that the values of the form ``values`` mean."""
+    """The knot announced by the form ``values``."""
     lost: int = 0
     """Telegrams that never came."""
     late: float = np.nan
-    """Answers that the controller has missed so far, as it says; NaN where it does not."""
+    """Answers that the controller has missed so far, as it reports; NaN if it does not."""
     has_missed: bool = False
-    """True: the controller says that it missed an answer since the telegram before."""
+    """True: the controller reports that it missed an answer since the telegram before."""
     ignored: int = 0
     """Telegrams that came twice or too late."""
 
@@ -114,7 +113,7 @@ def exchange(
 ) -> tuple[Session, Answer | None]:
     """Return the state after a telegram and its answer, None where it must not be answered.
 
-    ``load`` (6,) is what the force sensor says now, NaN where it says nothing.
+    ``load`` (6,) is the present load of the force sensor, NaN without a value.
     """
     before = session
     session, is_new = _counted(session, telegram.ipoc, device.settings)
@@ -123,7 +122,7 @@ def exchange(
     session = replace(session, late=telegram.late, has_missed=bool(telegram.late > session.late))
     if session.phase is Phase.WAITING:
         session = _enter(session, Phase.RESTING, "", rest_mm=telegram.position_mm)
-    if _silent_too_long(before, session, device.settings) and _has_lost_it(session, telegram, device):
+    if _silent_too_long(before, session, device.settings) and _lost_correction(session, telegram, device):
         return _enter(session, Phase.CLOSED, "restarted"), None
     session = _STEPS[session.phase](session, telegram, load, device)
     if session.phase is Phase.CLOSED:
@@ -133,7 +132,7 @@ def exchange(
 
 
 def silent(session: Session, silence_s: float, settings: Online) -> Session:
-    """Return the state after so long without a telegram: closed where that is too long."""
+    """Return the state after ``silence_s`` without a telegram: closed if that is too long."""
     if session.phase in (Phase.WAITING, Phase.CLOSED) or silence_s < settings.link.silence_s:
         return session
     return _enter(session, Phase.CLOSED, "silence")
@@ -144,7 +143,7 @@ def _enter(session: Session, phase: Phase, reason: str, **more: object) -> Sessi
 
 
 def _counted(session: Session, ipoc: int, settings: Online) -> tuple[Session, bool]:
-    """Take over the IPOC, and tell whether it is a new one; where it does not follow, say what that means."""
+    """Take over the IPOC, and return whether it is new; a gap or a restart changes the phase."""
     if session.ipoc < 0:
         return replace(session, ipoc=ipoc), True
     step_ms = round(settings.cycle_s / _S_PER_MS)
@@ -169,7 +168,7 @@ def _counted(session: Session, ipoc: int, settings: Online) -> tuple[Session, bo
 
 
 def _rest(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Zero, until the robot has stood for some time."""
+    """Send zero until the robot has stood still for some time."""
     probe = device.settings.probe
     session = _towards_zero(session, device)
     if session.sent.any():
@@ -184,7 +183,7 @@ def _rest(session: Session, telegram: Telegram, load: Floats, device: Compensato
 
 
 def _probe(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """A small correction, until the robot is seen to have moved by it, twice: one that adds up moves on."""
+    """Send a small correction until the robot has moved by it twice in a row: one that adds up moves on."""
     probe = device.settings.probe
     moved = _moved(session, telegram)
     if moved > ADDS_UP_SHARE * probe.amplitude_mm:
@@ -202,7 +201,7 @@ def _probe(session: Session, telegram: Telegram, load: Floats, device: Compensat
 
 
 def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Zero again: the robot must come back."""
+    """Send zero again: the robot must come back."""
     probe = device.settings.probe
     moved = _moved(session, telegram)
     if moved > ADDS_UP_SHARE * probe.amplitude_mm:
@@ -224,17 +223,17 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
 
 
 def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Compensate, as long as the robot is where it should be and the sensor is there.
+    """Compensate, as long as the robot is where it should be and the sensor has values.
 
-    A correction that the controller did not get is not gone on from: the next one it gets would be a step.
+    After an answer that the controller missed the correction is not continued: the next one would be a step.
     """
     session = _watched(session, telegram)
     if session.away >= RUNAWAY_CYCLES:
         most_mm = _away_mm(session, telegram) + RUNAWAY_MM
         return _enter(session, Phase.HELD, "too-far", away=0, furthest_mm=most_mm)
     knot = knot_of(telegram.values, session.knot, device)
-    told = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
-    state, out = step(device, session.device, sample_of(told, load))
+    reported = telegram if device.pilot_form == "index" else replace(telegram, knot=float(knot))
+    state, out = step(device, session.device, sample_of(reported, load))
     sent = out.correction[0]
     if session.has_missed:
         state, sent = state._replace(limit=session.device.limit), session.sent
@@ -243,7 +242,7 @@ def _run(session: Session, telegram: Telegram, load: Floats, device: Compensator
 
 
 def _hold(session: Session, telegram: Telegram, load: Floats, device: Compensator) -> Session:
-    """Send what was sent; nothing more to a robot that gets away although the correction stands."""
+    """Repeat the last correction; close if the robot moves away although the correction is constant."""
     feed, _ = feed_of(session.device.feed, telegram.command_mm[None])
     session = _watched(replace(session, device=session.device._replace(feed=feed)), telegram)
     return _enter(session, Phase.CLOSED, "adds-up") if session.away >= RUNAWAY_CYCLES else session
@@ -265,22 +264,22 @@ _STEPS = {
 
 
 def _adds_up(session: Session, device: Compensator) -> Session:
-    """The robot adds corrections up before one was made: for such a robot zero is to stand still."""
+    """End in ``zero``: a robot that adds corrections up, without one so far, stands still at zero."""
     return _towards_zero(_enter(session, Phase.ZERO, "adds-up"), device)
 
 
 def _towards_zero(session: Session, device: Compensator) -> Session:
-    """One step nearer to zero; the probe is at most one step (`Online`), so this is zero for a probe."""
+    """Go one step towards zero; the probe is at most one step (`Online`), so this is zero for a probe."""
     return replace(session, sent=towards(session.sent, np.zeros_like(session.sent), device.bounds))
 
 
 def _moved(session: Session, telegram: Telegram) -> float:
-    """Return how far the robot is from its rest along the probe, in mm."""
+    """Return how far the robot is from its rest position along the probe, in mm."""
     return float((telegram.position_mm - session.rest_mm) @ session.probe)
 
 
 def _watched(session: Session, telegram: Telegram) -> Session:
-    """Count the telegrams in a row in which the robot is farther from the program than it may be."""
+    """Count the telegrams in a row in which the robot is too far from the program."""
     away = session.away + 1 if _away_mm(session, telegram) > session.furthest_mm else 0
     return replace(session, away=away)
 
@@ -288,30 +287,30 @@ def _watched(session: Session, telegram: Telegram) -> Session:
 def _away_mm(session: Session, telegram: Telegram) -> float:
     """Return how far the robot is from the program.
 
-    By the applied correction where the controller reports it, else by RIst less RSol, of which only what is
-    normal to the movement counts: along it the robot is behind its program.
+    Measured by the applied correction if the controller reports it, else by RIst minus RSol, of which only
+    the component normal to the movement counts: along it the robot lags behind its program.
     """
     if np.isfinite(telegram.monitor_mm).all():
         return float(np.linalg.norm(telegram.monitor_mm))
-    apart = telegram.position_mm - telegram.command_mm
+    offset = telegram.position_mm - telegram.command_mm
     along = session.device.feed.direction
     length = float(along @ along)
     if length > 0.0:
-        apart = apart - (apart @ along) / length * along
-    return float(np.linalg.norm(apart))
+        offset = offset - (offset @ along) / length * along
+    return float(np.linalg.norm(offset))
 
 
 def _silent_too_long(before: Session, after: Session, settings: Online) -> bool:
-    """Tell whether the controller has missed so many answers that it gave up: it may be started anew."""
+    """Tell whether the controller has missed so many answers that it gave up and may be restarted."""
     cycle_ms = round(settings.cycle_s / _S_PER_MS)
     return before.ipoc >= 0 and after.ipoc - before.ipoc > settings.link.timeout_cycles * cycle_ms
 
 
-def _has_lost_it(session: Session, telegram: Telegram, device: Compensator) -> bool:
-    """Tell whether sending on what was sent would be a jump: more than a step, and the robot has it no more.
+def _lost_correction(session: Session, telegram: Telegram, device: Compensator) -> bool:
+    """Tell whether repeating the correction would be a jump: more than a step, and the robot has lost it.
 
-    RSI begins anew at zero; its program waits for `ready` then, but corrections count at once. A position
-    that cannot be the robot's says nothing of it, so it does not count as still having the correction.
+    RSI restarts at zero; its program then waits for `ready`, but corrections apply at once. A position that
+    cannot be the robot's does not show that the robot still has the correction.
     """
     sent, step = session.sent, device.bounds.step
     largest = np.linalg.norm(sent / step) if device.bounds.is_vector else np.abs(sent / step).max()
@@ -333,7 +332,7 @@ def _has_lost_it(session: Session, telegram: Telegram, device: Compensator) -> b
 def knot_of(values: Floats, last: int, device: Compensator) -> int:
     """Return which knot of the sidecar announced values (4,) are: the last one, the next, or none of them.
 
-    Before the first all are zero. Values are compared to the decimals in which they are written.
+    Before the first knot all values are zero. They are compared with the decimals in which they are written.
     """
     table = device.table
     if not np.isfinite(values).all():
@@ -350,12 +349,12 @@ def knot_of(values: Floats, last: int, device: Compensator) -> int:
 
 def sample_of(telegram: Telegram, load: Floats) -> Samples:
     """Return a telegram and the sensor's load (6,) as one row for the compensator."""
-    told = (telegram.knot, telegram.checksum, telegram.override_percent, telegram.t1)
+    pilot = (telegram.knot, telegram.checksum, telegram.override_percent, telegram.t1)
     return Samples(
         time_s=np.array([_S_PER_MS * telegram.ipoc]),
         load=load[None],
         q_rad=telegram.q_rad[None],
         q_command_rad=telegram.q_command_rad[None],
         position_mm=telegram.command_mm[None],
-        told=Announced(*(np.array([value]) for value in told)),
+        told=Announced(*(np.array([value]) for value in pilot)),
     )

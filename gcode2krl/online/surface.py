@@ -1,4 +1,4 @@
-"""What of a machined part stands off its nominal: the floor over a grid, and the walls along the path."""
+"""Deviation of a machined part from nominal: the floor over a grid, and the walls along the path."""
 
 from typing import NamedTuple
 
@@ -34,13 +34,13 @@ def surface_of(prediction: Prediction, run: Run, judged: Judged) -> Surface:
     """Return how the part that a run leaves differs from the one its commanded path would leave.
 
     The floor is the lowest tip over each cell, of a flat bottom. Walls are where an edge passes the side of
-    the cut, at the tool's radius; the tip's error towards a wall is what it cuts too much.
+    the cut, at the tool's radius; the tip's error towards a wall is the excess cut.
     """
     motion, forces, cell = prediction.motion, prediction.forces, prediction.cell
     if motion is None or forces is None:
         raise ValueError("a prediction without forces")
     cuts = (forces.force_base_N != 0.0).any(axis=1)
-    here = judged.counts | judged.ploughs
+    is_judged = judged.counts | judged.ploughs
     radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
     low, shape = grid_of(motion.position_mm[cuts], radius[cuts])
     nominal = floor_over(motion.position_mm[cuts], radius[cuts], low, shape)
@@ -58,7 +58,7 @@ def surface_of(prediction: Prediction, run: Run, judged: Judged) -> Surface:
     with np.errstate(invalid="ignore"):
         sides = ((1.0, (start <= SIDE_RAD).any(axis=1)), (-1.0, (end >= np.pi - SIDE_RAD).any(axis=1)))
     for sign, is_wall in sides:
-        rows = here & is_wall & moves
+        rows = is_judged & is_wall & moves
         normal = sign * across[rows]
         shift = np.concatenate([radius[rows, None] * normal, np.zeros((rows.sum(), 1))], axis=1)
         points.append(motion.position_mm[rows] + shift)

@@ -1,9 +1,9 @@
 """KUKA's telegrams: ``<Rob …>`` as the controller sends it, ``<Sen …>`` as it is answered.
 
-The parser is our own, because what comes over a network must not be able to do more than state numbers: an
-XML library knows entities, documents types, nesting and encodings, each of which has been a way to hang or
-read files. Here a telegram is at most 8 kB of ASCII: one element ``Rob`` with elements in it that have
-attributes or a text, nothing below them, nothing else. Whatever is not exactly that is refused.
+The parser is our own, because data from a network must not be able to do more than state numbers: an XML
+library supports entities, document types, nesting and encodings, each of which has been used to hang a reader
+or to read files. Here a telegram is at most 8 kB of ASCII: one element ``Rob`` whose children have attributes
+or a text and no children of their own. Anything else is refused.
 """
 
 import math
@@ -34,12 +34,12 @@ _NEEDED = {"RIst": _XYZ, "RSol": _XYZ, "AIPos": _AXES, "ASPos": _AXES}
 
 
 class MalformedError(ValueError):
-    """What was received is no telegram; the text says why."""
+    """The data received is not a telegram; the text says why."""
 
 
 @dataclass(frozen=True)
 class Telegram:
-    """What the controller says in one cycle."""
+    """What the controller reports in one cycle."""
 
     ipoc: int
     """ms on the controller's clock."""
@@ -76,16 +76,16 @@ def parse(data: bytes) -> Telegram:
     ipoc = values.get("IPOC", {}).get("", b"")
     if not re.fullmatch(rb"\d{1,18}", ipoc):
         raise MalformedError("no IPOC")
-    found = {tag: _numbers(values, tag, names) for tag, names in _NEEDED.items()}
-    if any(np.isnan(part).any() for part in found.values()):
+    numbers = {tag: _numbers(values, tag, names) for tag, names in _NEEDED.items()}
+    if any(np.isnan(part).any() for part in numbers.values()):
         raise MalformedError("RIst, RSol, AIPos and ASPos must all be there")
     pint = [_text_number(values, f"SenPInt{k}") for k in (1, 2)]
     return Telegram(
         ipoc=int(ipoc),
-        position_mm=found["RIst"],
-        command_mm=found["RSol"],
-        q_rad=found["AIPos"] * RAD_PER_DEG,
-        q_command_rad=found["ASPos"] * RAD_PER_DEG,
+        position_mm=numbers["RIst"],
+        command_mm=numbers["RSol"],
+        q_rad=numbers["AIPos"] * RAD_PER_DEG,
+        q_command_rad=numbers["ASPos"] * RAD_PER_DEG,
         late=float(_numbers(values, "Delay", ("D",))[0]),
         monitor_mm=_numbers(values, "PosCorrMon", _XYZ),
         knot=pint[0],
@@ -98,7 +98,7 @@ def parse(data: bytes) -> Telegram:
 
 
 class Answer(NamedTuple):
-    """What is sent back."""
+    """The answer to a telegram."""
 
     ipoc: int
     correction: Floats
@@ -134,28 +134,28 @@ def _elements(data: bytes) -> dict[str, dict[str, bytes]]:
     body = _ROB.match(data)
     if body is None:
         raise MalformedError("not one <Rob> element")
-    found: dict[str, dict[str, bytes]] = {}
+    elements: dict[str, dict[str, bytes]] = {}
     text, at = body[1], 0
     while at < len(text) and text[at:].strip():
         element = _ELEMENT.match(text, at)
-        if element is None or len(found) >= MOST_ELEMENTS:
+        if element is None or len(elements) >= MOST_ELEMENTS:
             raise MalformedError("not a flat list of elements")
         tag = element[1].decode("ascii")
-        if tag in found:
+        if tag in elements:
             raise MalformedError(f"{tag} twice")
         values = {name.decode("ascii"): value for name, value in _ATTRIBUTE.findall(element[2])}
         if element[3] is not None:
             values[""] = element[3].strip()
-        found[tag], at = values, element.end()
-    return found
+        elements[tag], at = values, element.end()
+    return elements
 
 
 def _numbers(values: dict[str, dict[str, bytes]], tag: str, names: tuple[str, ...]) -> Floats:
     """Return the attributes of a tag; all NaN where it is not there, or not whole."""
-    own = values.get(tag)
-    if own is None or any(name not in own for name in names):
+    attributes = values.get(tag)
+    if attributes is None or any(name not in attributes for name in names):
         return np.full(len(names), math.nan)
-    return np.array([_number(own[name], tag) for name in names])
+    return np.array([_number(attributes[name], tag) for name in names])
 
 
 def _text_number(values: dict[str, dict[str, bytes]], tag: str) -> float:

@@ -1,10 +1,10 @@
 """The twin: predicted forces cut the part, the compensator sees them late and noisy, the robot reacts late.
 
-Truth is the prediction: its forces bend its arm. The compensator knows less: its model is too stiff, its
-pilot too low, its sensor noisy. The loop is closed by iteration over the whole run: the joints follow the
-correction, which follows the joints, until the tip stays where it is. What the tip's error does to the cut
-is left out: in a slot 9 mm deep a tool 0.6 mm too deep feels 7 % more, and the forces measured on a real
-part have that in them.
+The prediction is the truth: its forces bend its arm. The compensator knows less: its model is too stiff, its
+pilot force too low, its sensor noisy. The loop is closed by iteration over the whole run: the joints follow
+the correction, which follows the joints, until the tip stays where it is. The effect of the tip's error on
+the cut is left out: in a slot 9 mm deep a tool 0.6 mm too deep has 7 % more force, and the forces measured on
+a real part include that.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -44,7 +44,7 @@ CHECKSUM = 1
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """What the twin's world is like, and where each number comes from."""
+    """Parameters of the twin's world, and the source of each."""
 
     sensor_delay_s: float = 0.004
     """One telegram from the sensor to the compensator: the paper's cycle."""
@@ -52,15 +52,16 @@ class World:
     lag_s: float = 0.012
     """One cycle of the controller each (section 2.3: at best ± 12 ms): RSI, then the position controller."""
     stiffness_scale: float = 1.06
-    """The compensator's model over the truth: measured deviations are 6 % larger (section 3.1)."""
+    """Stiffness of the compensator's model over the truth: measured deviations are 6 % larger (section
+    3.1)."""
     pilot_scale: float = 0.93
-    """Forces of the pilot over the truth: with measured coefficients four slots agree within 6-9 %."""
+    """Pilot force over the truth: with measured coefficients four slots agree within 6-9 %."""
     sensor_gain: float = 1.0
     """Normal mismatch ± 2 %."""
     noise_N: float = 3.0
     """1-sigma of a sample of the sensor; an assumption."""
     late_s: float = 0.0
-    """By how much the cutter really enters and leaves later than predicted."""
+    """How much later than predicted the cutter enters and leaves."""
     backlash_deg: float = 0.005
     """Play of every drive: 0.3 arcmin, the small end of the reversal error of a large KUKA."""
     feed_scale: float = 1.0
@@ -76,11 +77,11 @@ class Run(NamedTuple):
     case: Case
     time_s: Floats
     error_mm: Floats
-    """(n, 3) of the tip against the commanded path, along ``$BASE``."""
+    """(n, 3) of the tip from the commanded path, along ``$BASE``."""
     normal_mm: Floats
     """(n,) length of that error normal to the feed."""
     shift_mm: Floats
-    """(n, 3) what the robot has made of the correction."""
+    """(n, 3) motion of the robot by the correction."""
     needed_mm: Floats
     """(n,) length of the deflection normal to the feed: the correction that would have been right."""
     force_N: Floats
@@ -88,7 +89,7 @@ class Run(NamedTuple):
     device: Corrections | None
     """None: no compensation."""
     rounds: int
-    """Passes until the loop was closed."""
+    """Passes until the loop converged."""
 
 
 @dataclass(frozen=True)
@@ -109,14 +110,16 @@ class Twin:
 def twin_of(prediction: Prediction, settings: Online, world: World) -> Twin:
     """Return the twin of a prediction with forces, sampled at the cycle of the settings.
 
-    Raises `NotUnderstoodError` where it has none, another sample time, or several tools.
+    Raises `NotUnderstoodError` where it has no forces, another sample time, or several tools.
     """
     motion, joints, forces = prediction.motion, prediction.joints, prediction.forces
     if motion is None or joints is None or forces is None or prediction.deflection is None:
         raise input_error(
-            "option-value", "the prediction has no forces or no deflection to compensate",
-            "give [material], [stock] and [compliance] in the cell", source=prediction.toolpath.source,
-        )  # fmt: skip
+            "option-value",
+            "the prediction has no forces or no deflection to compensate",
+            "give [material], [stock] and [compliance] in the cell",
+            source=prediction.toolpath.source,
+        )
     step_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else settings.cycle_s
     if abs(step_s - settings.cycle_s) > 1e-6:
         message = f"sampled every {1000 * step_s:g} ms, the twin runs at {1000 * settings.cycle_s:g} ms"
@@ -140,7 +143,7 @@ def simulate(twin: Twin, case: Case) -> Run:
     time_s = twin.motion.time_s / twin.world.feed_scale
     force, moment = _late(twin, time_s)
     device = None if case == "uncompensated" else _device(twin, case)
-    told = _told(twin, time_s)
+    told = _announced(twin, time_s)
     noise = np.random.default_rng(twin.world.seed).normal(0.0, twin.world.noise_N, (len(time_s), 3))
     shift = np.zeros((len(time_s), 3))
     corrections: Corrections | None = None
@@ -167,25 +170,25 @@ def simulate(twin: Twin, case: Case) -> Run:
 
 def as_settings(twin: Twin) -> dict[str, float | str | bool]:
     """Return everything that the figures depend on, for ``--json``."""
-    own = twin.settings
+    online = twin.settings
     world = {f"world_{name}": value for name, value in asdict(twin.world).items()}
     return {
-        "lead_ms": 1000.0 * own.pilot_lead_s,
-        "threshold_N": own.threshold_N,
-        "blend_ms": 1000.0 * own.blend_s,
-        "filter_ms": 1000.0 * own.filter_s,
+        "lead_ms": 1000.0 * online.pilot_lead_s,
+        "threshold_N": online.threshold_N,
+        "blend_ms": 1000.0 * online.blend_s,
+        "filter_ms": 1000.0 * online.filter_s,
         "robot_delay_ms": 1000.0 * (twin.world.dead_s + twin.world.lag_s),
         "feed_scale": twin.world.feed_scale,
         "pilot_scale": twin.world.pilot_scale,
-        "cycle_ms": 1000.0 * own.cycle_s,
-        "lowpass_hz": own.lowpass_hz,
-        "average_ms": 1000.0 * own.average_s,
+        "cycle_ms": 1000.0 * online.cycle_s,
+        "lowpass_hz": online.lowpass_hz,
+        "average_ms": 1000.0 * online.average_s,
         **world,
     }
 
 
 def stiffer(cell: Cell, scale: float) -> Cell:
-    """Return the cell as a compensator knows it whose model is stiffer by a factor; rigid joints stay so."""
+    """Return the cell with a stiffness multiplied by a factor; rigid joints stay rigid."""
     joints = {
         name: VirtualJoint(
             **{
@@ -195,8 +198,8 @@ def stiffer(cell: Cell, scale: float) -> Cell:
         )
         for name, stated in cell.compliance.virtual_joints.items()
     }
-    own = cell.compliance.model_copy(update={"virtual_joints": joints})
-    return cell.model_copy(update={"compliance": own})
+    compliance = cell.compliance.model_copy(update={"virtual_joints": joints})
+    return cell.model_copy(update={"compliance": compliance})
 
 
 def _device(twin: Twin, case: Case) -> Compensator:
@@ -204,9 +207,13 @@ def _device(twin: Twin, case: Case) -> Compensator:
     cell = stiffer(twin.cell, twin.world.stiffness_scale)
     piloted = case in ("pilot", "axis")
     return build_compensator(
-        cell, settings, tool=twin.tool, load_frame="base",
-        knots=twin.knots if piloted else None, header=twin.header if piloted else None,
-    )  # fmt: skip
+        cell,
+        settings,
+        tool=twin.tool,
+        load_frame="base",
+        knots=twin.knots if piloted else None,
+        header=twin.header if piloted else None,
+    )
 
 
 def _late(twin: Twin, time_s: Floats) -> tuple[Floats, Floats]:
@@ -219,7 +226,7 @@ def _late(twin: Twin, time_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _sensed(twin: Twin, force: Floats, moment: Floats, noise: Floats, time_s: Floats) -> Floats:
-    """Return what the compensator hears of a load (n, 6): later, scaled, noisy."""
+    """Return the load (n, 6) that the compensator receives: later, scaled, noisy."""
     load = np.concatenate([twin.world.sensor_gain * force + noise, twin.world.sensor_gain * moment], axis=1)
     at = time_s - twin.world.sensor_delay_s
     return np.stack([np.interp(at, time_s, column) for column in load.T], axis=1)
@@ -237,7 +244,7 @@ def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: An
 
 
 def _shift(twin: Twin, sent: Floats, time_s: Floats) -> Floats:
-    """Return how far the robot has moved the tip (n, 3) for the corrections sent."""
+    """Return the motion (n, 3) of the tip by the corrections sent."""
     moved = reaction(sent, time_s, twin.world.dead_s, twin.world.lag_s)
     if sent.shape[1] == 3:
         return moved
@@ -246,7 +253,7 @@ def _shift(twin: Twin, sent: Floats, time_s: Floats) -> Floats:
     return tip_shift_mm(behind, twin.joints.q_rad, twin.cell, twin.tool)
 
 
-def _told(twin: Twin, time_s: Floats) -> Announced:
+def _announced(twin: Twin, time_s: Floats) -> Announced:
     """Return what the controller reports: a knot's number once its trigger has fired, path-true."""
     fired = (twin.knots.time_s - twin.knots.lead_s) / twin.world.feed_scale
     knot = np.asarray(np.searchsorted(fired, time_s, side="right") - 1.0, dtype=np.float64)

@@ -1,8 +1,8 @@
 """Knots of the pilot force: cutting forces as a sparse polyline along the path.
 
 Cutting forces along a Motion are compressed to few knots between which an online controller ramps linearly
-(pilot control: Haehn & Weigold 2020, section 2.3). Before the first knot and behind the last the pilot is
-zero. `krl` announces the knots in the program, `online` reads them.
+(pilot control: Haehn & Weigold 2020, section 2.3). Before the first knot and after the last the pilot force
+is zero. `krl` announces the knots in the program, `online` reads them.
 """
 
 import math
@@ -19,12 +19,12 @@ from gcode2krl.tables import Table, _column
 
 LEAST_TOLERANCE_N = 10.0
 TOLERANCE_SHARE = 0.03
-"""The default tolerance: the larger of 10 N and this share of the largest force."""
+"""The default tolerance: the larger of 10 N and this fraction of the largest force."""
 CYCLE_S = 0.012
 FORCE_DECIMALS, DEFLECTION_DECIMALS = 2, 5
 TIME_DECIMALS, PATH_DECIMALS, LEAD_DECIMALS = 6, 6, 4
 _WRITTEN_N = 0.1
-"""Kept free of the tolerance for the decimals in which knots are written."""
+"""Part of the tolerance reserved for rounding to the decimals in which knots are written."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,15 +70,15 @@ def knots_of(
     breaks : samples with a force that become knots in any case (changes of direction).
     line : (m,) lines of the G-code, for the knots and for the words of a finding.
     tolerance_N : largest distance of a sample to the polyline; default max(10 N, 3 % of the largest force).
-    cycle_s : no two knots are nearer to each other; those that are wanted nearer are merged.
+    cycle_s : least time between two knots; closer ones are merged.
 
     Returns
     -------
-    Knots, without their lead. The last sample before a contact and the first behind it are knots; between
-    them a Ramer-Douglas-Peucker polyline (Douglas & Peucker 1973) in the three components. Its distance
-    counts for both ways to draw the polyline, linear in the path and linear in time (they differ where the
-    speed changes), and the larger error is the one that is stated. A change within one cycle cannot be
-    followed; a tolerance not kept for it is a finding in ``issues``.
+    Knots, without their lead. The last sample before a contact and the first after it are knots; between
+    them lies a Ramer-Douglas-Peucker polyline (Douglas & Peucker 1973) in the three components. The polyline
+    may be read linearly in the path or in time, which differs where the speed changes; the larger error of
+    the two is stated. A change within one cycle cannot be followed; if the tolerance is exceeded for that
+    reason, ``issues`` has a finding.
     """
     acting = in_contact(force_N)
     lines = np.zeros(len(time_s), dtype=np.int32) if line is None else line
@@ -131,7 +131,7 @@ def force_at(knots: Knots, time_s: Floats) -> Floats:
 
 
 def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
-    """Return vectors (m, 3) along ``$BASE`` in the frame in which the cell wants its knots.
+    """Return vectors (m, 3) along ``$BASE`` in the frame in which the cell states its knots.
 
     ``tcp`` is the tool frame as the controller has it (``[tool] axis`` says which of its axes points from
     tip to holder), at the commanded pose with quaternions ``rotation`` (m, 4) of the inner tool frame.
@@ -190,7 +190,7 @@ def _always_kept(time_s: Floats, acting: Bools, breaks: Rows, least_s: float) ->
 
 @njit(cache=True, nogil=True)
 def _spaced(time: Floats, least: float) -> Bools:
-    """Mark the times (k,) that are at least so far behind the last marked one."""
+    """Mark the times (k,) that are at least ``least`` after the last marked one."""
     marked = np.zeros(len(time), dtype=np.bool_)
     last = -np.inf
     for i in range(len(time)):
@@ -202,7 +202,7 @@ def _spaced(time: Floats, least: float) -> Bools:
 
 @njit(cache=True, nogil=True)
 def _thin(time: Floats, path: Floats, force: Floats, kept: Bools, tolerance: float, least: float) -> None:
-    """Ramer-Douglas-Peucker between the samples that are kept: marks those the polyline needs besides.
+    """Ramer-Douglas-Peucker between kept samples: marks the further samples that the polyline needs.
 
     The right ends of the open spans wait on a stack; a span is split at its farthest sample that is a cycle
     away from both ends.
@@ -253,17 +253,33 @@ def _errors(
                 size += (force[i, c] - (knot_force[last, c] if at_last else 0.0)) ** 2
         else:
             size = _off2(
-                time, path, force, i, knot_time[k], knot_time[k + 1], knot_path[k], knot_path[k + 1],
-                knot_force[k], knot_force[k + 1],
-            )  # fmt: skip
+                time,
+                path,
+                force,
+                i,
+                knot_time[k],
+                knot_time[k + 1],
+                knot_path[k],
+                knot_path[k + 1],
+                knot_force[k],
+                knot_force[k + 1],
+            )
         error[i] = math.sqrt(size)
 
 
 @njit(cache=True, nogil=True)
 def _off2(
-    time: Floats, path: Floats, force: Floats, i: int, ta: float, tb: float, sa: float, sb: float,
-    fa: Floats, fb: Floats,
-) -> float:  # fmt: skip
+    time: Floats,
+    path: Floats,
+    force: Floats,
+    i: int,
+    ta: float,
+    tb: float,
+    sa: float,
+    sb: float,
+    fa: Floats,
+    fb: Floats,
+) -> float:
     """Return the square of a sample's distance to the chord, linear in time or in the path, the larger."""
     by_time = min(max((time[i] - ta) / (tb - ta), 0.0), 1.0)
     by_path = min(max((path[i] - sa) / (sb - sa), 0.0), 1.0) if sb - sa > 1e-6 else by_time

@@ -1,4 +1,4 @@
-"""The sidecar of a program, ``part.pilot.csv``: its knots, and in the first line what they mean.
+"""The sidecar of a program, ``part.pilot.csv``: its knots, and in the first line how to read them.
 
 The first line is ``# gcode2krl/pilot/1`` and words ``key=value``; then follow the names of the columns and a
 row per knot, counted from 0.
@@ -25,7 +25,7 @@ from gcode2krl.pilot.knots import (
 
 SCHEMA = "gcode2krl/pilot/1"
 NOT_YET = -1
-"""The checksum of a program that is not composed yet."""
+"""The checksum of a program that has not been composed yet."""
 COLUMNS = (
     *("knot", "line", "s_mm", "time_s", "lead_s"),
     *("fx_N", "fy_N", "fz_N"),
@@ -42,11 +42,11 @@ class PilotHeader:
     frame: Literal["tcp", "base"]
     """Frame in which the knots state force and deflection: ``$TOOL`` or ``$BASE`` of the controller."""
     form: Literal["index", "values"]
-    """What the program's triggers write: the number of a knot, or the knot."""
+    """What the program's triggers write: the number of a knot, or its values."""
     variable: str
     """The controller's variable they write to."""
     lead_s: float
-    """Least time by which a knot is announced ahead, but for those that begin a section of the program."""
+    """Least time by which a knot is announced ahead, except for knots that begin a section of the program."""
     checksum: int = NOT_YET
     """31 bits over targets and knots as written; the program sets it at its start."""
     sign: Literal["on-tool"] = "on-tool"
@@ -93,7 +93,7 @@ def read_pilot(path: str | Path) -> tuple[Knots, PilotHeader]:
     ------
     NotUnderstoodError
         Names file, row and column: unreadable file, another format or version, a word of the head that is
-        missing or not allowed, another column, what is not a number, knots out of order.
+        missing or not allowed, another column, a value that is not a number, knots out of order.
     """
     file = Path(path)
     try:
@@ -125,10 +125,10 @@ def _wrong(file: Path, row: int, what: str) -> NotUnderstoodError:
 
 
 def _header(line: str, file: Path) -> PilotHeader:
-    found = re.fullmatch(r"#\s*(\S+)((?:\s+\S+=\S+)*)\s*", line)
-    if found is None or found[1] != SCHEMA:
+    match = re.fullmatch(r"#\s*(\S+)((?:\s+\S+=\S+)*)\s*", line)
+    if match is None or match[1] != SCHEMA:
         raise _wrong(file, 1, f"found {line[:60]!r}, allowed '# {SCHEMA} frame=… sign=… …'")
-    words = dict(word.split("=", 1) for word in found[2].split())
+    words = dict(word.split("=", 1) for word in match[2].split())
     for name in (spec.name for spec in fields(PilotHeader)):
         if name not in words:
             raise _wrong(file, 1, f"{name}= is missing")
@@ -165,12 +165,12 @@ def _values(lines: list[str], file: Path) -> Floats:
 
 
 def _number(word: str) -> float:
-    """Return a finite decimal number, NaN where the word is none."""
+    """Return a finite decimal number, NaN where the word is not a number."""
     return float(word) if re.fullmatch(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?", word.strip()) else math.nan
 
 
 def _check_order(values: Floats, file: Path) -> None:
-    """Knots count up from 0 and rise in time; lines of the G-code are whole and not negative."""
+    """Raise unless knots count up from 0 and rise in time and G-code lines are whole and not negative."""
     number, line = values[:, 0], values[:, 1]
     checks = (
         ("knot", number != np.arange(len(values)), "knots count up from 0"),
@@ -181,5 +181,5 @@ def _check_order(values: Floats, file: Path) -> None:
     for name, wrong, rule in checks:
         if wrong.any():
             row = int(np.argmax(wrong))
-            found = values[row, COLUMNS.index(name)]
-            raise _wrong(file, row + 3, f"column {name}: found {found:g}; {rule}")
+            value = values[row, COLUMNS.index(name)]
+            raise _wrong(file, row + 3, f"column {name}: found {value:g}; {rule}")

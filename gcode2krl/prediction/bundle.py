@@ -26,7 +26,7 @@ _UNFINISHED = f'schema = "{SCHEMA}"\nunfinished = true\n'.encode("ascii")
 _OURS = re.compile(rb'^schema = "gcode2krl/prediction/\d+"', re.MULTILINE)
 _MOST_OF_RECORD = 4096
 _IGNORED = re.compile(r"\.DS_Store|Thumbs\.db|desktop\.ini|\..+\.(?:part|old)")
-"""Files that make no folder somebody's: those of desktops, and leftovers of a killed run."""
+"""Files that do not make a folder foreign: those of desktops, and leftovers of a killed run."""
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
 _ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)")
 _AXES = {3: "xyz", 4: "xyzw"}
@@ -56,14 +56,15 @@ class Prediction:
     def issues(self) -> tuple[Issue, ...]:
         """All findings, of the targets (which carry those of the G-code) and of every later stage."""
         later = (self.motion, self.forces, self.deflection)
-        found = (issue for table in later if table is not None for issue in table.issues)
-        return (*self.targets.issues, *found, *self.skipped)
+        stage_issues = (issue for table in later if table is not None for issue in table.issues)
+        return (*self.targets.issues, *stage_issues, *self.skipped)
 
     def save(self, folder: str | Path, csv: bool = False, inputs: Iterable[str | Path] = ()) -> list[Path]:
         """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files.
 
-        The folder must be empty or hold a prediction. While it is written it says that it is unfinished, so
-        that what a killed run leaves is not read as a whole. ``inputs`` are never overwritten.
+        The folder must be empty or hold a prediction. While it is being written its record says that it
+        is unfinished, so that what a killed run leaves is never read as complete. ``inputs`` are never
+        overwritten.
         """
         place = Path(folder)
         refuse_foreign(place)
@@ -134,7 +135,7 @@ class Prediction:
 
 
 def _cell_of(record: PredictionRecord, file: Path) -> Cell:
-    """Return the cell of a prediction; of what is wrong with it the first is said."""
+    """Return the cell of a prediction; an error names the first thing that is wrong with it."""
     try:
         return cell_from_resolved(record.cell, source=str(file))
     except NotUnderstoodError as error:
@@ -155,9 +156,12 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
         events=events_of(record.toolpath_events, paths, "toolpath"),
     )
     targets = _table(
-        Targets, frames["targets"], source=source, issues=record.findings(),
+        Targets,
+        frames["targets"],
+        source=source,
+        issues=record.findings(),
         events=events_of(record.targets_events, poses, "targets"),
-    )  # fmt: skip
+    )
     parts: dict[str, Any] = {"toolpath": toolpath, "targets": targets}
     if motion_frame is not None:
         parts["motion"] = _table(Motion, motion_frame)
@@ -177,17 +181,20 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
 
 
 _BESIDE: tuple[tuple[str, type[Table], str], ...] = (
-    ("joints", Joints, "q1_rad"), ("forces", Forces, "force_base_x_N"),
+    ("joints", Joints, "q1_rad"),
+    ("forces", Forces, "force_base_x_N"),
     ("deflection", Deflection, "deflection_base_x_mm"),
-)  # fmt: skip
-"""What stands beside Motion, and a column that only it has."""
+)
+"""Tables saved beside Motion, each with a column that no other table has."""
 _TABLES: dict[str, tuple[type[Table], ...]] = {
-    "toolpath": (Toolpath,), "targets": (Targets,), "motion": (Motion, *(kind for _, kind, _ in _BESIDE)),
-}  # fmt: skip
+    "toolpath": (Toolpath,),
+    "targets": (Targets,),
+    "motion": (Motion, *(kind for _, kind, _ in _BESIDE)),
+}
 
 
 def _kind_of(file: str) -> Callable[[str], str | None]:
-    """Return what tells the Parquet type of a column of a file by its name, None for one that is not ours."""
+    """Return the function from column name to Parquet type in a file; None for a column that is not ours."""
     specs = [spec for kind in _TABLES[file] for spec in fields(kind) if "tail" in spec.metadata]
     fixed: dict[str, str] = {}
     counted = [_ADDED] if file == "motion" else []
@@ -216,7 +223,7 @@ def refuse_foreign(folder: Path) -> None:
         return
     others = sorted(file.name for file in folder.iterdir() if not _IGNORED.fullmatch(file.name))
     if others:
-        what = "and no prediction of ours" if RECORD not in others else "which is no prediction of ours"
+        what = "and no prediction" if RECORD not in others else "which is not a prediction"
         named = RECORD if RECORD in others else others[0]
         sentence = f"the folder is not empty: it holds {named}, {what}"
         raise input_error("output-foreign", sentence, "name a new folder", source=str(folder))

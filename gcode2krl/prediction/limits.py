@@ -1,4 +1,4 @@
-"""Predicted figures beyond ``[limits]`` of the cell, beyond the robot's data sheet, or beyond all sense.
+"""Predicted figures beyond ``[limits]`` of the cell, beyond the robot's data sheet, or absurd.
 
 - Beyond ``[limits]``: a warning with the line where the largest value occurs.
 - Beyond the rated payload: an error. The cutting force and the weight on the flange together must not exceed
@@ -22,12 +22,12 @@ Lines = Ints32
 GRAVITY_M_S2 = 9.80665
 """Standard gravity (CGPM 1901)."""
 GUESSED_FACTOR = 2.0
-"""How far a force may be too large because its stock is guessed: an assumption. Up to so many times the rated
-payload it is a warning then."""
+"""Factor by which a force may be too large because its stock is guessed (an assumption): up to this many
+times the rated payload it is then a warning."""
 ABSURD_FORCE_N = 100_000.0
 """No robot of the library carries a tenth of it (10 t): the figure is a mistake, not a prediction."""
 ABSURD_DEFLECTION_MM = 100.0
-"""The compliance model is linear in small angles: so far off, 2° on a reach of 3 m, it predicts nothing."""
+"""The compliance model is linear in small angles: at this size, 2° on a reach of 3 m, it is not valid."""
 
 
 def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
@@ -35,7 +35,7 @@ def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
 
     The law's own peak, v²·cos(alpha/2)/d, is not what drives see where a corner is passed within a cycle:
     at 0.2 m/s and d = 0.1 mm it lasts 1 ms, and the controller commands a position every ``cycle_s``.
-    Where the tool changes the tip is another point, and there is none.
+    It is 0 at a tool change, where the tip becomes another point.
     """
     result = np.zeros(len(motion))
     if len(motion) < 3:
@@ -110,7 +110,7 @@ def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
 
 
 def absurd_forces(forces: Forces, line: Lines) -> Issue | None:
-    """Return the finding on forces that mean nothing, None where they do."""
+    """Return the finding on absurd forces, None if there are none."""
     columns = (
         forces.force_base_N,
         forces.moment_base_Nmm,
@@ -122,15 +122,15 @@ def absurd_forces(forces: Forces, line: Lines) -> Issue | None:
         wrong = ~finite | ~(np.linalg.norm(forces.force_base_N, axis=1) <= ABSURD_FORCE_N)
     if not wrong.any():
         return None
-    sentence = f"the forces on T{forces.tool[np.argmax(wrong)]} come out beyond all sense: they are left out"
+    sentence = f"the forces on T{forces.tool[np.argmax(wrong)]} are absurd: they are left out"
     remedy = "check [material] (N/mm2, N/mm), the tool's diameter_mm and teeth, S and F"
     return Issue("error", "force-absurd", int(line[np.argmax(wrong)]), sentence, remedy)
 
 
 def absurd_deflection(deflection: Deflection, reached: Bools, line: Lines) -> Issue | None:
-    """Return the finding on a deflection that means nothing, None where it does.
+    """Return the finding on an absurd deflection, None if there is none.
 
-    ``reached`` (m,) is False where the robot has no joint angles, which is a finding of its own.
+    ``reached`` (m,) is False where the robot has no joint angles, which is reported separately.
     """
     columns = (deflection.deflection_base_mm, deflection.correction_base_mm)
     finite = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])

@@ -1,4 +1,4 @@
-"""``prediction.toml`` as it is read: every key of its type, or one line that names it."""
+"""Reads ``prediction.toml``: every key must have its type; an error names the key in one line."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -41,7 +41,7 @@ class _IssueRecord(_Part):
 
 
 class _EventValues(_Part):
-    """What any event may state; `_WANTED` says what each kind must."""
+    """What an event may state; `_WANTED` lists what each kind must state."""
 
     line: _Line
     m: StrictInt | None = None
@@ -86,7 +86,7 @@ class _Inputs(BaseModel):
 
 
 class PredictionRecord(BaseModel):
-    """The head of a prediction; `cell` is checked by whoever knows cells."""
+    """The head of a prediction; `cell` is checked when it is made into a `Cell`."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -116,11 +116,11 @@ def read_record(file: Path) -> PredictionRecord:
     except NotTomlError as error:
         raise input_error("not-toml", str(error), REMEDY, source=str(file)) from None
     if tables.get("unfinished"):
-        sentence = "the prediction was not written to its end"
+        sentence = "the prediction was not written completely"
         raise input_error("prediction-unfinished", sentence, "predict again", source=str(file))
-    found = tables.get("schema")
-    if found != SCHEMA:
-        message = f"schema: found {repr(found)[:60]}, allowed: {SCHEMA}"
+    schema = tables.get("schema")
+    if schema != SCHEMA:
+        message = f"schema: found {repr(schema)[:60]}, allowed: {SCHEMA}"
         raise input_error("prediction-schema", message, REMEDY, source=str(file))
     try:
         return PredictionRecord.model_validate(tables)
@@ -129,7 +129,7 @@ def read_record(file: Path) -> PredictionRecord:
 
 
 def events_of(records: tuple[_EventRecord, ...], rows: int, table: str) -> tuple[Event, ...]:
-    """Return the events of a table of so many rows; raises `ValueError` for one outside of it."""
+    """Return the events of a table of ``rows`` rows; raises `ValueError` for one outside of it."""
     events = tuple(record.event() for record in records)
     for event in events:
         if event.row >= rows:
@@ -141,8 +141,8 @@ def _wrong_key(error: ValidationError, file: Path) -> NotUnderstoodError:
     first, *rest = error.errors(include_url=False)
     key = ".".join(str(step) for step in first["loc"])[:120]
     allowed = first["msg"].removeprefix("Input should be ")
-    found = (
+    reason = (
         "missing" if first["type"] == "missing" else f"found {repr(first['input'])[:60]}, allowed: {allowed}"
     )
     more = f" (and {len(rest)} more)" if rest else ""
-    return input_error("prediction-key", f"{key}: {found}{more}", REMEDY, source=str(file))
+    return input_error("prediction-key", f"{key}: {reason}{more}", REMEDY, source=str(file))

@@ -1,4 +1,4 @@
-"""The Parquet tables of a prediction, read by those who trust nothing: types, counts, numbers, references."""
+"""The Parquet tables of a prediction, checked as they are read: types, counts, numbers, references."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 REMEDY = "predict the part again"
 PARQUET_TYPES = {"f": "DOUBLE", "i": "INT32", "b": "BOOLEAN"}
-"""By the kind of a column's dtype, as `Prediction.save` writes it."""
+"""Parquet type by the kind of a column's dtype, as `Prediction.save` writes it."""
 _MAY_BE_NAN = {
     "Toolpath": ("tolerance_mm", "length_offset_mm"),
     "Targets": ("speed_mm_s",),
@@ -54,7 +54,7 @@ def read_table(file: Path, kind_of: Callable[[str], str | None]) -> "pl.DataFram
 
 
 def _refuse_other_types(frame: "pl.DataFrame", kinds: dict[str, str]) -> None:
-    """An INT32 may be a date or an unsigned number, too, and any value may be missing."""
+    """Raise if values are missing or of another type: an INT32 may also be a date or unsigned."""
     import polars as pl
 
     allowed = {"DOUBLE": pl.Float64, "INT32": pl.Int32, "BOOLEAN": pl.Boolean}

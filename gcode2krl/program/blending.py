@@ -1,4 +1,4 @@
-"""CDIS at each corner: from a tolerance where one is asked for, else the cell's.
+"""CDIS at each corner: from a tolerance if one is given, else the cell's.
 
 The controller leaves the line at d before a corner and joins the next d after it on a parabola; the corner
 is then off by d·cos(alpha/2)/2 (Bigliardi et al. 2022, eq. 1-3; alpha = interior angle, d at most half of
@@ -27,7 +27,7 @@ def corner_cdis(
 ) -> Floats:
     """Return CDIS (p,) in mm at the end of each motion.
 
-    ``tolerance_mm`` (p,) is NaN where none is asked for: there ``cdis_mm`` holds. ``exact`` (p,) forces 0.
+    ``tolerance_mm`` (p,) is NaN where none is given: there ``cdis_mm`` applies. ``exact`` (p,) forces 0.
     A reversal (interior angle below 1°) is an exact stop.
     """
     count = len(position_mm)
@@ -71,7 +71,7 @@ def _corner_cdis(position, tolerance, cdis, exact, levels, start, end, result):
         largest = levels[-1] if cos_half < 1e-12 else 2.0 * tolerance[i] / cos_half
         half_line = 0.5 * math.sqrt(min(before, after))
         level = 0.0
-        for value in levels:  # the largest that is allowed, but none beyond what half the line can use
+        for value in levels:  # the largest allowed level, none beyond what half the line can use
             if value > largest * (1.0 + 1e-12) or level >= half_line:
                 break
             level = value

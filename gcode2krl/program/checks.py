@@ -1,4 +1,4 @@
-"""What must not become a program, seen from the G-code and the cell alone (no robot, no material)."""
+"""Checks that refuse a program from the G-code and the cell alone (no robot, no material)."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ _TOUCHED_OFF = (
 
 
 def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
-    """Return the findings on a Toolpath that are errors in ``design`` terms of safety, with their lines."""
+    """Return the findings on a Toolpath that would make its program unsafe, with their lines."""
     feed = ~toolpath.rapid & ~toolpath.machine
     feed[:1] = False
     findings: list[Issue] = []
@@ -33,7 +33,7 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
 
 
 def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
-    """Raise `RefusedError` with all findings where the cell does not say where anything is."""
+    """Raise `RefusedError` with all findings where the cell lacks the geometry of arm, work or tool."""
     if lacks_geometry(toolpath, cell):
         raise RefusedError((*toolpath.issues, *check_toolpath(toolpath, cell)), toolpath.source)
 
@@ -81,7 +81,7 @@ def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
 
 
 def axes_nowhere(toolpath: Toolpath) -> str:
-    """Return the words for axes that no line gives a position, empty where each has one, or nothing moves."""
+    """Return a text on axes that no line gives a position, empty if all have one or nothing moves."""
     known: Bools = np.any(toolpath.known, axis=0)
     lines = int(toolpath.source_line.max(initial=0))
     return (
@@ -300,12 +300,12 @@ def _events(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
 
 
 def m_code(event: Event) -> str:
-    """Return the M-code an event stands for (``M3``), empty for a mere text."""
+    """Return the M-code an event stands for (``M3``), empty for a plain message."""
     if event.kind == "tool":
         return "M6"
     return f"M{event.values['m']}" if event.values["m"] >= 0 else ""
 
 
 def has_krl(code: str, cell: Cell) -> bool:
-    """Tell whether the cell says what an M-code becomes."""
+    """Tell whether the cell has KRL for an M-code."""
     return bool(cell.tool_change.strip()) if code == "M6" else code in cell.m_code

@@ -1,4 +1,4 @@
-"""What a program may say, but hardly means: warnings from the G-code and the cell alone."""
+"""Valid G-code that is hardly intended: warnings from the G-code and the cell alone."""
 
 import math
 from collections.abc import Iterator
@@ -14,12 +14,13 @@ from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MS_PER_S, RAD_PER_REV, S_PER_MIN
 
 LONG_DWELL_S = 30.0
-"""Assumed: a spindle needs some seconds to start, a chip some turns to break; 30 s are a slip of the unit."""
+"""Assumed: a spindle needs some seconds to start, a chip some turns to break; 30 s are probably a wrong
+unit."""
 WIDE_CORNER_MM = 3.0
 """Assumed: a corner that is rounded by more is not what a milled part asks for (the test program of
 `identify controller` rounds by 2.4 mm on purpose)."""
 RUBBING_MM = 0.001
-"""Feed per tooth below which nothing comes off: a fifth of the edge radius of the sharpest carbide, 5 µm."""
+"""Feed per tooth below which no chip forms: a fifth of the edge radius of the sharpest carbide, 5 µm."""
 THICK_MM, THICK_OF_DIAMETER, THICK_OF_FLAT_IN_METAL = 0.2, 0.1, 0.03
 """Feed per tooth above which no mill of that diameter cuts: usual are 0.002 to 0.02 of it, 0.05 in wood; at
 small depth a ball or a corner radius makes the chip thinner than the feed."""
@@ -70,18 +71,18 @@ def _blends(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None, feed: Bo
         row = int(np.argmax(programmed))
         line = int(toolpath.source_line[row])
         value = float(toolpath.tolerance_mm[row])
-        found = line_with(toolpath.source, r"G64.*P", 1, line, from_end=True)
+        g64_line = line_with(toolpath.source, r"G64.*P", 1, line, from_end=True)
         remedy = "G64 P0.05 is usual; under G20 P counts inches"
-        yield _wide_blend(f"G64 P allows corners to be {value:g} mm off", found or line, remedy)
+        yield _wide_blend(f"G64 P allows corners to be {value:g} mm off", g64_line or line, remedy)
     rest = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
     if not rest.any():
         return
-    asked = tolerance_mm if tolerance_mm is not None else controller.tolerance_mm
-    if asked is not None:
-        if asked > WIDE_CORNER_MM:
+    tolerance = tolerance_mm if tolerance_mm is not None else controller.tolerance_mm
+    if tolerance is not None:
+        if tolerance > WIDE_CORNER_MM:
             name = "--tolerance" if tolerance_mm is not None else "[controller] tolerance_mm ="
             line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, rest)[0]])
-            words = f"{name} {asked:g} allows corners to be as many mm off"
+            words = f"{name} {tolerance:g} allows corners to be as many mm off"
             yield _wide_blend(words, line, "0.02 to 0.2 is usual")
     elif controller.cdis_mm * math.sqrt(0.125) > WIDE_CORNER_MM:
         row, error_mm = _widest_corner(toolpath, controller.cdis_mm, rest)
@@ -109,7 +110,7 @@ def _widest_corner(toolpath: Toolpath, cdis_mm: float, rows: Bools) -> tuple[int
 
 
 def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    """M0 and M1 where the tool stands lower than where its feed run began: in what it cuts."""
+    """Yield M0 and M1 that stop the tool lower than its feed run began, so in the material."""
     stops = [event for event in toolpath.events if _stops(event, cell)]
     if not stops:
         return
@@ -156,7 +157,7 @@ def _thick_share(tool: Tool, material: Material | None) -> float:
 
 
 def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Issue]:
-    """Yield warnings on a feed per tooth F/(S·z) of nothing, or of more than a mill of that diameter takes.
+    """Yield warnings on a feed per tooth F/(S·z) that forms no chip or is too large for the diameter.
 
     ``cuts`` (n,) tells which moves meet material.
     """

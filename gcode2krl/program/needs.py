@@ -1,4 +1,4 @@
-"""What a program needs of its cell and the cell does not state, and what it states that is doubtful."""
+"""Keys that a program needs and its cell does not state, and doubtful values that it states."""
 
 from collections.abc import Iterator
 
@@ -12,11 +12,11 @@ from gcode2krl.tables import Event, Toolpath
 _LEAST_WAIT_S = 0.5
 """Assumed: motor spindles start and stop in 1 to 15 s, the smallest in half a second."""
 _LEAST_HELIX_DEG = 5.0
-"""Catalogues: straight edges, or 10 to 60 degrees; 0.17 to 1.05 are these in radians."""
+"""Catalogues: straight edges, or 10 to 60 degrees; 0.17 to 1.05 are those in radians."""
 
 
 def lacks_geometry(toolpath: Toolpath, cell: Cell) -> bool:
-    """Tell whether the cell does not say where the arm, the work or a tool is: nothing can be planned."""
+    """Tell whether the cell lacks the geometry of arm, work or a tool, so that nothing can be planned."""
     return any(_geometry_keys(toolpath, cell))
 
 
@@ -63,7 +63,7 @@ def _doubtful_cutters(used: set[int], cell: Cell) -> Iterator[Issue]:
 
 
 def _short_waits(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
-    """Yield the waits for the spindle that the program's own templates use and no spindle can keep."""
+    """Yield the waits for the spindle that the program's templates use and that are too short."""
     templates = cell.templates()
     used = [templates[key] for key in _used_templates(toolpath, templates)]
     waits = {"start_s": cell.spindle.start_s, "stop_s": cell.spindle.stop_s}
@@ -79,7 +79,7 @@ def _short_waits(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
 
 
 def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
-    """Yield (key, why) of what places the program: without these nothing can be planned."""
+    """Yield (key, reason) of the geometry: without these keys nothing can be planned."""
     if not cell.robot.geometry.known:
         yield "robot.model", "which arm moves is not known"
     if cell.frames.base is None:
@@ -96,7 +96,7 @@ def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
 
 
 def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
-    """Yield (key, why) of what else the text of the program says."""
+    """Yield (key, reason) of the other keys that the text of the program needs."""
     tools = [cell.tool[number] for number in _used_tools(toolpath) if number in cell.tool]
     if cell.load.mass_kg is None and any(tool.tool_data is None for tool in tools):
         yield "load.mass_kg", "$LOAD is written with $TOOL"
@@ -114,11 +114,11 @@ def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
             if "." in error.key:
                 yield error.key.removeprefix("cell."), f"{key} switches it"
         except cell_templates.TemplateError:
-            continue  # said where it is rendered with its own values
+            continue  # reported where it is rendered with its own values
 
 
 def _unread_pairs(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
-    """Yield the pairs that the program uses and whose second half calls a subprogram."""
+    """Yield the pairs that the program uses whose switching off calls a subprogram."""
     from gcode2krl.cell import switching
 
     templates = cell.templates()

@@ -11,14 +11,14 @@ _NEARLY_ONE = 1.0 - 1e-12
 def tool_rotation(axis: Floats, spin_rad: Floats | float) -> Floats:
     """Return tool frames as quaternions (n, 4) whose z is ``axis`` (n, 3).
 
-    At zero spin the frame is ``$BASE`` turned by the shortest way from z to the axis, so a 3-axis program
+    At zero spin the frame is ``$BASE`` turned by the smallest angle from z to the axis, so a 3-axis program
     has A = B = C = 0; ``spin_rad`` (n,) or a number then turns it about the axis. An axis along -z is
     reached by a half turn about x.
     """
     constant = len(axis) == 0 or (axis.strides[0] == 0 or bool(np.all(axis == axis[0])))
     if constant and np.ndim(spin_rad) == 0 and len(axis):
-        one = _rotation(axis[:1], np.asarray([float(spin_rad)]))
-        return np.broadcast_to(one, (len(axis), 4))
+        rotation = _rotation(axis[:1], np.asarray([float(spin_rad)]))
+        return np.broadcast_to(rotation, (len(axis), 4))
     return _rotation(axis, np.broadcast_to(np.asarray(spin_rad, dtype=float), (len(axis),)))
 
 

@@ -20,10 +20,10 @@ def line_with(source: str, pattern: str, first: int, last: int, *, from_end: boo
     except (OSError, ValueError):
         return None
     wanted = re.compile(pattern)
-    found = [k for k, text in enumerate(lines, start=first) if wanted.search(_code(text))]
-    if not found:
+    matching = [k for k, text in enumerate(lines, start=first) if wanted.search(_code(text))]
+    if not matching:
         return None
-    return found[-1] if from_end else found[0]
+    return matching[-1] if from_end else matching[0]
 
 
 def _code(text: str) -> str:

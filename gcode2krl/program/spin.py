@@ -1,8 +1,8 @@
 """The free turn about the tool axis: a mill is symmetric, so the robot may choose it.
 
-``auto`` keeps away from joint limits and singularities. One angle for the whole program where one is good
-enough (the smoothest choice); otherwise an angle that changes slowly along the path, found by dynamic
-programming over a grid. ``stiffest`` picks the angle that bends least, with the same care.
+``auto`` keeps away from joint limits and singularities. One angle is used for the whole program where it is
+good enough (the smoothest choice); otherwise an angle that changes slowly along the path, found by dynamic
+programming over a grid. ``stiffest`` takes the angle at which the arm bends least, within the same limits.
 """
 
 from collections.abc import Callable
@@ -20,18 +20,18 @@ GOOD_ENOUGH = 0.3
 STEP_MM = 25.0
 """Path over which a changing angle may move by one step of the grid."""
 STIFF_QUALITY = 0.15
-"""Least quality of a pose that is taken for its stiffness."""
+"""Least quality of a pose that `stiffest_spin` may take."""
 _WORTH_TURNING = 0.02
-"""Share of the mean deflection that a changing angle must save against a constant one."""
+"""Fraction of the mean deflection that a changing angle must save compared with a constant one."""
 _CHANGE_COST = 0.05
 _SAMPLES = 400
 
 
 def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
-    """Return the spin in rad: one number, or (p,) where no constant angle will do.
+    """Return the spin in rad: one number, or (p,) where no constant angle is good enough.
 
-    ``quality(rows, spin)`` gives (len(rows), branches): how far the worst of limits and singularities is,
-    1 = 30° and more, 0 = at it, negative = impossible; the branch must be one for the whole program.
+    ``quality(rows, spin)`` gives (len(rows), branches): the distance to the nearest limit or
+    singularity, 1 = 30° and more, 0 = at it, negative = impossible. One branch serves the whole program.
     """
     rows = _judged_rows(position_mm)
     spins = _grid()
@@ -48,8 +48,8 @@ def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
 def stiffest_spin(position_mm: Floats, quality: Quality, bending: Quality) -> Floats | float:
     """Return the spin in rad that bends least: one number, or (p,) where a changing angle saves more.
 
-    ``quality`` as in `smooth_spin`; ``bending(rows, spin)`` gives (len(rows), branches) in mm, any load, NaN
-    where the pose cannot be. One branch for the whole program.
+    ``quality`` as in `smooth_spin`; ``bending(rows, spin)`` gives (len(rows), branches) in mm, under
+    any load, NaN where the pose is impossible. One branch serves the whole program.
     """
     rows, spins = _judged_rows(position_mm), _grid()
     comfort = np.stack([quality(rows, float(spin)) for spin in spins])
@@ -112,9 +112,9 @@ def _changing(position_mm: Floats, rows: Ints, spins: Floats, table: Floats) -> 
 
 
 def _cheapest_track(cost_here: Floats, allowed: Ints) -> tuple[float, Ints]:
-    """Return (cost, grid index per sample) of the cheapest way through the grid (spins, samples).
+    """Return (cost, grid index per sample) of the cheapest track through the grid (spins, samples).
 
-    No wrap at ±180°: a full turn about the tool would wind up A6.
+    It does not wrap at ±180°: a full turn about the tool would wind up A6.
     """
     size, samples = cost_here.shape
     distance = np.abs(np.arange(size)[:, None] - np.arange(size)[None, :])

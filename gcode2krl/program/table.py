@@ -1,4 +1,4 @@
-"""Nothing of the tool goes below the table that carries the work."""
+"""Checks that no part of the tool goes below the table that carries the work."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ def below_table(targets: Targets, cell: Cell) -> Iterator[Issue]:
     """Yield where a tool goes below ``[table] z_mm``: any motion, approach and retract included.
 
     Judged at the targets: between two of them the tool goes straight, and a corner is rounded within its
-    triangle. (On a PTP it goes neither, but none ends below the clearance plane, apart from HOME.)
+    triangle. (A PTP is not straight, but none ends below the clearance plane, except at HOME.)
     """
     if cell.table is None:
         return
@@ -44,7 +44,7 @@ def below_table(targets: Targets, cell: Cell) -> Iterator[Issue]:
 def lowest_points(targets: Targets, cell: Cell) -> Floats:
     """Return the height (p,) in ``$BASE`` of the lowest point of the cutter at each target.
 
-    Of an upright cutter that is its tip; of one that leans, its corner or its rim.
+    For an upright cutter that is its tip, for an inclined one its corner or its rim.
     """
     x, y, *_ = targets.rotation.T
     upright = 1.0 - 2.0 * (x * x + y * y)  # z component of the tool axis
@@ -53,12 +53,12 @@ def lowest_points(targets: Targets, cell: Cell) -> Floats:
     if leaning.max(initial=0.0) < 1e-9:
         return lowest
     for number in np.unique(targets.tool).tolist():
-        own = targets.tool == number
+        with_tool = targets.tool == number
         points = [
-            upright[own] * height - leaning[own] * radius - corner
+            upright[with_tool] * height - leaning[with_tool] * radius - corner
             for radius, height, corner in _outline(cell.tool[number])
         ]
-        lowest[own] += np.minimum.reduce([np.zeros(np.count_nonzero(own)), *points])
+        lowest[with_tool] += np.minimum.reduce([np.zeros(np.count_nonzero(with_tool)), *points])
     return lowest
 
 

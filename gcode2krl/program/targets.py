@@ -145,14 +145,14 @@ class _Plan:
         return np.array([position[0], position[1], max(position[2], self.clearance)])
 
     def _retract(self, move: int) -> None:
-        """From the path straight up to the clearance plane."""
+        """Add the retract from the path straight up to the clearance plane."""
         if self.place == "path":
             if self.here[2] < self.clearance:
                 self._add(self._above(self.here), move)
             self.place = "clearance"
 
     def _run(self, start: int, end: int) -> None:
-        """A run of plain rows, approached over the clearance plane where the robot is not on the path."""
+        """Add a run of plain rows, approached over the clearance plane if the robot is not on the path."""
         rows = slice(start, end)
         position = self.toolpath.position_mm[rows]
         self.axis = self.toolpath.axis[start]
@@ -167,7 +167,7 @@ class _Plan:
         self.here, self.axis, self.place = position[-1], self.toolpath.axis[end - 1], "path"
 
     def _special(self, row: int) -> None:
-        """A machine move, or a row of which not every axis is a programmed position."""
+        """Add a machine move, or a row in which not every axis has a programmed position."""
         toolpath = self.toolpath
         known = toolpath.known[row]
         self._retract(row if toolpath.machine[row] else -1)
@@ -180,7 +180,7 @@ class _Plan:
             self._add(np.array([*toolpath.position_mm[row, :2], self.clearance]), row)
 
     def _change_tool(self, index: int) -> None:
-        """Stand on the clearance plane, high enough for the longer of the two tools, and change."""
+        """Add a tool change on the clearance plane, high enough for the longer of the two tools."""
         if index in self.tool_events:
             return
         new = self._frame_tool(self.toolpath.events[index].values["tool"])
@@ -222,15 +222,15 @@ class _Plan:
         for row in np.flatnonzero(toolpath.dwell_s > 0).tolist():
             for target, dwell_s in self._dwells(row, stand, kept_index):
                 wait[target] += dwell_s
-        said = self._said_by_moves(move, kind, tolerance_mm)
-        exact = self._exact_stops(said, move, kind, tool, wait, events)
+        programmed = self._programmed_columns(move, kind, tolerance_mm)
+        exact = self._exact_stops(programmed, move, kind, tool, wait, events)
         return Targets(
             position_mm=position,
             rotation=rotation,
             ptp=kind != _LIN,
             home=kind == _HOME,
-            speed_mm_s=said.speed_mm_s,
-            cdis_mm=corner_cdis(position, said.tolerance_mm, self.cell.controller.cdis_mm, exact),
+            speed_mm_s=programmed.speed_mm_s,
+            cdis_mm=corner_cdis(position, programmed.tolerance_mm, self.cell.controller.cdis_mm, exact),
             wait_s=wait,
             move=move,
             source_line=self._source_lines(move, kind),
@@ -241,23 +241,23 @@ class _Plan:
         )
 
     def _source_lines(self, move: Ints32, kind: NDArray[np.int8]) -> Ints32:
-        """Return the G-code line of each target; what is added has that of the move it leads to."""
+        """Return the G-code line of each target; added targets have that of the move they lead to."""
         line: Ints32 = self.toolpath.source_line[np.maximum(move, 0)]
-        own, added = np.flatnonzero(move >= 0), np.flatnonzero(move < 0)
-        after = own[np.minimum(np.searchsorted(own, added), len(own) - 1)]
+        programmed, added = np.flatnonzero(move >= 0), np.flatnonzero(move < 0)
+        after = programmed[np.minimum(np.searchsorted(programmed, added), len(programmed) - 1)]
         line[added] = np.where(kind[added] == _HOME, 0, self.toolpath.source_line[move[after]])
         return line
 
-    def _said_by_moves(self, move: Ints32, kind: NDArray[np.int8], tolerance_mm: float | None) -> "_Said":
-        """Return what the G-code says of the targets; added ones are rapid, without a tolerance.
+    def _programmed_columns(self, move: Ints32, kind: NDArray[np.int8], tolerance_mm: float | None) -> "_Programmed":
+        """Return the columns that the G-code gives the targets; added ones are rapid, without a tolerance.
 
-        The tolerance's precedence: ``G64 P``, then the one asked for, then the cell's.
+        Order of precedence of the tolerance: ``G64 P``, then the option, then the cell's.
         """
         toolpath, controller = self.toolpath, self.cell.controller
-        own = controller.tolerance_mm
-        below = tolerance_mm if tolerance_mm is not None else (own if own is not None else np.nan)
+        of_cell = controller.tolerance_mm
+        below = tolerance_mm if tolerance_mm is not None else (of_cell if of_cell is not None else np.nan)
         count = len(move)
-        said = _Said(np.empty(count, bool), np.empty(count), np.empty(count), np.empty(count, bool))
+        columns = _Programmed(np.empty(count, bool), np.empty(count), np.empty(count), np.empty(count, bool))
 
         def part(start: int, end: int) -> None:
             rows, row = slice(start, end), np.maximum(move[start:end], 0)
@@ -265,13 +265,13 @@ class _Plan:
             rapid = added | toolpath.rapid[row] | toolpath.machine[row]
             speed = np.where(rapid, controller.rapid_m_s * MM_PER_M, toolpath.feed_mm_s[row])
             programmed = np.where(added, np.nan, toolpath.tolerance_mm[row])
-            said.rapid[rows] = rapid
-            said.speed_mm_s[rows] = np.where(kind[rows] == _LIN, speed, np.nan)
-            said.tolerance_mm[rows] = np.where(np.isnan(programmed), below, programmed)
-            said.exact_stop[rows] = ~added & toolpath.exact_stop[row]
+            columns.rapid[rows] = rapid
+            columns.speed_mm_s[rows] = np.where(kind[rows] == _LIN, speed, np.nan)
+            columns.tolerance_mm[rows] = np.where(np.isnan(programmed), below, programmed)
+            columns.exact_stop[rows] = ~added & toolpath.exact_stop[row]
 
         in_chunks(part, chunk_borders(count))
-        return said
+        return columns
 
     def _axes(self) -> Floats:
         if self.toolpath.axis.strides[0] == 0:
@@ -296,11 +296,11 @@ class _Plan:
         for index, event in enumerate(self.toolpath.events):
             if index in self.tool_events:
                 target = int(kept_index[self.tool_events[index]])
-            elif event.values.get("implied"):  # above the work, not while the mill is still in it
+            elif event.values.get("implied"):  # above the work, not while the mill is in the material
                 target = int(kept_index[self._next_tool_change(index)])
             else:
                 target = int(kept_index[stand.at(event.row)])
-            implied = event.values.get("implied")  # may come before M30 and texts, not before another switch
+            implied = event.values.get("implied")  # may move before M30 and messages only
             row = max(switched if implied else earliest, target)
             earliest = max(earliest, row)
             switched = row if event.kind != "message" else switched
@@ -338,17 +338,17 @@ class _Plan:
 
     def _exact_stops(
         self,
-        said: "_Said",
+        programmed: "_Programmed",
         move: Ints32,
         kind: NDArray[np.int8],
         tool: Ints32,
         wait: Floats,
         events: tuple[Event, ...],
     ) -> Bools:
-        """Mark the targets (p) that are reached at rest; among them both ends of the predicted motion."""
-        exact: Bools = (kind != _LIN) | (wait > 0) | said.exact_stop
-        exact[:-1] |= (said.rapid[:-1] != said.rapid[1:]) | (kind[1:] != _LIN)
-        exact[1:] |= tool[1:] != tool[:-1]  # the way there began with another tip
+        """Mark the targets (p) reached at rest, including both ends of the predicted motion."""
+        exact: Bools = (kind != _LIN) | (wait > 0) | programmed.exact_stop
+        exact[:-1] |= (programmed.rapid[:-1] != programmed.rapid[1:]) | (kind[1:] != _LIN)
+        exact[1:] |= tool[1:] != tool[:-1]  # that motion began with another tip
         exact[[event.row for event in events]] = True
         exact[np.flatnonzero(move >= 0)[[0, -1]]] = True
         exact[-1] = True
@@ -370,7 +370,7 @@ class _Plan:
         ]
 
     def _stopped_by_end(self) -> list[Issue]:
-        """Say what is still on at the program's end, where it is switched off."""
+        """Return a note on what is still on at the program's end and is switched off there."""
         last = max(self.tool_events, default=-1)
         ends = [event for event in self.toolpath.events[last + 1 :] if event.values.get("implied")]
         if not ends:
@@ -383,8 +383,8 @@ class _Plan:
         return [Issue("note", "stopped-by-end", line, sentence, f"program {codes} before the end")]
 
 
-class _Said(NamedTuple):
-    """What the G-code says of each target (p)."""
+class _Programmed(NamedTuple):
+    """Columns that the G-code gives the targets (p)."""
 
     rapid: Bools
     speed_mm_s: Floats
@@ -393,7 +393,7 @@ class _Said(NamedTuple):
 
 
 class _StandingAt:
-    """Finds the planned motion at whose end the tool stands after a row of the Toolpath."""
+    """Finds the planned motion at whose end the tool is after a row of the Toolpath."""
 
     def __init__(self, move: Ints32) -> None:
         self.moved = np.flatnonzero(move >= 0)
@@ -405,7 +405,7 @@ class _StandingAt:
 
 
 def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints32) -> Bools:
-    """Mark the rows that print as another point than the row before, are PTP or move another tool."""
+    """Mark the rows whose printed point differs from the row before, that are PTP or move another tool."""
     different: Bools = (kind != _LIN) | (np.arange(len(kind)) == 0)
 
     def part(start: int, end: int) -> None:
@@ -421,7 +421,7 @@ def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints
 
 
 def _as_slice(chosen: Bools) -> slice | Ints:
-    """Return the index of the chosen rows, a slice where they stand together, so that nothing is copied."""
+    """Return the index of the chosen rows, a slice where they are contiguous, so that nothing is copied."""
     rows = np.flatnonzero(chosen)
     together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
     return slice(int(rows[0]), int(rows[-1]) + 1) if together else rows

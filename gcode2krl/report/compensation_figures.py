@@ -1,4 +1,4 @@
-"""The path before and after offline compensation, with what it is off drawn larger by a stated factor."""
+"""The path before and after offline compensation, with deviations magnified by a stated factor."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,7 @@ from gcode2krl.report.drawing import BLACK, BLUE, GREEN, GREY, PALE, VERMILION, 
 
 _FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 _SHARE = 0.06
-"""The largest deviation is drawn at most this share of the path's extent."""
+"""The largest deviation is drawn at most this fraction of the path's extent."""
 
 
 def exaggeration(path_mm: Floats, largest_mm: float) -> float:
@@ -32,7 +32,7 @@ def compensation_figure(
     before, after : intended points (m, 3), offsets from them (m, 3) and whether the tool cuts there (m,), as
         in the columns of `compensation.intended_path.Deviation`; the two differ in their rows.
     commanded_mm : (m, 3) what is commanded with the correction, rows as in ``after``.
-    factor : how much larger offsets are drawn; by default what makes them visible, 1 to 1000.
+    factor : magnification of the offsets; by default one that makes them visible, 1 to 1000.
     """
     cut_mm = before[0][before[2]]
     sizes = [np.linalg.norm(offset, axis=1) for _, offset, _ in (before, after)]
@@ -78,6 +78,6 @@ def compensation_figure(
 def _line(
     axes: Axes, points_mm: Floats, cuts: Bools, columns: list[int], colour: str, width: float, label: str
 ) -> None:
-    """Draw what of a path is cut, with gaps in between."""
+    """Draw the cutting parts of a path, with gaps in between."""
     shown = np.where(cuts[:, None], points_mm[:, columns], np.nan)
     axes.plot(*thin_path(shown).T, color=colour, lw=width, label=label)

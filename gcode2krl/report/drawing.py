@@ -48,15 +48,15 @@ def look() -> Iterator[None]:
 def thin(time_s: Floats, values: Floats, most: int = MOST_POINTS) -> tuple[Floats, Floats]:
     """Return time and values with at most ``most`` points that look the same drawn.
 
-    Of each stretch the lowest, the highest and the first missing sample are kept, so that neither a peak
+    In each stretch the lowest, the highest and the first missing sample are kept, so that neither a peak
     nor a gap is lost.
 
     Parameters
     ----------
     time_s : (m,) array
-        Any abscissa that never falls.
+        Any non-decreasing abscissa.
     values : (m,) array
-        What is not finite is a gap and returned as NaN.
+        Values that are not finite are gaps and returned as NaN.
     most : int
         The largest number of points, at least 8.
     """
@@ -71,7 +71,7 @@ def thin_path(points_mm: Floats, most: int = MOST_POINTS) -> Floats:
 
 
 def thin_dots(points_mm: Floats, most: int = MOST_POINTS) -> Floats:
-    """Return (k, 2) of the points, at most ``most``, those that share a pixel being drawn once."""
+    """Return (k, 2) of the points, at most ``most``, one for each pixel."""
     if len(points_mm) <= most:
         return points_mm
     low = points_mm.min(axis=0)
@@ -105,7 +105,7 @@ def _kept(columns: list[Floats], rows: int, most: int) -> Ints:
 
 
 def intervals(time_s: Floats, mask: Bools, most: int = MOST_BARS) -> tuple[list[tuple[float, float]], float]:
-    """Return (start, width) of the stretches where ``mask`` holds, and the gap below which two became one.
+    """Return (start, width) of the stretches where ``mask`` holds, and the gap below which two were joined.
 
     A stretch reaches half a sample beyond its samples. Stretches are joined only where there are more than
     ``most``; the gap is 0 where none were.
@@ -118,8 +118,8 @@ def intervals(time_s: Floats, mask: Bools, most: int = MOST_BARS) -> tuple[list[
     gap = 0.0
     if len(start) > most:
         gap = float(time_s[-1] - time_s[0]) / most
-        apart = np.flatnonzero(start[1:] - end[:-1] > gap)
-        start, end = start[np.append(0, apart + 1)], end[np.append(apart, len(end) - 1)]
+        gaps = np.flatnonzero(start[1:] - end[:-1] > gap)
+        start, end = start[np.append(0, gaps + 1)], end[np.append(gaps, len(end) - 1)]
     return list(zip(start.tolist(), (end - start).tolist(), strict=True)), gap
 
 
@@ -127,7 +127,7 @@ def line_ticks(time_s: Floats, line: Ints32, most: int = 14) -> tuple[list[float
     """Return times at which a G-code line begins and their labels, in order and at most ``most`` + 1.
 
     Of the lines that begin too close together to label each, the one that lasts longest is labelled. Line 0,
-    what the program's own lines do not say, has no label.
+    motion without a G-code line, has no label.
     """
     begins = np.flatnonzero(np.diff(line, prepend=line[0] - 1))
     lasts = np.diff(time_s[begins], append=time_s[-1])
@@ -255,8 +255,8 @@ def _between_samples(path_mm: Floats, nearest: Ints, vertex: Floats) -> Floats:
     s = np.linspace(-1.0, 1.0, 201)[:, None, None]
     points = middle + s * (after - before) / 2.0 + s**2 * (after - 2.0 * middle + before) / 2.0
     pick = np.linalg.norm(points - vertex, axis=2).argmin(axis=0)
-    found: Floats = points[pick, np.arange(len(pick))]
-    return found
+    nearest_points: Floats = points[pick, np.arange(len(pick))]
+    return nearest_points
 
 
 def smooth(samples: Floats) -> Floats:

@@ -156,7 +156,7 @@ def joints_figure(
     limits_deg: Floats | None = None,
     speed_limits_deg_s: Floats | None = None,
 ) -> Figure:
-    """Draw the six joint angles over time, their speeds as a share of the limit, margin and conditioning.
+    """Draw the six joint angles over time, their speeds as a fraction of the limit, margin and conditioning.
 
     A limit is drawn where it lies in or near the range of the joint; otherwise its distance is noted above
     the panel. Stretches out of reach (NaN) are shaded. The speed row is left out without speed limits.
@@ -223,12 +223,12 @@ def joints_figure(
         margin.set_xlabel("Time (s)")
         sigma.set_xlabel("Time (s)")
         _time_limits(margin, motion)
-        found = {}
+        entries = {}
         for axes in figure.axes:
             axes.xaxis.set_major_locator(MaxNLocator(6))
             handles, labels = axes.get_legend_handles_labels()
-            found.update(dict(zip(labels, handles, strict=True)))
-        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=len(found))
+            entries.update(dict(zip(labels, handles, strict=True)))
+        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=len(entries))
         figure.suptitle("Joints along the path")
     return figure
 
@@ -261,7 +261,7 @@ def _title(what: str, toolpath: Toolpath) -> str:
 
 
 def _programmed_mm(targets: Targets, motion: Motion) -> Floats:
-    """Return (k, 3) the programmed vertices that the motion covers, with a NaN row where no line leads on."""
+    """Return (k, 3) the programmed vertices that the motion covers, with a NaN row where lines end."""
     planned = targets.move >= max(int(motion.move.min()), 0)
     points = targets.position_mm[planned]
     row = np.flatnonzero(planned)
@@ -416,7 +416,7 @@ def _angle_limits(axes: Axes, angle_deg: Floats, limit: Floats | None) -> None:
 
 
 def _speed_share(axes: Axes, time_s: Floats, share: Floats, joint: int) -> None:
-    """Draw a joint's speed in percent of its limit, on the scale that all six share."""
+    """Draw a joint's speed in percent of its limit, on a common scale for all six."""
     present = share[np.isfinite(share)]
     largest = float(present.max()) if len(present) else 0.0
     axes.plot(*thin(time_s, share[:, joint]), color=GREEN, lw=1.0, label="joint speed")

@@ -85,7 +85,7 @@ def deflection_figure(toolpath: Toolpath, motion: Motion, deflection: Deflection
 
 
 def share_figure(toolpath: Toolpath, motion: Motion, names: Sequence[str], share_mm: Floats) -> Figure:
-    """Draw which virtual joint costs how much.
+    """Draw how much of the deflection each virtual joint causes.
 
     Parameters
     ----------

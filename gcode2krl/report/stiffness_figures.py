@@ -1,4 +1,4 @@
-"""Stiffness maps as matplotlib figures: over the workspace, over the spin, and which joint costs how much.
+"""Stiffness maps as matplotlib figures: over the workspace, over the spin, and the deflection by joint.
 
 Needs no display; importing this module loads matplotlib, so it is imported only where a figure is asked for.
 """
@@ -18,7 +18,7 @@ def workspace_figure(x_mm: Floats, y_mm: Floats, deflection_mm: Floats, title: s
     Parameters
     ----------
     x_mm, y_mm : (i,), (j,) lines of the grid.
-    deflection_mm : (j, i), NaN = the tool cannot be there: left blank.
+    deflection_mm : (j, i), NaN = out of reach: left blank.
     title : load and height in words.
     """
     with look():
@@ -68,7 +68,7 @@ def spin_figure(
     deflection_mm : (n,), NaN = out of reach.
     beyond : (n,) True where a joint would be beyond its limit, or the pose out of reach.
     singular : (n,) True where the wrist is singular.
-    chosen_deg : the spin that the cell states, None where it searches one.
+    chosen_deg : the spin that the cell states, None where it is searched.
     """
     with look():
         figure = Figure(figsize=(9.0, 5.0), layout="constrained")
@@ -81,9 +81,15 @@ def spin_figure(
             bars = [(float(spin) - half, 2.0 * half) for spin in spin_deg[mask]]
             if bars:
                 axes.broken_barh(
-                    bars, (0.0, 1.0), transform=axes.get_xaxis_transform(), color=colour, alpha=0.3, lw=0.0,
-                    label=label, zorder=0,
-                )  # fmt: skip
+                    bars,
+                    (0.0, 1.0),
+                    transform=axes.get_xaxis_transform(),
+                    color=colour,
+                    alpha=0.3,
+                    lw=0.0,
+                    label=label,
+                    zorder=0,
+                )
         axes.plot(spin_deg, deflection_mm, color=BLUE, lw=1.3, label="deflection")
         usable = np.isfinite(deflection_mm) & ~beyond & ~singular
         if usable.any():
@@ -106,9 +112,9 @@ def spin_figure(
 
 
 def joint_cost_figure(names: Sequence[str], share_mm: Floats, title: str) -> Figure:
-    """Draw what each virtual joint costs at one pose.
+    """Draw the deflection that each virtual joint causes at one pose.
 
-    ``share_mm`` (j,) is each joint's part of the deflection along the whole of it; a negative one helps.
+    ``share_mm`` (j,) is each joint's part of the deflection along the whole of it; a negative one reduces it.
     """
     total = float(share_mm.sum())
     with look():

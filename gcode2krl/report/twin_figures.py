@@ -38,26 +38,40 @@ class Map(NamedTuple):
 def deviation_figure(maps: Mapping[str, Map]) -> Figure:
     """Draw up to four machined parts against nominal, in one colour scale; ``maps`` by title.
 
-    Floors are drawn as they lie, walls as dots beside them. The scale ends at the largest stated deviation;
-    what is beyond has the last colour.
+    Floors are drawn in place, walls as dots beside them. The scale ends at the largest stated deviation;
+    larger values have the last colour.
     """
-    stated = [one.stated_mm for one in maps.values() if one.stated_mm is not None]
+    stated = [surface.stated_mm for surface in maps.values() if surface.stated_mm is not None]
     most = next((step for step in _STEPS_MM if step >= max(stated, default=0.0)), _STEPS_MM[-1])
     with look():
         figure = Figure(figsize=(11.0, 8.0), layout="constrained")
         panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-        for axes, (title, one) in zip(panels, maps.items(), strict=False):
+        for axes, (title, surface) in zip(panels, maps.items(), strict=False):
             drawn = axes.pcolormesh(
-                one.x_mm, one.y_mm, one.floor_mm, cmap=_COLOURS, vmin=-most, vmax=most, rasterized=True
+                surface.x_mm,
+                surface.y_mm,
+                surface.floor_mm,
+                cmap=_COLOURS,
+                vmin=-most,
+                vmax=most,
+                rasterized=True,
             )
-            step = max(1, len(one.wall_mm) // _MOST_DOTS)
+            step = max(1, len(surface.wall_mm) // _MOST_DOTS)
             axes.scatter(
-                *one.wall_mm[::step, :2].T, c=one.wall_off_mm[::step], s=5.0, lw=0.0, cmap=_COLOURS,
-                vmin=-most, vmax=most, rasterized=True,
-            )  # fmt: skip
+                *surface.wall_mm[::step, :2].T,
+                c=surface.wall_off_mm[::step],
+                s=5.0,
+                lw=0.0,
+                cmap=_COLOURS,
+                vmin=-most,
+                vmax=most,
+                rasterized=True,
+            )
             axes.set_aspect("equal")
             axes.set_facecolor("#F2F2F2")
-            number = "nothing to judge" if one.stated_mm is None else f"at most {one.stated_mm:.2f} mm"
+            number = (
+                "nothing to judge" if surface.stated_mm is None else f"at most {surface.stated_mm:.2f} mm"
+            )
             axes.set_title(f"{title}: {number}", loc="left")
         for axes in panels[len(maps) :]:
             axes.set_axis_off()
@@ -83,20 +97,20 @@ class Signals(NamedTuple):
     estimate_N: Floats
     """(n, 3) the pilot's."""
     used_N: Floats
-    """(n, 3) that is compensated."""
+    """(n, 3) force that is compensated."""
     weight: Floats
-    """(n,) share of the estimate."""
+    """(n,) weight of the estimate."""
     wanted_mm: Floats
     """(n,) length of the correction that the true force would need."""
     moved_mm: Floats
-    """(n,) length of what the robot has made of it."""
+    """(n,) length of the robot's resulting motion."""
     threshold_N: float
 
 
 def signal_figure(signals: Signals, around_s: float, half_s: float = 0.45) -> Figure:
-    """Draw forces, weight of the pilot and correction about an instant, the cutter's exit say."""
-    here = np.abs(signals.time_s - around_s) <= half_s
-    time = signals.time_s[here]
+    """Draw forces, weight of the pilot and correction about an instant, such as the cutter's exit."""
+    shown = np.abs(signals.time_s - around_s) <= half_s
+    time = signals.time_s[shown]
     with look():
         figure = Figure(figsize=(11.0, 7.0), layout="constrained")
         force, weight, moved = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 0.7, 1.2))
@@ -107,16 +121,16 @@ def signal_figure(signals: Signals, around_s: float, half_s: float = 0.45) -> Fi
             (signals.used_N, VERMILION, 1.6, "used"),
         )
         for values, colour, width, label in lines:
-            force.plot(time, _length(values[here]), color=colour, lw=width, label=label)
-        apart = _length(signals.estimate_N[here] - signals.measured_N[here])
-        force.plot(time, apart, color=GREY, lw=0.8, ls="--", label="pilot less measured")
+            force.plot(time, _length(values[shown]), color=colour, lw=width, label=label)
+        difference = _length(signals.estimate_N[shown] - signals.measured_N[shown])
+        force.plot(time, difference, color=GREY, lw=0.8, ls="--", label="pilot minus measured")
         force.axhline(signals.threshold_N, color=PALE, lw=0.8)
         force.set_ylabel("Force (N)")
-        weight.fill_between(time, signals.weight[here], color=SKY, lw=0.0)
+        weight.fill_between(time, signals.weight[shown], color=SKY, lw=0.0)
         weight.set_ylim(0.0, 1.05)
         weight.set_ylabel("Weight of\nthe pilot")
-        moved.plot(time, signals.wanted_mm[here], color=BLACK, lw=1.2, label="needed")
-        moved.plot(time, signals.moved_mm[here], color=GREEN, lw=1.4, label="moved")
+        moved.plot(time, signals.wanted_mm[shown], color=BLACK, lw=1.2, label="needed")
+        moved.plot(time, signals.moved_mm[shown], color=GREEN, lw=1.4, label="moved")
         moved.set_ylabel("Correction (mm)")
         moved.set_xlabel("Time (s)")
         for axes in (force, weight, moved):

@@ -1,7 +1,7 @@
 """Which of the eight branches a program runs in, and its joints along a path in that branch.
 
 The controller keeps its configuration on LIN, so the branch is chosen once, for the whole program: a trial on
-a thinned path picks it, the full path gets only that one.
+a thinned path picks it, and the full path is solved in that branch only.
 """
 
 import itertools
@@ -77,7 +77,7 @@ def thinned(starts: Ints, count: int) -> Ints:
 def best_branch(path: Path, samples: Ints, cell: Cell) -> Branch:
     """Return the branch and turns that keep a thinned path (samples of the full one) within the limits.
 
-    Among branches that do, the one whose weakest point (limits, wrist) is not poor and whose start lies
+    Among those it takes the branch whose weakest point (limits, wrist) is not poor and whose start is
     nearest to HOME.
     """
     position, rotation = flange_frames(path.position_mm, path.rotation, path.tool, cell)
@@ -101,7 +101,7 @@ def _chains(
     reference: Floats,
     cell: Cell,
 ) -> Floats:
-    """Solve each chain (from PTP to PTP) with one branch; rows before the first start go on from another."""
+    """Solve each chain (from PTP to PTP) with one branch; rows before the first start continue a chain."""
     borders = [*np.flatnonzero(starts), len(position)]
     if borders[0] > 0:
         borders.insert(0, 0)
@@ -133,7 +133,7 @@ def _turns(q: Floats, cell: Cell) -> Floats:
 
 
 def _cost(q: Floats, cell: Cell) -> tuple[float, float]:
-    """Return (share of samples that cannot be, distance of the start from HOME plus poverty of the wrist)."""
+    """Return (fraction of impossible samples, distance of the start from HOME plus penalty of the wrist)."""
     if len(q) == 0:
         return 0.0, 0.0
     bad = ~(limit_margin(q, cell) >= 0)  # NaN, out of reach, too

@@ -1,7 +1,7 @@
-"""What stands in the robot's way between the targets: reach, limits, singularities, speeds, PTP ways.
+"""Findings along the path: reach, limits, singularities, joint speeds, PTP paths.
 
 The whole program is judged row by row (`standing`); the few stretches that are named in a finding are then
-sampled again, so that a message can tell the place and the angle.
+sampled again, so that a message can state the place and the angle.
 """
 
 from collections.abc import Iterator
@@ -33,9 +33,9 @@ from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 WEAK_SIGMA = 0.03
 """Smallest singular value below which an excessive joint speed is called a singularity of the arm."""
 _NEIGHBOURS = 2
-"""Rows before and behind the beginning of a stretch that are sampled with it."""
+"""Rows before and after the beginning of a stretch that are sampled with it."""
 _GAP = 1000
-"""Rows between two spans that are quicker sampled than left out."""
+"""Rows between two spans that are faster to sample than to leave out."""
 _TURN_OR_MOVE = 'turn the tool about its axis ([frames] spin = "auto" or an angle), or move the part'
 _PTP_SAMPLES = 50
 _PTP_TOLERANCE_MM = 0.01
@@ -44,10 +44,10 @@ _PTP_TOLERANCE_MM = 0.01
 def joint_findings(
     targets: Targets, q: Floats, wrong: Bits, samples: Ints, branch: Branch, cell: Cell
 ) -> tuple[Issue, ...]:
-    """Return what stands in the robot's way, by line.
+    """Return the findings along the path, by line.
 
     ``q`` (p, 6) are the joints at the targets, ``wrong`` (p,) the bits of `what_is_wrong` on the way there,
-    found in so many ``samples`` (p,).
+    found in ``samples`` (p,) samples each.
     """
     findings = [*_cell_findings(cell)]
     if wrong.any():
@@ -70,13 +70,13 @@ def _sampled(
         line = sample_lines(targets, cell, start, end)
         starts = np.isnan(line.duration_s)
         path = Path(line.position_mm, line.rotation, line.tool, starts)
-        found = branch.joints(path, cell, _last_reached(q, start))
+        q_span = branch.joints(path, cell, _last_reached(q, start))
         line.duration_s[:1] = np.nan  # the sample before is another span's
-        bits = what_is_wrong(found, line.duration_s, cell)
-        if not starts[:1].any():  # no stretch begins just because a span does
+        bits = what_is_wrong(q_span, line.duration_s, cell)
+        if not starts[:1].any():  # the start of a span is not the start of a stretch
             bits[:1] |= bits[1:2] & FAST
         lines.append(line)
-        joints.append(found)
+        joints.append(q_span)
         wrong.append(bits)
     names = ("position_mm", "rotation", "tool", "target", "duration_s", "is_target")
     columns = {name: np.concatenate([getattr(line, name) for line in lines]) for name in names}
@@ -89,8 +89,8 @@ def _last_reached(q: Floats, row: int) -> Floats | None:
         first = max(end - ROWS, 0)
         reached = np.flatnonzero(~np.isnan(q[first:end, 0]))
         if len(reached):
-            found: Floats = q[first + reached[-1]]
-            return found
+            q_last: Floats = q[first + reached[-1]]
+            return q_last
     return None
 
 
@@ -109,13 +109,13 @@ def _spans(wrong: Bits, samples: Ints) -> list[tuple[int, int]]:
             for neighbour in range(2 * _NEIGHBOURS + 1):
                 chosen[begins + neighbour] = True
     starts, ends = _runs(chosen[_NEIGHBOURS : _NEIGHBOURS + len(wrong)])
-    apart = starts[1:] - ends[:-1] > _GAP
-    first, last = np.append(True, apart), np.append(apart, True)
+    is_gap = starts[1:] - ends[:-1] > _GAP
+    first, last = np.append(True, is_gap), np.append(is_gap, True)
     return [(int(start), int(end)) for start, end in zip(starts[first], ends[last], strict=True)]
 
 
 def _runs(has: Bools) -> tuple[Ints, Ints]:
-    """Return the first row of each run of True and the one behind its last."""
+    """Return the first row of each run of True and the row after its last."""
     change = np.diff(np.concatenate([[False], has, [False]]).astype(np.int8))
     return np.flatnonzero(change == 1), np.flatnonzero(change == -1)
 
@@ -129,7 +129,7 @@ def _source_line(line: Line, sample: int, targets: Targets) -> int:
 
 
 def _cell_findings(cell: Cell) -> Iterator[Issue]:
-    """What is wrong before anything moves."""
+    """Yield the findings that do not depend on the path."""
     if cell.robot.limits.q_deg is None:
         yield Issue(
             "error",
@@ -194,7 +194,7 @@ def _limit_findings(line: Line, q: Floats, bits: Bits, targets: Targets, cell: C
 
 
 def _speed_findings(line: Line, q: Floats, bits: Bits, targets: Targets, cell: Cell) -> Iterator[Issue]:
-    """Joint speeds on straight lines at the programmed speed: singularities, and plain slow joints."""
+    """Yield joint speeds above the limit on straight lines: singularities, or merely slow joints."""
     if cell.robot.speeds.qd_deg_s is None:
         return
     most = np.array(cell.robot.speeds.qd_deg_s) * RAD_PER_DEG
@@ -233,7 +233,7 @@ def _wrist_findings(line: Line, q: Floats, bits: Bits, targets: Targets) -> Iter
 
 
 def _ptp_findings(targets: Targets, q: Floats, cell: Cell) -> list[Issue]:
-    """PTP between HOME and the clearance plane, sampled in joint space: no dip below the plane."""
+    """Return PTP motions that dip below the clearance plane, sampled in joint space."""
     clearance = cell.clearance_z_mm
     if clearance is None:
         return []

@@ -2,9 +2,9 @@
 
 The index of a branch is KUKA's status S: bit 0 overhead, bit 1 elbow (A3 >= phi), bit 2 wrist (A5 < 0).
 The wrist centre splits the problem (Pieper 1968): A1 from the direction to it, A2 and A3 from a planar
-triangle by the law of cosines, A4 to A6 from the rotation that is left. All angles come from atan2 of a
-direction (y, x), and A6 from what A4 leaves over, so a pose next to a singularity is met as exactly as any
-other.
+triangle by the law of cosines, A4 to A6 from the remaining rotation. All angles come from atan2 of a
+direction (y, x), and A6 from the rotation that remains after A4, so a pose next to a singularity is solved as
+exactly as any other.
 """
 
 import math
@@ -34,7 +34,7 @@ _BLOCK = 4096
 def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: npt.ArrayLike) -> Floats:
     """Return every set of angles that puts the flange into the given poses.
 
-    Joint limits are not looked at. Where axes 4 and 6 are one, A4 is 0 and both wrist branches are equal;
+    Joint limits are ignored. Where axes 4 and 6 are one, A4 is 0 and both wrist branches are equal;
     where the wrist centre lies on axis 1, A1 is 0.
 
     Parameters
@@ -75,7 +75,7 @@ def one_branch(
     Each angle is the turn nearest to that of the row before, in the first row to the reference, so A4 and A6
     wind beyond 180 degrees where the path does. Where axes 4 and 6 are one, A4 stays as it was and A6 takes
     the rest; where the wrist centre lies on axis 1, A1 stays. A row out of reach is NaN and the next row
-    follows the last one that was reached. Joint limits are not looked at.
+    follows the last one that was reached. Joint limits are ignored.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def one_branch(
     Raises
     ------
     ValueError
-        If an array has the wrong shape, the branch is none, or the reference is not finite.
+        If an array has the wrong shape, the branch is not 0 to 7, or the reference is not finite.
     """
     if branch not in range(8):
         raise ValueError(f"branch is {branch}, not 0 to 7")
@@ -112,15 +112,15 @@ def one_branch(
     room = np.empty((2, 6 * _BLOCK))
     for first in range(0, len(position), _BLOCK):
         rows = slice(first, first + _BLOCK)
-        turned, found = axes[rows] if len(axes) > 1 else axes, q_rad[rows]
-        y, x = (column[: 6 * len(found)].reshape(6, len(found)) for column in room)
+        turned, q_part = axes[rows] if len(axes) > 1 else axes, q_rad[rows]
+        y, x = (column[: 6 * len(q_part)].reshape(6, len(q_part)) for column in room)
         if _direction_rows(position[rows], turned, shape, int(branch), y, x):
-            _wind_rows(np.arctan2(y, x, out=y), reference, found)  # numpy's is the faster arc tangent
+            _wind_rows(np.arctan2(y, x, out=y), reference, q_part)  # numpy's is the faster arc tangent
         else:
-            _path_rows(position[rows], turned, shape, int(branch), reference, found)
-        reached = np.flatnonzero(found[:, 0] == found[:, 0])
+            _path_rows(position[rows], turned, shape, int(branch), reference, q_part)
+        reached = np.flatnonzero(q_part[:, 0] == q_part[:, 0])
         if len(reached):
-            reference = read_only("q_reference_rad", found[reached[-1]], 6)
+            reference = read_only("q_reference_rad", q_part[reached[-1]], 6)
     return q_rad
 
 
@@ -142,7 +142,7 @@ def _direction_rows(
     y: Floats,
     x: Floats,
 ) -> bool:
-    """Write the angles (6, n) as directions y, x; False where one depends on the row before, or is none."""
+    """Write the angles (6, n) as directions y, x; False where one depends on the row before or has none."""
     regular = True
     step = 1 if rotation.shape[0] > 1 else 0
     for i in range(position_mm.shape[0]):
@@ -174,16 +174,24 @@ def _path_rows(
     q_reference_rad: Floats,
     q_rad: Floats,
 ) -> None:
-    """Write the angles row by row, each with what the one before leaves open."""
+    """Write the angles row by row; free angles are those of the row before."""
     before = np.empty(6)
     for j in range(6):
         before[j] = q_reference_rad[j]
     step = 1 if rotation.shape[0] > 1 else 0
     for i in range(position_mm.shape[0]):
         y, x, free_1, free_4 = _directions(
-            position_mm, i, rotation, i * step, geometry, branch,
-            math.cos(before[0]), math.sin(before[0]), math.cos(before[3]), math.sin(before[3]),
-        )  # fmt: skip
+            position_mm,
+            i,
+            rotation,
+            i * step,
+            geometry,
+            branch,
+            math.cos(before[0]),
+            math.sin(before[0]),
+            math.cos(before[3]),
+            math.sin(before[3]),
+        )
         reached = not math.isnan(y[5])  # NaN as soon as any part of the pose is
         for j in range(6):
             stays = (j == 0 and free_1) or (j == 3 and free_4)
@@ -222,7 +230,7 @@ def _directions(
     wrist_x = position_mm[k, 0] - c4 * rotation[i, 0, 2]  # wrist centre: back along the flange's z
     wrist_y = position_mm[k, 1] - c4 * rotation[i, 1, 2]
     radius = math.sqrt(wrist_x * wrist_x + wrist_y * wrist_y)
-    if branch & 1:  # overhead: axis 1 turns its back on the wrist centre
+    if branch & 1:  # overhead: axis 1 faces away from the wrist centre
         wrist_x, wrist_y, radius = -wrist_x, -wrist_y, -radius
     free_1 = not abs(radius) > AXIS_1_TOLERANCE_MM
     cos_1 = cos_1 if free_1 else wrist_x / abs(radius)

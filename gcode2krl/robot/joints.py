@@ -1,7 +1,8 @@
-"""Joints along a program and along its motion: one branch, the right turns, part by part on all cores.
+"""Joints along a program and along its motion: one branch, the right turns, in parts on all cores.
 
-A part starts from what the trial of the branch found there. Neighbouring parts share a row; where both agree
-on its joints, turns included, they are one path, and where not, the later one is solved again from it.
+A part starts from the joints that the trial of the branch found there. Neighbouring parts share a row; where
+both agree on its joints, turns included, they are one path, and where not, the later one is solved again from
+it.
 """
 
 import itertools
@@ -49,7 +50,7 @@ def joints_at(q_rad: Floats, tool: Ints32, cell: Cell, conditioning: bool = True
 
 
 def ptp_joints(targets: Targets, cell: Cell) -> Joints:
-    """Return what `follow` does, at the PTP targets only; the other rows are NaN, S and T there 0."""
+    """Return the joints of `follow` at the PTP targets only; other rows are NaN, their S and T 0."""
     counts = count_samples(targets, cell)
     branch = _branch_of(targets, counts, cell)
     q = np.full((len(targets), 6), np.nan)
@@ -67,7 +68,7 @@ def follow_motion(motion: Motion, cell: Cell) -> Joints:
 def angles_near(motion: Motion, q_rad: Floats, cell: Cell) -> Floats:
     """Return the angles (m, 6) in rad along a Motion whose first row is near the joints (6,).
 
-    Branch and turns are those of these joints; nothing is said of limits.
+    Branch and turns are those of these joints; limits are not checked.
     """
     starts = np.zeros(len(motion), dtype=np.bool_)
     path = Path(motion.position_mm, motion.rotation, motion.tool, starts)
@@ -89,11 +90,11 @@ def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
 
     def solve(start: int, end: int, before: Floats | None) -> Floats:
         first = max(start - 1, 0)
-        found = branch.joints(
+        angles = branch.joints(
             path(slice(first, end)), cell, branch.guess(first) if before is None else before
         )
-        q[start:end] = found[start - first :]
-        row_before: Floats = found[0]
+        q[start:end] = angles[start - first :]
+        row_before: Floats = angles[0]
         return row_before
 
     _solve_parts(solve, q, chunk_borders(count), cell)
@@ -101,7 +102,7 @@ def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
 
 
 def joints_from_angles(motion: Motion, q_rad: Floats, qd_rad_s: Floats, cell: Cell) -> Joints:
-    """Return the table of angles and speeds that `motion_angles` found."""
+    """Return the table of angles and speeds from `motion_angles`."""
     return _joints(q_rad, qd_rad_s, motion.tool, cell)
 
 
@@ -141,7 +142,7 @@ def _path(line: Line) -> Path:
 
 
 def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> tuple[Floats, Bits]:
-    """Return the joints (p, 6) at the targets, and what is wrong on the way to each (p,)."""
+    """Return the joints (p, 6) at the targets, and the bits of `what_is_wrong` up to each (p,)."""
     q = np.full((len(targets), 6), np.nan)
     wrong = np.zeros(len(targets), dtype=np.uint16)
 
@@ -164,7 +165,7 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
 
 
 def _with_row_before(targets: Targets, counts: Ints, start: int, end: int, cell: Cell) -> tuple[Line, int]:
-    """Return the line to targets ``start`` to ``end`` - 1 and how many samples of the row before lead it."""
+    """Return the line to targets ``start`` to ``end`` - 1, and how many samples belong to the row before."""
     first = max(start - 1, 0)
     line = sample_lines(targets, cell, first, end)
     before = int(np.searchsorted(line.target, start))
@@ -174,7 +175,7 @@ def _with_row_before(targets: Targets, counts: Ints, start: int, end: int, cell:
 def _solve_parts(
     solve: Callable[[int, int, Floats | None], Floats], q: Floats, borders: list[int], cell: Cell
 ) -> None:
-    """Solve the parts, and again where a part and the one before it disagree on the row they share.
+    """Solve the parts; solve a part again where it and the part before disagree on their common row.
 
     ``solve(start, end, before)`` writes the joints of its rows into ``q`` and returns those (6,) it has for
     the row before them.
@@ -202,9 +203,9 @@ def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool 
         margin[rows] = limit_margin(q[rows], cell)
         status[rows], turn[rows] = status_turn(q[rows], geometry, _ANGLE_GRID_RAD)
         for number in np.unique(tool[rows]) if conditioning else ():
-            own = start + np.flatnonzero(tool[rows] == number)
+            with_tool = start + np.flatnonzero(tool[rows] == number)
             tip = cell.tool_matrix(int(number))[:3, 3]
-            sigma[own] = smallest_singular_value(q[own], geometry, tip)
+            sigma[with_tool] = smallest_singular_value(q[with_tool], geometry, tip)
 
     in_chunks(part, chunk_borders(count, ROWS))
     return Joints(q_rad=q, qd_rad_s=qd, limit_margin_rad=margin, sigma_min=sigma, status=status, turn=turn)

@@ -20,7 +20,7 @@ from gcode2krl.compiled.inputs import read_only
 
 
 def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[Floats, Floats]:
-    """Return where the flange is, eq. 1.
+    """Return the pose of the flange, eq. 1.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[Floats, 
 def status_turn(
     q_rad: npt.ArrayLike, geometry: npt.ArrayLike, grid_rad: float = 0.0
 ) -> tuple[Ints32, Ints32]:
-    """Return status S and turn T, the two integers with which KRL makes a pose name one set of angles.
+    """Return status S and turn T, the two integers by which KRL selects one set of angles for a pose.
 
     Status: bit 0, the wrist centre is behind axis 1 (overhead); bit 1, A3 >= phi, where phi = -atan2(a2, c3)
-    is the stretched elbow; bit 2, A5 < 0. A3 and A5 count by the half circle they lie in, which is the plain
-    comparison anywhere within the limits of a real arm. Turn: bit i is set where A(i+1) < 0.
+    is the stretched elbow; bit 2, A5 < 0. For A3 and A5 the half circle they lie in decides, which equals the
+    plain comparison anywhere within the limits of a real arm. Turn: bit i is set where A(i+1) < 0.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def status_turn(
     geometry : (6,)
         a1, a2, c1, c2, c3, c4 in mm.
     grid_rad : float
-        The angles are rounded to its multiples first, so that a zero of the cell is one in spite of
-        rounding; 0 = not.
+        The angles are rounded to its multiples first, so that a zero of the cell is zero in
+        spite of rounding; 0 = no rounding.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def _status_rows(q: Floats, geometry: Floats, grid_rad: float, status: Ints32, t
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _wrapped(angle_rad: float) -> float:
-    """Return the same direction in (-pi, pi]; what already lies there is not touched by rounding."""
+    """Return the same direction in (-pi, pi]; an angle already there is returned unchanged."""
     turns = np.ceil((angle_rad - math.pi) / (2.0 * math.pi))
     return angle_rad - 2.0 * math.pi * turns  # type: ignore[no-any-return]
 

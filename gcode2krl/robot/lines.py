@@ -54,14 +54,14 @@ class _Motions:
     length_mm: Floats
     angle_rad: Floats
     steps: Ints
-    """(p,) samples of each: none of HOME, one of a PTP."""
+    """(p,) samples of each: none for HOME, one for a PTP."""
 
 
 def _motions(targets: Targets, cell: Cell, rows: Rows) -> _Motions:
     start, start_rotation = motion_starts(targets, cell, rows)
     end, end_rotation = targets.position_mm[rows], targets.rotation[rows]
     ptp, home = targets.ptp[rows], targets.home[rows]
-    if ptp.any():  # what lies before a PTP does not count
+    if ptp.any():  # the start of a PTP does not matter
         start, start_rotation = np.array(start), np.array(start_rotation)
         start[ptp], start_rotation[ptp] = end[ptp], end_rotation[ptp]
     x, y, z = (end - start).T
@@ -110,7 +110,7 @@ def samples_at(targets: Targets, cell: Cell, counts: Ints, samples: Ints) -> Lin
 
 
 def _line(targets: Targets, motions: _Motions, rows: Rows, target: Ints, which: Rows, part: Floats) -> Line:
-    """Return the samples at ``part`` (m,) of the way of the motions ``which``."""
+    """Return the samples at the fractions ``part`` (m,) of the motions ``which``."""
     position, rotation = motions.end_mm[which], motions.end_rotation[which]
     on_the_way = np.flatnonzero(part < 1.0)
     if len(on_the_way):

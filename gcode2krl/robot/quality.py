@@ -1,4 +1,4 @@
-"""How comfortable a pose is: distance from joint limits and from the wrist and elbow singularities."""
+"""Quality of a pose: distance from joint limits and from the wrist and elbow singularities."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ COMFORTABLE_RAD = 30.0 * RAD_PER_DEG
 
 
 def pose_quality(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
-    """Return (n, 8) per branch: 1 = 30° from everything, 0 = at a limit or singular, -1 = impossible.
+    """Return (n, 8) per branch: 1 = 30° from limits and singularities, 0 = at one, -1 = impossible.
 
     Each joint counts with its best whole turn; the elbow by A3's distance from the stretched arm.
     """

@@ -1,4 +1,4 @@
-"""How the arm stands, row by row: its distance to the limits, and what must not be."""
+"""The poses of the arm, row by row: distance to the limits, and what is not allowed."""
 
 import math
 
@@ -36,18 +36,18 @@ def limit_margin(q_rad: Floats, cell: Cell) -> Floats:
 
 
 def what_is_wrong(q_rad: Floats, duration_s: Floats, cell: Cell) -> Bits:
-    """Return the bits (n,) of what must not be: beyond a limit, out of reach, too fast.
+    """Return the bits (n,) of what is not allowed: beyond a limit, out of reach, too fast.
 
     ``duration_s`` (n,) is the time since the row before, NaN where there is none. A joint is too fast where
-    its mean speed since then is above its limit; of a robot whose speeds are not known, the rows within
-    `WRIST_ZONE_RAD` of the wrist singularity are marked instead.
+    its mean speed since then is above its limit; if the speed limits are not known, the rows
+    within `WRIST_ZONE_RAD` of the wrist singularity are marked instead.
     """
     _, wrong = _judged(q_rad, duration_s, cell)
     return wrong
 
 
 def speed_share_of_rows(qd_rad_s: Floats, row: Ints32, count: int, cell: Cell) -> Floats | None:
-    """Return the largest share (count,) of its limit that a joint speed has in each row, 0 where none is.
+    """Return the largest ratio (count,) of a joint speed to its limit in each row, 0 without samples.
 
     ``row`` (m,) is the row that each of the speeds (m, 6) belongs to. None where the limits are not known.
     """
@@ -79,7 +79,7 @@ def _judge_rows(
     margin: Floats,
     wrong: Bits,
 ) -> None:
-    """Without durations only the margin is written; without ``most_rad_s`` the wrist is looked at."""
+    """Without durations only the margin is written; without ``most_rad_s`` the wrist is checked."""
     for i in range(q.shape[0]):
         nearest, bits = math.inf, 0
         if math.isnan(q[i, 0]):  # a pose out of reach has no angle at all
@@ -107,6 +107,6 @@ def _judge_rows(
 def _share_rows(qd: Floats, most_rad_s: Floats, row: Ints32, share: Floats) -> None:
     for i in range(qd.shape[0]):
         for j in range(6):
-            found = abs(qd[i, j]) / most_rad_s[j]
-            if found > share[row[i]]:  # NaN is not
-                share[row[i]] = found
+            ratio = abs(qd[i, j]) / most_rad_s[j]
+            if ratio > share[row[i]]:  # NaN is not
+                share[row[i]] = ratio

@@ -14,7 +14,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.compiled.inputs import read_only
 
 _TOGETHER = 64
-"""Rows that are worked on side by side."""
+"""Rows that are computed together."""
 
 
 def jacobian(q_rad: npt.ArrayLike, geometry: npt.ArrayLike, tool_position_mm: npt.ArrayLike) -> Floats:
@@ -53,7 +53,7 @@ def smallest_singular_value(
 
     The velocity rows are divided by the length of the stretched arm, c2 + hypot(c3, a2), 2151 mm on the
     KR 300 R2500 ultra. A joint turning with 1 rad/s then moves the tip by at most about 1, as it turns the
-    flange by 1, so that neither kind of row drowns the other; and arms of one shape and different size have
+    flange by 1, so that neither kind of row dominates; and arms of one shape and different size have
     the same value. Its inverse is the largest norm of the joint speeds for a unit motion of the tool.
 
     Parameters
@@ -68,7 +68,7 @@ def smallest_singular_value(
     Returns
     -------
     sigma_min : (n,)
-        0 at a singularity, found as the root of an eigenvalue: right to 1e-7, not better. NaN where q is.
+        0 at a singularity, computed as the root of an eigenvalue, so accurate to 1e-7 only. NaN where q is.
 
     Raises
     ------
@@ -90,17 +90,17 @@ def _jacobian_rows(q: Floats, geometry: Floats, tool_position_mm: Floats, column
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _sigma_rows(q: Floats, geometry: Floats, tool_position_mm: Floats, sigma_min: Floats) -> None:
-    """Many rows go through each step together, side by side, so that the processor takes several at once."""
+    """Write the singular values; rows go through each step together, so that it is vectorised."""
     scale = 1.0 / (geometry[3] + math.hypot(geometry[4], geometry[1]))
     count = q.shape[0]
-    one, columns, gram = np.empty((6, 6)), np.empty((6, 6, _TOGETHER)), np.empty((6, 6, _TOGETHER))
+    matrix, columns, gram = np.empty((6, 6)), np.empty((6, 6, _TOGETHER)), np.empty((6, 6, _TOGETHER))
     square, root = np.empty((6, _TOGETHER)), np.empty(_TOGETHER)
     for first in range(0, count, _TOGETHER):
         for m in range(_TOGETHER):
-            _fill(q, min(first + m, count - 1), geometry, tool_position_mm, scale, one)
+            _fill(q, min(first + m, count - 1), geometry, tool_position_mm, scale, matrix)
             for row in range(6):
                 for j in range(6):
-                    columns[row, j, m] = one[row, j]
+                    columns[row, j, m] = matrix[row, j]
         for row in range(6):
             for other in range(row + 1):
                 for m in range(_TOGETHER):
@@ -170,9 +170,9 @@ def _fill(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _tridiagonal(a: Floats, square: Floats) -> None:
-    """Bring symmetric (6, 6, m), of which the lower half is looked at, to Householder's tridiagonal form.
+    """Bring symmetric (6, 6, m), of which the lower half is read, to Householder's tridiagonal form.
 
-    The diagonal is left in ``a``; ``square`` (6, m) gets the squares of the numbers beside it, from row 1 on
+    The diagonal is left in ``a``; ``square`` (6, m) gets the squares of the off-diagonal, from row 1 on
     (Golub and Van Loan, 8.3).
     """
     step, two_over = np.empty((6, _TOGETHER)), np.empty(_TOGETHER)

@@ -1,4 +1,4 @@
-"""Does a run belong to a prediction? Units, axes, frame, clock, override and program, each in a sentence."""
+"""Checks whether a run belongs to a prediction: units, axes, frame, clock, override and program."""
 
 import hashlib
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from gcode2krl.units import DEG_PER_RAD
 
 _REACH_S = 10.0
 _CLOCK_S = 0.5
-"""A larger offset of the clock is worth a word; smaller ones are fitted by whoever compares."""
+"""A larger offset of the clock is reported; smaller ones are fitted in the diagnosis."""
 _FOLLOWS = 0.95
 _LIKE = 0.15
 _OVERRIDE_SLACK = 0.05
@@ -28,14 +28,14 @@ _NEAR, _PARTLY, _ALONG = 0.9, 0.5, 0.7
 
 
 class _Kind(NamedTuple):
-    """What differs between positions and joint angles."""
+    """Constants that differ between positions and joint angles."""
 
     unit: str
     factors: dict[float, str]
     floor: float
     near: float
     apart: float
-    """A mean difference that is another frame."""
+    """A larger mean difference means another frame."""
 
 
 _LENGTH = _Kind("mm", matching.LENGTH_FACTORS, 0.2, 5.0, 20.0)
@@ -64,7 +64,7 @@ class _Signal(NamedTuple):
 
 
 def check_against(run: Run, time_s: Floats, position_mm: Floats, q_rad: Floats | None = None) -> list[Issue]:
-    """Return what speaks against a run being a run of this prediction; empty where nothing does.
+    """Return findings that contradict a run being one of this prediction; empty if there are none.
 
     Parameters
     ----------
@@ -73,18 +73,18 @@ def check_against(run: Run, time_s: Floats, position_mm: Floats, q_rad: Floats |
     q_rad : (m, 6) joint angles, where they are known.
 
     Codes: ``run-unit``, ``run-axes``, ``run-frame``, ``run-program``, ``run-override``, ``run-t1`` are
-    errors; ``run-clock``, and ``run-frame`` for a mere shift, are warnings: a diagnosis can fit those. Gaps
-    of a few millimetres and clocks within half a second are nobody's business here.
+    errors; ``run-clock``, and ``run-frame`` for a mere shift, are warnings: a diagnosis can fit those.
+    Differences of a few millimetres and clocks within half a second are not reported.
     """
-    found: dict[str, list[Issue]] = {}
+    by_file: dict[str, list[Issue]] = {}
     for signal in _signals(run, position_mm, q_rad):
-        if not found.get(signal.file):  # what a table's first signal shows, its others would repeat
-            found[signal.file] = list(_check(signal, time_s, run.head))
-    return [issue for issues in found.values() for issue in issues]
+        if not by_file.get(signal.file):  # other signals of a table would repeat the findings of the first
+            by_file[signal.file] = list(_check(signal, time_s, run.head))
+    return [issue for issues in by_file.values() for issue in issues]
 
 
 def check_program(run: Run, program_sha256: str) -> list[Issue]:
-    """Return an error where the program that ``run.toml`` names is not the one of that SHA-256."""
+    """Return an error if the program that ``run.toml`` names does not have that SHA-256."""
     program = run.path("program")
     if program is None or not program.is_file():
         return []
@@ -114,7 +114,7 @@ def _columns(name: str) -> tuple[str, ...]:
 
 
 def _check(signal: _Signal, time_s: Floats, head: RunHead) -> Iterator[Issue]:
-    """Yield the findings of one signal: aligned in time if that is possible, else as a mere path."""
+    """Yield the findings of one signal: aligned in time if possible, else as a path only."""
     if float(np.ptp(signal.predicted, axis=0).max()) < signal.kind.near:
         return
     if head.override_percent == 100.0 and head.mode != "T1":
@@ -127,7 +127,7 @@ def _check(signal: _Signal, time_s: Floats, head: RunHead) -> Iterator[Issue]:
 
 
 def _aligned(signal: _Signal, time_s: Floats, shift: matching.Shift) -> list[Issue] | None:
-    """Return the findings where the motion agrees in time, None where it does not after all."""
+    """Return the findings if the motion agrees in time, None if it does not."""
     own_s = signal.table.time_s
     inside = (time_s + shift.seconds >= own_s[0]) & (time_s + shift.seconds <= own_s[-1])
     predicted = signal.predicted[inside]
@@ -137,7 +137,7 @@ def _aligned(signal: _Signal, time_s: Floats, shift: matching.Shift) -> list[Iss
     if odd and matching.agree(predicted, matching.corrected(measured, odd), _LIKE):
         return [_odd_issue(signal, each, predicted, measured) for each in odd] + clock
     if matching.agree(predicted, measured, _LIKE):
-        return list(_apart(signal, measured.mean(axis=0) - predicted.mean(axis=0))) + clock
+        return list(_offset_issues(signal, measured.mean(axis=0) - predicted.mean(axis=0))) + clock
     if signal.kind is _LENGTH:
         rotation, shift_mm = matching.rotation_between(predicted, measured)
         if matching.agree(predicted @ rotation.T, measured, _LIKE):
@@ -168,7 +168,7 @@ def _clock(signal: _Signal, seconds: float) -> Iterator[Issue]:
         yield signal.issue("warning", "run-clock", words, remedy)
 
 
-def _apart(signal: _Signal, apart: Floats) -> Iterator[Issue]:
+def _offset_issues(signal: _Signal, apart: Floats) -> Iterator[Issue]:
     if np.abs(apart).max() > signal.kind.apart:
         values = ", ".join(f"{value:.2f}" for value in apart)
         words = f"{', '.join(signal.columns)} lie ({values}) {signal.kind.unit} off the prediction"
@@ -202,7 +202,7 @@ def _as_path(signal: _Signal, time_s: Floats, head: RunHead) -> Iterator[Issue]:
             f"does not follow the predicted path: {shares[0]:.0%} of its points lie within {near:.3g} "
             f"{signal.kind.unit} of it, {shares[1]:.0%} of the predicted ones near it"
         )
-        remedy = "another program, or another frame: name the prediction of what ran"
+        remedy = "another program, or another frame: name the prediction of the program that ran"
         yield signal.issue("error", "run-program", words, remedy)
         return
     if signal.kind is _ANGLE and head.mode == "T1":
@@ -213,7 +213,7 @@ def _as_path(signal: _Signal, time_s: Floats, head: RunHead) -> Iterator[Issue]:
 
 
 def _speed(signal: _Signal, measured: Floats, predicted: Floats, head: RunHead) -> Iterator[Issue]:
-    """Yield what the speeds at the same places say: capped as in T1, or of another override."""
+    """Yield findings from the speeds at the same places: capped as in T1, or another override."""
     if signal.kind is _LENGTH and _is_capped(measured, predicted):
         if head.mode != "T1":
             top = float(predicted.max())
@@ -224,8 +224,8 @@ def _speed(signal: _Signal, measured: Floats, predicted: Floats, head: RunHead) 
     declared = head.override_percent
     slack = _OVERRIDE_SLACK if declared == 100.0 else _DECLARED_SLACK
     if abs(percent / declared - 1.0) > slack:
-        said = f", {declared:g} % are declared" if declared != 100.0 else ""
-        words = f"runs at {percent:.0f} % of the predicted speed{said}"
+        stated = f", {declared:g} % are declared" if declared != 100.0 else ""
+        words = f"runs at {percent:.0f} % of the predicted speed{stated}"
         remedy = f"run it at 100 %, or write override_percent = {percent:.0f} into run.toml"
         yield signal.issue("error", "run-override", words, remedy)
 

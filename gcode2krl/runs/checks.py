@@ -1,4 +1,4 @@
-"""What one run must fulfil by itself: time that rises in seconds, units, columns that belong together."""
+"""Checks of a run by itself: rising time in seconds, units, columns that belong together."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -19,7 +19,7 @@ _LONGEST_CYCLE_S = 0.5
 _SHORTEST_CYCLE_S = 1e-6
 _EPOCH_S = 1e8
 _SCALED = (300.0, 3000.0)
-"""Two recordings of one run whose lengths differ by such a factor are in s and ms."""
+"""Two recordings of one run whose durations differ by a factor in this range are in s and ms."""
 _WORKSPACE_MM = 50_000.0
 _FURTHEST_DEG = 1000.0
 _LENGTH_FLOOR_MM, _ANGLE_FLOOR_DEG = 0.2, 0.02
@@ -29,7 +29,7 @@ _FOLLOWS, _LIKE = 0.95, 0.15
 _REACH_S = 10.0
 _LEAST_MOTION_MM = 0.5
 _COARSE = {"mm": 0.05, "deg": 0.005}
-"""Steps of the last decimal above these are worth a word even where no noise is stated."""
+"""Larger steps of the last decimal are reported even where no noise is stated."""
 _POSITIONS = ("position_cmd_mm", "position_act_mm", "position_mm")
 _ANGLES = ("q_cmd_rad", "q_act_rad", "q_load_rad")
 
@@ -77,11 +77,12 @@ def check_columns(controller: Controller | None, tracker: Tracker | None, head: 
 
 
 def quantised(table: Measured, head: RunHead) -> Iterator[Issue]:
-    """Yield a warning for each signal whose last decimal is coarser than its noise, or than was declared."""
+    """Yield a warning for each signal whose last decimal is coarser than its noise, measured or declared."""
     stated = {
-        "position_mm": head.noise.tcp_mm, "q_act_rad": head.noise.q_act_deg,
+        "position_mm": head.noise.tcp_mm,
+        "q_act_rad": head.noise.q_act_deg,
         "q_load_rad": head.noise.q_load_deg,
-    }  # fmt: skip
+    }
     declared = 0.0 if head.channels.decimals is None else 1.01 * 10.0**-head.channels.decimals
     for signal in SIGNALS[type(table)]:
         values = getattr(table, signal.name)
@@ -126,7 +127,7 @@ def _check_reach(
 
 
 def _check_radians(table: Controller) -> None:
-    """Raise where six absolute angles are within 2 pi and A2, A3 stay off 0: in degrees, a stretched arm."""
+    """Raise if all absolute angles stay within 2 pi and A2, A3 off 0: as degrees, a stretched arm."""
     for name in ("q_cmd_rad", "q_act_rad"):
         values = getattr(table, name)
         if values is None or not np.isfinite(values).all():
@@ -168,13 +169,15 @@ def _compare_joints(table: Controller, name: str, reference: str) -> None:
     if not known.any():
         return
     columns, references = (
-        tuple(c for c, there in zip(_names(each), known.tolist(), strict=True) if there)
-        for each in (name, reference)
+        tuple(c for c, there in zip(_names(signal), known.tolist(), strict=True) if there)
+        for signal in (name, reference)
     )
     odd = matching.odd_columns(
-        wanted[:, known] * DEG_PER_RAD, measured[:, known] * DEG_PER_RAD, _ANGLE_FLOOR_DEG,
+        wanted[:, known] * DEG_PER_RAD,
+        measured[:, known] * DEG_PER_RAD,
+        _ANGLE_FLOOR_DEG,
         matching.ANGLE_FACTORS,
-    )  # fmt: skip
+    )
     _refuse_odd(_Sides(table, columns, table, references, "deg"), odd)
 
 
@@ -191,7 +194,8 @@ class _Sides(NamedTuple):
 def _refuse_odd(sides: _Sides, odd: list[matching.Odd]) -> None:
     """Raise for the first column that is in another unit, swapped or reversed.
 
-    Of two columns in different units the smaller is blamed: metres, inches and radians are the usual slips.
+    If two columns have different units the smaller is reported: metres, inches and radians are the usual
+    slips.
     """
     if not odd:
         return
@@ -212,7 +216,7 @@ def _refuse_odd(sides: _Sides, odd: list[matching.Odd]) -> None:
 
 
 def _names(signal: str) -> tuple[str, ...]:
-    return next(each.columns for each in SIGNALS[Controller] if each.name == signal)
+    return next(entry.columns for entry in SIGNALS[Controller] if entry.name == signal)
 
 
 def _error(code: str, words: str, remedy: str, table: Measured, index: int) -> NotUnderstoodError:

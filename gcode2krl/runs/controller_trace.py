@@ -1,6 +1,6 @@
 """The controller's trace of the commanded position, read, checked and cut at standstills.
 
-Columns as in ``controller.csv``: ``t_s``, ``x_cmd_mm``, ``y_cmd_mm``, ``z_cmd_mm``; others are left alone.
+Columns as in ``controller.csv``: ``t_s``, ``x_cmd_mm``, ``y_cmd_mm``, ``z_cmd_mm``; others are ignored.
 """
 
 import math
@@ -17,7 +17,7 @@ from gcode2krl.runs.tables import missing_column, read_sheet
 POSITION = ("x_cmd_mm", "y_cmd_mm", "z_cmd_mm")
 _LONGEST_CYCLE_S = 1.0
 _METRES_SHOW_BELOW = 0.02
-"""A trace that spans less than this share of the program on an axis is taken to be in another unit."""
+"""A trace that spans a smaller fraction of the program on an axis is assumed to be in another unit."""
 _MOST_DECIMALS = 7
 _QUIET_SHARE = 0.25
 _STILL_SIGMA = 8.0
@@ -48,8 +48,8 @@ def read_controller_trace(path: str | Path) -> ControllerTrace:
     Raises
     ------
     NotUnderstoodError
-        Names file, row and column: unreadable file, missing column, what is not a number, time that does not
-        rise or is not in seconds, fewer than 10 rows.
+        Names file, row and column: unreadable file, missing column, a value that is not a number, time that
+        does not rise or is not in seconds, fewer than 10 rows.
     """
     sheet = read_sheet(path, (TIME, *POSITION))
     missing = [name for name in (TIME, *POSITION) if name not in sheet.columns]
@@ -73,10 +73,10 @@ def read_controller_trace(path: str | Path) -> ControllerTrace:
 def check_scale(trace: ControllerTrace, program_mm: Floats) -> None:
     """Raise `NotUnderstoodError` where a column spans about a thousandth of the program's (p, 3) positions.
 
-    That is how a column in metres that is named ``_mm`` shows.
+    Such a column is in metres although it is named ``_mm``.
     """
-    wanted, found = np.ptp(program_mm, axis=0), np.ptp(trace.position_mm, axis=0)
-    for name, programmed_mm, traced_mm in zip(POSITION, wanted.tolist(), found.tolist(), strict=True):
+    wanted, traced = np.ptp(program_mm, axis=0), np.ptp(trace.position_mm, axis=0)
+    for name, programmed_mm, traced_mm in zip(POSITION, wanted.tolist(), traced.tolist(), strict=True):
         if programmed_mm > 1.0 and 1e-4 * programmed_mm < traced_mm < _METRES_SHOW_BELOW * programmed_mm:
             raise input_error(
                 "trace-unit",
@@ -110,7 +110,7 @@ def standstills(trace: ControllerTrace, least_s: float, still_mm: float) -> Ints
     """Return (s, 2) first and last sample of each standstill of at least ``least_s``.
 
     Within a standstill no axis moves by more than ``still_mm``. The first and the last sample of the trace
-    count as standstills of their own where the trace begins or ends in motion.
+    count as standstills, too, if the trace begins or ends in motion.
     """
     count = len(trace)
     width = min(count, math.ceil(least_s / float(np.median(np.diff(trace.time_s))) - 1e-6) + 1)
@@ -135,13 +135,13 @@ def program_rests(trace: ControllerTrace, wanted_mm: Floats, line: Ints, least_s
     Parameters
     ----------
     wanted_mm : (s + 1, 3) where the program stands still, in order.
-    line : (s + 1,) its G-code lines, for the words of an error.
+    line : (s + 1,) its G-code lines, for the text of an error.
     least_s : what counts as a standstill.
 
     Raises
     ------
     NotUnderstoodError
-        Where the trace does not stand still at these places, all of them and no other between.
+        Where the trace does not stand still at exactly these places.
     """
     still_mm = _STILL_SIGMA * noise_mm(trace) + 2.0 * resolution_mm(trace.position_mm) + 1e-4
     rests = standstills(trace, least_s, still_mm)
@@ -156,9 +156,11 @@ def program_rests(trace: ControllerTrace, wanted_mm: Floats, line: Ints, least_s
         if np.abs(gap - shift).max() <= tolerance_mm and len(wanted_mm) > 2:
             x, y, z = shift.tolist()
             raise _no_match(
-                trace, 0, f"the trace is shifted against the program by ({x:.3f}, {y:.3f}, {z:.3f}) mm",
+                trace,
+                0,
+                f"the trace is shifted against the program by ({x:.3f}, {y:.3f}, {z:.3f}) mm",
                 "record with the $BASE and $TOOL of the program",
-            )  # fmt: skip
+            )
     counts = f"the trace has {len(places) - 1} sections between standstills, the program {len(wanted_mm) - 1}"
     at, gap_start = 0, 0
     for j in range(len(places)):
@@ -170,13 +172,14 @@ def program_rests(trace: ControllerTrace, wanted_mm: Floats, line: Ints, least_s
     if gap_start + at >= len(places):
         where = f"; it ends before G-code line {line[min(at, len(line) - 1)]}"
         raise _no_match(trace, int(trace.row[-1]), counts + where, "record the whole program")
-    found, needed = (", ".join(f"{x:.3f}" for x in p) for p in (places[gap_start + at], wanted_mm[at]))
+    traced, needed = (", ".join(f"{x:.3f}" for x in p) for p in (places[gap_start + at], wanted_mm[at]))
     raise _no_match(
-        trace, int(trace.row[rests[gap_start + at, 0]]),
-        f"{counts}; they part at standstill {at + 1} (G-code line {line[at]}): "
-        f"({found}) instead of ({needed})",
+        trace,
+        int(trace.row[rests[gap_start + at, 0]]),
+        f"{counts}; they differ at standstill {at + 1} (G-code line {line[at]}): "
+        f"({traced}) instead of ({needed})",
         "record this program, without stops of your own; name it with --part",
-    )  # fmt: skip
+    )
 
 
 def _no_match(trace: ControllerTrace, row: int, message: str, remedy: str) -> NotUnderstoodError:
@@ -184,7 +187,7 @@ def _no_match(trace: ControllerTrace, row: int, message: str, remedy: str) -> No
 
 
 def _joined(runs: list[tuple[int, int]], position_mm: Floats, still_mm: float) -> list[tuple[int, int]]:
-    """Join neighbours between which nothing moves: noise had parted one standstill."""
+    """Join neighbours between which nothing moves: noise had split one standstill."""
     joined = [runs[0]]
     for first, last in runs[1:]:
         before = joined[-1]

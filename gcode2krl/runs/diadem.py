@@ -79,7 +79,7 @@ def is_data_set(file: Path) -> bool:
 def read_data_set(path: str | Path) -> DataSet:
     """Read a header and its values; the time channel becomes ``time_s``.
 
-    Raises `NotUnderstoodError` naming file, line and channel: no such header, keys that are missing or no
+    Raises `NotUnderstoodError` naming file, line and channel: no such header, keys that are missing or not
     numbers, values that are missing or not float64 in little-endian order.
     """
     file = Path(path)
@@ -90,15 +90,15 @@ def read_data_set(path: str | Path) -> DataSet:
         _refuse(file, "no channel with values (key 210 EXPLIZIT)")
     raw: dict[str, Floats] = {}
     issues: list[Issue] = []
-    found = [_values(file, block, blocks, raw) for block in blocks]
-    rows = min(len(values) for values in found)
+    columns = [_values(file, block, blocks, raw) for block in blocks]
+    rows = min(len(values) for values in columns)
     announced = max(_whole(file, block, 220) for block in blocks)
     if rows < announced:
         text = f"{file.name}: {announced} values announced, {rows} there: the recording is cut off"
         issues.append(Issue("warning", "krc-trace", 0, text))
     channels = [
         Channel(block.name, block.keys.get(202, "").strip("[] "), values[:rows])
-        for block, values in zip(blocks, found, strict=True)
+        for block, values in zip(blocks, columns, strict=True)
     ]
     time_s, used = _time(file, clocks, channels, rows)
     rest = tuple(channel for channel in channels if channel is not used)
@@ -135,8 +135,8 @@ def _values(file: Path, block: _Block, blocks: list[_Block], raw: dict[str, Floa
     """Return an explicit channel's values: raw · factor + offset."""
     kind, method = block.keys.get(214, "REAL64").upper(), block.keys.get(213, "BLOCK").upper()
     if kind != "REAL64" or method not in ("BLOCK", "CHANNEL"):
-        found = f"found {method} of {kind}, allowed: BLOCK or CHANNEL of REAL64"
-        _refuse(file, f"channel {block.name}, keys 213 and 214: {found}", block.lines.get(214, 0))
+        problem = f"found {method} of {kind}, allowed: BLOCK or CHANNEL of REAL64"
+        _refuse(file, f"channel {block.name}, keys 213 and 214: {problem}", block.lines.get(214, 0))
     if block.file not in raw:
         raw[block.file] = _read_raw(file, block)
     data = raw[block.file]
@@ -146,8 +146,8 @@ def _values(file: Path, block: _Block, blocks: list[_Block], raw: dict[str, Floa
     else:
         width = _width(data, count, [other for other in blocks if other.file == block.file])
         if first >= width:
-            found = f"column {first + 1}, but {block.file} has {width}"
-            _refuse(file, f"channel {block.name}, key 221: {found}", block.lines.get(221, 0))
+            problem = f"column {first + 1}, but {block.file} has {width}"
+            _refuse(file, f"channel {block.name}, key 221: {problem}", block.lines.get(221, 0))
         values = data[: len(data) // width * width].reshape(-1, width)[:count, first]
     return values * _number(file, block, 241, 1.0) + _number(file, block, 240, 0.0)
 
@@ -183,8 +183,8 @@ def _time(
     if clocks:
         step = _number(file, clocks[0], 241, 0.0) * _seconds(clocks[0].keys.get(202, ""))
         if step <= 0.0:
-            found = f"a step of {step:g} s"
-            _refuse(file, f"channel {clocks[0].name}, key 241: {found}", clocks[0].lines.get(241, 0))
+            problem = f"a step of {step:g} s"
+            _refuse(file, f"channel {clocks[0].name}, key 241: {problem}", clocks[0].lines.get(241, 0))
         start = _number(file, clocks[0], 240, 0.0) * _seconds(clocks[0].keys.get(202, ""))
         return start + step * np.arange(rows, dtype=np.float64), None
     for channel in channels:
@@ -206,16 +206,16 @@ def _number(file: Path, block: _Block, key: int, default: float) -> float:
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        found = f"{text[:40]!r} is not a number"
-        _refuse(file, f"channel {block.name}, key {key}: {found}", block.lines[key])
+        problem = f"{text[:40]!r} is not a number"
+        _refuse(file, f"channel {block.name}, key {key}: {problem}", block.lines[key])
     return value
 
 
 def _whole(file: Path, block: _Block, key: int, default: int = 0) -> int:
     value = _number(file, block, key, float(default))
     if value != int(value) or not 1 <= value <= _MOST_VALUES:
-        found = f"{block.keys.get(key, 'nothing')}, allowed: a whole number from 1"
-        _refuse(file, f"channel {block.name}, key {key}: found {found}", block.lines.get(key, 0))
+        problem = f"{block.keys.get(key, 'nothing')}, allowed: a whole number from 1"
+        _refuse(file, f"channel {block.name}, key {key}: found {problem}", block.lines.get(key, 0))
     return int(value)
 
 

@@ -2,9 +2,9 @@
 
 axis_n(t) = sum of c_k · motor_k(t + lag) + zero, with k = n for A1 to A4 and k = 4 … n for A5 and A6, whose
 motors turn with the wrist axes before them (``$COUP_COMP``). c and zero come from least squares over the
-whole recording, the lag is one for all axes: the interpolator is ahead of the drives, by 40-100 ms on a KRC.
-Commanded and actual angle of a drive get the same c and zero, so that their difference, the servo's, is not
-fitted away.
+whole recording; all axes have one lag: the interpolator is ahead of the drives, by 40-100 ms on a KRC.
+Commanded and actual angle of a drive get the same c and zero, so that the fit does not remove their
+difference, the servo error.
 """
 
 from collections.abc import Sequence
@@ -42,16 +42,16 @@ class _Fit(NamedTuple):
 def axis_angles(
     drive: Angles, actual_deg: Floats, wanted: Angles | None, gear_ratio: Sequence[float] | None
 ) -> tuple[Floats, Floats, list[str]]:
-    """Return commanded and actual axis angles (n, 6) in degrees, and what was done, axis by axis.
+    """Return commanded and actual axis angles (n, 6) in degrees, and a text for each axis on what was done.
 
     Parameters
     ----------
     drive : commanded angles of the drives.
     actual_deg : (n, 6) actual angles of the drives, at the same times.
     wanted : the interpolator's commanded axis angles, where they were recorded.
-    gear_ratio : (6,) used where nothing else tells; sign and zero are then unknown.
+    gear_ratio : (6,) used where there is no other source; sign and zero are then unknown.
 
-    Columns that nobody can turn into axis angles become NaN.
+    Columns that cannot be turned into axis angles become NaN.
     """
     command, actual, words = drive.deg.copy(), actual_deg.copy(), []
     without_command = np.isnan(drive.deg).all(axis=0)
@@ -76,7 +76,7 @@ def _axis(
     lag_s: float,
     gear_ratio: Sequence[float] | None,
 ) -> tuple[_Fit, str]:
-    """Return what turns the motors' angles into that of one axis, NaN where nobody knows."""
+    """Return the map from motor angles to the angle of one axis, NaN where it is unknown."""
     as_is, unknown = _Fit(np.eye(6)[axis], 0.0, 0.0), _Fit(np.full(6, np.nan), 0.0, 0.0)
     if wanted is not None and _moves(wanted.deg[:, axis]) and _moves(drive.deg[:, axis]):
         alone = _fit(axis, [axis], drive, wanted, lag_s)
@@ -111,7 +111,7 @@ def _common_lag(drive: Angles, wanted: Angles) -> float:
 
 
 def _fit(axis: int, motors: list[int], drive: Angles, wanted: Angles, lag_s: float) -> _Fit:
-    """Return the least squares fit of one axis to some motors; motors at rest count for nothing."""
+    """Return the least squares fit of one axis to some motors; motors at rest are ignored."""
     motors = [n for n in motors if _moves(drive.deg[:, n])]
     every = max(1, len(wanted.time_s) // _MOST_SAMPLES)
     time_s, y = wanted.time_s[::every] + lag_s, wanted.deg[::every, axis]

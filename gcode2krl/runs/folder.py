@@ -57,7 +57,7 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
     place = Path(folder)
     if not place.is_dir():
         raise input_error(
-            "file-unreadable", "is no folder", "a run is a folder with run.toml", source=str(place)
+            "file-unreadable", "is not a folder", "a run is a folder with run.toml", source=str(place)
         )
     head, issues = read_head(place / "run.toml")
     files = {what: _file_of(what, place, head) for what in ("controller", "tracker", "force", "scan")}
@@ -67,16 +67,18 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
             return read_krc_trace(file, _gear_ratio(place, head))
         return read_rsi_log(file) if is_rsi_log(file) else _sheet(Controller)(file)
 
-    traced = files["controller"] is not None and is_data_set(files["controller"])  # joints as the drives gave
+    traced = files["controller"] is not None and is_data_set(files["controller"])  # angles of the drives
     controller = _table(Controller, files["controller"], controller_sheet, head, partial or traced)
     tracker = _table(Tracker, files["tracker"], _sheet(Tracker), head, partial)
     force = _table(Force, files["force"], _sheet(Force), head, partial)
     scan = read_scan(files["scan"]) if files["scan"] else None
     check_together(controller, tracker, force)
     check_columns(controller, tracker, head)
-    found = [issue for table in (controller, tracker, force, scan) if table for issue in table.issues]
-    found += [issue for table in (controller, tracker, force) if table for issue in quantised(table, head)]
-    issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]), *found)
+    table_issues = [issue for table in (controller, tracker, force, scan) if table for issue in table.issues]
+    table_issues += [
+        issue for table in (controller, tracker, force) if table for issue in quantised(table, head)
+    ]
+    issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]), *table_issues)
     return Run(place.resolve().name, place, head, controller, tracker, force, scan, issues)
 
 
@@ -104,18 +106,18 @@ def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
             raise input_error("file-unreadable", words, source=str(place / "run.toml"))
         return place / named
     usual = [place / f"{what}{ending}" for ending in _ENDINGS.get(what, (".csv", ".parquet"))]
-    found = [file for file in usual if file.is_file()]
-    if not found and what == "controller":
-        found = _controller_logs(place)
-    if len(found) > 1:
-        names = ", ".join(file.name for file in found)
-        remedy = f"keep one, or name it: [files] {what} = {found[0].name!r}"
+    files = [file for file in usual if file.is_file()]
+    if not files and what == "controller":
+        files = _controller_logs(place)
+    if len(files) > 1:
+        names = ", ".join(file.name for file in files)
+        remedy = f"keep one, or name it: [files] {what} = {files[0].name!r}"
         raise input_error("run-files", f"{what}: several files: {names}", remedy, source=str(place))
-    return found[0] if found else None
+    return files[0] if files else None
 
 
 def _exists(path: Path, is_file: bool = True) -> bool:
-    """Tell whether a path leads to a file (or anything); a name that no system takes leads nowhere."""
+    """Tell whether a path leads to a file (or anything); an invalid name leads nowhere."""
     try:
         return path.is_file() if is_file else path.exists()
     except (OSError, ValueError):
@@ -132,7 +134,7 @@ def _controller_logs(place: Path) -> list[Path]:
 
 
 def _not_read(place: Path, controller: Path | None) -> list[Issue]:
-    """Return a note for each log of the controller that stands beside the table that was read."""
+    """Return a note for each controller log beside the table that was read."""
     return [
         Issue("note", "run-files", 0, f"{file.name}: not read, {controller.name} is")
         for file in _controller_logs(place)

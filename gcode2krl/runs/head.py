@@ -1,4 +1,4 @@
-"""``run.toml``: what a person says about a measured run."""
+"""``run.toml``: what a person states about a measured run."""
 
 import difflib
 from datetime import UTC, datetime
@@ -31,7 +31,7 @@ class RunFrames(_Table):
 
 
 class Noise(_Table):
-    """1-sigma of the instruments, None where nobody stated it."""
+    """1-sigma of the instruments, None where it is not stated."""
 
     tcp_mm: Positive | None = None
     force_N: Positive | None = None
@@ -40,10 +40,10 @@ class Noise(_Table):
 
 
 class Channels(_Table):
-    """Where the controller's channels come from; None where nobody stated it.
+    """Where the controller's channels come from; None where it is not stated.
 
     An interpolator position may be 40-100 ms ahead of the drives; under RSI correction the commanded values
-    stay those of the program.
+    do not include the correction.
     """
 
     position_cmd: Origin | None = None
@@ -53,7 +53,7 @@ class Channels(_Table):
     rsi: bool | None = None
     """RSI correction on or off."""
     correction: Literal["absolute", "relative"] = "absolute"
-    """Whether a logged correction is the whole one or that of its cycle alone."""
+    """Whether a logged correction is the total or the increment of its cycle."""
     decimals: Annotated[int, Field(ge=0, le=12)] | None = None
 
 
@@ -124,21 +124,21 @@ def _read(file: Path) -> dict[str, Any]:
 
 def _wrong_key(detail: Any) -> Issue:
     key = ".".join(str(step) for step in detail["loc"])
-    found = repr(detail["input"])
-    found = found if len(found) <= 60 else found[:57] + "…"
+    value = repr(detail["input"])
+    value = value if len(value) <= 60 else value[:57] + "…"
     allowed = detail["msg"].removeprefix("Input should be ")
-    return Issue("error", "run-key", 0, f"{key}: found {found}, allowed: {allowed}", _DOCS)
+    return Issue("error", "run-key", 0, f"{key}: found {value}, allowed: {allowed}", _DOCS)
 
 
 def _unknown_keys(data: dict[str, Any], kind: type[BaseModel], file: str, above: str = "") -> list[Issue]:
-    found: list[Issue] = []
+    issues: list[Issue] = []
     for key, value in data.items():
         field = kind.model_fields.get(key)
         if field is None:
             near = difflib.get_close_matches(key, kind.model_fields, n=1)
             remedy = f"did you mean {above}{near[0]}?" if near else "free text belongs into [notes]"
             message = f"{file}: {above}{key}: there is no such key, it is left out"
-            found.append(Issue("warning", "run-key", 0, message, remedy))
+            issues.append(Issue("warning", "run-key", 0, message, remedy))
         elif isinstance(value, dict) and isinstance(field.default, BaseModel):
-            found += _unknown_keys(value, type(field.default), file, f"{above}{key}.")
-    return found
+            issues += _unknown_keys(value, type(field.default), file, f"{above}{key}.")
+    return issues

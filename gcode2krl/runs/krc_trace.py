@@ -1,10 +1,10 @@
 """A KRC trace → the columns of ``controller.csv``.
 
 One recording is several data sets, ``<name>_<module>.dat``: the interpolator's (``KRCIpo``: ``X_CmdIpo``,
-``AxisPos_CmdIpo1``, ``AxisPos_Act1``, …) and one a drive (``NextGenDrive#1``: Sollposition, Istposition,
-Iststrom, …, the axis standing in the file's name). Modules of other rates are put on the clock of the slowest
-by linear interpolation between their own, closer samples. Angles of the drives, which see the servo, replace
-those of the interpolator.
+``AxisPos_CmdIpo1``, ``AxisPos_Act1``, …) and one for each drive (``NextGenDrive#1``: Sollposition,
+Istposition, Iststrom, …, the axis is in the file's name). Modules of other rates are put on the clock of the
+slowest by linear interpolation between their own, closer samples. Angles of the drives, which include the
+servo error, replace those of the interpolator.
 """
 
 import re
@@ -55,14 +55,15 @@ def read_krc_trace(path: str | Path, gear_ratio: Sequence[float] | None = None) 
     file = Path(path)
     issues: list[Issue] = []
     unknown: list[str] = []
-    modules = [_module(read_data_set(each), issues, unknown) for each in modules_of(file)]
+    modules = [_module(read_data_set(module_file), issues, unknown) for module_file in modules_of(file)]
     modules = [module for module in modules if module.columns and len(module.time_s) > 1]
     if not modules:
         raise input_error(
-            "krc-trace", f"no channel is known; the trace has {', '.join(unknown[:12])}",
+            "krc-trace",
+            f"no channel is known; the trace has {', '.join(unknown[:12])}",
             "record AxisPos_CmdIpo, AxisPos_Act, X_CmdIpo …, or Sollposition and Istposition of the drives",
             source=str(file),
-        )  # fmt: skip
+        )
     others, drives = (_merged([m for m in modules if m.drive is drive]) for drive in (False, True))
     if drives is not None:
         words = _turn_to_axes(drives, others, gear_ratio)
@@ -73,7 +74,7 @@ def read_krc_trace(path: str | Path, gear_ratio: Sequence[float] | None = None) 
 
 
 def _merged(modules: list[_Module]) -> _Module | None:
-    """Return modules on the clock of the slowest; of two equal columns the later module's stays."""
+    """Return modules on the clock of the slowest; the later module wins if two have the same column."""
     if not modules:
         return None
     slowest = max(modules, key=lambda module: float(np.median(np.diff(module.time_s))))
@@ -85,7 +86,7 @@ def _merged(modules: list[_Module]) -> _Module | None:
 
 
 def _turn_to_axes(drives: _Module, others: _Module | None, gear_ratio: Sequence[float] | None) -> list[str]:
-    """Turn the drives' angles into those of the axes, in place; returns words about it."""
+    """Turn the drives' angles into those of the axes, in place; returns a text for each axis."""
     command = Angles(drives.time_s, _six(drives, _COMMAND))
     wanted = Angles(others.time_s, _six(others, _COMMAND)) if others else None
     *turned, words = axis_angles(command, _six(drives, _ACTUAL), wanted, gear_ratio)
@@ -107,11 +108,15 @@ def modules_of(file: Path) -> list[Path]:
     """Return the data sets of one recording, in order of their names."""
     stem = recording_of(file)
     beside = sorted(file.parent.glob("*.dat"))
-    return [each for each in beside if recording_of(each) == stem and is_data_set(each)] or [file]
+    return [
+        module_file
+        for module_file in beside
+        if recording_of(module_file) == stem and is_data_set(module_file)
+    ] or [file]
 
 
 def recording_of(file: Path) -> str:
-    """Return the name of the recording that a file belongs to: what stands before the last underscore."""
+    """Return the name of the recording that a file belongs to: the part before the last underscore."""
     return file.stem.rpartition("_")[0] or file.stem
 
 
@@ -139,15 +144,18 @@ def _module(data: DataSet, issues: list[Issue], unknown: list[str]) -> _Module:
 
 
 def column_of(channel: str, axis: str) -> str:
-    """Return the column that a channel fills, "" where it is none; ``axis`` is that of the file's name."""
+    """Return the column that a channel fills, "" if none; ``axis`` is that of the file's name."""
     name = re.sub(r"\s+", "", channel).casefold()
     number = re.search(r"_?a?([1-6])$", name)
     digit = number[1] if number else axis
     stem = name[: number.start()] if number else name
     german = {
-        "sollposition": _COMMAND, "istposition": _ACTUAL, "positionsschleppfehler": _LAG,
-        "iststrom": "i{}_A", "istmoment": "tau{}_Nm",
-    }  # fmt: skip
+        "sollposition": _COMMAND,
+        "istposition": _ACTUAL,
+        "positionsschleppfehler": _LAG,
+        "iststrom": "i{}_A",
+        "istmoment": "tau{}_Nm",
+    }
     if stem in german:
         return german[stem].format(digit) if digit else ""
     if re.fullmatch(r"axispos_(cmd|act)\w*", stem):
@@ -159,7 +167,7 @@ def column_of(channel: str, axis: str) -> str:
 
 
 def _factor(channel: Channel, column: str, file: Path, issues: list[Issue]) -> float:
-    """Return what turns a channel's unit into that of its column."""
+    """Return the factor from a channel's unit to that of its column."""
     wanted = column.rpartition("_")[2]
     unit = channel.unit.casefold().replace("μ", "µ").replace("\N{MASCULINE ORDINAL INDICATOR}", "°")
     factor = _UNITS[wanted].get(unit)

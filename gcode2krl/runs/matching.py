@@ -1,4 +1,4 @@
-"""How one recorded signal belongs to another: columns, units, signs, frame, clock. Arrays in, numbers out."""
+"""How one recorded signal relates to another: columns, units, signs, frame, clock."""
 
 import math
 from typing import Literal, NamedTuple
@@ -9,9 +9,11 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.units import DEG_PER_RAD, MM_PER_INCH, MM_PER_M, RAD_PER_DEG
 
 LENGTH_FACTORS = {
-    1.0 / MM_PER_M: "metres", MM_PER_M: "micrometres", 1.0 / MM_PER_INCH: "inches",
+    1.0 / MM_PER_M: "metres",
+    MM_PER_M: "micrometres",
+    1.0 / MM_PER_INCH: "inches",
     MM_PER_INCH: "millimetres taken for inches",
-}  # fmt: skip
+}
 ANGLE_FACTORS = {RAD_PER_DEG: "radians", DEG_PER_RAD: "degrees converted twice"}
 _GRID_S = 0.04
 _MOST_GRID = 8000
@@ -31,7 +33,7 @@ class Odd(NamedTuple):
     other: int
     """Column of the reference that it follows."""
     factor: float
-    """Measured over reference, rounded to the unit that it is."""
+    """Measured over reference, rounded to a known ratio of units."""
 
 
 class Shift(NamedTuple):
@@ -39,14 +41,14 @@ class Shift(NamedTuple):
 
     seconds: float
     share: float
-    """Variance of the measured columns that an affine map of the reference explains, 0 to 1."""
+    """Fraction of the measured columns' variance that an affine map of the reference explains."""
 
 
 def odd_columns(reference: Floats, measured: Floats, floor: float, factors: dict[float, str]) -> list[Odd]:
     """Return the columns of ``measured`` (n, k) that are in another unit, swapped, or of the other sign.
 
-    Means are removed. A column is odd where it is off its own reference by more than ``floor`` and by 30 % of
-    the larger motion; it is explained where it is correlated with a reference column by more than 0.98 and
+    Means are removed. A column is odd if it differs from its own reference by more than ``floor`` and by 30 %
+    of the larger motion; it is explained if it is correlated with a reference column by more than 0.98 and
     has the slope of a known factor (within 10 %), or equals another column five times better than its own.
     """
     r, m = reference - reference.mean(axis=0), measured - measured.mean(axis=0)
@@ -56,23 +58,23 @@ def odd_columns(reference: Floats, measured: Floats, floor: float, factors: dict
         correlation = np.nan_to_num(covariance / np.outer(moves_m, moves_r))
         slope = np.nan_to_num(covariance / moves_r**2)
     off = np.sqrt(np.maximum(moves_m[:, None] ** 2 + moves_r**2 - 2.0 * covariance, 0.0))
-    found = []
+    odd = []
     for j in range(r.shape[1]):
         if off[j, j] <= max(floor, _BAD * max(moves_r[j], moves_m[j])):
             continue
         unit = _unit_of(slope[j, j], factors) if abs(correlation[j, j]) > _CORRELATED else 0.0
         k = int(np.argmin(off[j]))
         if unit:
-            found.append(Odd("unit", j, j, unit))
+            odd.append(Odd("unit", j, j, unit))
         elif k != j and off[j, k] < _SAME * off[j, j] and correlation[j, k] > _CORRELATED:
-            found.append(Odd("swapped", j, k, 1.0))
+            odd.append(Odd("swapped", j, k, 1.0))
         elif correlation[j, j] < -_CORRELATED and abs(slope[j, j] + 1.0) < _FACTOR_SLACK:
-            found.append(Odd("sign", j, j, -1.0))
-    return found
+            odd.append(Odd("sign", j, j, -1.0))
+    return odd
 
 
 def _unit_of(slope: float, factors: dict[float, str]) -> float:
-    """Return the known factor that a slope is, 0.0 where it is none."""
+    """Return the known factor that a slope is close to, 0.0 if none."""
     for factor in factors:
         if abs(abs(slope) / factor - 1.0) < _FACTOR_SLACK:
             return math.copysign(factor, slope)
@@ -80,8 +82,8 @@ def _unit_of(slope: float, factors: dict[float, str]) -> float:
 
 
 def corrected(measured: Floats, odd: list[Odd]) -> Floats:
-    """Return the columns as they would be without what is odd; the rest of a swap falls into what is free."""
-    order = {each.other: each.column for each in odd}
+    """Return the columns with odd ones corrected; the rest of a swap fills the columns that are free."""
+    order = {entry.other: entry.column for entry in odd}
     free = [j for j in range(measured.shape[1]) if j not in order.values()]
     for column in range(measured.shape[1]):
         if column not in order and column in free:
@@ -91,14 +93,14 @@ def corrected(measured: Floats, odd: list[Odd]) -> Floats:
         if column not in order:
             order[column] = free.pop(0)
     factor = np.ones(measured.shape[1])
-    for each in odd:
-        factor[each.other] = each.factor
+    for entry in odd:
+        factor[entry.other] = entry.factor
     result: Floats = measured[:, [order[column] for column in range(measured.shape[1])]] / factor
     return result
 
 
 def agree(reference: Floats, measured: Floats, like: float) -> bool:
-    """Tell whether two signals (n, k) move alike: rms of the difference below a share of the motion's."""
+    """Tell whether two signals (n, k) move alike: rms difference below ``like`` times that of the motion."""
     r, m = reference - reference.mean(axis=0), measured - measured.mean(axis=0)
     return bool(np.sum((m - r) ** 2) < like**2 * np.sum(r**2))
 
@@ -106,10 +108,10 @@ def agree(reference: Floats, measured: Floats, like: float) -> bool:
 def best_shift(
     reference_s: Floats, reference: Floats, own_s: Floats, measured: Floats, reach_s: float
 ) -> Shift:
-    """Return the clock offset within ± ``reach_s`` at which an affine map of the reference explains most.
+    """Return the clock offset within ± ``reach_s`` at which an affine map explains the most variance.
 
-    The map takes in units, signs, swapped columns and frames, so that the clock is found whatever else is
-    wrong. At least 60 % of the shorter recording overlap. Of equally good offsets the smallest is taken.
+    The map absorbs units, signs, swapped columns and frames, so that the clock is found whatever else is
+    wrong. At least 60 % of the shorter recording must overlap. Among equal offsets the smallest is taken.
     """
     first, last = max(reference_s[0], own_s[0] - reach_s), min(reference_s[-1], own_s[-1] + reach_s)
     grid = np.arange(first, last, _GRID_S)[:_MOST_GRID]
@@ -119,14 +121,14 @@ def best_shift(
     most = int(reach_s / _GRID_S)
     around = grid[0] + _GRID_S * np.arange(-most, len(grid) + most)
     inside = (around >= own_s[0]) & (around <= own_s[-1])
-    found = at(around, own_s, measured)
+    shifted = at(around, own_s, measured)
     least = max(_LEAST_GRID, int(_LEAST_OVERLAP * min(len(grid), int(np.count_nonzero(inside)))))
     shares = np.full(2 * most + 1, -1.0)
     for step in range(2 * most + 1):
         both = inside[step : step + len(grid)]
         if np.count_nonzero(both) >= least:
             chosen = np.flatnonzero(both)[:: max(1, len(grid) // _MOST_COMPARED)]
-            shares[step] = explained(wanted[chosen], found[step + chosen])
+            shares[step] = explained(wanted[chosen], shifted[step + chosen])
     best = shares.max()
     if best < 0.0:
         return Shift(0.0, 0.0)
@@ -136,7 +138,7 @@ def best_shift(
 
 
 def _finer(coarse: Shift, grid: Floats, wanted: Floats, own_s: Floats, measured: Floats) -> Shift:
-    """Return the offset to a millisecond."""
+    """Return the offset refined to a millisecond."""
     best = coarse
     for step_s in (1e-2, 1e-3):
         for seconds in best.seconds + step_s * np.arange(-5, 6):
@@ -148,14 +150,14 @@ def _finer(coarse: Shift, grid: Floats, wanted: Floats, own_s: Floats, measured:
 
 
 def explained(reference: Floats, measured: Floats) -> float:
-    """Return the share of the variance of ``measured`` (n, k) that an affine map of the other explains."""
+    """Return the fraction of the variance of ``measured`` (n, k) that an affine map of the other explains."""
     m = measured - measured.mean(axis=0)
     total = float(np.sum(m**2))
     if total == 0.0:
         return 0.0
     r = reference - reference.mean(axis=0)
     products = r.T @ m
-    # normal equations: four digits of a share are plenty, and this runs once an offset
+    # normal equations: four digits are plenty, and this runs once for each offset
     return float(np.sum(products * (np.linalg.pinv(r.T @ r, rcond=1e-10, hermitian=True) @ products))) / total
 
 
@@ -175,7 +177,7 @@ def at(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
 
 
 class Course(NamedTuple):
-    """A path as evenly timed points that move, with speed and direction."""
+    """The moving part of a path as points at equal times, with speed and direction."""
 
     position: Floats
     """(n, k)"""

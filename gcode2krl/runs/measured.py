@@ -18,10 +18,10 @@ from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 TIME = "t_s"
 LEAST_ROWS = 10
 LARGEST_VALUE = 1e15
-"""No instrument states more, in whatever unit; our choice. Squares and differences of what is below are
-numbers."""
+"""No instrument states more, in any unit; our choice. Squares and differences of smaller values do not
+overflow."""
 _GAP_STEPS, _GAP_JITTERS = 1.5, 5.0
-"""A step is a gap above this many times the median, plus so many times what the clock usually jitters."""
+"""A step is a gap if it exceeds this many medians plus this many times the usual jitter of the clock."""
 
 
 class Signal(NamedTuple):
@@ -33,7 +33,7 @@ class Signal(NamedTuple):
     each: bool = False
     """Columns may be missing one by one (a joint without encoder)."""
     joints: bool = False
-    """A joint may be missing where part of the joints is asked for."""
+    """A joint may be missing if only some joints are required."""
     gaps: bool = False
     """A missing value does not cost its row."""
 
@@ -47,17 +47,17 @@ class Measured:
     """One measured table: rows in order of time, without missing values."""
 
     time_s: Floats
-    """(n,) on the table's own clock, less what ``run.toml`` says of it."""
+    """(n,) on the table's own clock, minus the offset in ``run.toml``."""
     row: Ints
     """(n,) number of each row in its file: the line of a CSV, the 1-based row of a Parquet table."""
     segments: Ints
-    """(s, 2) first row and one past the last of each stretch without a gap; filters start anew at each."""
+    """(s, 2) first row and one past the last of each stretch without a gap; filters restart at each."""
     source: str = ""
     dropped: Mapping[str, int] = field(default_factory=dict)
     """Column → rows in which its value is missing."""
     dropped_rows: int = 0
     ignored: tuple[str, ...] = ()
-    """Columns of the file that the format does not know."""
+    """Columns of the file that are not in the format."""
     missing: tuple[str, ...] = ()
     """Columns of the format that are not in the file, or empty."""
     constant: tuple[str, ...] = ()
@@ -88,7 +88,7 @@ class Controller(Measured):
     q_act_rad: Floats | None = None
     """(n, 6) motor side."""
     q_load_rad: Floats | None = None
-    """(n, 6) behind the gear."""
+    """(n, 6) after the gear."""
     current_A: Floats | None = None
     """(n, 6)"""
     torque_Nmm: Floats | None = None
@@ -117,7 +117,7 @@ class Controller(Measured):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tracker(Measured):
-    """``tracker.csv``: the TCP by an instrument of its own, in the frame that ``run.toml`` names."""
+    """``tracker.csv``: the TCP by a separate instrument, in the frame that ``run.toml`` names."""
 
     position_mm: Floats
     """(n, 3)"""
@@ -160,7 +160,7 @@ SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
 }
 _ALWAYS = ("position_mm", "force_N")
 _USUAL = ("position_cmd_mm", "abc_cmd_rad", "q_cmd_rad", "q_act_rad")
-"""Signals of the format that are not marked optional: their absence is said."""
+"""Signals of the format that are not marked optional: their absence is reported."""
 AnyMeasured = TypeVar("AnyMeasured", bound=Measured)
 
 
@@ -174,27 +174,27 @@ def build(
 ) -> AnyMeasured:
     """Return the table of a file.
 
-    A signal is there whole or not at all, except joints that ``Signal.each`` (or ``partial`` for commanded
-    and actual angles) allows to be missing; rows with a missing value are dropped and counted.
+    A signal must have all of its columns or none, except joints that ``Signal.each`` (or ``partial`` for
+    commanded and actual angles) allows to be missing; rows with a missing value are dropped and counted.
 
     Raises `NotUnderstoodError` for a missing column, and for fewer than 10 rows.
     """
-    there = {name for name, values in sheet.columns.items() if np.isfinite(values).any()}
+    present = {name for name, values in sheet.columns.items() if np.isfinite(values).any()}
     if TIME not in sheet.columns:
         raise missing_column(sheet, [TIME], f"time in seconds in a column {TIME}")
     _refuse_few(sheet.rows(), sheet.rows(), sheet)
-    used = [signal for signal in SIGNALS[kind] if _is_there(signal, there, sheet, partial)]
+    used = [signal for signal in SIGNALS[kind] if _is_there(signal, present, sheet, partial)]
     if not used:
         wanted = ", ".join(SIGNALS[kind][0].columns)
         raise missing_column(sheet, [wanted], f"a table of measured values has {TIME} and, say, {wanted}")
-    strict = [c for signal in used if not signal.gaps for c in signal.columns if c in there]
-    _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in there)))
+    strict = [c for signal in used if not signal.gaps for c in signal.columns if c in present]
+    _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in present)))
     finite = np.stack([np.isfinite(sheet.columns[name]) for name in (TIME, *strict)], axis=1)
     kept = np.flatnonzero(finite.all(axis=1))
     _refuse_few(len(kept), len(finite), sheet)
     time_s = sheet.columns[TIME][kept] - clock_s
     lost = zip((TIME, *strict), np.count_nonzero(~finite, axis=0).tolist(), strict=True)
-    columns: dict[str, Any] = {signal.name: _signal(signal, sheet, there, kept) for signal in used}
+    columns: dict[str, Any] = {signal.name: _signal(signal, sheet, present, kept) for signal in used}
     table = kind(
         time_s=time_s,
         row=kept + sheet.first_row,
@@ -203,7 +203,7 @@ def build(
         dropped={name: count for name, count in lost if count},
         dropped_rows=len(finite) - len(kept),
         ignored=tuple(name for name in sheet.names if name not in columns_of(kind)),
-        missing=tuple(name for name in _expected(kind, used) if name not in there),
+        missing=tuple(name for name in _expected(kind, used) if name not in present),
         constant=tuple(name for name in strict if np.ptp(sheet.columns[name][kept]) == 0.0),
         **columns,
     )
@@ -212,14 +212,14 @@ def build(
 
 
 def _expected(kind: type[Measured], used: list[Signal]) -> Iterator[str]:
-    """Yield the columns whose absence is worth a word."""
+    """Yield the columns whose absence is reported."""
     for signal in SIGNALS[kind]:
         if signal in used or signal.name in _USUAL:
             yield from signal.columns
 
 
 def _is_there(signal: Signal, there: set[str], sheet: Sheet, partial: bool) -> bool:
-    """Tell whether a signal is there; raises where only a part of it is."""
+    """Tell whether a signal is there; raises where only some of its columns are."""
     absent = [column for column in signal.columns if column not in there]
     if not absent:
         return True
@@ -231,9 +231,12 @@ def _is_there(signal: Signal, there: set[str], sheet: Sheet, partial: bool) -> b
     empty = [column for column in absent if column in sheet.columns]
     if empty:
         raise input_error(
-            "trace-column", f"column {', '.join(empty)}: has no value in any row",
-            "record it, or leave the column out", line=sheet.first_row, source=sheet.source,
-        )  # fmt: skip
+            "trace-column",
+            f"column {', '.join(empty)}: has no value in any row",
+            "record it, or leave the column out",
+            line=sheet.first_row,
+            source=sheet.source,
+        )
     if len(absent) < len(signal.columns):
         rest = ", ".join(column for column in signal.columns if column in there)
         raise missing_column(sheet, absent, f"it belongs with {rest}: give all or none")
@@ -249,7 +252,7 @@ def _signal(signal: Signal, sheet: Sheet, there: set[str], kept: Ints) -> Floats
 def _segments(time_s: Floats, index: Ints) -> Ints:
     """Return (s, 2) the stretches without dropped rows and without a long step."""
     step = np.diff(time_s)
-    usual, jittery = (float(each) for each in np.quantile(step, [0.5, 0.9]))
+    usual, jittery = (float(quantile) for quantile in np.quantile(step, [0.5, 0.9]))
     longest = _GAP_STEPS * usual + _GAP_JITTERS * (jittery - usual)
     breaks = np.flatnonzero((np.diff(index) > 1) | ((step > longest) & (longest > 0.0))) + 1
     edges = np.concatenate([[0], breaks, [len(time_s)]])
@@ -260,9 +263,12 @@ def _refuse_few(kept: int, rows: int, sheet: Sheet) -> None:
     if kept < LEAST_ROWS:
         lost = f" ({rows - kept} dropped for missing values)" if rows > kept else ""
         raise input_error(
-            "trace-short", f"{kept} usable rows{lost}, at least {LEAST_ROWS} are needed",
-            "record the whole program", line=sheet.first_row if rows else 0, source=sheet.source,
-        )  # fmt: skip
+            "trace-short",
+            f"{kept} usable rows{lost}, at least {LEAST_ROWS} are needed",
+            "record the whole program",
+            line=sheet.first_row if rows else 0,
+            source=sheet.source,
+        )
 
 
 def _refuse_absurd(sheet: Sheet, names: tuple[str, ...]) -> None:
@@ -270,7 +276,7 @@ def _refuse_absurd(sheet: Sheet, names: tuple[str, ...]) -> None:
         values = np.abs(np.nan_to_num(sheet.columns[name], posinf=0.0, neginf=0.0))
         if values.max(initial=0.0) > LARGEST_VALUE:
             row = int(np.argmax(values)) + sheet.first_row
-            words = f"row {row}, column {name}: {values.max():.3g} is no measured value"
+            words = f"row {row}, column {name}: {values.max():.3g} is not a measured value"
             raise input_error(
                 "trace-number", words, "export the recording again", line=row, source=sheet.source
             )
@@ -290,7 +296,7 @@ def _findings(table: Measured, first_lost: int) -> Iterator[Issue]:
         text = f"{name}: {len(gap_s)} gaps, the longest {gap_s.max():.3g} s before row {row}"
         yield Issue("note", "trace-gap", row, text)
     for columns, code, words in (
-        (table.missing, "trace-missing", "not recorded, what needs it is left out"),
+        (table.missing, "trace-missing", "not recorded; analyses that need it are left out"),
         (table.constant, "trace-constant", "never changes"),
         (table.ignored, "trace-ignored", "not a column of the format, left out"),
     ):

@@ -1,8 +1,8 @@
 """An RSI log → the columns of ``controller.csv``: telegrams as text, or a CSV of their elements.
 
-``RSol`` and ``ASPos`` are commanded and stay those of the program under a correction, ``RIst`` and ``AIPos``
+``RSol`` and ``ASPos`` are commanded and do not include a correction, ``RIst`` and ``AIPos``
 are actual; ``RKorr`` and ``AKorr`` of the answers (``Sen``) go to the telegram of the same IPOC. IPOC counts
-milliseconds. Telegrams are read with a pattern of their own: no entities, no nesting, at most 16 kB each.
+milliseconds. Telegrams are read with our own pattern: no entities, no nesting, at most 16 kB each.
 """
 
 import re
@@ -115,7 +115,7 @@ def _parse(text: bytes) -> tuple[int | None, dict[str, float] | None]:
 
 
 def _name(tag: str, attribute: str) -> str:
-    """Return the column of an attribute, "" where it is none."""
+    """Return the column of an attribute, "" if it has none."""
     if tag == "delay":
         return "delay" if attribute == "d" else ""
     if tag in _POSES and attribute in tuple("xyzabc"):
@@ -126,7 +126,7 @@ def _name(tag: str, attribute: str) -> str:
 
 
 def _from_csv(file: Path) -> Sheet:
-    """Read ``IPOC, RIst_X, …``; other signs may part the words, and words may stand before."""
+    """Read ``IPOC, RIst_X, …``; other separators are allowed, and text may precede the header."""
     header = _header(file)
     columns_of = {name: _column(name.encode("utf-8", "replace")) for name in header}
     wanted = {name: column for name, column in columns_of.items() if column}
@@ -151,7 +151,7 @@ def _header(file: Path) -> list[str]:
 
 
 def _column(name: bytes) -> str:
-    """Return the column that a heading of the CSV means, "" where it is none."""
+    """Return the column that a heading of the CSV means, "" if none."""
     words = re.findall(r"[a-z0-9]+", name.decode("utf-8", "replace").casefold())
     if words and words[-1] == "ipoc":
         return "ipoc"
@@ -170,11 +170,11 @@ def _refuse_restart(ipoc: list[int], file: Path) -> None:
 
 def _findings(file: Path, columns: dict[str, Floats], bad: int, twice: int) -> Iterator[Issue]:
     if bad or twice:
-        text = f"{file.name}: {bad} telegrams malformed, {twice} there twice, dropped"
+        text = f"{file.name}: {bad} telegrams malformed, {twice} duplicated, dropped"
         yield Issue("warning", "rsi-log", 0, text)
     late = columns.get("delay")
     if late is not None and np.nanmax(late, initial=0.0) > np.nanmin(late, initial=np.inf):
-        text = f"{file.name}: Delay rises to {np.nanmax(late):g}: answers came late"
+        text = f"{file.name}: Delay rises to {np.nanmax(late):g}: answers were late"
         yield Issue("note", "rsi-log", 0, text)
     if any(name.startswith("i") and name.endswith("_A") for name in columns):
         yield Issue("note", "rsi-log", 0, f"{file.name}: MACur is taken as amperes")

@@ -14,10 +14,23 @@ from gcode2krl.runs.tables import missing_column, read_sheet
 
 _LONGEST_HEADER = 65536
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4",
-    "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
+}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -38,7 +51,7 @@ class Scan:
 def read_scan(path: str | Path) -> Scan:
     """Read a scan; points without a value are dropped and counted.
 
-    Raises `NotUnderstoodError` naming the file: unreadable, no points, not of the format.
+    Raises `NotUnderstoodError` naming the file: unreadable, without points, or of another format.
     """
     file = Path(path)
     points = _read_ply(file) if file.suffix.lower() == ".ply" else _read_table(file)
@@ -51,7 +64,7 @@ def read_scan(path: str | Path) -> Scan:
     kept = np.ascontiguousarray(points[keep])
     if np.abs(kept).max() > LARGEST_VALUE:
         row = int(np.argmax(np.abs(kept).max(axis=1)))
-        words = f"point {row + 1}: {np.abs(kept).max():.3g} mm is no measured value"
+        words = f"point {row + 1}: {np.abs(kept).max():.3g} mm is not a measured value"
         raise input_error("trace-unit", words, "export the scan in mm", source=str(file))
     text = f"{file.name}: {lost} of {len(points)} points dropped for missing values"
     return Scan(locked(kept), str(file), lost, (Issue("warning", "trace-dropped", 0, text),) if lost else ())
@@ -75,8 +88,8 @@ def _read_ply(file: Path) -> Floats:
         return _ascii_vertices(data[body:], count, fields, file, data.count(b"\n", 0, body))
     layout = np.dtype([(name, order + kind) for name, kind in fields])
     if len(data) - body < count * layout.itemsize:
-        there = (len(data) - body) // layout.itemsize
-        _refuse(file, f"{count} vertices announced, {there} there: the file is cut off")
+        available = (len(data) - body) // layout.itemsize
+        _refuse(file, f"{count} vertices announced, {available} there: the file is cut off")
     table = np.frombuffer(data, dtype=layout, count=count, offset=body)
     with np.errstate(invalid="ignore"):  # a NaN that signals
         return np.stack([table[axis].astype(np.float64) for axis in "xyz"], axis=1)
@@ -121,7 +134,7 @@ def _ascii_vertices(
         try:
             points[index] = [float(words[place]) for place in at]
         except (ValueError, IndexError):
-            _refuse(file, f"{line[:40]!r} is no vertex", lines_before + index + 1)
+            _refuse(file, f"{line[:40]!r} is not a vertex", lines_before + index + 1)
     return points
 
 
@@ -131,6 +144,9 @@ def _refuse(file: Path, message: str, line: int = 0) -> NoReturn:
 
 def _error(file: Path, message: str, line: int) -> NotUnderstoodError:
     return input_error(
-        "scan-ply", message, "export PLY (text or binary) with x, y, z in mm, or CSV", line=line,
+        "scan-ply",
+        message,
+        "export PLY (text or binary) with x, y, z in mm, or CSV",
+        line=line,
         source=str(file),
-    )  # fmt: skip
+    )

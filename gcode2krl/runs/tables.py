@@ -43,12 +43,13 @@ class Sheet:
 
 
 def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
-    """Read the wanted columns of a CSV or Parquet file; what is not there is left out.
+    """Read the wanted columns of a CSV or Parquet file; columns that are missing are left out.
 
     Raises
     ------
     NotUnderstoodError
-        Names file, row and column: unreadable file, no table, a column twice, what is not a number.
+        Names file, row and column: unreadable file, not a table, a column twice, a value that is not a
+        number.
     """
     file = Path(path)
     frame, first_row = _read_frame(file)
@@ -61,7 +62,7 @@ def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
 
 
 def printable(name: str) -> str:
-    """Return a name of a file as it may stand in a line for a person."""
+    """Return a name from a file, safe to print on one line."""
     return name if name.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in name)
 
 
@@ -103,7 +104,7 @@ def _read_frame(file: Path) -> "tuple[pl.DataFrame, int]":
 
 
 def _without_trailing_blanks(frame: "pl.DataFrame") -> "pl.DataFrame":
-    """Return the table without empty lines at its end, which are no rows."""
+    """Return the table without empty lines at its end, which are not rows."""
     rows = frame.height
     while rows and all(value is None for value in frame.row(rows - 1)):
         rows -= 1
@@ -111,7 +112,7 @@ def _without_trailing_blanks(frame: "pl.DataFrame") -> "pl.DataFrame":
 
 
 def _no_table(file: Path, why: str) -> NotUnderstoodError:
-    """Return the error for a file that is no table; the first line that is too long is named."""
+    """Return the error for a file that is not a table; it names the first line that is too long."""
     text = file.read_bytes().decode("latin-1").splitlines()
     wide = text[0].count(",") if text else 0
     for number, line in enumerate(text, start=1):
@@ -136,7 +137,7 @@ def _refuse_twins(names: tuple[str, ...], file: Path) -> None:
     for name in names:
         stem = name.partition("_duplicated_")[0]
         if names.count(name) > 1 or (stem != name and stem in names):
-            raise input_error("trace-column", f"column {stem}: stands there twice", line=1, source=str(file))
+            raise input_error("trace-column", f"column {stem}: is present twice", line=1, source=str(file))
 
 
 def _numbers(column: "pl.Series", name: str, first_row: int, file: Path) -> Floats:

@@ -31,8 +31,14 @@ def test_a_file_keeps_what_it_is_based_on(tmp_path, cell):
 def test_defaults_of_the_krc4(cell):
     c = cell.controller
     assert (c.k_s, c.advance, c.cycle_s, c.cdis_mm, c.acc_cp_m_s2, c.rapid_m_s, c.law) == (
-        0.168, 3, 0.012, 0.1, 2.0, 0.2, "averages",
-    )  # fmt: skip
+        0.168,
+        3,
+        0.012,
+        0.1,
+        2.0,
+        0.2,
+        "averages",
+    )
 
 
 def test_the_default_cell_is_not_verified_and_knows_t1_to_t20(cell):

@@ -1,4 +1,4 @@
-"""A cell is its own: nothing of another cell in silence, halves of pairs and double meanings are errors."""
+"""No value comes silently from another cell; half pairs and double meanings are errors."""
 
 import json
 
@@ -79,7 +79,7 @@ def test_a_missing_output_of_a_used_template_is_named(tmp_path):
 
 
 def test_no_tool_of_another_cell(tmp_path):
-    """T5 of the demonstration stood 20 mm too long in a cell that names T1 alone."""
+    """T5 of the demonstration was 20 mm too long in a cell that names only T1."""
     data = own(tool={"1": OWN_CELL["tool"]["1"]})
     with pytest.raises(RefusedError, match="T5 is not in the cell"):
         Made(tmp_path, PART.replace("T1 M6\nG43 H1", "T5 M6\nG43 H5"), data=data)
@@ -93,7 +93,7 @@ def test_a_complete_cell_is_enough_and_verified_covers_it(tmp_path):
     assert "taken over" not in text
 
 
-# --- what is taken over by name ------------------------------------------------------------------------
+# --- values taken over by name -------------------------------------------------------------------------
 
 
 def test_every_value_taken_over_is_in_the_header(tmp_path):
@@ -148,7 +148,7 @@ def test_a_base_that_is_none_is_one_line(tmp_path, name):
 def test_two_cells_based_on_each_other(tmp_path):
     write(tmp_path / "a.toml", 'based_on = "b.toml"\n')
     write(tmp_path / "b.toml", 'based_on = "a.toml"\n')
-    with pytest.raises(NotUnderstoodError, match="leads back to itself"):
+    with pytest.raises(NotUnderstoodError, match="is based on itself"):
         load_cell(tmp_path / "a.toml")
 
 

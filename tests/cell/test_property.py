@@ -23,7 +23,7 @@ def frame(x, y, z, b=0.0):
 
 @st.composite
 def cells(draw):
-    """Return a complete cell of its own, some of its keys then left out; what is left out; its tool."""
+    """Return a complete cell without some of its keys, the keys left out, and its tool."""
     one = st.integers
     outputs = draw(st.lists(one(40, 4000), min_size=3, max_size=3, unique=True))
     number = draw(one(1, 30))
@@ -36,23 +36,35 @@ def cells(draw):
         },
         "home": {"q_deg": [2.5, -87.5, 92.5, 1.5, -3.5, 4.5]},
         "clearance": {"z_mm": draw(one(60, 90)) + 0.5},
-        "load": {"mass_kg": draw(one(10, 90)) + 0.125, "x_mm": 91.5, "y_mm": 2.5, "z_mm": 133.5,
-                 "jx_kgm2": 1.5, "jy_kgm2": 1.25, "jz_kgm2": 1.75},
+        "load": {
+            "mass_kg": draw(one(10, 90)) + 0.125,
+            "x_mm": 91.5,
+            "y_mm": 2.5,
+            "z_mm": 133.5,
+            "jx_kgm2": 1.5,
+            "jy_kgm2": 1.25,
+            "jz_kgm2": 1.75,
+        },
         "tool": {str(number): {"diameter_mm": 9.5, "teeth": 2, "length_mm": draw(one(70, 90)) + 0.25}},
-        "spindle": {"max_rpm": 18500, "run_cw_output": outputs[0], "speed_analog_output": 7,
-                    "flood_output": outputs[1], "stop_s": 6.5},
+        "spindle": {
+            "max_rpm": 18500,
+            "run_cw_output": outputs[0],
+            "speed_analog_output": 7,
+            "flood_output": outputs[1],
+            "stop_s": 6.5,
+        },
         "controller": {"acc_cp_m_s2": 1.375, "rapid_m_s": 0.135, "ptp_percent": 13, "cdis_mm": 0.15},
         "tool_change": f"$OUT[{outputs[2]}]=FALSE",
         "m_code": {
             "M3": "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
-                  "$OUT[{{ spindle.run_cw_output }}]=TRUE",
+            "$OUT[{{ spindle.run_cw_output }}]=TRUE",
             "M5": "$OUT[{{ spindle.run_cw_output }}]=FALSE\nWAIT SEC {{ spindle.stop_s }}",
             "M4": "$OUT[{{ spindle.run_cw_output }}]=TRUE",
             "M7": "$OUT[{{ spindle.flood_output }}]=TRUE",
             "M8": "$OUT[{{ spindle.flood_output }}]=TRUE",
             "M9": "$OUT[{{ spindle.flood_output }}]=FALSE",
         },
-    }  # fmt: skip
+    }
     paths = [(section,) for section in data] + [
         (section, key) for section in ("frames", "load", "spindle", "m_code", "tool") for key in data[section]
     ]
@@ -89,8 +101,12 @@ def test_every_value_of_the_program_was_stated(made):
     for key, output in (("run_cw_output", 0), ("flood_output", 1)):
         if f"spindle.{key}" not in taken and key in data.get("spindle", {}):
             assert cell.spindle.model_dump()[key] == outputs[output]
-    check(code, r"\$BASE=\{(.*?)\}", list(data["frames"]["base"].values()) if stated(data, "frames", "base")
-          else DEMONSTRATION["base"], "frames.base" in taken)  # fmt: skip
+    check(
+        code,
+        r"\$BASE=\{(.*?)\}",
+        list(data["frames"]["base"].values()) if stated(data, "frames", "base") else DEMONSTRATION["base"],
+        "frames.base" in taken,
+    )
     mass = float(re.search(r"\$LOAD=\{M ([\d.]+)", code)[1])
     assert mass == (data["load"]["mass_kg"] if stated(data, "load", "mass_kg") else DEMONSTRATION["M"])
     assert (mass == DEMONSTRATION["M"]) == ("load.mass_kg" in taken)

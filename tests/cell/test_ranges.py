@@ -17,7 +17,7 @@ NO_MEASURE = (
     "most_cycles", "settle_cycles", "port", "timeout_cycles", "lost_cycles", "decimals", "t1_output",
     "ready_output", "run_cw_output", "run_ccw_output", "speed_analog_output", "at_speed_input",
     "flood_output", "mist_output", "number", "max_lines", "comment_every", "memory_moves", "warn_size_mb",
-)  # fmt: skip
+)  # fmt: skip  # word list, kept compact
 """Numbers that name or count something; their types bound them. Effects state their own bounds."""
 
 
@@ -175,13 +175,33 @@ def test_types_are_strict_and_a_wrong_one_names_its_key(data, key, base):
 
 @pytest.mark.parametrize(
     "text",
-    ["a = " + "[" * 100_000, "a." * 100_000 + "a = 1", '"a".' * 100_000 + "a = 1",
-     "[" + "a." * 100_000 + "a]",
-     "a = {" + "a." * 100_000 + "a = 1}", "a = " + "{a = " * 5000, "a = " + "1" * 10_000, "x = 1\n" * 2,
-     "\0", "a = " + "[" * 40 + "]" * 40, "#" + "x" * 5_000_000],
-    ids=["brackets", "dots", "quoted", "header", "inline", "tables", "digits", "twice", "nul", "lists",
-         "size"],
-)  # fmt: skip
+    [
+        "a = " + "[" * 100_000,
+        "a." * 100_000 + "a = 1",
+        '"a".' * 100_000 + "a = 1",
+        "[" + "a." * 100_000 + "a]",
+        "a = {" + "a." * 100_000 + "a = 1}",
+        "a = " + "{a = " * 5000,
+        "a = " + "1" * 10_000,
+        "x = 1\n" * 2,
+        "\0",
+        "a = " + "[" * 40 + "]" * 40,
+        "#" + "x" * 5_000_000,
+    ],
+    ids=[
+        "brackets",
+        "dots",
+        "quoted",
+        "header",
+        "inline",
+        "tables",
+        "digits",
+        "twice",
+        "nul",
+        "lists",
+        "size",
+    ],
+)
 def test_a_hostile_file_is_one_line_at_once(tmp_path, text):
     import time
 

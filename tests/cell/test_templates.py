@@ -68,14 +68,27 @@ KRL = [
     "{{ '$OUT[5]=TRUE\r$BASE=$NULLFRAME' }}", "$OUT[5]=TRUE{{ '\x0b' }}$BASE=$NULLFRAME", ";FOLD x", "é",
     "$out[5]=true\n$base = $nullframe", "  $BASE  =$NULLFRAME", "PTP{A1 0}", "$OUT[5]=TRUE$ADVANCE=0",
     "WAIT SEC 1$BASE=$NULLFRAME", "$OUT[I]=TRUE",
-]  # fmt: skip
+]  # fmt: skip  # list of statements, kept compact
 GOOD = [
-    "$OUT[5]=TRUE", "$ANOUT[1]=0.5", "PULSE ($OUT[5],TRUE,0.5)", "WAIT SEC 1.0", "WAIT FOR $IN[5]", "HALT",
-    "IF $IN[3]==TRUE THEN\n$OUT[5]=TRUE\nELSE\n$OUT[5]=FALSE\nENDIF", "VACUUM(TRUE)", "MY_FLAG=TRUE",
-    "FOR I=1 TO 3\nWAIT SEC 0.1\nENDFOR", "LOOP\nEXIT\nENDLOOP", "; PTP {A1 0}", "$FLAG[3]=TRUE",
-    'MY_TEXT[]="GOTO ; PTP"', "WHILE $IN[1]\nWAIT SEC 0.1\nENDWHILE", ";FOLD x\n$OUT[5]=TRUE\n;ENDFOLD",
-    "{% for n in (5, 6) %}$OUT[{{ n }}]=TRUE\n{% endfor %}", "{% if rpm > 5 %}HALT{% endif %}",
-]  # fmt: skip
+    "$OUT[5]=TRUE",
+    "$ANOUT[1]=0.5",
+    "PULSE ($OUT[5],TRUE,0.5)",
+    "WAIT SEC 1.0",
+    "WAIT FOR $IN[5]",
+    "HALT",
+    "IF $IN[3]==TRUE THEN\n$OUT[5]=TRUE\nELSE\n$OUT[5]=FALSE\nENDIF",
+    "VACUUM(TRUE)",
+    "MY_FLAG=TRUE",
+    "FOR I=1 TO 3\nWAIT SEC 0.1\nENDFOR",
+    "LOOP\nEXIT\nENDLOOP",
+    "; PTP {A1 0}",
+    "$FLAG[3]=TRUE",
+    'MY_TEXT[]="GOTO ; PTP"',
+    "WHILE $IN[1]\nWAIT SEC 0.1\nENDWHILE",
+    ";FOLD x\n$OUT[5]=TRUE\n;ENDFOLD",
+    "{% for n in (5, 6) %}$OUT[{{ n }}]=TRUE\n{% endfor %}",
+    "{% if rpm > 5 %}HALT{% endif %}",
+]
 
 
 def cell_with(tmp_path, template, code="M8"):

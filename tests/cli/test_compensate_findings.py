@@ -1,4 +1,4 @@
-"""What is found about the cut stays found where the targets are moved."""
+"""Findings about the cut are kept when the targets are moved."""
 
 import json
 

@@ -22,8 +22,11 @@ def test_explains_a_code_as_it_is_printed(word: str, capsys: pytest.CaptureFixtu
     first, *rest = text.splitlines()
     assert first == "spindle-off: error, warning"
     assert [line.split()[0] for line in rest if line.startswith("  ") and line[2] != " "] == [
-        "why", "example", "remedy", "allow",
-    ]  # fmt: skip
+        "why",
+        "example",
+        "remedy",
+        "allow",
+    ]
     assert "M6 stops the spindle" in text
     assert max(map(len, rest)) <= 100
 

@@ -23,7 +23,7 @@ def _part(folder: Path, lines: list[str]) -> str:
 
 
 def _cuts(count: int, before: str = "G0 Z5") -> list[str]:
-    """Stretches of feed, each parted from the next by a rapid."""
+    """Stretches of feed, separated by rapids."""
     return [line for k in range(count) for line in (before, f"G0 X{100 + k} Y0", "G1 Z-1 F500", "G1 Y10")]
 
 

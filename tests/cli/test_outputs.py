@@ -1,4 +1,5 @@
-"""File and DEF alike, no input overwritten, a prediction's folder its own; what cannot be read or written."""
+"""Equal names of file and DEF, no input overwritten, foreign folders, files that cannot be read or
+written."""
 
 import json
 import os
@@ -41,12 +42,28 @@ def hidden(folder):
 # --- names ------------------------------------------------------------------------------------------------
 
 BAD = {
-    "circ": "CIRC_1", "1abc": "P_1ABC", "a_name_of_more_than_24_characters": "A_NAME_OF_MORE_THAN_24_C",
-    "two words": "TWO_WORDS", "teil-ä": "TEIL", "part.v2": "PART_V2", "sps": "SPS_1", "bas": "BAS_1",
-    "ir_stopm": "IR_STOPM_1", "p00": "P00_1", "cell": "CELL_1", "MsgLib": "MSGLIB_1", "$config": "CONFIG_1",
-    "config": "CONFIG_1", "usertech": "USERTECH_1", "con": "CON_1", "lpt1": "LPT1_1", "sqrt": "SQRT_1",
-    "set_krlmsg": "SET_KRLMSG_1", "gk_pilot": "P_GK_PILOT", "gk_rsi_lost": "P_GK_RSI_LOST",
-}  # fmt: skip
+    "circ": "CIRC_1",
+    "1abc": "P_1ABC",
+    "a_name_of_more_than_24_characters": "A_NAME_OF_MORE_THAN_24_C",
+    "two words": "TWO_WORDS",
+    "teil-ä": "TEIL",
+    "part.v2": "PART_V2",
+    "sps": "SPS_1",
+    "bas": "BAS_1",
+    "ir_stopm": "IR_STOPM_1",
+    "p00": "P00_1",
+    "cell": "CELL_1",
+    "MsgLib": "MSGLIB_1",
+    "$config": "CONFIG_1",
+    "config": "CONFIG_1",
+    "usertech": "USERTECH_1",
+    "con": "CON_1",
+    "lpt1": "LPT1_1",
+    "sqrt": "SQRT_1",
+    "set_krlmsg": "SET_KRLMSG_1",
+    "gk_pilot": "P_GK_PILOT",
+    "gk_rsi_lost": "P_GK_RSI_LOST",
+}
 
 
 @pytest.mark.parametrize("stem", BAD)
@@ -142,8 +159,10 @@ endsolid s
         ({"part.nc": "a_ETH.xml"}, ["a_ETH.xml", "-o", "b.src", "--online", "a"]),
         ({"cell.toml": "part.dat"}, ["part.nc", "-o", "part.src", "--cell", "part.dat"]),
         ({"cell.toml": "part.src"}, ["part.nc", "--cell", "part.src"]),
-        ({"part.nc": "p.png"},
-         ["p.png", "-o", "b.src", "--compensate", "offline", "--compensate-plot", "p.png"]),
+        (
+            {"part.nc": "p.png"},
+            ["p.png", "-o", "b.src", "--compensate", "offline", "--compensate-plot", "p.png"],
+        ),
         ({"part.nc": "p.stl"}, ["predict", "p.stl", "-o", "new", "--part", "p.stl"]),
         ({}, ["predict", "part.nc", "--cell", "cell.toml", "-o", "new", "--part", "stock.stl"]),
         ({}, ["predict", "part.nc", "--cell", "cell.toml", "-o", "new", "--part", "./link.stl"]),
@@ -153,21 +172,27 @@ endsolid s
         ({}, ["identify", "controller", "trace.csv", "--plot", "trace.csv"]),
         ({"trace.csv": "t.png"}, ["identify", "controller", "t.png", "--plot", "t.png"]),
         ({"trace.csv": "t.toml"}, ["identify", "controller", "t.toml", "--apply", "t.toml"]),
-        ({"cell.toml": "c.png"},
-         ["identify", "controller", "trace.csv", "--plot", "c.png", "--cell", "c.png"]),
+        (
+            {"cell.toml": "c.png"},
+            ["identify", "controller", "trace.csv", "--plot", "c.png", "--cell", "c.png"],
+        ),
         ({}, ["identify", "sensor", "trace.csv", "-o", "trace.csv"]),
         ({}, ["identify", "sensor", "trace.csv", "-o", "cell.toml", "--cell", "cell.toml"]),
         ({}, ["identify", "force", "run", "--apply", "run/force.csv"]),
         ({}, ["diagnose", "prediction", "run", "--apply", "run/run.toml"]),
         ({}, ["online", "replay", "run", "-o", "run/force.csv"]),
         ({"cell.toml": "run/run.toml"}, ["online", "serve", "--cell", "run/run.toml", "-o", "run"]),
-        ({"cell.toml": "run/deviation.png"},
-         ["online", "simulate", "--cell", "run/deviation.png", "--plot", "run"]),
-        ({"cell.toml": "run/a_ETH.xml"},
-         ["online", "serve", "--files", "run", "--name", "a", "--cell", "run/a_ETH.xml"]),
+        (
+            {"cell.toml": "run/deviation.png"},
+            ["online", "simulate", "--cell", "run/deviation.png", "--plot", "run"],
+        ),
+        (
+            {"cell.toml": "run/a_ETH.xml"},
+            ["online", "serve", "--files", "run", "--name", "a", "--cell", "run/a_ETH.xml"],
+        ),
         ({"cell.toml": "run/spin.csv"}, ["stiffness-map", "--cell", "run/spin.csv", "-o", "run"]),
     ],
-)  # fmt: skip
+)
 def test_no_input_is_overwritten(run, part, tmp_path, rename, arguments):
     (tmp_path / "run").mkdir()
     contents = {"cell.toml": CELL, "stock.stl": STOCK, "trace.csv": "t_s\n", "run/force.csv": "t_s\n"}
@@ -200,7 +225,7 @@ def test_a_base_that_a_cell_names_is_an_input(run, part, tmp_path):
 
 
 def test_parts_are_compared_when_they_are_written(run, tmp_path):
-    """How many there will be is not known before."""
+    """The number of parts is not known beforehand."""
     moves = "".join(f"G1 X{10 * (k % 2)} Y{0.5 * k:.1f}\n" for k in range(300))
     (tmp_path / "LONG_002.src").write_text(PART.replace("G0 Z20\nM5", f"{moves}G0 Z20\nM5"))
     before = (tmp_path / "LONG_002.src").read_bytes()
@@ -278,9 +303,15 @@ def shell(tmp_path, command):
     environment = {**os.environ, "PYTHONPATH": str(root), "MPLBACKEND": "Agg"}
     text = command.replace("gcode2krl", f'"{sys.executable}" -m gcode2krl')
     return subprocess.run(
-        ["bash", "-c", text], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120,
-        stdin=subprocess.DEVNULL, check=False,
-    )  # fmt: skip
+        ["bash", "-c", text],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
 
 
 FULL = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
@@ -357,6 +388,8 @@ def test_names_with_spaces_and_umlauts(run, part, tmp_path):
     done = run(folder / "mein Teil ä.nc", "--json")
     assert done.code == 0
     assert [Path(file).name for file in json.loads(done.out)["files"]] == [
-        "MEIN_TEIL.src", "MEIN_TEIL.dat", "MEIN_TEIL.pilot.csv"
-    ]  # fmt: skip
+        "MEIN_TEIL.src",
+        "MEIN_TEIL.dat",
+        "MEIN_TEIL.pilot.csv",
+    ]
     assert run("predict", folder / "mein Teil ä.nc", "-o", folder / "vor her").code == 0

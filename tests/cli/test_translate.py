@@ -38,9 +38,17 @@ def test_every_example_is_translated_verified_and_verifies_again(run, tmp_path, 
 def test_json_has_every_key_of_the_contract(run, part):
     result = json.loads(run(part, "-o", "part.src", "--json").out)
     assert set(result) == {
-        "files", "moves", "time_s", "path_mm", "max_force_N", "max_deflection_mm", "corner_error_mm",
-        "verify", "pilot", "issues",
-    }  # fmt: skip
+        "files",
+        "moves",
+        "time_s",
+        "path_mm",
+        "max_force_N",
+        "max_deflection_mm",
+        "corner_error_mm",
+        "verify",
+        "pilot",
+        "issues",
+    }
     assert result["moves"] == 5
     assert result["path_mm"] == pytest.approx(52 + 50 + 52, abs=0.1)  # corners cut a little of it
     assert 52 / 10 + 50 / 25 + 52 / 200 < result["time_s"] < 9

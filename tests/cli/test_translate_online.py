@@ -102,7 +102,7 @@ def test_not_on_standard_output(run, tmp_path):
 
 
 def test_both_compensations_need_a_word(translate, run, tmp_path):
-    """Its band must be known well enough for the offline one."""
+    """The band must be narrow enough for offline compensation."""
     sure = "[material]\nrelative_band = 0.1\n[stock]\nbox_mm = [[-20, -20, -9], [60, 20, 0]]\n"
     (tmp_path / "cell.toml").write_text(CELL + sure, encoding="utf-8")
     options = ("--online", "A", "--compensate", "offline", "--both")

@@ -1,4 +1,4 @@
-"""Offline compensation on stand-in forces: exact where the answer is known, refused where it would guess."""
+"""Offline compensation on stand-in forces: exact where the answer is known, refused where it is uncertain."""
 
 import io
 from dataclasses import replace
@@ -68,9 +68,16 @@ def standing_in(law, cell, band=0.3):
         rows = len(motion)
         nothing = np.zeros(rows)
         forces = Forces(
-            force_base_N=law(motion), moment_base_Nmm=np.zeros((rows, 3)), peak_N=nothing, torque_Nmm=nothing,
-            a_p_mm=nothing, a_e_mm=nothing, phi_rad=np.zeros((rows, 2)), tool=motion.tool, relative_band=band,
-        )  # fmt: skip
+            force_base_N=law(motion),
+            moment_base_Nmm=np.zeros((rows, 3)),
+            peak_N=nothing,
+            torque_Nmm=nothing,
+            a_p_mm=nothing,
+            a_e_mm=nothing,
+            phi_rad=np.zeros((rows, 2)),
+            tool=motion.tool,
+            relative_band=band,
+        )
         return motion, joints, forces, compliance.deflect(joints, forces, cell)
 
     return evaluate

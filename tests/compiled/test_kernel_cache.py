@@ -31,19 +31,23 @@ ASK = "from pack.caller import total; print(total(1), sum(total.stats.cache_hits
 
 
 def ask(program, folder, **environment):
-    """Return what a program prints that runs in a folder, in a process of its own."""
+    """Return the output of a program that runs in a folder, in a separate process."""
     paths = os.pathsep.join([str(folder), str(PACKAGE.parent)])
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=300,
+        [sys.executable, "-c", program],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
         env={**kept, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1", **environment},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
 
 def rewrite(path, old, new):
-    """Change a file so that neither its size nor its time tells."""
+    """Change a file without changing its size or time."""
     times = path.stat()
     text = path.read_text(encoding="utf-8")
     assert text.count(old) == 1
@@ -106,7 +110,7 @@ def test_unchanged_sources_keep_their_kernels(tmp_path, monkeypatch):
 
 
 def test_kernels_of_unknown_sources_are_dropped(tmp_path, monkeypatch):
-    """Those that an earlier version has left."""
+    """Kernels of an earlier version."""
     monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     (tmp_path / "callee.py").write_text("a", encoding="ascii")
     (tmp_path / "__pycache__").mkdir()
@@ -117,7 +121,7 @@ def test_kernels_of_unknown_sources_are_dropped(tmp_path, monkeypatch):
 
 
 class Names:
-    """What names of the package's files rest on, by reading them."""
+    """Dependencies of the names in the package's files, from their source."""
 
     def __init__(self):
         self._trees = {}
@@ -163,7 +167,7 @@ def defined(node):
 
 
 def names_in(node):
-    """Return the names that a statement's value rests on; types say nothing to a kernel."""
+    """Return the names that a statement's value depends on; types do not affect a kernel."""
     if isinstance(node, ast.FunctionDef):
         parts = [*node.body, *node.decorator_list]
     elif isinstance(node, ast.ClassDef):
@@ -218,6 +222,6 @@ import scipy.linalg.cython_blas
 
 
 def test_numba_starts_without_linear_algebra_and_finds_it_when_asked():
-    """In a process of its own, because whatever the tests have imported stays imported."""
+    """In a separate process, because modules that the tests have imported stay imported."""
     result = subprocess.run([sys.executable, "-c", QUICK_START], capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr

@@ -21,7 +21,7 @@ PHI = (np.arange(3600) + 0.5) * math.pi / 3600
 
 @dataclass(frozen=True)
 class Scene:
-    """A flat mill on a way through a stock."""
+    """A flat mill on a path through a stock."""
 
     name: str
     top: Callable  # (x, y) -> height of the raw stock, -inf where there is none
@@ -30,7 +30,7 @@ class Scene:
     corners: np.ndarray  # (c, 3)
     radius_mm: float = 8.0
     step_mm: float = 0.5
-    steady: tuple = field(default=())  # ways along the path between which the engagement does not change
+    steady: tuple = field(default=())  # places on the path between which the engagement does not change
 
     def field(self, cell_mm: float) -> HeightField:
         """The stock at the middle of cells that fill its bounds; the bounds are faces of a block in it."""
@@ -43,7 +43,7 @@ class Scene:
         return HeightField(height, low, size, -30.0)
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, 3) every step, corners included, and their way (n,)."""
+        """Points (n, 3) every step, corners included, and their place on the path (n,)."""
         points, ways, way = [self.corners[:1]], [np.zeros(1)], 0.0
         for a, b in zip(self.corners, self.corners[1:], strict=False):
             length = float(np.linalg.norm(b - a))
@@ -54,7 +54,7 @@ class Scene:
         return np.concatenate(points), np.concatenate(ways)
 
     def exact(self, way: float) -> np.ndarray:
-        """Feed, normal and axial force where the cutter stands after a way, N."""
+        """Feed, normal and axial force at a place on the path, N."""
         here, before, direction = self._history(way)
         feed, normal = direction[:2], np.array([-direction[1], direction[0]])
         rim = here[:2] + self.radius_mm * (np.sin(PHI)[:, None] * feed + np.cos(PHI)[:, None] * normal)
@@ -128,17 +128,38 @@ def transitions() -> list[Scene]:
     wide_low, wide_high = (-32.0, -32.0), (32.0, 32.0)
     return [
         Scene("slot", shape, low, high, straight, steady=(25, 45)),
-        Scene("slot, off the grid", box(off_low, off_high), off_low, off_high,
-              straight + np.array([0.0173, 0.0311, 0.0]), step_mm=0.37, steady=(25, 45)),
-        Scene("slot and stock turned 30°", turned(shape, 30), wide_low, wide_high,
-              turn(straight, 30), step_mm=0.37, steady=(25, 45)),
-        Scene("slot and stock turned 77°, short steps", turned(shape, 77), wide_low, wide_high,
-              turn(straight, 77), step_mm=0.05, steady=(25, 45)),
-    ]  # fmt: skip
+        Scene(
+            "slot, off the grid",
+            box(off_low, off_high),
+            off_low,
+            off_high,
+            straight + np.array([0.0173, 0.0311, 0.0]),
+            step_mm=0.37,
+            steady=(25, 45),
+        ),
+        Scene(
+            "slot and stock turned 30°",
+            turned(shape, 30),
+            wide_low,
+            wide_high,
+            turn(straight, 30),
+            step_mm=0.37,
+            steady=(25, 45),
+        ),
+        Scene(
+            "slot and stock turned 77°, short steps",
+            turned(shape, 77),
+            wide_low,
+            wide_high,
+            turn(straight, 77),
+            step_mm=0.05,
+            steady=(25, 45),
+        ),
+    ]
 
 
 def steady_scenes() -> list[Scene]:
-    """Cuts whose engagement is constant over some way, or changes within a corner."""
+    """Cuts whose engagement is constant over some distance, or changes within a corner."""
     low, high = (-25.0, -20.0), (25.0, 20.0)
     shape = box(low, high)
     wide_low, wide_high = (-33.0, -33.0), (33.0, 33.0)
@@ -149,21 +170,56 @@ def steady_scenes() -> list[Scene]:
     def step(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.where(y > 2.3, shape(x, y), shape(x, y) - 3.0)
 
-    pocket = way((-12, -6, -5), (6, -6, -5), (6, 12, -5), (-12, 12, -5), (-12, -5, -5),
-                 (-11, -10, -5), (10, -10, -5), (10, 12, -5))  # fmt: skip
+    pocket = way(
+        (-12, -6, -5),
+        (6, -6, -5),
+        (6, 12, -5),
+        (-12, 12, -5),
+        (-12, -5, -5),
+        (-11, -10, -5),
+        (10, -10, -5),
+        (10, 12, -5),
+    )
     return [
         Scene("half immersion, up", shape, low, high, up, steady=(25, 50)),
         Scene("half immersion, down", shape, low, high, down, steady=(25, 50)),
-        Scene("half immersion, down, turned 30°", turned(shape, 30), wide_low, wide_high,
-              turn(down, 30), step_mm=0.43, steady=(25, 50)),
+        Scene(
+            "half immersion, down, turned 30°",
+            turned(shape, 30),
+            wide_low,
+            wide_high,
+            turn(down, 30),
+            step_mm=0.43,
+            steady=(25, 50),
+        ),
         Scene("0.5 mm beside a face", shape, low, high, thin, steady=(25, 50)),
         Scene("0.63 mm beside a slot", shape, low, high, second, steady=(225, 250)),
-        Scene("0.63 mm beside a slot, turned 30°", turned(shape, 30), wide_low, wide_high,
-              turn(second, 30), step_mm=0.41, steady=(225, 250)),
+        Scene(
+            "0.63 mm beside a slot, turned 30°",
+            turned(shape, 30),
+            wide_low,
+            wide_high,
+            turn(second, 30),
+            step_mm=0.41,
+            steady=(225, 250),
+        ),
         Scene("step in the stock", step, low, high, way((-35, 0, -5), (35, 0, -5)), steady=(25, 50)),
-        Scene("step in the stock, turned 30°", turned(step, 30), wide_low, wide_high,
-              turn(way((-35, 0, -5), (35, 0, -5)), 30), steady=(25, 50)),
+        Scene(
+            "step in the stock, turned 30°",
+            turned(step, 30),
+            wide_low,
+            wide_high,
+            turn(way((-35, 0, -5), (35, 0, -5)), 30),
+            steady=(25, 50),
+        ),
         Scene("pocket corner", shape, low, high, pocket, step_mm=0.5, steady=(85, 112)),
-        Scene("pocket corner, turned 30°", turned(shape, 30), wide_low, wide_high,
-              turn(pocket, 30), step_mm=0.5, steady=(85, 112)),
-    ]  # fmt: skip
+        Scene(
+            "pocket corner, turned 30°",
+            turned(shape, 30),
+            wide_low,
+            wide_high,
+            turn(pocket, 30),
+            step_mm=0.5,
+            steady=(85, 112),
+        ),
+    ]

@@ -1,4 +1,4 @@
-"""The guessed top of the stock: a mistake does not set the scale that it is judged by."""
+"""The guessed top of the stock: a mistake in the program does not change it."""
 
 import io
 import itertools

@@ -1,4 +1,4 @@
-"""The field: what strips take out and bring back, where cells lie, what is left."""
+"""The field: strips copied out and back, positions of cells, remaining material."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Rapids that go down into material are seen however slowly they go, and sound ones are not blamed."""
+"""Rapids that go down into material are found however slow they are, and sound ones are not reported."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,13 @@ def test_what_rapids_meet_does_not_depend_on_the_strips(angle_deg):
         law = linear_edge_law(np.eye(6)[0])
         for threads in (1, 2, 3, 4):
             engaged = engage(
-                block(box, 0.2), position, np.zeros(len(along), np.int32), rapid, np.full(len(along), 0.05),
-                [tool], law, threads=threads,
-            )  # fmt: skip
+                block(box, 0.2),
+                position,
+                np.zeros(len(along), np.int32),
+                rapid,
+                np.full(len(along), 0.05),
+                [tool],
+                law,
+                threads=threads,
+            )
             assert engaged.overlap_mm[:, 0].max() < 0.01, threads

@@ -1,4 +1,4 @@
-"""The raw part: block, mesh and guess become the same field; what is left becomes a closed mesh."""
+"""The raw part: block, mesh and guess become the same field; the remaining material becomes a closed mesh."""
 
 import io
 

@@ -118,7 +118,7 @@ def test_slot_of_round_cutters_is_the_closed_form(tool, a_p_mm, degrees):
     middle = len(position) // 2
     wanted = mean_force(
         [0.0, math.pi], a_p_mm, 0.1, 3, tool.diameter_mm, tool.corner_radius_mm, COEFFICIENTS
-    )[0]  # fmt: skip
+    )[0]
     found = local(position, result.force_N)[middle]
     assert np.linalg.norm(found - wanted) < 0.01 * np.linalg.norm(wanted)
     assert result.a_p_mm[middle] == pytest.approx(a_p_mm, abs=1e-3)
@@ -143,7 +143,7 @@ def test_ramp_down_is_the_closed_form(tool, ramp_deg):
     assert level == pytest.approx(math.radians(ramp_deg))
     wanted = mean_force(
         [-math.pi / 2, 1.5 * math.pi], depth, 0.1, 3, 16.0, tool.corner_radius_mm, COEFFICIENTS, level
-    )[0]  # fmt: skip
+    )[0]
     found = local(position, result.force_N)[row]
     assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted)
     assert result.centre_mm[row] > 0

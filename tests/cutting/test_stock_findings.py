@@ -1,4 +1,4 @@
-"""What the stated stock, the tools' reach and the rapid moves tell of a program."""
+"""Findings from the stated stock, the reach of the tools and the rapid moves."""
 
 import io
 

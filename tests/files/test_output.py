@@ -1,4 +1,4 @@
-"""Files written together: all or none, never over an input, nothing left of a killed run."""
+"""Files written together: all or none, never over an input, no leftovers of a killed run."""
 
 import os
 import signal
@@ -146,7 +146,7 @@ def test_a_run_that_lives_keeps_its_files(tmp_path):
 
 
 def iter_host(folder):
-    """Yield the word by which the names tell this host."""
+    """Yield the part of a file name that identifies this host."""
 
     def look(path):
         found.append(path.name)
@@ -163,8 +163,11 @@ def test_only_what_is_surely_left_and_ours_is_removed(tmp_path):
         ".a.src.deadbeef-1-abcd1234.part",  # of another host
         f".a.src.{host}-{os.getpid()}-abcd1234.part",  # our own
         f".b.src.{host}-999999999-abcd1234.part",  # of another target
-        "a.src.part", ".a.src.part", ".a.src.notes.part", ".a.src.swp",
-    ]  # fmt: skip
+        "a.src.part",
+        ".a.src.part",
+        ".a.src.notes.part",
+        ".a.src.swp",
+    ]
     gone = [f".a.src.{host}-999999999-abcd1234.part", f".a.src.{host}-999999999-abcd1234.old"]
     aged = [".a.src.deadbeef-1-zzzz1234.part", ".a.src.zzzz1234.part"]
     for name in [*kept, *gone, *aged]:

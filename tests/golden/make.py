@@ -1,4 +1,4 @@
-"""Write the golden programs anew; read the difference as an integrator would before committing it."""
+"""Write the golden programs again; review the difference as an integrator would before committing it."""
 
 import tempfile
 from pathlib import Path

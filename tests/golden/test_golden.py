@@ -1,4 +1,4 @@
-"""Whole programs compared byte for byte; after a wanted change: ``python tests/golden/make.py``."""
+"""Whole programs compared byte for byte; after an intended change: ``python tests/golden/make.py``."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""Identification recovers what made a trace; the traces come from brute force, not from the planner."""
+"""Identification recovers the parameters of a trace; the traces come from brute force, not from the
+planner."""
 
 import io
 import json
@@ -255,7 +256,7 @@ def test_wrong_traces_are_told(targets, text, cell):
         (changed(trace, slice(0, half)), "the program 37; it ends before G-code line"),
         (changed(trace, position_mm=np.add(trace.position_mm, [0, 0, 12.5])), r"shifted .*12\.500"),
         (changed(trace, position_mm=trace.position_mm * 0.001), "column x_cmd_mm .* metres"),
-        (longer, "the trace has 39 sections .* the program 37; they part at standstill"),
+        (longer, "the trace has 39 sections .* the program 37; they differ at standstill"),
     )
     for wrong, words in cases:
         with pytest.raises(NotUnderstoodError, match=words):

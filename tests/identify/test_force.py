@@ -1,4 +1,4 @@
-"""Coefficients come back from forces that other coefficients made; what is not there is refused."""
+"""Coefficients are recovered from forces made with them; coefficients that are not determined are refused."""
 
 import json
 

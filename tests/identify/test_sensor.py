@@ -203,9 +203,11 @@ def test_hose_pack_is_taken_off_between_the_orientations():
     between = [(a, b, c) for a in (-30, 40) for b in (60, 115) for c in (-35, 25)]
     new = drawn(between, with_hose=True, **WITHOUT_NOISE)
     plain = found.calibration.model_copy(
-        update={"force_terms_N": Calibration.model_fields["force_terms_N"].default,
-                "moment_terms_Nmm": Calibration.model_fields["moment_terms_Nmm"].default}
-    )  # fmt: skip
+        update={
+            "force_terms_N": Calibration.model_fields["force_terms_N"].default,
+            "moment_terms_Nmm": Calibration.model_fields["moment_terms_Nmm"].default,
+        }
+    )
     rest, without = (
         compensate(new.force_N, new.moment_Nmm, new.rotation, c) for c in (found.calibration, plain)
     )
@@ -259,7 +261,7 @@ def test_noise_alone_gets_no_terms_and_few_or_like_orientations_neither():
     alike = [(a, b, 0.0) for a in range(-60, 61, 30) for b in (20, 60, 100, 140)]
     flat = identify_sensor(drawn([*alike, (0.0, 90.0, 20.0)]))
     assert not np.any(flat.calibration.force_terms_N)
-    assert "too much alike" in flat.issues[0].message
+    assert "too similar" in flat.issues[0].message
 
 
 # --- compensation and transfer --------------------------------------------------------------------------

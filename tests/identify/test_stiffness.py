@@ -144,11 +144,17 @@ def test_another_robot_and_another_stiffness(monkeypatch):
     )
     a1, a2, c1, c2, c3, c4 = cell.robot.geometry.array()
     steps = {
-        "A1": (0, 0, c1, 0), "A2": (-90, a1, 0, 0),
-        "linked_arm": (0, c2 / 2, 0, 0), "A3": (0, c2 / 2, 0, -90),
-        "arm": (-90, -a2, c3 / 2, 0), "A4": (0, 0, c3 / 2, 0), "A5": (90, 0, 0, 0), "A6": (-90, 0, c4, 180),
-        "sensor": (0, 0, 20, 0), "spindle": (0, 0, 20, 0),
-    }  # fmt: skip
+        "A1": (0, 0, c1, 0),
+        "A2": (-90, a1, 0, 0),
+        "linked_arm": (0, c2 / 2, 0, 0),
+        "A3": (0, c2 / 2, 0, -90),
+        "arm": (-90, -a2, c3 / 2, 0),
+        "A4": (0, 0, c3 / 2, 0),
+        "A5": (90, 0, 0, 0),
+        "A6": (-90, 0, c4, 180),
+        "sensor": (0, 0, 20, 0),
+        "spindle": (0, 0, 20, 0),
+    }
     monkeypatch.setattr(make, "FRAMES", steps)
     truth = {name: tuple(1.7 * k for k in reversed(values)) for name, values in make.TABLE_1.items()}
     rows = clean_rows(stiffness=truth)

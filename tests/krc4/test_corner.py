@@ -276,7 +276,7 @@ def test_corners_that_meet_in_the_middle_of_a_line(run_program):
 
 
 def test_corner_between_unequal_speeds_runs_at_the_slower(run_program):
-    """The change takes longer than the corner: slowing ends before it, speeding up begins after it."""
+    """The speed changes longer than the corner lasts: braking ends before it, acceleration starts after."""
     p = triangle(100, 100, 90)
     cdis, cosine = 0.5, np.sqrt(0.5)
     for speeds in ((60, 20), (20, 60)):

@@ -41,7 +41,7 @@ def test_same_chain_and_motion(monkeypatch, make_cell, read, text, rows, cdis_mm
 
 
 def test_speeds_that_change_in_wide_corners_multiply_up_to_the_next_stop(make_cell, read):
-    """Behind each such corner lengths count v2/v1 times as before; an exact stop starts anew."""
+    """After each such corner lengths are scaled by v2/v1; an exact stop resets the scale."""
     points = [(x, y, 0) for x, y in [(0, 0), (200, 0), (200, 200), (0, 200), (0, 0), (200, 0), (200, 200)]]
     speeds = [50.0, 60.0, 90.0, 45.0, 45.0, 30.0]
     text = polyline(points, speeds)

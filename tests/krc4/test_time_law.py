@@ -233,8 +233,10 @@ def test_effective_acceleration_takes_arrays():
 
 
 @given(
-    length=st.floats(0.5, 200), speed=st.floats(10, 1000), a_m_s2=st.sampled_from([0.5, 2.0, 4.0]),
-)  # fmt: skip
+    length=st.floats(0.5, 200),
+    speed=st.floats(10, 1000),
+    a_m_s2=st.sampled_from([0.5, 2.0, 4.0]),
+)
 @few
 def test_bounds_on_one_line(run_program, length, speed, a_m_s2):
     motion = run_program(straight([length], [speed]), dt_s=0.002, acc_cp_m_s2=a_m_s2)
@@ -253,10 +255,16 @@ def test_bounds_on_one_line(run_program, length, speed, a_m_s2):
 @pytest.mark.parametrize(
     ("v0", "v1", "a", "k_s"),
     [
-        (0, 600, 2000, K_S), (0, 200, 4000, K_S), (100, 30, 2000, K_S), (30, 100, 500, K_S),
-        (500, 0, 4000, K_S), (50, 50.01, 2000, K_S), (0, 336, 2000, K_S), (20, 300, 2000, 0.012),
+        (0, 600, 2000, K_S),
+        (0, 200, 4000, K_S),
+        (100, 30, 2000, K_S),
+        (30, 100, 500, K_S),
+        (500, 0, 4000, K_S),
+        (50, 50.01, 2000, K_S),
+        (0, 336, 2000, K_S),
+        (20, 300, 2000, 0.012),
     ],
-)  # fmt: skip
+)
 def test_speed_step_is_the_double_average(v0, v1, a, k_s):
     length = abs(v1 - v0) / a
     wanted = oracle.pulses([(0.0, v1 - v0, length)], k_s, length + k_s + 0.1, v0)
@@ -321,11 +329,16 @@ def test_feed_of_each_move_is_kept(run_program, lines):
     assert (motion.speed_mm_s <= np.array(speeds)[on] * (1 + 1e-6))[inside].all()
 
 
-@pytest.mark.parametrize("text", [
-    straight([50], [75]), straight([1.5], [400]), straight([80, 60, 70], [100, 30, 60]),
-    straight([10, 0.5, 12], [50, 75, 20], "G61"),
-    HEAD + "G64\nG0 X0 Y0 Z0\nG1 Y40 F3000\nG1 X30 Y60\nG1 X30 Y20\nM30\n",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        straight([50], [75]),
+        straight([1.5], [400]),
+        straight([80, 60, 70], [100, 30, 60]),
+        straight([10, 0.5, 12], [50, 75, 20], "G61"),
+        HEAD + "G64\nG0 X0 Y0 Z0\nG1 Y40 F3000\nG1 X30 Y60\nG1 X30 Y20\nM30\n",
+    ],
+)
 def test_doubling_the_samples_changes_nothing(run_program, text):
     once = run_program(text, dt_s=0.012, cdis_mm=5.0)
     twice = run_program(text, dt_s=0.006, cdis_mm=5.0)
@@ -366,9 +379,10 @@ def test_reversed_program_mirrors_the_path(run_program, points, speed):
 
 
 @given(
-    pieces=st.lists(st.floats(0.2, 40), min_size=2, max_size=12), speed=st.sampled_from([20.0, 75.0, 400.0]),
+    pieces=st.lists(st.floats(0.2, 40), min_size=2, max_size=12),
+    speed=st.sampled_from([20.0, 75.0, 400.0]),
     law=st.sampled_from(["averages", "trapezoid"]),
-)  # fmt: skip
+)
 @few
 def test_collinear_pieces_are_one_line(run_program, pieces, speed, law):
     pieces = [round(piece, 3) for piece in pieces]
@@ -384,9 +398,10 @@ def test_collinear_pieces_are_one_line(run_program, pieces, speed, law):
 @given(
     lines=st.lists(
         st.tuples(st.floats(0.1, 60), st.sampled_from([10.0, 75.0, 400.0]), st.sampled_from([0.0, 0.1])),
-        min_size=1, max_size=5,
+        min_size=1,
+        max_size=5,
     )
-)  # fmt: skip
+)
 @few
 def test_random_exact_stops(run_program, lines):
     text, y = HEAD + "G61\nG0 X0 Y-150 Z0\n", -150.0

@@ -13,7 +13,7 @@ from gcode2krl.online.telegram import answer_text, parse
 
 @dataclass
 class Log:
-    """What a session did, a row a telegram."""
+    """Record of a session, a row for each telegram."""
 
     sent: list = field(default_factory=list)
     phase: list = field(default_factory=list)

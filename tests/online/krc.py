@@ -16,9 +16,21 @@ class Krc:
     """One robot standing or moving in ``$BASE``, the correction applied after some cycles and a lag."""
 
     def __init__(
-        self, cell, *, cycle_ms=4, relative=False, dead_cycles=1, lag_s=0.0, decimals=4, ipoc=123456,
-        start_mm=(50.0, 0.0, 40.0), stands_s=1.0, speed_mm_s=25.0, axis=False, ignores=False,
-    ):  # fmt: skip
+        self,
+        cell,
+        *,
+        cycle_ms=4,
+        relative=False,
+        dead_cycles=1,
+        lag_s=0.0,
+        decimals=4,
+        ipoc=123456,
+        start_mm=(50.0, 0.0, 40.0),
+        stands_s=1.0,
+        speed_mm_s=25.0,
+        axis=False,
+        ignores=False,
+    ):
         self.cell, self.cycle_ms, self.relative, self.decimals = cell, cycle_ms, relative, decimals
         self.lag_s, self.axis, self.ignores = lag_s, axis, ignores
         self.ipoc = ipoc
@@ -80,7 +92,7 @@ class Krc:
         return ET.tostring(root)
 
     def take(self, answer):
-        """Take an answer, None where none came, and go on to the next cycle."""
+        """Take an answer, None if there is none, and go on to the next cycle."""
         correction = None
         if answer is not None:
             root = ET.fromstring(answer)
@@ -97,7 +109,7 @@ class Krc:
             self.late += 1
             self.ready = False
         else:
-            self.asked = correction  # HOLDON: what was asked for last stays
+            self.asked = correction  # HOLDON: the last correction is kept
         self.waiting.append(np.zeros_like(self.asked) if self.ignores else self.asked)
         now = self.waiting.popleft()
         target = self.applied + now if self.relative else now

@@ -1,4 +1,5 @@
-"""A bad network between a controller and the server: loses, delays, doubles, and adds what is no telegram."""
+"""A bad network between a controller and the server: loses, delays and doubles telegrams, and adds
+garbage."""
 
 import heapq
 import itertools
@@ -11,15 +12,15 @@ GARBAGE = (
     b"",
     b"\x00\xff" * 300,
     b"<Rob",
-    b"<Rob Type=\"KUKA\"><RIst X=\"1\"/></Rob>",
-    b"<!DOCTYPE x [<!ENTITY a \"aaaa\">]><Rob>&a;</Rob>",
+    b'<Rob Type="KUKA"><RIst X="1"/></Rob>',
+    b'<!DOCTYPE x [<!ENTITY a "aaaa">]><Rob>&a;</Rob>',
     b"<Rob><A><B/></A><IPOC>1</IPOC></Rob>",
     b"<Rob>" + b"<A/>" * 5000 + b"</Rob>",
-)  # fmt: skip
+)
 
 
 class Relay:
-    """Carries datagrams both ways; every share is a probability for each datagram."""
+    """Carries datagrams both ways; the rates are probabilities for each datagram."""
 
     def __init__(
         self, to_controller=None, *, lose=0.0, double=0.0, delay=0.0, delay_s=0.006, garbage=0.0, seed=1

@@ -1,4 +1,4 @@
-"""The blend of section 2.3: threshold, linear way over and back, and an estimate that is wrong."""
+"""The blend of section 2.3: threshold, linear blend to the estimate and back, and a wrong estimate."""
 
 import numpy as np
 

@@ -39,10 +39,14 @@ def test_simulate_gives_the_four_figures_and_its_settings(online):
 
 def test_options_change_the_figures_and_are_echoed(online):
     options = {
-        "--lead-ms": ("lead_ms", 10), "--threshold-N": ("threshold_N", 400), "--blend-ms": ("blend_ms", 160),
-        "--filter-ms": ("filter_ms", 30), "--robot-delay-ms": ("robot_delay_ms", 60),
-        "--feed-scale": ("feed_scale", 0.98), "--pilot-scale": ("pilot_scale", 0.8),
-    }  # fmt: skip
+        "--lead-ms": ("lead_ms", 10),
+        "--threshold-N": ("threshold_N", 400),
+        "--blend-ms": ("blend_ms", 160),
+        "--filter-ms": ("filter_ms", 30),
+        "--robot-delay-ms": ("robot_delay_ms", 60),
+        "--feed-scale": ("feed_scale", 0.98),
+        "--pilot-scale": ("pilot_scale", 0.8),
+    }
     plain = simulate(online)
     for option, (key, value) in options.items():
         found = simulate(online, option, value)
@@ -63,18 +67,27 @@ def test_simulate_says_it_to_a_person_and_draws(online, tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("simulate", "nothing.nc"), ("simulate", "slot.nc", "--feed-scale", "0"),
-        ("simulate", "slot.nc", "--filter-ms", "0"), ("simulate", "slot.nc", "--lead-ms", "-1"),
-        ("simulate", "slot.nc", "--blend-ms", "0"), ("simulate", "slot.nc", "--pilot-scale", "nan"),
-        ("simulate", "slot.nc", "--plot", "a/b/c"), ("replay", "nothing"), ("serve", "--port", "0"),
-        ("serve", "--address", "203.0.113.1"), ("serve", "--pilot", "nothing.csv"),
+        ("simulate", "nothing.nc"),
+        ("simulate", "slot.nc", "--feed-scale", "0"),
+        ("simulate", "slot.nc", "--filter-ms", "0"),
+        ("simulate", "slot.nc", "--lead-ms", "-1"),
+        ("simulate", "slot.nc", "--blend-ms", "0"),
+        ("simulate", "slot.nc", "--pilot-scale", "nan"),
+        ("simulate", "slot.nc", "--plot", "a/b/c"),
+        ("replay", "nothing"),
+        ("serve", "--port", "0"),
+        ("serve", "--address", "203.0.113.1"),
+        ("serve", "--pilot", "nothing.csv"),
         ("serve", "--files", "a", "--name", "much too long a name"),
-        ("serve", "--address", "the robot"), ("serve", "--tool", "99"),
-        ("serve", "--files", "a/b/c"), ("serve", "--most-mm", "99"), ("serve", "--address", "0.0.0.0"),
+        ("serve", "--address", "the robot"),
+        ("serve", "--tool", "99"),
+        ("serve", "--files", "a/b/c"),
+        ("serve", "--most-mm", "99"),
+        ("serve", "--address", "0.0.0.0"),
         ("serve", "--robot-address", "192.168.1.20"),
         ("serve", "--files", "a", "--address", "0.0.0.0", "--robot-address", "192.168.1.20"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_one_line_and_exit_code_2(online, arguments):
     outcome = online(*arguments)
     assert outcome.code == 2

@@ -1,4 +1,4 @@
-"""The whole chain: one sample at a time and as a stream, and against its parts written down again."""
+"""The whole chain: one sample at a time and as a stream, and against a second implementation of its parts."""
 
 from dataclasses import fields
 
@@ -27,18 +27,24 @@ from gcode2krl.units import RAD_PER_DEG
 
 COUNT = 400
 CALIBRATION = Calibration(
-    weight_N=400.0, centre_mm=(10.0, -5.0, 120.0), force_offset_N=(3.0, -2.0, 5.0),
-    moment_offset_Nmm=(100.0, 50.0, -70.0), force_terms_N=tuple((0.1 * k, 0.2, -0.1) for k in range(10)),
-)  # fmt: skip
+    weight_N=400.0,
+    centre_mm=(10.0, -5.0, 120.0),
+    force_offset_N=(3.0, -2.0, 5.0),
+    moment_offset_Nmm=(100.0, 50.0, -70.0),
+    force_terms_N=tuple((0.1 * k, 0.2, -0.1) for k in range(10)),
+)
 
 
 def pilot():
     time_s = np.array([0.2, 0.5, 1.2, 1.3])
     knots = Knots(
-        line=np.ones(4, dtype=np.int32), path_mm=25.0 * time_s, time_s=time_s, lead_s=np.full(4, 0.04),
+        line=np.ones(4, dtype=np.int32),
+        path_mm=25.0 * time_s,
+        time_s=time_s,
+        lead_s=np.full(4, 0.04),
         force_N=np.array([[0, 0, 0], [0, 400, 50], [0, 400, 50], [0, 0, 0.0]]),
         deflection_mm=np.zeros((4, 3)),
-    )  # fmt: skip
+    )
     return knots, PilotHeader("tcp", "index", "$SEN_PINT[1]", 0.04, 99)
 
 
@@ -62,9 +68,13 @@ def samples(cell, seed=1):
 def test_sample_by_sample_gives_the_bits_of_the_stream(cell, mode, frame):
     knots, header = pilot()
     device = build_compensator(
-        cell, Online(mode=mode), load_frame=frame, knots=knots, header=header,
+        cell,
+        Online(mode=mode),
+        load_frame=frame,
+        knots=knots,
+        header=header,
         calibration=CALIBRATION if frame == "sensor" else None,
-    )  # fmt: skip
+    )
     taken = samples(cell)
     _, whole = stream(device, start(device), taken)
     state, rows = start(device), []
@@ -150,7 +160,7 @@ def test_a_joint_limit_ahead_holds_the_correction(cell):
 
 
 def test_a_pose_out_of_reach_holds_it_too(cell):
-    q = np.array([0.0, -10.0, 2.0, 0.0, 5.0, 0.0]) * RAD_PER_DEG  # the arm all but stretched
+    q = np.array([0.0, -10.0, 2.0, 0.0, 5.0, 0.0]) * RAD_PER_DEG  # the arm nearly stretched
     shift = np.array([[400.0, 0.0, 0.0]])
     assert np.isnan(joints_at(q[None], shift, cell)).all()
 

@@ -1,4 +1,4 @@
-"""Filters against scipy and numpy, and whatever way a stream is cut."""
+"""Filters against scipy and numpy, and for any division of a stream."""
 
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ PROVEN = 250
 
 
 def steep(k):
-    """Return a load that rises to all the correction there may be."""
+    """Return a load that rises until the correction is at its limit."""
     return SIDE * min(max(k - PROVEN, 0) / 20.0, 4.0)
 
 
@@ -52,7 +52,7 @@ def test_a_network_that_loses_answers_makes_no_step_at_the_robot(cell, device, s
     rounding = 1e-4
     steps = np.linalg.norm(np.diff(np.array(asked), axis=0), axis=1)
     assert steps.max() <= limit + rounding
-    assert np.linalg.norm(asked[-1]) > 2.0 * limit  # it was corrected all the same
+    assert np.linalg.norm(asked[-1]) > 2.0 * limit  # there was a correction nevertheless
     check(log, settings)
 
 
@@ -103,7 +103,7 @@ def test_a_clock_that_lies(cell, device, settings, far):
 
 
 def test_everything_that_a_wild_controller_can_say(cell, device, settings):
-    """Now and then any number of a telegram is anything that can be parsed, in every phase."""
+    """Sometimes a number of a telegram is any value that can be parsed, in every phase."""
     rng = np.random.default_rng(7)
     names = ("position_mm", "command_mm", "q_rad", "q_command_rad", "monitor_mm", "load", "values")
     numbers = ("late", "knot", "checksum", "override_percent", "t1")

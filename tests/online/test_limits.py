@@ -1,4 +1,4 @@
-"""No correction leaves its sum, its rate and its step, whatever is wanted."""
+"""No correction leaves its sum, its rate and its step, whatever correction is wanted."""
 
 import numpy as np
 import pytest

@@ -95,7 +95,7 @@ def test_a_robot_that_was_started_anew_is_not_sent_the_old_correction(cell, axis
 
 @pytest.mark.parametrize("mm", [6.0, 1e9])
 def test_a_position_that_cannot_be_hides_no_restart(cell, device, mm):
-    """RIst jumps the way of the correction, so it looks as if the robot still had it."""
+    """RIst jumps in the direction of the correction, as if the robot still had it."""
     krc = Krc(cell, stands_s=0.3)
     session, _ = talk(device, krc, 300, load=ramp)
     sent = session.sent

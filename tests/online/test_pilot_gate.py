@@ -1,4 +1,4 @@
-"""The pilot is used when it fits, and in no cycle of a hundred cases in which it does not."""
+"""The pilot is used when it matches, and in no cycle of a hundred cases in which it does not."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_a_robot_within_5_percent_of_the_speed_is_followed(scale):
 
 def test_knots_are_not_run_ahead_of_their_announcement():
     time_s, position, told = run_of()
-    stopped = told._replace(knot=np.minimum(told.knot, 3.0))  # what follows the next one is never announced
+    stopped = told._replace(knot=np.minimum(told.knot, 3.0))  # later knots are never announced
     force, known, _ = used(time_s, position, stopped)
     assert force[known][-1, 0] == pytest.approx(200.0)
 

@@ -1,4 +1,4 @@
-"""What is written down: all of it, or it is counted."""
+"""Recorded lines: all are written, or counted as lost."""
 
 import io
 import threading

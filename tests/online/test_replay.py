@@ -71,9 +71,13 @@ def test_with_pilot_the_ends_are_better(cell, run):
     time_s = np.array([0.6, 1.0, 1.3, 2.6, 4.0, 4.3])
     share = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
     knots = Knots(
-        line=np.ones(6, dtype=np.int32), path_mm=25.0 * time_s, time_s=time_s, lead_s=np.full(6, 0.04),
-        force_N=share[:, None] * np.array([-100.0, 400.0, -60.0]), deflection_mm=np.zeros((6, 3)),
-    )  # fmt: skip
+        line=np.ones(6, dtype=np.int32),
+        path_mm=25.0 * time_s,
+        time_s=time_s,
+        lead_s=np.full(6, 0.04),
+        force_N=share[:, None] * np.array([-100.0, 400.0, -60.0]),
+        deflection_mm=np.zeros((6, 3)),
+    )
     header = PilotHeader("base", "index", "$SEN_PINT[1]", 0.04, 1)
     plain = as_json(replay(run[0], cell, Online(threshold_N=60.0)))
     piloted = as_json(replay(run[0], cell, Online(threshold_N=60.0), knots=knots, header=header))
@@ -86,9 +90,13 @@ def test_a_run_at_another_override_or_in_t1_has_no_pilot(cell, tmp_path, head):
     write_run(tmp_path / "run", cell, head=head)
     time_s = np.array([0.6, 1.0, 1.3, 2.6, 4.0, 4.3])
     knots = Knots(
-        line=np.ones(6, dtype=np.int32), path_mm=25.0 * time_s, time_s=time_s, lead_s=np.full(6, 0.04),
-        force_N=np.ones((6, 3)), deflection_mm=np.zeros((6, 3)),
-    )  # fmt: skip
+        line=np.ones(6, dtype=np.int32),
+        path_mm=25.0 * time_s,
+        time_s=time_s,
+        lead_s=np.full(6, 0.04),
+        force_N=np.ones((6, 3)),
+        deflection_mm=np.zeros((6, 3)),
+    )
     header = PilotHeader("base", "index", "$SEN_PINT[1]", 0.04, 1)
     found = as_json(replay(load_run(tmp_path / "run"), cell, Online(), knots=knots, header=header))
     assert "open" not in found["gate_cycles"]

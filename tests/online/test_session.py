@@ -1,4 +1,4 @@
-"""One session: the proof of the absolute mode, and what every fault ends in."""
+"""One session: the proof of the absolute mode, and the final state after every fault."""
 
 from dataclasses import replace
 
@@ -46,10 +46,12 @@ def rests(log, cycles=50):
 @pytest.mark.parametrize(
     "robot",
     [
-        {}, {"decimals": 2}, {"dead_cycles": 3, "lag_s": 0.012},
+        {},
+        {"decimals": 2},
+        {"dead_cycles": 3, "lag_s": 0.012},
         {"dead_cycles": 5, "lag_s": 0.03, "decimals": 2},
     ],
-)  # fmt: skip
+)
 def test_an_absolute_robot_is_proven_and_then_compensated(cell, device, settings, robot):
     krc = Krc(cell, **robot)
     session, log = talk(device, krc, 600, load=lambda k: SIDE if k > 300 else np.zeros(6))
@@ -260,10 +262,13 @@ def test_all_faults_at_once_come_to_rest(cell, device, settings):
 def pilot(form="index"):
     time_s = np.array([0.6, 0.75, 1.4, 1.5])
     knots = Knots(
-        line=np.ones(4, dtype=np.int32), path_mm=25.0 * time_s, time_s=time_s, lead_s=np.full(4, 0.04),
+        line=np.ones(4, dtype=np.int32),
+        path_mm=25.0 * time_s,
+        time_s=time_s,
+        lead_s=np.full(4, 0.04),
         force_N=np.array([[0, 0, 0], [0, 300, -50], [0, 310, -50], [0, 0, 0.0]]),
         deflection_mm=np.zeros((4, 3)),
-    )  # fmt: skip
+    )
     return knots, PilotHeader("base", form, "$SEN_PINT[1]", 0.04, 12345)
 
 

@@ -1,4 +1,4 @@
-"""The twin on a slot: what it says without faults, what each fault costs, and that luck has no say."""
+"""The twin on a slot: its figures without faults, the cost of each fault, and repeatability."""
 
 from dataclasses import replace
 

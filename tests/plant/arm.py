@@ -1,4 +1,4 @@
-"""Where the robot stands: screws of its reference pose, a product of exponentials, and its closed inverse.
+"""Kinematics of the arm: screws of its reference pose, a product of exponentials, and the closed inverse.
 
 Reference pose: all six angles of the controller are zero; the arm lies forward along x. Every joint is a
 screw (direction, point) of that pose, every virtual joint an origin with three directions of that pose.

@@ -31,7 +31,7 @@ CLOCKS = ("tracker", "force", "controller", "q_load")
 
 @dataclass(frozen=True)
 class Fault:
-    """One effect at work: its kind and form, and what it becomes at a size."""
+    """One acting effect: its kind and form, and its parameters at a size."""
 
     kind: Kind
     form: str
@@ -69,7 +69,7 @@ def _fault(name: str, form: str, seed: int) -> Fault:
 
 
 def has_other_form(name: str) -> bool:
-    """Whether the plant knows another form of the same physics."""
+    """Whether the plant has another form of the same physics."""
     return bool(find(name.partition("@")[0]).others)
 
 
@@ -163,7 +163,7 @@ def _ratio(kind: Kind, sized: dict[str, dict]) -> float:
 
 
 def _clearest(sized: dict[str, dict]) -> str:
-    """Signal in which an effect stands out most; what is commanded has no noise and does not count."""
+    """Signal in which an effect stands out most; commanded signals have no noise and do not count."""
     return max(sized, key=lambda name: sized[name]["ratio"] if name != "joint_commanded" else -1.0)
 
 
@@ -180,7 +180,7 @@ def _sized(fault: Fault, days, runs, how: Instruments, world: World, ratio: floa
     change = truth.differences(instruments.clean(with_it, how), instruments.clean(runs[index], how))
     found = _ratio(fault.kind, truth.sizes([change], how))
     size = trial * ratio / max(found, 1e-9)
-    if size < low:  # that small is normal or hardly real: a small one of the plausible ones instead
+    if size < low:  # too small to be plausible: a small plausible size instead
         return float(low * np.exp(rng.uniform(0.0, np.log(min(6.0, high / low)))))
     return float(min(size, high))
 

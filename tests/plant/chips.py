@@ -1,4 +1,4 @@
-"""What the cutter meets and what it costs: rim points against exact swept volumes, teeth summed one by one.
+"""Engagement and cutting force: rim points against exact swept volumes, teeth summed one by one.
 
 There is no grid. The stock is a box; what earlier motion has removed is a union of swept cutters along
 straight pieces. A point of the rim is cut from the top of what is left there down to the tip. The height left
@@ -122,7 +122,7 @@ def _near(p, fx, fy, last, share, swept, top, radius, near):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _teeth(phi, width, depth, advance, cos_ramp, k, edge, offsets, exponent, out):
-    """Add the mean over one turn of what all teeth feel in one cell of the rim to `out`.
+    """Add the mean force of all teeth over one turn in one cell of the rim to `out`.
 
     out: feed, normal, axial (towards the tip), torque, and lever·feed, lever·normal about the tip.
     A tooth cuts the least of what the teeth before it have left (runout); a tooth that cuts nothing
@@ -259,7 +259,7 @@ def cut(place_mm, before_mm, chain, s_before_mm, work: Pieces, world: World) -> 
     force = np.stack([feed * fx - normal * fy, feed * fy + normal * fx, -axial], axis=1)
     lever = np.stack([lever_feed * fx - lever_normal * fy, lever_feed * fy + lever_normal * fx], axis=1)
     torque = tangential * cutter.diameter_mm / 2.0
-    moment = np.stack([-lever[:, 1], lever[:, 0], torque], axis=1)  # height x force, and what resists turning
+    moment = np.stack([-lever[:, 1], lever[:, 0], torque], axis=1)  # height x force, and the resisting torque
     width_mm = cutter.diameter_mm / 2.0 * (np.cos(arc_rad[:, 0]) - np.cos(arc_rad[:, 1]))
     return Cut(force, moment, depth_mm, width_mm, arc_rad)
 

@@ -1,4 +1,4 @@
-"""What is measured of a run, how well, and by which clock: clean readings first, then noise on top."""
+"""The measured signals of a run, their noise and clocks: clean readings first, then noise on top."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,5 @@
-"""What has a memory: lag, play, friction, hysteresis. One column at a time, marched at the plant's step."""
+"""Signals with memory: lag, play, friction, hysteresis. One column at a time, integrated at the plant's
+step."""
 
 import numpy as np
 from numba import njit
@@ -96,7 +97,7 @@ def lugre(velocity, breakaway_rad, stribeck_rad_s, extra, dt_s):
 
 @njit(cache=True, nogil=True)
 def high_pass(x, tau_s, dt_s):
-    """What a controller with an integral part leaves of a disturbance; starts settled."""
+    """Rest of a disturbance behind a controller with an integral part; starts settled."""
     out = np.empty_like(x)
     slow = x[0]
     fade = np.exp(-dt_s / tau_s)

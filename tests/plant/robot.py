@@ -25,7 +25,7 @@ Hooks = dict[str, Callable[["Run"], None]]
 
 @dataclass(frozen=True)
 class Mismatch:
-    """What is never exact and never a cause: one robot and process (case) and one day (run)."""
+    """Normal mismatch, which is never a cause: of one robot and process (case) and one day (run)."""
 
     stiffness: np.ndarray = field(default_factory=lambda: np.ones(10))
     coefficients: np.ndarray = field(default_factory=lambda: np.ones(6))
@@ -46,7 +46,7 @@ class Run:
 
     def __init__(self, way: Waypoints, world: World, mismatch: Mismatch, age_s: float = 0.0):
         self.way, self.mismatch = way, mismatch
-        self.believed = world  # what the controller and the prediction think
+        self.believed = world  # the world that controller and prediction assume
         self.world = world.but(stiffness_Nmm_rad=world.stiffness_Nmm_rad * mismatch.stiffness[:, None])
         self.world = self.world.cutting(coefficients=world.cutter.coefficients * mismatch.coefficients)
         self.age_s = age_s
@@ -111,7 +111,7 @@ def ripple(q_rad: np.ndarray, joint: int, amplitude_deg, harmonic: int, phase: f
 
 
 def slack(q_rad: np.ndarray, gap_deg, start: float) -> np.ndarray:
-    """What a play of ± gap/2 adds to an angle, rad."""
+    """Angle added by a play of ± gap/2, rad."""
     half = np.broadcast_to(np.asarray(gap_deg, float) * DEGREE / 2.0, q_rad.shape).copy()
     return memory.play(q_rad.copy(), half, start) - q_rad
 
@@ -128,7 +128,7 @@ def _gear(run: Run) -> None:
 
 
 def cut_at(run: Run, t_s: np.ndarray, place_mm: np.ndarray) -> chips.Cut:
-    """What the cutter meets at times, at their commanded places, after all that the tooth before has left."""
+    """Engagement at times, at their commanded places, in the material that the previous tooth has left."""
     starts, before_mm, gone_mm = [c.start_s for c in run.links], place_mm.copy(), np.zeros(len(t_s))
     owner = np.clip(np.searchsorted(starts, t_s, side="right") - 1, 0, None)
     for i, chain in enumerate(run.links):
@@ -151,7 +151,7 @@ def take_cut(run: Run) -> None:
 
 
 def _weight(run: Run, arm, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force and moment at the TCP of loads that the model has not."""
+    """Force and moment at the TCP of loads that are not in the model."""
     force, moment = np.zeros((len(q_rad), 3)), np.zeros((len(q_rad), 3))
     if run.payload:
         axes = arms.pose(arm, q_rad)[1]

@@ -1,4 +1,4 @@
-"""Every effect of the plant: it shows, it tells its parameters, and it is what its definition says."""
+"""Every effect of the plant: it shows in the signals, states its parameters, and matches its definition."""
 
 import json
 

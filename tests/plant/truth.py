@@ -40,7 +40,7 @@ def noise_of(signal: str, how: Instruments) -> float:
 
 
 def differences(with_it: dict, without: dict) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """What an effect changes in each signal of a run; the shorter of two runs counts."""
+    """Change of each signal of a run by an effect; the shorter of two runs counts."""
     one, two = signals(with_it), signals(without)
     out = {}
     for name in one:

@@ -1,4 +1,4 @@
-"""Predictions: saved and loaded, what the robot slows down, what costs time, the command."""
+"""Predictions: saving and loading, slowed and lost time, the command."""
 
 import io
 import json

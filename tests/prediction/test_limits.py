@@ -1,4 +1,4 @@
-"""Predicted figures beyond limits, data sheet and sense: warning, error, never a figure."""
+"""Predicted figures beyond limits and data sheet, and absurd ones: a warning, an error, no figure."""
 
 import io
 import json
@@ -19,7 +19,7 @@ STOCK = {"box_mm": [[-20, -20, -20], [80, 20, 0]], "resolution_mm": 0.5}
 
 
 def predicted(text=HEAD + SLOT, *, instead=None, **data):
-    """``instead`` replaces sections by what no cell file may state."""
+    """``instead`` replaces sections by values that a cell file may not state."""
     cell = resolve_cell({"based_on": "demonstration", "stock": STOCK, **data})
     cell = cell.model_copy(update=instead(cell) if instead else {})
     toolpath = read_stream(io.BytesIO((text + "M5\nM30\n").encode()), "part.nc", cell)

@@ -1,4 +1,4 @@
-"""The remedy of a feed above the clearance plane names a height that is enough for the whole program."""
+"""The remedy of a feed above the clearance plane names a height sufficient for the whole program."""
 
 import io
 
@@ -11,7 +11,10 @@ PART = b"G21\nT1 M6\nG43 H1\nS1000 M3\nG0 X0 Y0 Z50\nG1 Z110 F500\nG0 Z20\nG1 Z1
 
 def test_the_remedy_names_the_highest_feed():
     cell = load_cell()
-    found = [i for i in check_toolpath(read_stream(io.BytesIO(PART), "part.nc", cell), cell)
-             if i.code == "above-clearance"]  # fmt: skip
+    found = [
+        i
+        for i in check_toolpath(read_stream(io.BytesIO(PART), "part.nc", cell), cell)
+        if i.code == "above-clearance"
+    ]
     assert found
     assert all("z_mm to 125.000 or more" in issue.remedy for issue in found)

@@ -1,4 +1,4 @@
-"""What a program hardly means: long dwells, wide corners, stops in the cut, absurd feeds per tooth."""
+"""Doubtful programs: long dwells, wide corners, stops in the cut, absurd feeds per tooth."""
 
 import pytest
 

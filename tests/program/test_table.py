@@ -1,4 +1,4 @@
-"""Nothing goes below the table: feed, rapid, approach, tools that lean, compensated targets."""
+"""Nothing goes below the table: feed, rapid, approach, inclined tools, compensated targets."""
 
 from dataclasses import replace
 

@@ -12,11 +12,16 @@ LONG = {"tool": {"2": {"length_mm": 150.0}, "3": {"length_mm": 60.0}}}
 def test_approach_and_final_retract(plan):
     made = plan(HEAD + "G0 X10 Y20\nG0 Z5\nG1 Z-1 F600\nG1 X30\nM30\n")
     assert made.steps == [
-        "HOME", ("PTP", 10, 20, 100), ("LIN", 10, 20, 5), ("LIN", 10, 20, -1), ("LIN", 30, 20, -1),
-        ("LIN", 30, 20, 100), "HOME",
-    ]  # fmt: skip
+        "HOME",
+        ("PTP", 10, 20, 100),
+        ("LIN", 10, 20, 5),
+        ("LIN", 10, 20, -1),
+        ("LIN", 30, 20, -1),
+        ("LIN", 30, 20, 100),
+        "HOME",
+    ]
     targets = made.targets
-    assert targets.source_line.tolist() == [0, 6, 6, 7, 8, 8, 0]  # what is added has the line it serves
+    assert targets.source_line.tolist() == [0, 6, 6, 7, 8, 8, 0]  # added targets have the line they serve
     assert (targets.move < 0).tolist() == [True, True, False, False, False, True, True]
     assert targets.speed_mm_s[2:6] == pytest.approx([200, 10, 10, 200])
     assert np.isnan(targets.speed_mm_s[targets.ptp]).all()
@@ -63,9 +68,14 @@ def test_machine_move_at_home_is_no_motion(plan, move):
 def test_retract_in_the_program_carries_the_line(plan, move):
     made = plan(HEAD + "G0 X10 Y20\nG0 Z5\nG1 Z-1 F600\n" + move + "\nG0 X50 Y60\nG0 Z5\nG1 Z-2\nM30\n")
     assert made.steps[3:] == [
-        ("LIN", 10, 20, -1), ("LIN", 10, 20, 100), ("LIN", 50, 60, 100), ("LIN", 50, 60, 5),
-        ("LIN", 50, 60, -2), ("LIN", 50, 60, 100), "HOME",
-    ]  # fmt: skip
+        ("LIN", 10, 20, -1),
+        ("LIN", 10, 20, 100),
+        ("LIN", 50, 60, 100),
+        ("LIN", 50, 60, 5),
+        ("LIN", 50, 60, -2),
+        ("LIN", 50, 60, 100),
+        "HOME",
+    ]
     targets, row = made.targets, 4
     assert targets.source_line[row] == 8
     assert made.toolpath.machine[targets.move[row]]
@@ -77,8 +87,12 @@ def test_retract_in_the_program_carries_the_line(plan, move):
 def test_x_and_y_of_the_machine_are_home(plan, move):
     made = plan(HEAD + "G0 X10 Y20\nG0 Z5\nG1 Z-1 F600\n" + move + "\nG0 X50 Y60 Z5\nG1 Z-2\nM30\n")
     assert made.steps[3:8] == [
-        ("LIN", 10, 20, -1), ("LIN", 10, 20, 100), "HOME", ("PTP", 50, 60, 100), ("LIN", 50, 60, 5),
-    ]  # fmt: skip
+        ("LIN", 10, 20, -1),
+        ("LIN", 10, 20, 100),
+        "HOME",
+        ("PTP", 50, 60, 100),
+        ("LIN", 50, 60, 5),
+    ]
     assert made.targets.source_line[4] == made.targets.source_line[5] == 8
     assert made.steps.count("HOME") == 3
 
@@ -260,7 +274,7 @@ def test_dwell_before_the_first_position_is_at_home(plan):
 
 
 def test_dwell_after_a_tool_change_stands_behind_it(plan):
-    """The mill does not wait in the work for what is to wait above it."""
+    """Waits that belong above the work do not happen with the mill in the work."""
     made = plan(change(4).replace("T4 M6\n", "T4 M6\nG4 P2\n"))
     row = next(
         event.row for event in made.targets.events if event.kind == "tool" and event.values["tool"] == 4

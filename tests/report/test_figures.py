@@ -1,4 +1,4 @@
-"""Figures: labelled, honest about peaks and gaps, drawn from any motion, the same bytes each time."""
+"""Figures: labelled, with all peaks and gaps, for any motion, the same bytes each time."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Stiffness maps and the figure of the compensation: right numbers, blank where nothing is."""
+"""Stiffness maps and the figure of the compensation: right numbers, blank where there are none."""
 
 import json
 

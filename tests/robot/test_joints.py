@@ -94,7 +94,7 @@ def test_turn_of_a_wrist_wound_at_home(a6_deg):
 
 
 def test_turn_that_would_leave_the_limits_is_not_taken():
-    """HOME at A4 = 349: the nearest turn of A4 would be beyond 350 somewhere, so another one is."""
+    """HOME at A4 = 349: the nearest turn of A4 would exceed 350 somewhere, so another one is taken."""
     made = solve(SQUARE, home={"q_deg": [0, -90, 90, 349, 0, 0]})
     assert not made.errors
     assert (made.q_deg[:, 3] <= 350).all()

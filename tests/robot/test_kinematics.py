@@ -61,10 +61,18 @@ def spelled_out(q: FloatArray, geometry: FloatArray) -> FloatArray:
     """Eq. 1, factor by factor."""
     a1, a2, c1, c2, c3, c4 = geometry
     factors = [
-        turn("z", -q[0]), translation(a1, 0, c1), turn("y", q[1]), translation(c2, 0, 0), turn("y", q[2]),
-        translation(c3, 0, -a2), turn("x", -q[3]), turn("y", q[4]), turn("x", -q[5]), translation(c4, 0, 0),
+        turn("z", -q[0]),
+        translation(a1, 0, c1),
+        turn("y", q[1]),
+        translation(c2, 0, 0),
+        turn("y", q[2]),
+        translation(c3, 0, -a2),
+        turn("x", -q[3]),
+        turn("y", q[4]),
+        turn("x", -q[5]),
+        translation(c4, 0, 0),
         turn("y", math.pi / 2),
-    ]  # fmt: skip
+    ]
     return np.asarray(np.linalg.multi_dot(factors))
 
 
@@ -134,9 +142,16 @@ class TestAllBranches:
         mine = all_branches(position, rotation, geometry)
         a1, a2, c1, c2, c3, c4 = geometry
         model = opw.KinematicModel(
-            a1=a1, a2=a2, b=0.0, c1=c1, c2=c2, c3=c3, c4=c4, offsets=(0.0, -math.pi / 2, 0.0, 0.0, 0.0, 0.0),
+            a1=a1,
+            a2=a2,
+            b=0.0,
+            c1=c1,
+            c2=c2,
+            c3=c3,
+            c4=c4,
+            offsets=(0.0, -math.pi / 2, 0.0, 0.0, 0.0, 0.0),
             flip_axes=(True, False, False, True, False, True),
-        )  # fmt: skip
+        )
         solver = opw.Robot(model, degrees=False)
         poses = RigidTransform.from_components(position, Rotation.from_matrix(rotation))
         compared = 0

@@ -72,9 +72,17 @@ def moving(q_rad, cell):
     count = len(q_rad)
     zero, none = np.zeros(count), np.zeros(count, dtype=int)
     return Motion(
-        time_s=0.012 * np.arange(count), position_mm=position, rotation=rotation, speed_mm_s=zero,
-        acceleration_mm_s2=zero, jerk_mm_s3=zero, path_mm=zero, move=none, corner=none, tool=none + 1,
-    )  # fmt: skip
+        time_s=0.012 * np.arange(count),
+        position_mm=position,
+        rotation=rotation,
+        speed_mm_s=zero,
+        acceleration_mm_s2=zero,
+        jerk_mm_s3=zero,
+        path_mm=zero,
+        move=none,
+        corner=none,
+        tool=none + 1,
+    )
 
 
 def turning_wrist(count=200, turns=2.0):

@@ -1,4 +1,4 @@
-"""Does a run belong to a prediction: each slip gets its own sentence, real gaps get none."""
+"""Checking a run against a prediction: each slip has its own finding, real gaps have none."""
 
 import hashlib
 
@@ -139,8 +139,11 @@ def test_a_declared_override(found):
 
 
 def test_t1(found):
-    capped = {"how": FAST, "controller": maker.controller(top=250.0, **FAST),
-              "tracker": maker.tracker(top=250.0, **FAST)}  # fmt: skip
+    capped = {
+        "how": FAST,
+        "controller": maker.controller(top=250.0, **FAST),
+        "tracker": maker.tracker(top=250.0, **FAST),
+    }
     issues = found(**capped)
     assert codes(issues) == ["run-t1"] * 2
     assert "no faster than 250 mm/s" in issues[0].message
@@ -197,8 +200,13 @@ def test_recordings_longer_and_shorter_than_the_program(found):
 
 
 def raster(rows, hold, scale=1.0):
-    ends = np.array([[[0, y, 0], [400, y, 1]] if r % 2 == 0 else [[400, y, 1], [0, y, 0]]
-                     for r, y in enumerate(0.25 * np.arange(rows))], dtype=float).reshape(-1, 3)  # fmt: skip
+    ends = np.array(
+        [
+            [[0, y, 0], [400, y, 1]] if r % 2 == 0 else [[400, y, 1], [0, y, 0]]
+            for r, y in enumerate(0.25 * np.arange(rows))
+        ],
+        dtype=float,
+    ).reshape(-1, 3)
     length = np.linalg.norm(np.diff(ends, axis=0), axis=1)
     start = np.concatenate([[0.0], np.cumsum(length / 80.0 + hold)]) / scale
     t = np.arange(0.0, start[-1], 0.02)

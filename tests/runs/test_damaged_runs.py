@@ -1,4 +1,4 @@
-"""Run folders made to harm: one line, and nothing allocated by what a file announces."""
+"""Run folders made to harm: one line, and no memory allocated for what a file announces."""
 
 import numpy as np
 import polars as pl

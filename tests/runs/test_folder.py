@@ -187,7 +187,7 @@ def test_joints_may_be_missing_only_where_asked(folder):
 
 
 def test_no_folder_and_no_run_toml(tmp_path, folder):
-    with pytest.raises(NotUnderstoodError, match="is no folder"):
+    with pytest.raises(NotUnderstoodError, match="is not a folder"):
         load_run(tmp_path / "nowhere")
     folder.mkdir()
     with pytest.raises(NotUnderstoodError, match=r"run\.toml: error: cannot read.*an empty one will do"):
@@ -316,7 +316,7 @@ def test_a_column_twice_and_columns_of_the_wrong_separator(folder):
     maker.run_folder(folder)
     file = folder / "tracker.csv"
     file.write_text("t_s,x_mm,x_mm,z_mm\n" + "0,1,2,3\n" * 20, encoding="utf-8")
-    with pytest.raises(NotUnderstoodError, match="column x_mm: stands there twice"):
+    with pytest.raises(NotUnderstoodError, match="column x_mm: is present twice"):
         load_run(folder)
     file.write_text("t_s;x_mm;y_mm;z_mm\n" + "0;1;2;3\n" * 20, encoding="utf-8")
     with pytest.raises(NotUnderstoodError, match="separate columns by commas"):
@@ -427,8 +427,10 @@ def test_motor_angles_are_no_axis_angles(folder):
 
 def test_real_gaps_are_no_errors(folder):
     columns = maker.controller(lag=0.08)
-    load = {f"q{n}_load_deg": columns[f"q{n}_act_deg"] + 0.05 * np.sign(np.gradient(columns[f"q{n}_act_deg"]))
-            for n in range(1, 7)}  # fmt: skip
+    load = {
+        f"q{n}_load_deg": columns[f"q{n}_act_deg"] + 0.05 * np.sign(np.gradient(columns[f"q{n}_act_deg"]))
+        for n in range(1, 7)
+    }
     tracker = maker.tracker(offset=0.2)
     tracker["x_mm"] += 3.0 + 0.8 * np.sin(tracker["t_s"])
     run = load_run(maker.run_folder(folder, "", controller=columns | load, tracker=tracker))

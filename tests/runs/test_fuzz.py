@@ -12,18 +12,32 @@ from tests.runs.test_krc_trace import data_set
 from tests.runs.test_rsi_log import log
 
 FILES = (
-    "controller.csv", "controller.parquet", "tracker.csv", "force.parquet", "scan.csv", "scan.ply", "rsi.log",
-    "rsi.csv", "a_KRCIpo.dat", "run.toml",
-)  # fmt: skip
+    "controller.csv",
+    "controller.parquet",
+    "tracker.csv",
+    "force.parquet",
+    "scan.csv",
+    "scan.ply",
+    "rsi.log",
+    "rsi.csv",
+    "a_KRCIpo.dat",
+    "run.toml",
+)
 HEADS = (
-    b"", b"PAR1", b"DIAEXTENDED\n", b"<Rob ", b"ply\n", b"t_s,x_mm,y_mm,z_mm\n", b"\xef\xbb\xbft_s,",
+    b"",
+    b"PAR1",
+    b"DIAEXTENDED\n",
+    b"<Rob ",
+    b"ply\n",
+    b"t_s,x_mm,y_mm,z_mm\n",
+    b"\xef\xbb\xbft_s,",
     b"IPOC,RIst_X\n",
-)  # fmt: skip
+)
 QUIET = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def load_or_refuse(folder):
-    """Load a run; what is wrong must be said by an error of the project that names the file."""
+    """Load a run; any failure must be an error of the project that names the file."""
     message = ""
     try:
         run = load_run(folder)

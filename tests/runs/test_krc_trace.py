@@ -29,15 +29,30 @@ def data_set(folder, stem, step_s, channels, start_s=0.0, **change):
     count = len(channels[0][2])
     raw = np.stack([(np.asarray(v) - offset) / factor for _, _, v, factor, offset in channels], axis=1)
     head = [
-        "DIAEXTENDED  {@:ENGLISH", "#BEGINGLOBALHEADER", "1,WINDOWS NT", "101,Trace",
-        "102,KR 300 R2500 ultra #1", "104,06.05.2024", "105,07:08:09", "112,High -> Low", "#ENDGLOBALHEADER",
+        "DIAEXTENDED  {@:ENGLISH",
+        "#BEGINGLOBALHEADER",
+        "1,WINDOWS NT",
+        "101,Trace",
+        "102,KR 300 R2500 ultra #1",
+        "104,06.05.2024",
+        "105,07:08:09",
+        "112,High -> Low",
+        "#ENDGLOBALHEADER",
         block(k200="Zeit", k202="s", k210="IMPLIZIT", k220=count, k240=f"{start_s:g}", k241=f"{step_s:g}"),
-    ]  # fmt: skip
+    ]
     for number, (name, unit, _, factor, offset) in enumerate(channels, start=1):
         keys = {
-            "k200": name, "k202": unit, "k210": "EXPLIZIT", "k211": f"C:\\TRACE\\{stem}.r64", "k213": "BLOCK",
-            "k214": "REAL64", "k220": count, "k221": number, "k240": f"{offset!r}", "k241": f"{factor!r}",
-        }  # fmt: skip
+            "k200": name,
+            "k202": unit,
+            "k210": "EXPLIZIT",
+            "k211": f"C:\\TRACE\\{stem}.r64",
+            "k213": "BLOCK",
+            "k214": "REAL64",
+            "k220": count,
+            "k221": number,
+            "k240": f"{offset!r}",
+            "k241": f"{factor!r}",
+        }
         head.append(block(**(keys | change)))
     (folder / f"{stem}.dat").write_bytes("\r\n".join("\n".join(head).splitlines()).encode("latin-1"))
     values = b"".join(struct.pack("<d", value) for value in raw.ravel().tolist())
@@ -59,11 +74,12 @@ def recording(folder, lag_s=0.06, servo_s=0.02, motor=True, name="240506"):
     for n in range(6):
         soll, ist = (motor_deg(q)[:, n] if motor else q[:, n] for q in (command, actual))
         channels = [
-            ("Sollposition", "µ°", soll * 1e6, 1.0, 0.0), ("Istposition", "µ°", ist * 1e6, 1.0, 0.0),
+            ("Sollposition", "µ°", soll * 1e6, 1.0, 0.0),
+            ("Istposition", "µ°", ist * 1e6, 1.0, 0.0),
             ("Iststrom", "A", np.full(len(fast), n + 0.25), 1e-3, 0.5),
             ("Istmoment", "Nm", np.full(len(fast), n + 0.5), 1.0, 0.0),
             ("Motortemperatur", "K", np.full(len(fast), 310.0), 1.0, 0.0),
-        ]  # fmt: skip
+        ]
         data_set(folder, f"{name}_NextGenDrive#{n + 1}", 0.004, channels)
     return slow, position, command[::3], actual[::3]
 
@@ -150,14 +166,23 @@ def test_only_one_recording_of_a_folder_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("channel", "axis", "column"),
     [
-        ("Sollposition", "3", "q3_cmd_deg"), ("Istposition A4", "", "q4_act_deg"),
-        ("Istposition_5", "", "q5_act_deg"), ("AxisPos_CmdIpo1", "", "q1_cmd_deg"),
-        ("AxisPos_Act6", "", "q6_act_deg"), ("X_CmdIpo", "", "x_cmd_mm"),
-        ("A_CmdIpo", "", "a_cmd_deg"), ("Z_Act", "", "z_act_mm"), ("Iststrom", "2", "i2_A"),
-        ("Istmoment 6", "", "tau6_Nm"), ("Istposition", "", ""), ("Motortemperatur", "1", ""),
-        ("AxisVel_CmdIpo1", "", ""), ("DriveMotorTorq_CmdIpo1", "", ""), ("Sollgeschwindigkeit", "2", ""),
+        ("Sollposition", "3", "q3_cmd_deg"),
+        ("Istposition A4", "", "q4_act_deg"),
+        ("Istposition_5", "", "q5_act_deg"),
+        ("AxisPos_CmdIpo1", "", "q1_cmd_deg"),
+        ("AxisPos_Act6", "", "q6_act_deg"),
+        ("X_CmdIpo", "", "x_cmd_mm"),
+        ("A_CmdIpo", "", "a_cmd_deg"),
+        ("Z_Act", "", "z_act_mm"),
+        ("Iststrom", "2", "i2_A"),
+        ("Istmoment 6", "", "tau6_Nm"),
+        ("Istposition", "", ""),
+        ("Motortemperatur", "1", ""),
+        ("AxisVel_CmdIpo1", "", ""),
+        ("DriveMotorTorq_CmdIpo1", "", ""),
+        ("Sollgeschwindigkeit", "2", ""),
     ],
-)  # fmt: skip
+)
 def test_channel_names(channel, axis, column):
     assert column_of(channel, axis) == column
 
@@ -172,8 +197,10 @@ values_of = st.lists(
     values_of,
     st.tuples(st.floats(1e-6, 1e3), st.floats(1e-6, 1e3), st.floats(1e-6, 1e3)),
     st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)),
-    st.floats(1e-3, 1.0), st.booleans(), st.sampled_from(["IMPLIZIT", "IMPLICIT"]),
-)  # fmt: skip
+    st.floats(1e-3, 1.0),
+    st.booleans(),
+    st.sampled_from(["IMPLIZIT", "IMPLICIT"]),
+)
 def test_any_data_set_comes_back(tmp_path_factory, rows, factors, offsets, step, contiguous, word):
     folder = tmp_path_factory.mktemp("trace")
     raw = np.array(rows)
@@ -184,10 +211,19 @@ def test_any_data_set_comes_back(tmp_path_factory, rows, factors, offsets, step,
     for n in range(3):
         first = n * len(raw) + 1 if contiguous else n + 1
         text.append(
-            block(k200=f"Größe {n}", k202="[mm]", k210="EXPLIZIT", k211="x.r64",
-                  k213="CHANNEL" if contiguous else "BLOCK", k214="REAL64", k220=len(raw), k221=first,
-                  k240=repr(offsets[n]), k241=repr(factors[n]))
-        )  # fmt: skip
+            block(
+                k200=f"Größe {n}",
+                k202="[mm]",
+                k210="EXPLIZIT",
+                k211="x.r64",
+                k213="CHANNEL" if contiguous else "BLOCK",
+                k214="REAL64",
+                k220=len(raw),
+                k221=first,
+                k240=repr(offsets[n]),
+                k241=repr(factors[n]),
+            )
+        )
     (folder / "x.dat").write_bytes("\n".join(text).encode("latin-1"))
     found = read_data_set(folder / "x.dat")
     assert found.comment == "robot, with a comma"
@@ -231,13 +267,18 @@ def test_an_unknown_unit_is_said(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"k220": "many"}, "key 220: 'many' is not a number"), ({"k220": "0"}, "key 220: found 0"),
-        ({"k220": "1e18"}, "key 220: found 1e18"), ({"k220": "2.5"}, "key 220: found 2.5"),
-        ({"k214": "INT16"}, "found BLOCK of INT16"), ({"k213": "SOMEHOW"}, "found SOMEHOW of REAL64"),
-        ({"k221": "7"}, "column 7, but b_KRCIpo.r64 has 1"), ({"k241": "factor"}, "key 241: 'factor'"),
-        ({"k240": "nan"}, "key 240: 'nan'"), ({"k210": "IMPLIZIT"}, "no channel with values"),
+        ({"k220": "many"}, "key 220: 'many' is not a number"),
+        ({"k220": "0"}, "key 220: found 0"),
+        ({"k220": "1e18"}, "key 220: found 1e18"),
+        ({"k220": "2.5"}, "key 220: found 2.5"),
+        ({"k214": "INT16"}, "found BLOCK of INT16"),
+        ({"k213": "SOMEHOW"}, "found SOMEHOW of REAL64"),
+        ({"k221": "7"}, "column 7, but b_KRCIpo.r64 has 1"),
+        ({"k241": "factor"}, "key 241: 'factor'"),
+        ({"k240": "nan"}, "key 240: 'nan'"),
+        ({"k210": "IMPLIZIT"}, "no channel with values"),
     ],
-)  # fmt: skip
+)
 def test_a_broken_header_names_channel_key_and_line(tmp_path, change, words):
     t = np.arange(50) * 0.004
     file = data_set(tmp_path, "b_KRCIpo", 0.004, [("X_Act", "mm", t, 1.0, 0.0)], **change)

@@ -182,8 +182,10 @@ def test_no_telegrams(tmp_path):
 def test_any_telegram_comes_back(tmp_path_factory, values, ipoc, spaced):
     names = [f"A{n}" for n in range(1, 7)]
     gap = "\n  " if spaced else " "
-    inner = gap.join(f'{name} = "{value!r}"' if spaced else f'{name}="{value!r}"'
-                     for name, value in zip(names, values, strict=True))  # fmt: skip
+    inner = gap.join(
+        f'{name} = "{value!r}"' if spaced else f'{name}="{value!r}"'
+        for name, value in zip(names, values, strict=True)
+    )
     file = tmp_path_factory.mktemp("rsi") / "rsi.log"
     file.write_text(
         f'<Rob TYPE="KUKA">{gap}<AIPos{gap}{inner}/>{gap}<IPOC>{ipoc}</IPOC></Rob>', encoding="utf-8"

@@ -60,17 +60,29 @@ def test_scan_as_ply_of_a_mesh_and_big_endian(folder):
     [
         (b"", "no PLY header"),
         (b"ply\nformat ascii 1.0\nend_header\n", "no vertices with x, y, z"),
-        (b"ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int i\nelement vertex 20\nend_header\n",
-         "face stands before the vertices"),
+        (
+            b"ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int i\n"
+            b"element vertex 20\nend_header\n",
+            "face stands before the vertices",
+        ),
         (b"ply\nformat ascii 1.0\nelement vertex 20\nproperty list uchar float x\nend_header\n", "property"),
-        (b"ply\nformat ascii 1.0\nelement vertex 20\nproperty float x\nproperty float y\nproperty float z\n"
-         b"end_header\n1 2 3\n", "20 vertices announced, 1 there"),
-        (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-         b"end_header\n1 2 up\n", "'1 2 up' is no vertex"),
-        (b"ply\nformat binary_little_endian 1.0\nelement vertex 90000000000\nproperty float x\n"
-         b"property float y\nproperty float z\nend_header\n1234", "90000000000 vertices announced, 0 there"),
+        (
+            b"ply\nformat ascii 1.0\nelement vertex 20\nproperty float x\nproperty float y\n"
+            b"property float z\nend_header\n1 2 3\n",
+            "20 vertices announced, 1 there",
+        ),
+        (
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+            b"end_header\n1 2 up\n",
+            "'1 2 up' is not a vertex",
+        ),
+        (
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 90000000000\nproperty float x\n"
+            b"property float y\nproperty float z\nend_header\n1234",
+            "90000000000 vertices announced, 0 there",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_broken_ply(folder, text, words):
     maker.run_folder(folder)
     (folder / "scan.ply").write_bytes(text)

@@ -42,7 +42,7 @@ class Section(BaseModel):
 
 
 class Provenance(Section):
-    """Where values come from and how sure they are."""
+    """Where values come from and how reliable they are."""
 
     source: str = ""
     sure: Sure = "assumption"
@@ -65,7 +65,7 @@ class Place(Section):
 
 
 class Frame(Place):
-    """A KUKA frame of the cell, whole: a part of one would be completed by somebody else's."""
+    """A KUKA frame of the cell with all six values: a missing one could only come from another cell."""
 
     @model_validator(mode="before")
     @classmethod

@@ -21,7 +21,7 @@ from gcode2krl.cell.sections.fields import (
 )
 
 _ROUNDED_SHARE = 0.005
-"""Share of the diameter by which the radius of a ball may be rounded: 1.58 for a ball of 3.175 mm."""
+"""Fraction of the diameter by which the radius of a ball may be rounded: 1.58 for a ball of 3.175 mm."""
 
 
 class Tool(Provenance):
@@ -43,7 +43,7 @@ class Tool(Provenance):
     point_deg: Annotated[float, Field(strict=True, gt=10, lt=180)] | None = None
     """Full angle of a drill's point."""
     shank_diameter_mm: Positive | None = None
-    """Default: the cutter's diameter, which then cannot touch more than the edges have cut."""
+    """Default: the cutter's diameter, so that the shank touches nothing that the edges have not cut."""
     stick_out_mm: Positive | None = None
     """From the tip to the face of the holder; None: the holder is not checked."""
     holder_diameter_mm: Positive | None = None
@@ -139,7 +139,7 @@ class LinearEdge(Section):
 
 
 class Kienzle(Section):
-    """Kienzle's law: F_t = kc11·b·h^(1 - mc); the radial and axial forces are shares of it."""
+    """Kienzle's law: F_t = kc11·b·h^(1 - mc); the radial and axial forces are fractions of it."""
 
     kc11: Positive
     """Specific cutting force at h = b = 1 mm in N/mm²."""
@@ -149,7 +149,7 @@ class Kienzle(Section):
 
 
 _SOFT_N_MM2 = 150.0
-"""Between hardwood, 53 N/mm², and the softest metal of the library, 244."""
+"""Softer is not metal: hardwood has 53 N/mm², the softest metal of the library 244."""
 
 
 class Material(Provenance):
@@ -216,6 +216,6 @@ class ResultLimits(Section):
     """Mean torque on the spindle."""
     deflection_mm: Positive = 5.0
     acceleration_mm_s2: Positive = 40000.0
-    """Over one interpolation cycle, corners included; 0.2 m/s that turn back within a cycle are 33,333."""
+    """Over one interpolation cycle, corners included; reversing at 0.2 m/s within one cycle takes 33,333."""
     lost_time_share: Annotated[float, Field(strict=True, gt=0, le=1)] = 0.5
-    """Share of the time that short moves and stops cost; a sound program that drills comes to 0.35."""
+    """Fraction of the time that short moves and stops cost; a sound drilling program has 0.35."""

@@ -14,11 +14,11 @@ PortNumber = Annotated[int, Field(strict=True, ge=1, le=65535)]
 CYCLES_S = (0.004, 0.012)
 _BROADCAST = IPv4Address("255.255.255.255")
 LEAD_SHARE_OF_BLEND = 0.2
-"""The share of the blend time that belongs to the best lead; see `Online.pilot_lead_s`."""
+"""Fraction of the blend time that is added to the lead; see `Online.pilot_lead_s`."""
 
 
 class Gains(Section):
-    """A PID controller for each direction or axis; 1, 0, 0 hands the correction on as it is."""
+    """A PID controller for each direction or axis; 1, 0, 0 passes the correction on unchanged."""
 
     p: Finite = 1.0
     i_1_s: NotNegative = 0.0
@@ -42,17 +42,17 @@ class RobotLink(Section):
     """Telegrams missing in a row after which the correction is held for the rest of the session; the
     controller gives up after as many."""
     silence_s: Positive = 1.0
-    """Without a telegram for so long the session is over and nothing is answered any more."""
+    """After this time without a telegram the session ends and no telegram is answered any more."""
     decimals: Annotated[int, Field(strict=True, ge=3, le=9)] = 4
     """``Precision`` of the ETHERNET object: decimals of what the robot sends; KUKA's default is 1."""
     t1_output: SignalNumber = 993
-    """``$OUT`` that is on in T1 (``SIGNAL $T1``); 993 as remembered of KUKA's Automatic External interface:
+    """``$OUT`` that is on in T1 (``SIGNAL $T1``); 993 in KUKA's Automatic External interface, from memory:
     to be confirmed on the controller."""
     ready_output: SignalNumber = 1020
     """``$OUT`` that RSI keeps on while corrections are made, and that falls with the first answer missing;
-    the program waits for it and stops without it. Our choice: it must be free."""
+    the program waits for it and stops without it. The number is our choice: the output must be free."""
     retract_mm: Positive = 50.0
-    """Along the tool axis, out of the part, where the link is lost in a cut."""
+    """Length of the retract along the tool axis, out of the part, where the link is lost in a cut."""
 
     @field_validator("address", "robot_address")
     @classmethod
@@ -69,7 +69,7 @@ class RobotLink(Section):
 
     @model_validator(mode="after")
     def _one_robot(self) -> Self:
-        """Whoever listens everywhere must know whom to."""
+        """A server that listens on every network must know the controller's address."""
         if self.robot_address is None:
             if IPv4Address(self.address).is_unspecified:
                 raise ValueError(
@@ -102,17 +102,17 @@ class Probe(Section):
     amplitude_mm: Annotated[float, Field(strict=True, gt=0, le=0.2)] = 0.1
     """A correction along the tool axis, away from the part, while the robot stands in air."""
     rest_cycles: Annotated[int, Field(strict=True, ge=5)] = 25
-    """The robot must have stood for so long."""
+    """The robot must have stood still for this long."""
     rest_mm: Positive = 0.02
-    """What counts as standing: RIst moves by no more, the resolution of two decimals and its rounding."""
+    """The robot stands still if RIst moves by no more: the resolution of two decimals and its rounding."""
     most_cycles: Annotated[int, Field(strict=True, ge=2, le=50)] = 25
-    """The longest time the probe is on; it ends as soon as the robot is seen to move."""
+    """The probe is on for at most this long; it ends as soon as the robot is seen to move."""
     settle_cycles: Annotated[int, Field(strict=True, ge=5)] = 25
-    """After that the robot must be back where it was."""
+    """After this time the robot must be back where it was."""
 
 
 class Online(Section):
-    """The compensator of Haehn & Weigold 2020, section 2, and the limits that it is held in."""
+    """The compensator of Haehn & Weigold 2020, section 2, and its limits."""
 
     cycle_s: Positive = 0.004
     """0.004 (#IPO_FAST) or 0.012 (#IPO); the paper's is 4 ms (section 2.2)."""
@@ -134,7 +134,7 @@ class Online(Section):
     """Largest correction, of the sum; also ``POSCORR`` and ``POSCORRMON``. 1.4 mm is the paper's largest
     deviation."""
     rate_mm_s: Positive = 50.0
-    """Largest change in a second; 1.4 mm behind the low-pass of 4 Hz begin to fall with 35 mm/s."""
+    """Largest rate; behind the low-pass of 4 Hz a correction of 1.4 mm falls at 35 mm/s at first."""
     step_mm: Positive = 0.25
     """Largest change from one telegram to the next."""
     axis_most_deg: SixFloats = (0.3, 0.3, 0.3, 2.0, 2.0, 2.0)
@@ -142,11 +142,12 @@ class Online(Section):
     limit_margin_deg: NotNegative = 1.0
     """No correction may bring a joint nearer to its limit than this."""
     most_force_N: Positive = 2000.0
-    """A force above is no cut; the correction is held."""
+    """A larger force cannot come from cutting; the correction is held."""
     sensor_hold_s: NotNegative = 0.020
-    """A sensor may be silent, or not a number, for so long before the correction is held."""
+    """The sensor may send nothing, or NaN, for this long before the correction is held."""
     calibration: str | None = None
-    """File of `identify sensor`, relative to the cell file; None: the sensor's values are the process's."""
+    """File of `identify sensor`, relative to the cell file; None: the sensor's values are used as the process
+    force."""
     probe: Probe = Probe()
     link: RobotLink = RobotLink()
 
@@ -166,7 +167,7 @@ class Online(Section):
 
     @model_validator(mode="after")
     def _probe_is_one_step(self) -> Self:
-        """The proof switches the probe on and off, and takes it back at once from a robot that adds up."""
+        """The probe must be one step: it is taken back at once if the robot adds corrections up."""
         step_mm = min(self.step_mm, self.rate_mm_s * self.cycle_s)
         if self.probe.amplitude_mm > step_mm:
             raise ValueError(
@@ -180,7 +181,7 @@ class Online(Section):
         """Return how far ahead the pilot force is taken.
 
         The robot's delay and a fifth of the blend time, where the delay was measured, else the paper's 40 ms
-        (section 2.3): with the linear blend the estimate counts for half after half of it, and by then the
+        (section 2.3): half-way through the linear blend the estimate has half the weight, and by then the
         filtered measurement has begun to follow.
         """
         if self.lead_s is not None:
@@ -191,9 +192,9 @@ class Online(Section):
 
     @property
     def memory_s(self) -> float:
-        """Return how long an event is felt: lead, blend, four times the filters' delay, the robot's.
+        """Return how long an event has an effect: lead, blend, four times the filters' delay, robot's delay.
 
-        Four times, as a first-order low-pass has forgotten 98 % by then.
+        Four times, because a first-order low-pass has decayed by 98 % by then.
         """
         return self.pilot_lead_s + self.blend_s + 4.0 * self.filter_s + (self.robot_delay_s or 0.024)
 

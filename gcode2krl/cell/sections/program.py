@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 from gcode2krl.cell.sections.fields import Finite, OneLine, Positive, Section
 from gcode2krl.cell.template_rules import external_problem
 
-# Only variables of sensors, or the integrator's own: never one that the planner, a frame or an output has.
+# Only variables of sensors, or the integrator's own: never one of the planner, a frame or an output.
 _OWN = r"[A-FH-Za-fh-z][A-Za-z0-9_]{0,23}"
 _PILOT_VARIABLE = rf"^(\$SEN_PINT\[[0-9]{{1,2}}\]|{_OWN}(\[[0-9]{{1,3}}\])?)$"
 _PILOT_ARRAY = rf"^(\$SEN_PREA|{_OWN})$"
@@ -39,7 +39,7 @@ class Program(Section):
 
     max_lines: Annotated[int, Field(strict=True, ge=100)] = 5000
     comment_every: Annotated[int, Field(strict=True, ge=0, le=10**9)] = 50
-    """A comment with the G-code line every so many motions; 0 = only at events."""
+    """A comment with the G-code line after this many motions; 0 = only at events."""
     tool_length: Literal["g43", "from_table"] = "g43"
     """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
     the spindle, for posts that set lengths by touching off and never write G43."""
@@ -51,7 +51,7 @@ class Program(Section):
     epilogue: str = ""
     """KRL (Jinja2) after the last motion."""
     memory_moves: Annotated[int, Field(strict=True, ge=1)] = 30000
-    """LIN lines a controller surely holds."""
+    """LIN lines that any controller can hold."""
 
     @field_validator("externals")
     @classmethod
@@ -73,7 +73,7 @@ class Verified(Section):
         try:
             datetime.date.fromisoformat(given)
         except ValueError:
-            raise ValueError(f"{given} is no day of the calendar (year-month-day)") from None
+            raise ValueError(f"{given} is not a date (year-month-day)") from None
         return given
 
 

@@ -93,11 +93,11 @@ class Drives(Provenance):
 
 
 class Robot(Section):
-    """One robot model; without geometry nothing is known of where its joints stand."""
+    """One robot model; without geometry its joint angles are unknown."""
 
     model: OneLine = ""
     trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$")] = ""
-    """What ``$TRAFONAME[]`` of the controller must contain; empty: the guard does not look."""
+    """What ``$TRAFONAME[]`` of the controller must contain; empty: the guard does not check it."""
     geometry: Geometry = Geometry()
     limits: Limits = Limits()
     speeds: Speeds = Speeds()
@@ -107,7 +107,7 @@ class Robot(Section):
 
 
 class Controller(Provenance):
-    """What the controller's planner is set to; the defaults are those of the KRC4."""
+    """Settings of the controller's planner; the defaults are those of the KRC4."""
 
     model: OneLine = "KRC4"
     k_s: NotNegative = 0.168
@@ -193,7 +193,7 @@ class Compliance(Provenance):
     relative_band: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.1
     """Half-width of the 90 % band of the stiffness, relative."""
     modes_hz: tuple[Positive, ...] = ()
-    """Structural modes that a spindle speed or tooth passing should keep away from."""
+    """Structural modes that the spindle and tooth-passing frequencies should avoid."""
     robot_source: str = ""
     robot_sure: Sure = "unknown"
 

@@ -52,7 +52,7 @@ def other_form(name: str):
 
 
 class Draw:
-    """Random choices of one effect; `wanted` is a target that the caller insists on."""
+    """Random choices of one effect; `wanted` is a target that the caller requires."""
 
     def __init__(self, seed: int, wanted: str | None = None):
         self.rng = np.random.default_rng(seed)

@@ -95,7 +95,7 @@ def rsi_on(draw: Draw):
 
 
 def _along(run: Run, off: np.ndarray) -> np.ndarray:
-    """Share of an offset along the feed."""
+    """Component of an offset along the feed."""
     v = run.velocity_mm_s
     square = np.sum(v * v, axis=1, keepdims=True)
     return np.where(square > 1e-6, np.sum(off * v, axis=1, keepdims=True) / np.maximum(square, 1e-6) * v, 0.0)
@@ -143,7 +143,7 @@ def absolute_accuracy(draw: Draw):
 
 @declare(SLIPS, "set-up", 0.5, 6.0, signal="tcp")
 def other_program(draw: Draw):
-    """Not the program that was predicted: an edited one, or another altogether."""
+    """Another program than predicted: an edited one, or a different one."""
     kind, row_share = draw.pick(["shifted", "slower", "another"]), draw.uniform(0.2, 0.8)
 
     def at(size):

@@ -1,4 +1,4 @@
-"""Effects that no library has: the right answer is that something is unexplained, and where."""
+"""Effects that are in no library: the right answer is that something is unexplained, and where."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tests.plant.scene import DEGREE
 
 
 def _after(run: Run, share: float) -> np.ndarray:
-    """1 from some share of the run on, (n, 1)."""
+    """1 from some fraction of the run on, (n, 1)."""
     return (run.t_s > share * run.t_s[-1]).astype(float)[:, None]
 
 
