@@ -7,8 +7,8 @@ from pathlib import Path
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.errors import Issue, input_error
-from gcode2krl.gap.beside.clocks import with_coarse_clocks, with_controller_clocks
+from gcode2krl.errors import input_error
+from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING
@@ -17,8 +17,7 @@ from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface
-from gcode2krl.gap.slips.set_up import Slip, clock_slips, slips_of
-from gcode2krl.gap.slips.stops import unplanned_stops
+from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.gap.tell.scan_answer import with_scan
@@ -87,8 +86,9 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 
 def _diagnosed(context: Context) -> Gap:
     """Return the answer: slips first, then each link on what earlier ones have shown, then the verdict."""
-    context, slips, issues = _without_slips(context)
-    if any(slip.final for slip in slips):
+    set_up = examine_set_up(context)
+    context, slips, issues = set_up.context, set_up.slips, set_up.issues
+    if set_up.is_final:
         return answer(context, slips, issues)
     context = _with_data(with_controller_clocks(context, PATH))
     for link in SIGNALS:
@@ -98,24 +98,6 @@ def _diagnosed(context: Context) -> Gap:
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
     return with_scan(answer(context, slips, issues), judge_surface(PART, context))
-
-
-def _without_slips(context: Context) -> tuple[Context, list[Slip], list[Issue]]:
-    """Return the context with set-up slips in its plans, the slips, and what checks of the runs say besides.
-
-    Unplanned stops are looked for first: what a run falls behind at them looks like a wrong clock.
-    """
-    slips, stopped = unplanned_stops(context.pairs, context.offered)
-    if slips:
-        return replace(context.with_pairs(stopped), stopped=True), slips, []
-    context = context.with_pairs(with_coarse_clocks(pair) for pair in context.pairs)
-    slips, issues = slips_of(context.pairs, context.offered)
-    slips += clock_slips(context.pairs, context.offered)
-    if not any(slip.final for slip in slips):
-        for slip in slips:
-            if not slip.applied.effect.is_clock:  # a clock was taken off the stamps
-                context = context.with_slip(slip.applied)
-    return context, slips, issues
 
 
 def _with_data(context: Context) -> Context:

@@ -248,7 +248,9 @@ class _Plan:
         line[added] = np.where(kind[added] == _HOME, 0, self.toolpath.source_line[move[after]])
         return line
 
-    def _programmed_columns(self, move: Ints32, kind: NDArray[np.int8], tolerance_mm: float | None) -> "_Programmed":
+    def _programmed_columns(
+        self, move: Ints32, kind: NDArray[np.int8], tolerance_mm: float | None
+    ) -> "_Programmed":
         """Return the columns that the G-code gives the targets; added ones are rapid, without a tolerance.
 
         Order of precedence of the tolerance: ``G64 P``, then the option, then the cell's.

@@ -10,8 +10,8 @@ from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.gap.beside.commanded import commanded_path, on_the_curve
 from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.slips.order import first_slip
 from gcode2krl.gap.slips.program import other_program
-from gcode2krl.gap.slips.set_up import slips_of
 from gcode2krl.runs import Controller, Run
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
@@ -37,7 +37,7 @@ def test_a_path_shifted_from_a_move_on_is_another_program():
 
 
 def test_it_is_said_before_everything_else_and_ends_the_comparison():
-    slips, _ = slips_of([_side([], SHIFTED)], LIBRARY)
+    slips = first_slip([_side([], SHIFTED)], LIBRARY)
     assert [(slip.applied.effect.name, slip.final) for slip in slips] == [("other_program", True)]
 
 
@@ -88,7 +88,7 @@ def test_slower_feeds_beside_rapid_moves_as_planned_are_another_program():
 def test_an_override_is_no_other_program():
     pair = _side(applied("override:percent=60"))
     assert other_program([pair]) is None
-    slips, _ = slips_of([pair], LIBRARY)
+    slips = first_slip([pair], LIBRARY)
     assert [slip.applied.effect.name for slip in slips] == ["override"]
     assert slips[0].applied["percent"] == pytest.approx(60.0, abs=0.1)
 
@@ -114,13 +114,13 @@ def test_slower_rapid_moves_alone_are_no_other_program():
     [("base_number:x_mm=30,y_mm=-12", (("tool_number", None),)), ("base_number:x_mm=30,a_deg=2", ())],
 )
 def test_a_mere_shift_may_be_a_tool_as_well(text, alike):
-    slips, _ = slips_of([_side(applied(text))], LIBRARY)
+    slips = first_slip([_side(applied(text))], LIBRARY)
     assert [(slip.applied.effect.name, slip.alike) for slip in slips] == [("base_number", alike)]
 
 
 def test_a_model_of_the_controllers_own_is_no_other_base():
     pair = _with_own_model(_side([]))
-    slips, _ = slips_of([pair], LIBRARY)
+    slips = first_slip([pair], LIBRARY)
     assert slips == []
     moved = applied("base_number:x_mm=30,a_deg=2")[0]
     assert on_the_curve(_side([moved]), frame_of(moved))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import Cell, Gcode2KrlError, read_gcode
-from gcode2krl.cell import Frame
+from gcode2krl.cell.sections import Frame
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "rs274"
 EXPECTED = json.loads((REFERENCE / "expected.json").read_text(encoding="ascii"))

@@ -13,30 +13,23 @@ from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller, Measured
 from gcode2krl.runs.matching import best_shift
 
 if TYPE_CHECKING:
     from gcode2krl.gap.beside.links.base import Link
 
-
-_REACH_S = 10.0
-_STEPS = 12
-_SMALL_S = 1e-5
-LARGE_S = 0.025
-"""Offsets below this are found by the linear signature of the effect; larger ones are taken out first."""
-_FOLLOWS = 0.9
-_LEFT, _NOTHING = 0.01, 1e-7
-"""A wrong clock explains all but a hundredth of what is apart; a wrong time law, taken for one, does not."""
+LIMITS = THRESHOLDS.beside
 
 
-def fitted_offset(trace: Trace, most_s: float = 0.5) -> tuple[float, float]:
+def fitted_offset(trace: Trace, most_s: float = LIMITS.clock_fit_most_s) -> tuple[float, float]:
     """Return the offset of a trace's clock and its standard deviation, by least squares on the model's rate.
 
     A constant difference of each component is fitted along: a frame or an encoder zero is no clock.
     """
     offset, rate, r = 0.0, trace.rate, trace.residual
-    for _ in range(_STEPS):
+    for _ in range(LIMITS.clock_steps):
         r = trace.measured - _shifted(trace, offset)
         centred_rate, centred = rate - rate.mean(axis=0), r - r.mean(axis=0)
         power = float(np.sum(centred_rate**2))
@@ -44,7 +37,7 @@ def fitted_offset(trace: Trace, most_s: float = 0.5) -> tuple[float, float]:
             return 0.0, np.inf
         step = -float(np.sum(centred_rate * centred)) / power
         offset = float(np.clip(offset + step, -most_s, most_s))
-        if abs(step) < _SMALL_S:
+        if abs(step) < LIMITS.clock_settled_s:
             break
     return offset, float(np.sqrt(np.mean((r - r.mean(axis=0)) ** 2) / max(power, 1e-30)))
 
@@ -112,17 +105,23 @@ def coarse_offset(pair: Pair, table: Measured) -> float:
         measured, predicted = position, inputs.position_mm
     if measured.shape[1] == 0 or float(np.ptp(predicted, axis=0).max()) == 0.0:
         return 0.0
-    shift = best_shift(inputs.time_s, predicted, table.time_s, measured, _REACH_S)
+    shift = best_shift(inputs.time_s, predicted, table.time_s, measured, LIMITS.clock_reach_s)
     here = _apart(predicted, measured, table.time_s, inputs.time_s, 0.0)
     there = _apart(predicted, measured, table.time_s, inputs.time_s, shift.seconds)
-    constant = there < _LEFT * here or there < _NOTHING * float(np.sum(np.var(measured, axis=0)))
-    return shift.seconds if abs(shift.seconds) > LARGE_S and shift.share >= _FOLLOWS and constant else 0.0
+    constant = there < LIMITS.clock_left * here or there < LIMITS.clock_nothing * float(
+        np.sum(np.var(measured, axis=0))
+    )
+    return (
+        shift.seconds
+        if abs(shift.seconds) > LIMITS.clock_large_s and shift.share >= LIMITS.clock_follows and constant
+        else 0.0
+    )
 
 
 def _apart(predicted: Floats, measured: Floats, own_s: Floats, time_s: Floats, offset_s: float) -> float:
     """Return the mean square between both, where they overlap, each less its mean."""
     inside = (own_s - offset_s >= time_s[0]) & (own_s - offset_s <= time_s[-1])
-    if np.count_nonzero(inside) < 10:
+    if np.count_nonzero(inside) < LIMITS.clock_least_rows:
         return np.inf
     wanted = cubic(own_s[inside] - offset_s, time_s, predicted)
     apart = measured[inside] - wanted

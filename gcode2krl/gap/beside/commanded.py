@@ -10,15 +10,10 @@ from gcode2krl import robot
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Inputs
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import DEG_PER_RAD
 
-_ON_MM, _OFF_MM = 0.03, 0.2
-"""The predicted path is right to 0.01 mm (design/gap.md); a commanded one 0.2 mm beside it is another."""
-_DECIMALS_ON, _DECIMALS_OFF = 2.0, 5.0
-_MOST_DECIMALS = 6
-_MOSTLY = 0.8
-_SPACING_MM, _MOST_POINTS, _NEIGHBOURS = 1.0, 200_000, 4
-_STILL_MM = 1e-3
+LIMITS = THRESHOLDS.beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +36,12 @@ class CommandedPath:
     @property
     def on_mm(self) -> float:
         """Return the distance up to which a sample is right on the curve."""
-        return max(_ON_MM, _DECIMALS_ON * self.resolution_mm)
+        return max(LIMITS.path_on_mm, LIMITS.path_on_decimals * self.resolution_mm)
 
     @property
     def off_mm(self) -> float:
         """Return the distance above which a sample is off the curve."""
-        return max(_OFF_MM, _DECIMALS_OFF * self.resolution_mm)
+        return max(LIMITS.path_off_mm, LIMITS.path_off_decimals * self.resolution_mm)
 
     def share(self, rows: Bools) -> float:
         """Return the share of the way that some samples (n,) stand for."""
@@ -76,7 +71,7 @@ def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:
     way_mm = 0.5 * (np.append(steps_mm, 0.0) + np.append(0.0, steps_mm))
     resolution_mm = _last_decimal_rad(table.q_cmd_rad) * _reach_mm(tip_mm, inputs)
     rows = np.arange(len(tip_mm))
-    rows = rows[way_mm > max(_STILL_MM, resolution_mm)]
+    rows = rows[way_mm > max(LIMITS.path_still_mm, resolution_mm)]
     rows = rows[_of_the_program(tip_mm[rows], apart_mm[rows], inputs)]
     if len(rows) < 2:
         return None
@@ -101,10 +96,10 @@ def _nearest_tool(q_rad: Floats, inputs: Inputs, tool: int | None) -> tuple[Floa
 def _last_decimal_rad(q_rad: Floats) -> float:
     """Return the unit of the last decimal of degrees in which angles (n, 6) are stated."""
     q_deg = q_rad * DEG_PER_RAD
-    for decimals in range(_MOST_DECIMALS):
+    for decimals in range(LIMITS.log_most_decimals):
         if np.abs(q_deg - np.round(q_deg, decimals)).max() < 0.01 * 10.0**-decimals:
             return float(10.0**-decimals / DEG_PER_RAD)
-    return float(10.0**-_MOST_DECIMALS / DEG_PER_RAD)
+    return float(10.0**-LIMITS.log_most_decimals / DEG_PER_RAD)
 
 
 def _reach_mm(tip_mm: Floats, inputs: Inputs) -> float:
@@ -115,11 +110,11 @@ def _reach_mm(tip_mm: Floats, inputs: Inputs) -> float:
 
 def _of_the_program(tip_mm: Floats, apart_mm: Floats, inputs: Inputs) -> Bools:
     """Return which samples (n,) are neither on the way to the program's start nor after its end."""
-    on = np.flatnonzero(apart_mm <= _OFF_MM)
+    on = np.flatnonzero(apart_mm <= LIMITS.path_off_mm)
     inside = np.ones(len(tip_mm), dtype=np.bool_)
     if len(on):
         inside[: on[0]] = False
-        ended = np.linalg.norm(tip_mm - inputs.position_mm[-1], axis=1) <= _OFF_MM
+        ended = np.linalg.norm(tip_mm - inputs.position_mm[-1], axis=1) <= LIMITS.path_off_mm
         if ended.any():
             inside[np.flatnonzero(ended)[-1] + 1 :] = False
     return inside
@@ -132,7 +127,7 @@ class Curve:
         steps = np.linalg.norm(np.diff(position_mm, axis=0), axis=1)
         moving = np.concatenate([[True], steps > 0.0])
         points, gone = position_mm[moving], np.concatenate([[0.0], np.cumsum(steps[moving[1:]])])
-        spacing = max(_SPACING_MM, gone[-1] / _MOST_POINTS)
+        spacing = max(LIMITS.curve_spacing_mm, gone[-1] / LIMITS.curve_most_points)
         at = np.union1d(gone, np.arange(0.0, gone[-1], spacing))
         self.points = np.stack([np.interp(at, gone, column) for column in points.T], axis=1)
         self.tree = cKDTree(self.points)
@@ -140,7 +135,7 @@ class Curve:
     def foot(self, tip_mm: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the curve's points nearest to points (n, 3), distances (n,) and directions (n, 3)."""
         last = len(self.points) - 1
-        _, near = self.tree.query(tip_mm, k=min(_NEIGHBOURS, last + 1))
+        _, near = self.tree.query(tip_mm, k=min(LIMITS.curve_neighbours, last + 1))
         near = near.reshape(len(tip_mm), -1)
         first = np.clip(np.concatenate([near - 1, near], axis=1), 0, max(last - 1, 0))
         start = self.points[first]
@@ -167,4 +162,4 @@ def on_the_curve(pair: Pair, frame: Floats | None = None, tool: int | None = Non
     _, apart_mm, _ = Curve(pair.inputs.position_mm).foot(tip_mm)
     inside = _of_the_program(tip_mm, apart_mm, pair.inputs)
     on_mm = float(path.way_mm[inside & (apart_mm <= path.on_mm)].sum())
-    return on_mm > _MOSTLY * float(path.way_mm[inside].sum())
+    return on_mm > LIMITS.path_mostly * float(path.way_mm[inside].sum())

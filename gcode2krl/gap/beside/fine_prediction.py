@@ -10,13 +10,11 @@ import numpy as np
 
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.interpolation import cubic
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.pipeline import plan_motion, solve_joints
 from gcode2krl.prediction import Prediction
 
-STEP_S = 0.004
-"""The cycle of a KRC4 under RSI."""
-_SAME_MM = 0.05
-"""Planned anew, the prediction's own samples must be met; else it was not planned by these laws."""
+LIMITS = THRESHOLDS.beside
 
 
 def refined_prediction(prediction: Prediction) -> Prediction:
@@ -24,13 +22,13 @@ def refined_prediction(prediction: Prediction) -> Prediction:
     motion = prediction.motion
     if motion is None or len(motion) < 3 or prediction.joints is None:
         return prediction
-    if float(np.median(np.diff(motion.time_s))) <= STEP_S * 1.01:
+    if float(np.median(np.diff(motion.time_s))) <= LIMITS.fine_step_s * 1.01:
         return prediction
     try:
-        fine = plan_motion(prediction.targets, prediction.cell, STEP_S)
+        fine = plan_motion(prediction.targets, prediction.cell, LIMITS.fine_step_s)
         again = cubic(motion.time_s, fine.time_s, fine.position_mm)
         apart = np.linalg.norm(again - motion.position_mm, axis=1)
-        if float(np.sqrt(np.mean(apart**2))) > _SAME_MM:
+        if float(np.sqrt(np.mean(apart**2))) > LIMITS.fine_same_mm:
             return prediction
         joints = solve_joints(fine, prediction.cell)
         forces = None
@@ -40,5 +38,5 @@ def refined_prediction(prediction: Prediction) -> Prediction:
             forces = cut(prediction.toolpath, fine, prediction.cell)
     except Gcode2KrlError:
         return prediction
-    inputs = {**prediction.inputs, "dt_s": STEP_S}
+    inputs = {**prediction.inputs, "dt_s": LIMITS.fine_step_s}
     return replace(prediction, motion=fine, joints=joints, forces=forces, deflection=None, inputs=inputs)

@@ -1,21 +1,17 @@
-"""Splits: a run, or a stretch of one, is never used both to choose or fit an effect and to report on it."""
+"""Splits: no row of a run is used both to choose or fit an effect and to report on it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from gcode2krl.arrays import Bools, Floats
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-STRETCH_S = 1.0
-"""Longer than an instrument remembers; rows of one stretch are kept together in every split."""
-_GUARD_S = STRETCH_S
-_QUARTERS = 4
-_NEARLY_ALL, _EVENLY = 0.75, 0.2
-_LEAST_KEPT, _LEAST_HELD = 30, 10
-_LEAST_SEEN = 0.1
-"""Stretches with less than this of the power that a gap has cannot tell of it, held out or not."""
+LIMITS = THRESHOLDS.beside
+
+STRETCH_S = LIMITS.stretch_s
 
 
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:
@@ -26,52 +22,63 @@ def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[T
 
 
 def folds_of(traces: Sequence[Trace], power: Sequence[Floats] = ()) -> list[tuple[list[Trace], list[Trace]]]:
-    """Return (to explain, held out) pairs: whole runs by turns; of a single run quarters with guard gaps.
+    """Return (traces that explain, held-out traces): each run held out in turn, of a single run each quarter.
 
-    ``power``: what a gap has in each row of each trace. Where one run has nearly all of it the others cannot
-    tell of it, and what has a quarter of the power is held out by turns.
+    ``power`` is the power (n,) of the gap in each row of each trace. Where one run has nearly all of it, the
+    others cannot test an explanation; then each quarter of the power is held out in turn.
     """
     sums = [float(each.sum()) for each in power]
-    if len(traces) > 1 and not (sums and max(sums) > _NEARLY_ALL * sum(sums)):
+    if len(traces) > 1 and not (sums and max(sums) > LIMITS.holdout_nearly_all * sum(sums)):
         return [([trace for trace in traces if trace is not held], [held]) for held in traces]
     weights = list(power) if sum(sums) > 0.0 else [np.ones(len(trace.time_s)) for trace in traces]
-    # a little for every row, so that rows without power belong somewhere too
-    total = sum(float(each.sum()) for each in weights)
-    rows = sum(len(each) for each in weights)
-    gone, found = 0.0, []
-    quarters = []
-    for each in weights:
-        share = gone + np.cumsum(each / total + _EVENLY / rows) / (1.0 + _EVENLY)
-        gone = float(share[-1]) if len(share) else gone
-        quarters.append(np.minimum((_QUARTERS * share).astype(int), _QUARTERS - 1))
-    for quarter in range(_QUARTERS):
-        kept, held, seen = [], [], 0.0
-        for trace, own, each in zip(traces, quarters, weights, strict=True):
-            mine = own == quarter
-            near = _near(trace.time_s, mine)
-            held.append(with_rows(trace, mine))
-            kept.append(with_rows(trace, ~near))
-            seen += float(each[~near].sum())
-        if seen < _LEAST_SEEN * total:
-            continue
-        kept = [trace for trace in kept if len(trace.time_s) >= _LEAST_KEPT]
-        held = [trace for trace in held if len(trace.time_s) >= _LEAST_HELD]
-        if kept and held:
-            found.append((kept, held))
-    return found
+    quarters = _quarters(weights)
+    folds = (_fold(traces, weights, quarters, held) for held in range(LIMITS.holdout_quarters))
+    return [fold for fold in folds if fold is not None]
 
 
-def _near(time_s: Floats, mine: Bools) -> Bools:
-    """Return the rows within the guard of the held ones, which are one stretch."""
-    if not mine.any():
-        return mine
-    first, last = time_s[mine][[0, -1]]
-    near: Bools = (time_s >= first - _GUARD_S) & (time_s <= last + _GUARD_S)
-    return near
+def _quarters(weights: Sequence[Floats]) -> list[Ints]:
+    """Return the quarter (n,) of the power that each row belongs to, in the order of the traces."""
+    total = sum(float(weight.sum()) for weight in weights)
+    rows = sum(len(weight) for weight in weights)
+    # a little for every row, so that rows without power belong to a quarter too
+    evenly, before, quarters = LIMITS.holdout_evenly, 0.0, []
+    for weight in weights:
+        share = before + np.cumsum(weight / total + evenly / rows) / (1.0 + evenly)
+        before = float(share[-1]) if len(share) else before
+        last = LIMITS.holdout_quarters - 1
+        quarters.append(np.minimum((LIMITS.holdout_quarters * share).astype(np.int64), last))
+    return quarters
+
+
+def _fold(
+    traces: Sequence[Trace], weights: Sequence[Floats], quarters: Sequence[Ints], quarter: int
+) -> tuple[list[Trace], list[Trace]] | None:
+    """Return the traces without a quarter and its guards, and that quarter; None where too little is left."""
+    kept, held, power_kept = [], [], 0.0
+    for trace, weight, of_row in zip(traces, weights, quarters, strict=True):
+        inside = of_row == quarter
+        guarded = _with_guards(trace.time_s, inside)
+        held.append(with_rows(trace, inside))
+        kept.append(with_rows(trace, ~guarded))
+        power_kept += float(weight[~guarded].sum())
+    if power_kept < LIMITS.holdout_least_seen * sum(float(weight.sum()) for weight in weights):
+        return None
+    kept = [trace for trace in kept if len(trace.time_s) >= LIMITS.holdout_least_kept]
+    held = [trace for trace in held if len(trace.time_s) >= LIMITS.holdout_least_held]
+    return (kept, held) if kept and held else None
+
+
+def _with_guards(time_s: Floats, inside: Bools) -> Bools:
+    """Return the rows (n,) within the guard of the chosen ones, which are one stretch."""
+    if not inside.any():
+        return inside
+    first, last = time_s[inside][[0, -1]]
+    guarded: Bools = (time_s >= first - STRETCH_S) & (time_s <= last + STRETCH_S)
+    return guarded
 
 
 def with_rows(trace: Trace, chosen: Bools) -> Trace:
-    """Return a trace with some of its rows; what is left out makes a gap."""
+    """Return a trace with some of its rows; a segment ends where rows are left out."""
     rows = np.flatnonzero(chosen)
     owner = np.zeros(len(chosen), dtype=np.int64)
     for number, (first, last) in enumerate(trace.segments):

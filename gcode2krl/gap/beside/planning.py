@@ -6,11 +6,12 @@ from typing import Any
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects.inputs import Plan
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.pipeline import plan_motion
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Motion, Targets
 
-_MOST = 64
+LIMITS = THRESHOLDS.beside
 
 
 def remembered_plan(prediction: Prediction) -> Plan | None:
@@ -34,7 +35,7 @@ def remembered_plan(prediction: Prediction) -> Plan | None:
         )  # fmt: skip
         if key not in known:
             known[key] = plan(targets, cell)
-            if len(known) > _MOST:
+            if len(known) > LIMITS.remembered_plans:
                 known.popitem(last=False)
         return known[key]
 

@@ -5,8 +5,9 @@ from collections.abc import Hashable, Sequence
 from hashlib import blake2b
 
 from gcode2krl.effects import Applied, Inputs, Signals, commanded
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_MOST_KEPT = 64
+LIMITS = THRESHOLDS.beside
 
 
 class Simulator:
@@ -26,7 +27,7 @@ class Simulator:
         key = (_digest(inputs), effects)
         if key not in self._kept:
             self._kept[key] = commanded(inputs, applied)
-            if len(self._kept) > _MOST_KEPT:
+            if len(self._kept) > LIMITS.remembered_paths:
                 self._kept.popitem(last=False)
         return self._kept[key]
 

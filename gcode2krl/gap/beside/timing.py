@@ -7,15 +7,15 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_SLOW = 0.05
-"""Below this share of the rms rate a sample tells nothing about time."""
+LIMITS = THRESHOLDS.beside
 
 
 def late_s(trace: Trace, residual: Floats) -> tuple[Floats, Bools]:
     """Return how late the run is (n,) in s, and where it moves fast enough to tell."""
     power = np.sum(trace.rate**2, axis=1)
-    moves = power > (_SLOW**2) * float(np.mean(power))
+    moves = power > (LIMITS.timing_slow**2) * float(np.mean(power))
     late = np.zeros(len(power))
     late[moves] = -np.sum(trace.rate[moves] * residual[moves], axis=1) / power[moves]
     return late, moves

@@ -11,11 +11,12 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals
 from gcode2krl.gap.beside.interpolation import interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from gcode2krl.gap.beside.links.base import Link
 
-_CLOCK_STEP_S = 0.004
+LIMITS = THRESHOLDS.beside
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,7 +88,7 @@ class Trace:
         """(n, k) how fast the signal changes with its own clock: that of ``plus`` where both have one."""
         if not self.link.own_clock:
             return self.rate
-        step, signals = _CLOCK_STEP_S, self._plain
+        step, signals = LIMITS.clock_difference_s, self._plain
         times = self.time_s - self.plus_late_s
         apart = [interpolate(signals, self.plus, times + s) for s in (step, -step)]
         found: Floats = (apart[0] - apart[1])[:, list(self.columns)] / (2.0 * step)

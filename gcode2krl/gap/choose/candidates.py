@@ -10,8 +10,7 @@ from gcode2krl.gap.beside.links import SIGNALS, Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.selection import Question
 from gcode2krl.gap.fit.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
-
-_PEAKS = 4
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 
 def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Question:
@@ -42,6 +41,7 @@ def _blocks(effect: Effect, target: str | None, traces: Sequence[Trace]) -> Iter
         yield from blocks_of(effect, target)
         return
     p = effect.parameter(HZ)
+    residuals = [trace.residual for trace in traces]
     step_s = float(np.median(np.diff(traces[0].time_s)))
-    peaks = strongest_hz([trace.residual for trace in traces], step_s, p.low, p.high, _PEAKS)
+    peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)
     yield from blocks_at(effect, target, peaks)

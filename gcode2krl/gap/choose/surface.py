@@ -9,16 +9,11 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Applied, Effect, Inputs, commanded
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links.surface import LEAST_POINTS, SurfaceLink, SurfacePoints
+from gcode2krl.gap.beside.links.surface import SurfaceLink, SurfacePoints
 from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_OUTLIERS = 4.0
-_BLOCK_MM = 20.0
-"""Points of one block of the part have one error of the tip's model in common."""
-_CERTAIN = 4.0
-_ROUGH_MM = 1.0
-_TIP_MM = 0.003
-"""The swept surface is known to some micrometres."""
+LIMITS = THRESHOLDS.beside
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,7 @@ def judge_surface(link: SurfaceLink, context: Context) -> SurfaceFinding | None:
     base = link.base(context)
     clouds = [cloud for pair in context.pairs if (cloud := link.points(pair, base)) is not None]
     effect = _of_radius(link, context)
-    if not clouds or effect is None or sum(cloud.wall.sum() for cloud in clouds) < LEAST_POINTS:
+    if not clouds or effect is None or sum(cloud.wall.sum() for cloud in clouds) < LIMITS.scan_least_points:
         return None
     return _finding(clouds, effect, context)
 
@@ -83,13 +78,13 @@ def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) 
     gap2 = float(np.mean([p[0] for p in power])) - noise2 if power else 0.0
     left2 = float(np.mean([p[1] for p in power])) - noise2 if power else 0.0
     shrink = float(np.clip(1.0 - left2 / gap2, 0.0, 1.0)) if gap2 > 0.0 else 0.0
-    deviation = float(np.hypot(np.sqrt(covariance[0, 0]), _TIP_MM))
+    deviation = float(np.hypot(np.sqrt(covariance[0, 0]), LIMITS.scan_tip_mm))
     inputs = context.pairs[0].inputs
     per_size = _radius_per_size(effect, inputs)
     offset = Interval(*(float((b[0] + k * deviation) / per_size) for k in (0.0, -1.645, 1.645)))
     applied = Applied(effect, None, {effect.names[0]: offset.value})
     usual = context.mismatch.limits(applied, 1.0)[effect.names[0]]
-    is_gap = abs(b[0] / per_size) > usual + _CERTAIN * deviation
+    is_gap = abs(b[0] / per_size) > usual + LIMITS.scan_certain * deviation
     return SurfaceFinding(
         effect=effect,
         points=len(y),
@@ -107,7 +102,7 @@ def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Float
     rows = sum(len(cloud.deviation) for cloud in clouds)
     x = np.zeros((rows, 1 + 5 * len(clouds)))
     prior = np.zeros(x.shape[1])
-    prior[0] = 1.0 / _ROUGH_MM**2
+    prior[0] = 1.0 / LIMITS.scan_rough_mm**2
     at = 0
     for number, cloud in enumerate(clouds):
         rows_here, first = slice(at, at + len(cloud.deviation)), 1 + 5 * number
@@ -116,10 +111,10 @@ def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Float
         x[rows_here, first + 2] = ~cloud.wall
         x[rows_here, first + 3] = cloud.deflection
         x[rows_here, first + 4] = (
-            np.where(cloud.wall, 0.0, cloud.place[:, 0] - cloud.place[:, 0].mean()) / _BLOCK_MM
+            np.where(cloud.wall, 0.0, cloud.place[:, 0] - cloud.place[:, 0].mean()) / LIMITS.scan_block_mm
         )
         prior[first : first + 2] = 1.0 / sigma(mismatch.frame_mm) ** 2
-        prior[first + 2] = 1.0 / _ROUGH_MM**2
+        prior[first + 2] = 1.0 / LIMITS.scan_rough_mm**2
         prior[first + 3] = 1.0 / sigma(mismatch.stiffness) ** 2
         prior[first + 4] = 1.0 / sigma(mismatch.frame_mm) ** 2
         at += len(cloud.deviation)
@@ -129,11 +124,17 @@ def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Float
 def _blocks(clouds: Sequence[SurfacePoints]) -> Ints:
     """Return the number (n,) of the block of the part, run by run, that each point lies in."""
     numbers = [
-        np.column_stack([np.full(len(cloud.place), number), np.floor(cloud.place[:, :2] / _BLOCK_MM)])
+        np.column_stack([np.full(len(cloud.place), number), _in_blocks(cloud)])
         for number, cloud in enumerate(clouds)
     ]
     _, block = np.unique(np.concatenate(numbers), axis=0, return_inverse=True)
     return np.asarray(block, dtype=np.int64).ravel()
+
+
+def _in_blocks(cloud: SurfacePoints) -> Floats:
+    """Return the column and row (n, 2) of the block of each point."""
+    place: Floats = np.floor(cloud.place[:, :2] / LIMITS.scan_block_mm)
+    return place
 
 
 def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
@@ -148,7 +149,7 @@ def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
 
 def _inliers(x: Floats, y: Floats, prior: Floats) -> Bools:
     rest = y - x @ _solved(x, y, prior)
-    good: Bools = np.abs(rest) < _OUTLIERS * 1.4826 * np.median(np.abs(rest))
+    good: Bools = np.abs(rest) < LIMITS.scan_outliers * 1.4826 * np.median(np.abs(rest))
     return good
 
 

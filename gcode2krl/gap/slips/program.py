@@ -1,39 +1,52 @@
-"""A run of another program, found from its commanded path: where that lies, and how fast its moves are gone.
+"""A run of another program, by its commanded path: where that lies, and how fast it goes along its moves.
 
 A program that was edited keeps to the predicted curve for a good part of its way and leaves it for a stretch.
-A corner leaves it near that corner only, another base or an accurate model of the robot everywhere.
+A blended corner leaves it near that corner only, another base or an accurate model of the robot everywhere.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
+from gcode2krl.effects import Effect
 from gcode2krl.gap.beside.commanded import CommandedPath, Curve, commanded_path
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.slips.feeds import other_feeds
+from gcode2krl.gap.slips.slip import Slip, final_slip
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_ON_SHARE = 0.1
-_STRETCH_MM = 30.0
-_BLEND_MM = 50.0
-"""Largest approximation distance that occurs (KUKA's examples, see the effect ``corner``)."""
-_FRAME_STEPS, _ALL, _FRAME_ROWS = 8, 0.95, 4000
-_MOST_CHECKED = 200
+_NAME = "other_program"
+_LIMITS = THRESHOLDS.slips
+
+
+class ProgramTest:
+    """Another program than the predicted one. Nothing is compared beyond it."""
+
+    effects = (_NAME,)
+
+    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+        """Return the slip where a commanded path shows another program."""
+        effect = library.get(_NAME)
+        words = other_program(pairs) if effect is not None else None
+        return [] if effect is None or words is None else [final_slip(effect, None, words, pairs)]
 
 
 def other_program(pairs: Sequence[Pair]) -> str | None:
     """Return what shows that the runs are of another program, as a sentence; None where nothing does."""
     paths = [path for pair in pairs if (path := commanded_path(pair)) is not None]
-    beside = [f"{path.name}: {words}" for path in paths if (words := _beside(path)) is not None]
-    if beside:
-        return f"{beside[0]}: the run is of another program"
+    for path in paths:
+        words = _beside(path)
+        if words is not None:
+            return f"{path.name}: {words}: the run is of another program"
     return other_feeds(paths)
 
 
 def _beside(path: CommandedPath) -> str | None:
-    """Return from when a path is beside the curve, where part of it is right on it; None otherwise."""
+    """Return from when on a path is beside the curve, where part of it is right on it; None otherwise."""
     on = _long_stretches(path.apart_mm <= path.on_mm, path.way_mm)
-    if not on or sum(float(path.way_mm[rows].sum()) for rows in on) < _ON_SHARE * path.way_mm.sum():
+    on_way_mm = sum(float(path.way_mm[rows].sum()) for rows in on)
+    if not on or on_way_mm < _LIMITS.program_on_share * path.way_mm.sum():
         return None
     off = _long_stretches(path.apart_mm > path.off_mm, path.way_mm)
     off = [rows for rows in off if not _in_corners(path, rows)]
@@ -47,37 +60,34 @@ def _beside(path: CommandedPath) -> str | None:
 
 
 def _long_stretches(rows: Bools, way_mm: Floats) -> list[slice]:
-    """Return the runs of True (n,) that go further than corners do."""
+    """Return the stretches of True rows (n,) whose way is longer than that of corners."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     stretches = [slice(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
-    return [each for each in stretches if float(way_mm[each].sum()) > _STRETCH_MM]
+    return [each for each in stretches if float(way_mm[each].sum()) > _LIMITS.program_off_way_mm]
 
 
 def _in_corners(path: CommandedPath, rows: slice) -> bool:
     """Tell whether a stretch may be blended corners, whatever their approximation distance.
 
-    A blend stays in the triangle of a corner and the points from which and to which it goes, which are at
-    most half a move away.
+    A blend stays in the triangle of its corner and of a point on each leg, at most half a move away from it.
     """
     targets = path.inputs.targets
     if targets is None or len(targets.position_mm) < 3:
         return False
-    chosen = np.unique(np.linspace(rows.start, rows.stop - 1, _MOST_CHECKED).astype(np.int64))
-    corner_mm = targets.position_mm[1:-1][targets.cdis_mm[1:-1] > 0.0]
-    before, after = np.diff(targets.position_mm, axis=0)[:-1], np.diff(targets.position_mm, axis=0)[1:]
     blended = targets.cdis_mm[1:-1] > 0.0
-    legs = -_leg_mm(before[blended]), _leg_mm(after[blended])
-    outside = np.array(
-        [not _in_a_triangle(tip, corner_mm, *legs, path.off_mm) for tip in path.tip_mm[chosen]]
-    )
+    moves_mm = np.diff(targets.position_mm, axis=0)
+    corner_mm = targets.position_mm[1:-1][blended]
+    legs_mm = -_leg_mm(moves_mm[:-1][blended]), _leg_mm(moves_mm[1:][blended])
+    chosen = np.unique(np.linspace(rows.start, rows.stop - 1, _LIMITS.program_corner_rows).astype(np.int64))
+    outside = [not _in_a_triangle(tip, corner_mm, *legs_mm, path.off_mm) for tip in path.tip_mm[chosen]]
     way_mm = float(path.way_mm[rows].sum())
-    return float(np.mean(outside)) * way_mm <= _STRETCH_MM
+    return float(np.mean(outside)) * way_mm <= _LIMITS.program_off_way_mm
 
 
 def _leg_mm(move_mm: Floats) -> Floats:
     """Return half of each move (c, 3), at most the largest approximation distance."""
     length = np.maximum(np.linalg.norm(move_mm, axis=1, keepdims=True), 1e-12)
-    leg: Floats = move_mm * np.minimum(0.5, _BLEND_MM / length)
+    leg: Floats = move_mm * np.minimum(0.5, _LIMITS.corner_blend_mm / length)
     return leg
 
 
@@ -99,22 +109,26 @@ def _in_a_triangle(
 
 
 def _is_frame(path: CommandedPath) -> bool:
-    """Tell whether a shift and a turn of all of the path bring it onto the curve: another frame, then.
+    """Tell whether one shift and turn bring the whole path onto the curve: then it is in another frame.
 
     Points to lines by least squares, each step from the feet of the one before (Chen & Medioni 1992).
     """
-    rows = np.unique(np.linspace(0, len(path.tip_mm) - 1, _FRAME_ROWS).astype(np.int64))
+    rows = np.unique(np.linspace(0, len(path.tip_mm) - 1, _LIMITS.program_frame_rows).astype(np.int64))
     moved, way_mm, curve = path.tip_mm[rows], path.way_mm[rows], Curve(path.inputs.position_mm)
-    for _ in range(_FRAME_STEPS):
+    for _ in range(_LIMITS.program_frame_steps):
         feet, apart_mm, along = curve.foot(moved)
-        if float(way_mm[apart_mm <= path.on_mm].sum()) > _ALL * float(way_mm.sum()):
+        on_way_mm = float(way_mm[apart_mm <= path.on_mm].sum())
+        if on_way_mm > _LIMITS.program_frame_share * float(way_mm.sum()):
             return True
         moved = moved + _twist(moved, feet - moved, along)
     return False
 
 
 def _twist(points_mm: Floats, wanted_mm: Floats, along: Floats) -> Floats:
-    """Return what a small shift and turn add to points (n, 3) that miss lines by vectors (n, 3)."""
+    """Return the displacement (n, 3) by the small shift and turn that best bring points onto lines.
+
+    ``wanted_mm`` : (n, 3) from each point to its line, whose direction is ``along``.
+    """
     lever = points_mm - points_mm.mean(axis=0)
     scale_mm = float(np.sqrt(np.mean(np.sum(lever**2, axis=1)))) or 1.0
     across = np.eye(3) - along[:, :, None] * along[:, None, :]

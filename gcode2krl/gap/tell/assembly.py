@@ -14,7 +14,7 @@ from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judgement import Cause, Judgement
-from gcode2krl.gap.slips.set_up import Slip
+from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.gap.tell.where import place
 
@@ -88,7 +88,7 @@ def _verdict(gapped: Sequence[Judgement], slips: Sequence[Slip]) -> str:
 def _gap(main: Judgement | None, slips: Sequence[Slip]) -> dict[str, Any]:
     if main is None or (slips and main.verdict == "no_gap"):
         slip = slips[0] if slips else None
-        link = next(each for each in LINKS if each.name == (slip.link if slip else MECHANICS.name))
+        link = slip.link if slip else MECHANICS
         return {
             "signal": link.signal, "unit": link.unit,
             "rms_before": slip.rms_before if slip else None, "rms_after": slip.rms_after if slip else None,
@@ -136,7 +136,7 @@ def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[
                 "rms_after": factor * each.size.after**0.5,
                 "noise": factor * each.size.floor**0.5,
                 "unit": each.traces[0].unit,
-                "verdict": "explained" if link.name in slipped and verdict == "no_gap" else verdict,
+                "verdict": "explained" if link in slipped and verdict == "no_gap" else verdict,
             })  # fmt: skip
         if link is GEAR and link in by_link:
             found[-1]["offset_deg"] = _zeros(by_link[link])
@@ -205,7 +205,7 @@ def _slip_cause(slip: Slip) -> dict[str, Any]:
         wide = share * abs(v) + (Mismatch.clock_s if name.endswith("_s") else 0.0)
         values[name] = {"value": v, "low": v - wide, "high": v + wide}
     return {
-        "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link,
+        "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link.name,
         "probability": _SURE, "parameters": {} if slip.final else values, "shrink": None,
         "rms_after": slip.rms_after, "words": slip.words,
         "indistinguishable_from": [{"effect": name, "target": target} for name, target in slip.alike],

@@ -1,7 +1,7 @@
 """The links of the measuring chain, in its order."""
 
 from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
-from gcode2krl.gap.beside.links.joints import MODEL_RAD, GearLink, PathLink, ServoLink
+from gcode2krl.gap.beside.links.joints import GearLink, PathLink, ServoLink
 from gcode2krl.gap.beside.links.surface import SurfaceLink
 from gcode2krl.gap.beside.links.timing import TimingLink
 from gcode2krl.gap.beside.links.traces import JOINTS
@@ -19,7 +19,6 @@ __all__ = [
     "JOINTS",
     "LINKS",
     "MECHANICS",
-    "MODEL_RAD",
     "PART",
     "PATH",
     "SERVO",

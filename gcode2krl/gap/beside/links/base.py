@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Protocol
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from gcode2krl.gap.beside.context import Context
     from gcode2krl.gap.beside.trace import Trace
 
-_LEAST_ROWS = 10
-_CLOCKS_LOST = 4
+LIMITS = THRESHOLDS.beside
 
 
 class Verdict(Protocol):
@@ -88,7 +88,9 @@ class Link:
     def traces(self, pairs: Iterable[Pair], base: Sequence[Applied] = ()) -> "list[Trace]":
         """Return the measured signals, one a run that has it and is long enough to be judged."""
         traces = [self.trace(pair, base) for pair in pairs]
-        return [trace for trace in traces if trace is not None and len(trace.time_s) >= _LEAST_ROWS]
+        return [
+            trace for trace in traces if trace is not None and len(trace.time_s) >= LIMITS.trace_least_rows
+        ]
 
     def simulated(self, trace: "Trace", applied: Sequence[Applied]) -> Signals:
         """Return the signals of its model with some effects at work."""
@@ -109,7 +111,7 @@ class Link:
         """
         path = context.timing
         if is_lost(path):
-            return _CLOCKS_LOST
+            return LIMITS.clocks_lost
         return 1 if path is None or path.verdict == "no_gap" else 2
 
     def clock_share(self, context: "Context") -> float:

@@ -12,18 +12,15 @@ from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
 from gcode2krl.gap.beside.links.traces import joint_trace
+from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.retiming import refined, retimed
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller
 from gcode2krl.units import RAD_PER_DEG
 
-MODEL_RAD = 4e-4 * RAD_PER_DEG
-"""The predicted path is right to 0.01 mm (tests/plant), 4e-4 degrees at an arm's length."""
-_CLOCK_SET = 0.1
-"""The controller's clock is set before the path is examined: a tenth of its mismatch remains."""
-_CLOCKS_OF_TWO = 2
-"""Two clocks are the same where they differ by no more than normal mismatch of both."""
+LIMITS = THRESHOLDS.beside
 
 
 class PathLink(Link):
@@ -34,10 +31,10 @@ class PathLink(Link):
     unit = "deg"
     needs = "controller.csv with q1_cmd_deg …, and a prediction"
     of_joints = True
-    model_rms = MODEL_RAD
+    model_rms = LIMITS.model_rad
     tells_time = True
-    least_off = 2.0 * MODEL_RAD
-    least_step = 1e-4
+    least_off = LIMITS.progress_off_rad
+    least_step = LIMITS.progress_step_rad
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return the commanded joints of a run with a prediction."""
@@ -47,7 +44,7 @@ class PathLink(Link):
         # joints alone: what plans anew need not remove the material again
         pair = replace(pair, inputs=replace(pair.inputs, cut=None, forces=None))
         return joint_trace(
-            self, pair, table, table.q_cmd_rad, "q_cmd_rad", None, base=base, sigma_rad=MODEL_RAD
+            self, pair, table, table.q_cmd_rad, "q_cmd_rad", None, base=base, sigma_rad=LIMITS.model_rad
         )
 
     def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
@@ -64,7 +61,7 @@ class PathLink(Link):
 
     def clock_share(self, context: Context) -> float:
         """Return a tenth where the clock was set by the commanded joints already."""
-        return _CLOCK_SET if context.clocks_set else 1.0
+        return LIMITS.clock_set_share if context.clocks_set else 1.0
 
     def learn(self, context: Context, judged: Verdict) -> Context:
         """Plan named time laws into the inputs, then take over the run's own timing.
@@ -84,9 +81,9 @@ class PathLink(Link):
 
     def _without_own_model(self, pair: Pair) -> Pair:
         """Return the pair on the run's own time, the controller's joints less what its own model adds."""
-        on_time = refined(pair.with_own_model(), self)
+        on_time = refined(with_own_model(pair), self)
         inputs = replace(on_time.inputs, q_cmd_rad=pair.inputs.q_cmd_rad)
-        return replace(on_time, inputs=inputs).with_nominal_joints()
+        return with_nominal_joints(replace(on_time, inputs=inputs))
 
 
 class _DriveLink(Link):
@@ -162,7 +159,7 @@ def _with_fitted(pair: Pair, judged: Verdict) -> Pair:
     joints_rad = np.zeros((len(stamps), 6))
     for column, values in zip(trace.columns, model.T, strict=True):
         joints_rad[:, column] = np.interp(stamps, trace.time_s, values)
-    return replace(pair, fitted={**pair.fitted, judged.link.name: joints_rad})
+    return replace(pair, fitted={**pair.fitted, trace.plus: joints_rad})
 
 
 def _with_free_controller(context: Context, servo: Verdict) -> Context:
@@ -174,7 +171,7 @@ def _with_free_controller(context: Context, servo: Verdict) -> Context:
     of_table, of_columns = _clock(path, "controller"), _clock(servo, "q_cmd")
     if path is None or of_table is None or of_columns is None:
         return context
-    if abs(of_table["offset_s"] - of_columns["offset_s"]) > _CLOCKS_OF_TWO * context.mismatch.clock_s:
+    if abs(of_table["offset_s"] - of_columns["offset_s"]) > LIMITS.clocks_of_two * context.mismatch.clock_s:
         return context
     freed = (pair.later("controller", -of_table["offset_s"]) for pair in context.pairs)
     return context.without_cause(path, of_table).with_pairs(freed)

@@ -17,13 +17,9 @@ from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_REACH_MM = 1.0
-"""A point further from where a floor or a wall should be belongs to neither."""
-_ABOVE_MM, _INSIDE_MM = 0.2, 0.3
-_SMOOTH_S = 0.2
-_STRAIGHT = 1e-6
-LEAST_POINTS = 30
+LIMITS = THRESHOLDS.beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +61,7 @@ def _assigned(pair: Pair, base: Sequence[Applied]) -> SurfacePoints | None:
     scan, inputs = pair.run.scan, pair.inputs
     axis = inputs.tool_rotation[:, :, 2]
     cuts = inputs.force_base_N.any(axis=1)
-    if scan is None or not cuts.any() or np.ptp(axis, axis=0).max() > _STRAIGHT:
+    if scan is None or not cuts.any() or np.ptp(axis, axis=0).max() > LIMITS.scan_straight:
         return None
     tip, bent = _tips(pair, base)
     tool = inputs.cell.tool
@@ -77,7 +73,7 @@ def _assigned(pair: Pair, base: Sequence[Applied]) -> SurfacePoints | None:
     points = scan.position_mm @ turn.T
     assigned = [_surface(point, path, radius, corner) for point in points]
     kept = np.array([row is not None for row in assigned])
-    if kept.sum() < LEAST_POINTS:
+    if kept.sum() < LIMITS.scan_least_points:
         return None
     rows = [row for row in assigned if row is not None]
     deviation = np.array([row[0] for row in rows])
@@ -93,17 +89,17 @@ def _surface(
     """Return deviation, whether it is a wall, the normal and the row of the tip; None for neither."""
     offset = path[:, :2] - point[:2]
     away = np.hypot(offset[:, 0], offset[:, 1])
-    over = np.flatnonzero(away < radius - corner - _INSIDE_MM)
+    over = np.flatnonzero(away < radius - corner - LIMITS.scan_inside_mm)
     if len(over):
         row = int(over[np.argmin(path[over, 2])])
         low = float(path[row, 2] - point[2])
-        return (low, False, np.array([0.0, 0.0, 1.0]), row) if abs(low) < _REACH_MM else None
-    beside = np.flatnonzero(path[:, 2] + corner < point[2] - _ABOVE_MM)
+        return (low, False, np.array([0.0, 0.0, 1.0]), row) if abs(low) < LIMITS.scan_reach_mm else None
+    beside = np.flatnonzero(path[:, 2] + corner < point[2] - LIMITS.scan_above_mm)
     if not len(beside):
         return None
     row = int(beside[np.argmin(away[beside] - radius[beside])])
     far = float(away[row] - radius[row])
-    if abs(far) > _REACH_MM:
+    if abs(far) > LIMITS.scan_reach_mm:
         return None
     return far, True, np.array([*(offset[row] / away[row]), 0.0]), row
 
@@ -117,7 +113,7 @@ def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
         return tip, bent
     own_s = pair.stamps(table)
     offset = table.position_mm - linear(own_s, inputs.time_s, tip)
-    width = max(1, round(_SMOOTH_S / float(np.median(np.diff(own_s)))))
+    width = max(1, round(LIMITS.scan_smooth_s / float(np.median(np.diff(own_s)))))
     kernel = np.ones(width)
     weight = np.convolve(np.ones(len(offset)), kernel, mode="same")
     smooth = np.stack([np.convolve(column, kernel, mode="same") / weight for column in offset.T], axis=1)

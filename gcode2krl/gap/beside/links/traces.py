@@ -10,16 +10,16 @@ from gcode2krl.effects import Applied, Inputs
 from gcode2krl.gap.beside.holdout import with_rows
 from gcode2krl.gap.beside.pair import Pair, usable_rows
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller, Measured
-from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
+from gcode2krl.units import DEG_PER_RAD
 
 if TYPE_CHECKING:
     from gcode2krl.gap.beside.links.base import Link
 
+LIMITS = THRESHOLDS.beside
+
 JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
-_JUMP_S, _JUMP, _AROUND_S = 0.012, 0.1, 0.02
-"""A change by a tenth of the largest force within 12 ms is a jump; a cutter enters in tenths of a second."""
-_MOVES_RAD = 1e-4 * RAD_PER_DEG
 
 
 def joint_trace(
@@ -67,7 +67,7 @@ def _moves(table: Controller) -> Bools:
     moving = np.zeros(6, dtype=np.bool_)
     for values in (table.q_cmd_rad, table.q_act_rad):
         if values is not None:
-            moving |= np.nan_to_num(np.ptp(values, axis=0)) > _MOVES_RAD
+            moving |= np.nan_to_num(np.ptp(values, axis=0)) > LIMITS.joint_moves_rad
     return moving
 
 
@@ -119,12 +119,12 @@ def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
     if largest == 0.0:
         return np.zeros(len(time_s), dtype=np.bool_)
     own_s = inputs.time_s
-    later = np.stack([np.interp(own_s + _JUMP_S, own_s, column) for column in force.T], axis=1)
-    jumps = own_s[np.linalg.norm(later - force, axis=1) > _JUMP * largest] + _JUMP_S / 2.0
+    later = np.stack([np.interp(own_s + LIMITS.jump_s, own_s, column) for column in force.T], axis=1)
+    jumps = own_s[np.linalg.norm(later - force, axis=1) > LIMITS.jump_share * largest] + LIMITS.jump_s / 2.0
     if len(jumps) == 0:
         return np.zeros(len(time_s), dtype=np.bool_)
     after = np.clip(np.searchsorted(jumps, time_s), 1, len(jumps) - 1) if len(jumps) > 1 else 0
     before = np.maximum(after - 1, 0)
     nearest = np.minimum(np.abs(time_s - jumps[after]), np.abs(time_s - jumps[before]))
-    near: Bools = nearest < _AROUND_S
+    near: Bools = nearest < LIMITS.jump_left_out_s
     return near

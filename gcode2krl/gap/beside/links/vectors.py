@@ -10,6 +10,7 @@ from gcode2krl.gap.beside.links.joints import PathLink, ServoLink
 from gcode2krl.gap.beside.links.traces import vector_trace
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 
 class ForceLink(Link):
@@ -49,8 +50,8 @@ class MechanicsLink(Link):
     needs = "tracker.csv, absolute angles and a known robot"
     table = "tracker"
     sets_clocks = True
-    least_off = 0.5
-    least_step = 0.5
+    least_off = THRESHOLDS.beside.progress_off_mm
+    least_step = THRESHOLDS.beside.progress_step_mm
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return the tip, beside the model from the measured joints."""

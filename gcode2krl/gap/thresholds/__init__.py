@@ -1,0 +1,21 @@
+"""The thresholds of the diagnosis: one frozen table by rooms, each with its reason; in docs/thresholds.md."""
+
+from dataclasses import dataclass, field
+
+from gcode2krl.gap.thresholds.beside import BesideThresholds
+from gcode2krl.gap.thresholds.slips import SlipThresholds
+from gcode2krl.gap.thresholds.tell import TellThresholds
+
+__all__ = ["THRESHOLDS", "Thresholds"]
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Every number that decides an answer, by the room that uses it."""
+
+    beside: BesideThresholds = field(default_factory=BesideThresholds)
+    slips: SlipThresholds = field(default_factory=SlipThresholds)
+    tell: TellThresholds = field(default_factory=TellThresholds)
+
+
+THRESHOLDS = Thresholds()

@@ -1,0 +1,39 @@
+"""Thresholds of tell/: what of an answer is said, and where a gap is said to be."""
+
+from dataclasses import dataclass
+
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
+
+
+@dataclass(frozen=True)
+class TellThresholds:
+    """What of an answer is said."""
+
+    most_alike: int = convention(5, "effects that a cause lists as indistinguishable from it")
+    timing_share: float = convention(
+        0.5, "a gap of the path with more of its power along the motion is one of timing"
+    )
+    scan_probability: float = convention(
+        0.95, "of a diameter that takes `scan_least_shrink` of the scan's gap, or more"
+    )
+    scan_probability_unsure: float = convention(0.4, "of one that takes less: it is not named")
+    scan_least_shrink: float = calibrated(
+        0.4, DEVELOPMENT, "share of the scan's gap on points not fitted to, from which a diameter is named"
+    )
+    after_event_s: float = physics(
+        0.3,
+        "a gap this soon after a reversal, an entry or an exit belongs to it: modes of 7 Hz have died down",
+    )
+    same_interval_s: float = convention(0.2, "intervals that are nearer to each other are one")
+    smooth_s: float = convention(
+        0.1, "the size of a gap at a time is its rms over this; labels of the check use it too"
+    )
+    joint_moves_rad: float = convention(1e-4, "a joint that moves less never reverses")
+    joint_least_share: float = convention(0.01, "joints with less of the gap's power are left out")
+    band_low: float = convention(0.1, "share of the power below the band of a gap")
+    band_high: float = convention(0.9, "share of the power up to the band's upper end")
+    phase_named_share: float = convention(
+        0.5, "a phase with less of the gap's power is not in the first sentence"
+    )
+    report_lines: int = convention(8, "intervals, and causes, that the report prints")
+    headline_causes: int = convention(3, "causes in the first sentence")

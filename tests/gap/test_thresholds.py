@@ -1,0 +1,53 @@
+"""Every threshold of the diagnosis has a kind and a reason, calibrated ones their seeds; the docs agree."""
+
+import ast
+import importlib.util
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+
+import pytest
+
+from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.gap.thresholds.stated import Kind, Threshold, listed
+
+ROOT = Path(__file__).parents[2]
+ALL = list(listed(THRESHOLDS))
+FIRST_SCORED = 16_000
+"""Seeds from here on are scored: nothing may be chosen on them (docs/diagnose_check.md)."""
+
+
+@pytest.mark.parametrize("threshold", ALL, ids=lambda each: f"{each.room}.{each.name}")
+def test_a_threshold_has_a_kind_a_reason_and_seeds_where_it_was_calibrated(threshold: Threshold) -> None:
+    assert isinstance(threshold.kind, Kind)
+    assert len(threshold.reason.split()) >= 3
+    assert not threshold.reason.endswith(".")
+    if threshold.kind is Kind.CALIBRATED:
+        assert threshold.seeds is not None
+        assert 0 <= threshold.seeds.start < threshold.seeds.stop <= FIRST_SCORED
+    else:
+        assert threshold.seeds is None
+
+
+def test_the_table_is_frozen() -> None:
+    with pytest.raises(FrozenInstanceError):
+        setattr(THRESHOLDS.slips, "explained_share", 0.5)  # noqa: B010 (mypy refuses the assignment itself)
+
+
+@pytest.mark.parametrize("room", ["slips", "tell"])
+def test_a_room_keeps_no_numbers_beside_the_table(room: str) -> None:
+    for file in sorted((ROOT / "gcode2krl" / "gap" / room).glob("*.py")):
+        for node in ast.parse(file.read_text("utf-8")).body:
+            # a dict is a table of names, such as the units of force
+            if isinstance(node, ast.Assign | ast.AnnAssign) and not isinstance(node.value, ast.Dict | None):
+                values = [each for each in ast.walk(node.value) if isinstance(each, ast.Constant)]
+                numbers = [each.value for each in values if isinstance(each.value, int | float)]
+                assert not numbers, f"{file.name}:{node.lineno} states {numbers}"
+
+
+def test_the_page_says_what_the_table_says() -> None:
+    spec = importlib.util.spec_from_file_location("make_thresholds", ROOT / "docs" / "make_thresholds.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text("utf-8") == module.page(), "run python docs/make_thresholds.py"
