@@ -103,6 +103,12 @@ def _meanings(
 ) -> Iterator[Issue]:
     yield from _same_number(named, "$OUT", _may_share)
     yield from _same_number(inputs, "$IN", lambda a, b: False)
+    yield from _of_spindle_or_coolant(texts)
+    yield from _of_online(texts, named)
+
+
+def _of_spindle_or_coolant(texts: Mapping[str, str]) -> Iterator[Issue]:
+    """Yield the signals of spindle or coolant that something else switches on as well."""
     on = {key: rules.may_be_on(text) | frozenset(rules.pulses(text)) for key, text in texts.items()}
     spindle = _union(on, _SPINDLE)
     coolant = _union(on, _COOLANT)
@@ -118,14 +124,17 @@ def _meanings(
         elif others and (signal in spindle or "tool_change" in others):
             what = "the spindle (m_code.M3, M4)" if signal in spindle else "the coolant (m_code.M7, M8)"
             yield _two_meanings(signal, what, others[0])
+
+
+def _of_online(texts: Mapping[str, str], named: Mapping[str, int | None]) -> Iterator[Issue]:
+    """Yield the outputs of the online compensation that a template switches."""
     for key, number in named.items():
         if number is None or not key.startswith("online."):
             continue
         signal = f"$OUT[{number}]"
-        for user in (
-            user for user, text in texts.items() if signal in {s.name for s in rules.switched(text)}
-        ):
-            yield _two_meanings(signal, key, user)
+        for user, text in texts.items():
+            if signal in {one.name for one in rules.switched(text)}:
+                yield _two_meanings(signal, key, user)
 
 
 def signals_text(texts: Mapping[str, str], key: str) -> str:

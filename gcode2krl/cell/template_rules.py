@@ -5,7 +5,7 @@ The list is of what is allowed: an unknown statement is refused.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 RSI_INTERRUPT = 21
@@ -180,30 +180,42 @@ def _wrong(statement: str, callable_names: set[str]) -> str:
             return f"calls {name}, which program.externals does not declare"
     if _assignments(statement) > 1:
         return "assigns twice in a line"
-    if word == "PULSE":
-        return "" if _PULSE.match(statement) else "does not pulse an output given by its number"
+    return _wrong_form(word, statement, callable_names)
+
+
+def _wrong_form(word: str, statement: str, callable_names: set[str]) -> str:
+    """Return why a statement that moves nothing and calls nothing unknown has not the form of its word."""
+    if word in _FORMS:
+        return _FORMS[word](statement)
     if word in _ALONE and statement != word:
         return f"has more than {word}"
-    if word == "FOR":
-        counts = _COUNTS.match(statement)
-        return (
-            "" if counts and not _PLANNER_DATA.match(counts[1]) else "counts in a variable of the controller"
-        )
     if word in _CONDITIONS:
-        return "" if _assignments(statement) == 0 else "assigns in a condition"
+        return "assigns in a condition" if _assignments(statement) else ""
     if word in ("HALT", "CONTINUE", "EXIT") and statement == word:
         return ""
-    if word == "WAIT":
-        waits = re.match(r"WAIT (SEC|FOR)\b", statement) and _assignments(statement) == 0
-        return "" if waits else "is not WAIT SEC or WAIT FOR"
     assigned = _ASSIGNED.match(statement)
     if assigned:
         return _wrong_assignment(assigned)
-    if _CALL.match(statement) and statement.endswith(")") and _first(statement) in callable_names:
-        return "" if _assignments(statement) == 0 else "assigns in a call"
+    if _CALL.match(statement) and statement.endswith(")") and word in callable_names:
+        return "assigns in a call" if _assignments(statement) else ""
     return "is not a statement that templates may use"
 
 
+def _wrong_pulse(statement: str) -> str:
+    return "" if _PULSE.match(statement) else "does not pulse an output given by its number"
+
+
+def _wrong_for(statement: str) -> str:
+    counts = _COUNTS.match(statement)
+    return "" if counts and not _PLANNER_DATA.match(counts[1]) else "counts in a variable of the controller"
+
+
+def _wrong_wait(statement: str) -> str:
+    waits = re.match(r"WAIT (SEC|FOR)\b", statement) and not _assignments(statement)
+    return "" if waits else "is not WAIT SEC or WAIT FOR"
+
+
+_FORMS: dict[str, Callable[[str], str]] = {"PULSE": _wrong_pulse, "FOR": _wrong_for, "WAIT": _wrong_wait}
 _CONDITIONS = frozenset([*_OPEN, *_CLOSE, "ELSE", "CASE", "DEFAULT"])
 _FUNCTIONS = frozenset(["ABS", "SIN", "COS", "SQRT", "ROUND", "STRFIND", "STRLEN", "PULSE", "AND",
                         "OR", "NOT", "EXOR", "IF", "WHILE", "UNTIL", "FOR", "CASE", "SWITCH", "SEC", "B_AND",

@@ -85,6 +85,7 @@ def main(args: list[str] | None = None) -> None:
     sys.exit(code if flushed() else 2)
 
 
+# each branch is a way to end, with its exit code
 def _run(args: list[str] | None) -> int:
     words = sys.argv[1:] if args is None else args
     console = Console(quiet="-q" in words or "--quiet" in words)

@@ -339,15 +339,9 @@ def serve_command(
     knots, header = _pilot(sidecar)
     form = header.form if header is not None else "none"
     if files is not None:
-        written = _controller_files(
-            cell.model_copy(update={"online": settings}), form, name, Path(files), inputs
-        )
-        if settings.link.address.startswith("127."):
-            console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
-        if as_json:
-            console.json({"files": [str(file) for file in written]})
-        for file in written:
-            console.say(str(file))
+        changed = cell.model_copy(update={"online": settings})
+        written = _controller_files(changed, form, name, Path(files), inputs)
+        _say_files(written, settings.link.address, console, as_json)
         return 0
     from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.recorder import Recorder
@@ -439,6 +433,15 @@ def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
     if options["most_mm"] is not None:
         changes["most_mm"] = options["most_mm"]
     return _valid(settings, changes)
+
+
+def _say_files(files: list[Path], address: str, console: Console, as_json: bool) -> None:
+    if address.startswith("127."):
+        console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
+    if as_json:
+        console.json({"files": [str(file) for file in files]})
+    for file in files:
+        console.say(str(file))
 
 
 def _controller_files(cell: Cell, form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:

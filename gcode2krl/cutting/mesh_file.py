@@ -112,6 +112,15 @@ def _check_ply(data: bytes) -> None:
     _check_triangles(max(count for count, _ in elements.values()))
 
 
+def _property_bytes(words: list[str]) -> int | None:
+    """Return the least bytes of ``property KIND NAME`` or ``property list COUNT_KIND KIND NAME``, or None."""
+    if len(words) == 3:
+        return _SIZES.get(words[1])
+    if len(words) == 5 and words[1] == "list" and words[3] in _SIZES:
+        return _SIZES.get(words[2])  # an empty list
+    return None
+
+
 def _ply_elements(header: str) -> tuple[bool, dict[str, tuple[int, int]]]:
     """Return whether the body is text, and of each element its number and the least bytes of one."""
     text, elements, last = None, {}, ""
@@ -125,16 +134,10 @@ def _ply_elements(header: str) -> tuple[bool, dict[str, tuple[int, int]]]:
             last = words[1]
             elements[last] = (int(words[2]), 0)
         elif words[:1] == ["property"]:
-            kind = (
-                words[2]
-                if words[1:2] == ["list"] and len(words) == 5
-                else words[1]
-                if len(words) == 3
-                else ""
-            )
-            if not last or kind not in _SIZES or (len(words) == 5 and words[3] not in _SIZES):
+            least_bytes = _property_bytes(words)
+            if not last or least_bytes is None:
                 raise MeshError(f"{line[:60]!r} is not a property of a PLY file")
-            elements[last] = (elements[last][0], elements[last][1] + _SIZES[kind])
+            elements[last] = (elements[last][0], elements[last][1] + least_bytes)
     if text is None:
         raise MeshError("the PLY header names no format")
     return text, elements

@@ -29,6 +29,7 @@ from gcode2krl.cutting.sweep import (
 _REFRESH = 48  # visits after which the bound of a block is computed again
 
 
+# each branch is a shape of sweep: rapid or feed, level or inclined, and the kind of cutter
 @kernel
 def remove_sweep(grid, path, k, index):
     """Lower the field below the sweep that ends at sample k; return the height a rapid has cut off, else 0.
@@ -195,6 +196,7 @@ def _lower_ball(height, wall, i, ja, jb, begin, index, start, z, slope, sink, le
             height[i, j] = low if low < height[i, j] else height[i, j]
 
 
+# its branches are minima and maxima, written out so that the loop stays one of plain single-precision numbers
 @kernel
 def _lower_other(height, wall, i, ja, jb, begin, index, start, z, slope, length, outline):
     """Lower cells below any cutter. Along the sweep the height over a cell is convex: the lowest of both ends

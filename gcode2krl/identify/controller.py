@@ -37,6 +37,7 @@ from gcode2krl.identify.controller_fit import (
     slope_of,
 )
 from gcode2krl.identify.controller_turning import fit_turning
+from gcode2krl.identify.estimate import QUANTILE_90
 from gcode2krl.krc4.motion import build_chain
 from gcode2krl.krc4.profile import UNLIMITED
 from gcode2krl.runs import ControllerTrace, check_scale, resolution_mm
@@ -45,7 +46,6 @@ from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 
 LAWS: tuple[Law, Law] = ("averages", "trapezoid")
 
-_QUANTILE_90 = 1.6448536269514722
 _DECISIVE = 20.0
 """Twice the difference of log-likelihoods above which the law counts as decided."""
 _WIDEST = 0.5
@@ -234,7 +234,7 @@ def _estimates(fit: Fit, pieces: list[Piece], settings: Settings) -> tuple[Estim
         leverage = leverage + np.einsum("ij,jk,ik->i", kept, inverse, kept)
         weight = (residual / np.maximum(1.0 - leverage, 0.1)) ** 2
         covariance = inverse @ (kept.T * weight @ kept) @ inverse
-        half[used] = _QUANTILE_90 * np.sqrt(np.diag(covariance))
+        half[used] = QUANTILE_90 * np.sqrt(np.diag(covariance))
     return _around(fit.k_s, half[0]), _around(fit.ratio, half[1])
 
 
@@ -331,7 +331,7 @@ def _turning(
     if fitted is None:
         return None, None, None
     values, errors, rms = fitted
-    half = _QUANTILE_90 * errors
+    half = QUANTILE_90 * errors
     vel, acc = (_around(float(values[at]), float(half[at])) for at in (0, 1))
     return vel if _determined(vel) else None, acc if _determined(acc) else None, rms
 
@@ -417,7 +417,7 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
     if weight > 1e-9:
         d_fitted = d - float(slope @ residual) / weight
         left = residual + slope * (d_fitted - d)
-        half = _QUANTILE_90 * math.sqrt(float(left @ left) / max(len(left) - 2, 1) / weight)
+        half = QUANTILE_90 * math.sqrt(float(left @ left) / max(len(left) - 2, 1) / weight)
     share = float(piece.cos_half[row]) / 2.0
     return CornerFit(
         source_line=int(piece.source_line[row]),
@@ -442,6 +442,26 @@ def _issues(
         sentence = "law undecided: both predict this trace within its noise"
         remedy = "short fast moves decide: record the program of `gcode2krl make-test controller`"
         yield Issue("note", "law-undecided", 0, sentence, remedy)
+    yield from _cdis_issues(result, levels)
+    limit_mm = _MISFIT * result.noise_mm + _FLOOR_MM
+    if result.rms_mm > limit_mm:
+        worst = max((section for section in sections if section.fitted), key=lambda section: section.rms_mm)
+        yield Issue(
+            "warning", "law-misfit", worst.first_line,
+            f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at "
+            "this line; the intervals do not cover that",
+            "was the override 100 %, and $ACC.CP that of the cell?",
+        )  # fmt: skip
+    yield from _turning_issues(result, limit_mm)
+    for section in sections:
+        if not section.fitted and not section.turns and section.rms_mm > limit_mm:
+            yield Issue(
+                "note", "unequal-speeds", section.first_line,
+                f"the model for unequal speeds (an assumption) is {section.rms_mm:.4f} mm rms off here",
+            )  # fmt: skip
+
+
+def _cdis_issues(result: Identification, levels: Floats) -> Iterator[Issue]:
     if result.cdis_mm is None:
         why = "the program has no blended corner" if not len(levels) else _why_no_cdis(result)
         remedy = "record the program of `gcode2krl make-test controller`"
@@ -450,41 +470,19 @@ def _issues(
         several = ", ".join(f"{level:g}" for level in sorted(levels.tolist()))
         sentence = f"the corners have CDIS {several} mm: one ratio is fitted, stated for {levels[-1]:g} mm"
         yield Issue("note", "several-cdis", 0, sentence)
-    limit = _MISFIT * result.noise_mm
-    if result.rms_mm > limit + _FLOOR_MM:
-        worst = max((section for section in sections if section.fitted), key=lambda section: section.rms_mm)
+
+
+def _turning_issues(result: Identification, limit_mm: float) -> Iterator[Issue]:
+    if result.turning_rms_mm is None:
+        return
+    if result.turning_rms_mm > limit_mm:
+        sentence = f"lines that turn the tool leave (assumed model) {result.turning_rms_mm:.4f} mm rms"
+        yield Issue("note", "turning-misfit", 0, sentence)
+    if result.vel_ori_deg_s is None:
+        sentence = "$VEL.ORI is not determined: no line turns long enough to reach it"
         yield Issue(
-            "warning",
-            "law-misfit",
-            worst.first_line,
-            f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at "
-            "this line; the intervals do not cover that",
-            "was the override 100 %, and $ACC.CP that of the cell?",
+            "note", "not-determined", 0, sentence, "lower vel_ori_deg_s in the cell of the test program"
         )
-    if result.turning_rms_mm is not None:
-        if result.turning_rms_mm > limit + _FLOOR_MM:
-            yield Issue(
-                "note",
-                "turning-misfit",
-                0,
-                f"lines that turn the tool leave (assumed model) {result.turning_rms_mm:.4f} mm rms",
-            )
-        if result.vel_ori_deg_s is None:
-            yield Issue(
-                "note",
-                "not-determined",
-                0,
-                "$VEL.ORI is not determined: no line turns long enough to reach it",
-                "lower vel_ori_deg_s in the cell of the test program",
-            )
-    for section in sections:
-        if not section.fitted and not section.turns and section.rms_mm > limit + _FLOOR_MM:
-            yield Issue(
-                "note",
-                "unequal-speeds",
-                section.first_line,
-                f"the model for unequal speeds (an assumption) is {section.rms_mm:.4f} mm rms off here",
-            )
 
 
 def _why_no_cdis(result: Identification) -> str:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 LEVEL = 0.90
 """Default probability of the intervals."""
+QUANTILE_90 = 1.6448536269514722
+"""Of the normal distribution: 90 % lie within so many standard deviations."""
 
 
 @dataclass(frozen=True)

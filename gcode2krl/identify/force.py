@@ -13,11 +13,11 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.identify.estimate import QUANTILE_90
 
 NAMES = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 LEAST_SAMPLES = 30
 LONGEST_DELAY_S = 0.25
-_QUANTILE_90 = 1.6448536269514722
 _WIDEST = 0.5
 """A coefficient whose half interval is a larger fraction of the typical size of its kind is not
 determined."""
@@ -175,7 +175,7 @@ def _fit_of(
         score = np.einsum("rai,ra->ri", design[:, used].reshape(len(rows), 3, -1), residual)
         spread = _long_run(score, max(1, round(_MEMORY_S / max(step_s, 1e-6))))
         covariance[np.ix_(used, used)] = inverse @ spread @ inverse
-    half = np.where(used, _QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
+    half = np.where(used, QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
     fitted = (design @ solution).reshape(-1, 3)
     in_cut = np.abs(design.reshape(len(rows), 3, 9)[:, :, :6]).max(axis=(1, 2)) > 0.0
     typical = np.repeat([np.abs(solution[:3]).max(), np.abs(solution[3:6]).max()], 3)
@@ -211,4 +211,4 @@ def _band(design: Floats, covariance: Floats, fitted: Floats, in_cut: Bools) -> 
     variance = np.einsum("rai,ij,raj->r", cut, covariance[:6, :6], cut)
     size = np.linalg.norm(fitted[in_cut], axis=1)
     strong = size > 0.5 * size.max(initial=0.0)
-    return float(np.max(_QUANTILE_90 * np.sqrt(np.maximum(variance[strong], 0.0)) / size[strong]))
+    return float(np.max(QUANTILE_90 * np.sqrt(np.maximum(variance[strong], 0.0)) / size[strong]))

@@ -14,7 +14,7 @@ from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.krc4.sampling import sample, sample_times
 from gcode2krl.tables import Motion, Targets
-from gcode2krl.units import MM_PER_M, RAD_PER_DEG
+from gcode2krl.units import MM_PER_M, RAD_PER_DEG, S_PER_H
 
 _MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
@@ -150,7 +150,7 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
     if not (np.isfinite(dt_s) and dt_s > 0):
         raise input_error("option-value", f"sample time {dt_s} s is not positive")
     if profile.total_s / dt_s > _MOST_SAMPLES:
-        hours = profile.total_s / 3600.0
+        hours = profile.total_s / S_PER_H
         raise input_error(
             "too-long",
             f"the motion lasts {hours:.1f} h, more than {_MOST_SAMPLES} samples",

@@ -130,7 +130,24 @@ def _margins(length, speed, blend, stop, vertex, k):
     count = len(length)
     head, tail, top = np.zeros(count), np.zeros(count), speed.copy()
     bound = vertex.copy()
-    for i in range(1, count):  # behind slow places
+    _heads_behind_slow_places(length, blend, stop, bound, k, vertex, head, top)
+    _tails_before_slow_places(length, blend, stop, bound, k, vertex, head, tail, top)
+    for i in range(count):
+        if top[i] <= vertex[i]:
+            head[i] = 0.0
+        if top[i] <= vertex[i + 1]:
+            tail[i] = 0.0
+        if head[i] + tail[i] > _ROOM * length[i]:
+            head[i], tail[i] = 0.0, 0.0
+        vertex[i] = min(vertex[i], top[i])
+        vertex[i + 1] = min(vertex[i + 1], top[i])
+    return head, tail, top
+
+
+@njit(cache=True)
+def _heads_behind_slow_places(length, blend, stop, bound, k, vertex, head, top):
+    """Write what each run keeps, at its begin, of the lower speed ``bound`` of the corners before it."""
+    for i in range(1, len(length)):
         way = 0.0
         for j in range(i, 0, -1):
             if stop[j - 1]:
@@ -146,7 +163,13 @@ def _margins(length, speed, blend, stop, vertex, k):
             way += length[j - 1]
             if way > blend[j - 1] + 0.5 * top[i] * k:
                 break
-    for i in range(count - 2, -1, -1):  # before slow places
+
+
+@njit(cache=True)
+def _tails_before_slow_places(length, blend, stop, bound, k, vertex, head, tail, top):
+    """Write what each run takes on, at its end, of the lower speed ``bound`` of the corners after it."""
+    count = len(length)
+    for i in range(count - 2, -1, -1):
         way = 0.0
         for j in range(i, count - 1):
             if stop[j]:
@@ -162,16 +185,6 @@ def _margins(length, speed, blend, stop, vertex, k):
             way += length[j + 1]
             if way > blend[j] + 0.5 * top[i] * k:
                 break
-    for i in range(count):
-        if top[i] <= vertex[i]:
-            head[i] = 0.0
-        if top[i] <= vertex[i + 1]:
-            tail[i] = 0.0
-        if head[i] + tail[i] > _ROOM * length[i]:
-            head[i], tail[i] = 0.0, 0.0
-        vertex[i] = min(vertex[i], top[i])
-        vertex[i + 1] = min(vertex[i + 1], top[i])
-    return head, tail, top
 
 
 @njit(cache=True)
@@ -205,6 +218,7 @@ def phases(length, v, u0, u1, a, averages):
     return (top - u0) / a, max(0.0, constant), (top - u1) / a
 
 
+# each branch is a phase of the time law, and the pieces follow each other in one running sum
 @njit(cache=True)
 def _pieces(length, speed, stop, wait, vertex, head, tail, a, k, averages, out):
     """Write the pieces (time, path, speed, acceleration, integral); return how many and the total time."""

@@ -16,11 +16,8 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Deflection, Forces, Motion
-from gcode2krl.units import MM_PER_M, NMM_PER_NM
+from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, NMM_PER_NM
 
-Lines = Ints32
-GRAVITY_M_S2 = 9.80665
-"""Standard gravity (CGPM 1901)."""
 GUESSED_FACTOR = 2.0
 """Factor by which a force may be too large because its stock is guessed (an assumption): up to this many
 times the rated payload it is then a warning."""
@@ -50,7 +47,7 @@ def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
     return result
 
 
-def motion_findings(motion: Motion, line: Lines, cell: Cell) -> Iterator[Issue]:
+def motion_findings(motion: Motion, line: Ints32, cell: Cell) -> Iterator[Issue]:
     """Yield what exceeds the limits in a Motion; ``line`` (m,) is the G-code line of each sample."""
     acceleration = cycle_acceleration(motion, cell.controller.cycle_s)
     most = cell.limits.acceleration_mm_s2
@@ -64,7 +61,7 @@ def motion_findings(motion: Motion, line: Lines, cell: Cell) -> Iterator[Issue]:
         yield Issue("warning", "acceleration-high", int(line[row]), sentence, remedy)
 
 
-def force_findings(forces: Forces, line: Lines, cell: Cell) -> Iterator[Issue]:
+def force_findings(forces: Forces, line: Ints32, cell: Cell) -> Iterator[Issue]:
     """Yield what exceeds the limits and the robot's payload; one finding, at the largest value, each."""
     size_N, limits = np.linalg.norm(forces.force_base_N, axis=1), cell.limits
     if not len(size_N):
@@ -86,7 +83,7 @@ def force_findings(forces: Forces, line: Lines, cell: Cell) -> Iterator[Issue]:
         yield Issue("warning", "torque-high", int(line[row]), sentence, remedy.format(key="torque_Nm"))
 
 
-def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
+def _payload(forces: Forces, line: Ints32, cell: Cell) -> Issue | None:
     rated_kg = cell.robot.payload.mass_kg
     own_kg = cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
     if rated_kg is None:
@@ -109,7 +106,7 @@ def _payload(forces: Forces, line: Lines, cell: Cell) -> Issue | None:
     return Issue("error" if sure else "warning", "payload", int(line[row]), sentence, remedy)
 
 
-def absurd_forces(forces: Forces, line: Lines) -> Issue | None:
+def absurd_forces(forces: Forces, line: Ints32) -> Issue | None:
     """Return the finding on absurd forces, None if there are none."""
     columns = (
         forces.force_base_N,
@@ -127,7 +124,7 @@ def absurd_forces(forces: Forces, line: Lines) -> Issue | None:
     return Issue("error", "force-absurd", int(line[np.argmax(wrong)]), sentence, remedy)
 
 
-def absurd_deflection(deflection: Deflection, reached: Bools, line: Lines) -> Issue | None:
+def absurd_deflection(deflection: Deflection, reached: Bools, line: Ints32) -> Issue | None:
     """Return the finding on an absurd deflection, None if there is none.
 
     ``reached`` (m,) is False where the robot has no joint angles, which is reported separately.
@@ -147,7 +144,7 @@ def absurd_deflection(deflection: Deflection, reached: Bools, line: Lines) -> Is
     return Issue("error", "deflection-absurd", int(line[np.argmax(wrong)]), sentence, remedy)
 
 
-def deflection_findings(deflection: Deflection, line: Lines, cell: Cell) -> Iterator[Issue]:
+def deflection_findings(deflection: Deflection, line: Ints32, cell: Cell) -> Iterator[Issue]:
     """Yield the deflection that exceeds the limit, at its largest value."""
     size_mm = np.linalg.norm(deflection.deflection_base_mm, axis=1)
     row, most = int(np.argmax(np.nan_to_num(size_mm))) if len(size_mm) else 0, cell.limits.deflection_mm

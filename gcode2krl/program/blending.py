@@ -43,6 +43,7 @@ def corner_cdis(
     return result
 
 
+# each branch is a rule for a corner: ends, reversal, tolerance, level
 @njit(cache=True, nogil=True)
 def _corner_cdis(position, tolerance, cdis, exact, levels, start, end, result):
     count = len(position)

@@ -17,7 +17,7 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
 from gcode2krl.program.orientation import tool_rotation
@@ -102,15 +102,8 @@ class _Plan:
         toolpath = self.toolpath
         plain = toolpath.is_position() & ~toolpath.machine
         plain[0] = False
-        if not (plain & np.concatenate([[False], np.ones(len(plain) - 1, dtype=bool)])).any():
-            nowhere = axes_nowhere(toolpath)
-            raise input_error(
-                "no-motion",
-                "the program has no move to a programmed position" + (f": {nowhere}" if nowhere else ""),
-                "program X, Y and Z",
-                line=_first_move_line(toolpath) if nowhere else 0,
-                source=toolpath.source,
-            )
+        if not plain.any():
+            raise _no_motion(toolpath)
         changes = [(event.row, index) for index, event in enumerate(toolpath.events) if event.kind == "tool"]
         stops = sorted(
             {0, len(toolpath), *np.flatnonzero(np.diff(plain)) + 1, *(row + 1 for row, _ in changes)}
@@ -431,6 +424,17 @@ def _as_slice(chosen: Bools) -> slice | Ints:
 
 def _without_dwell(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key != "dwell_s"}
+
+
+def _no_motion(toolpath: Toolpath) -> NotUnderstoodError:
+    nowhere = axes_nowhere(toolpath)
+    return input_error(
+        "no-motion",
+        "the program has no move to a programmed position" + (f": {nowhere}" if nowhere else ""),
+        "program X, Y and Z",
+        line=_first_move_line(toolpath) if nowhere else 0,
+        source=toolpath.source,
+    )
 
 
 def _first_move_line(toolpath: Toolpath) -> int:

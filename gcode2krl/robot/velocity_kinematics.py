@@ -168,6 +168,7 @@ def _fill(
         columns[5, j] = axis_z
 
 
+# each branch is a loop of the textbook's form, over rows that are worked on together
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _tridiagonal(a: Floats, square: Floats) -> None:
     """Bring symmetric (6, 6, m), of which the lower half is read, to Householder's tridiagonal form.

@@ -1,7 +1,7 @@
 """The measured tables of a run: columns of a file → frozen arrays, with what was dropped and why."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.inputs import locked
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.runs.tables import Sheet, missing_column
@@ -189,26 +189,37 @@ def build(
         raise missing_column(sheet, [wanted], f"a table of measured values has {TIME} and, say, {wanted}")
     strict = [c for signal in used if not signal.gaps for c in signal.columns if c in present]
     _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in present)))
-    finite = np.stack([np.isfinite(sheet.columns[name]) for name in (TIME, *strict)], axis=1)
+    needed = (TIME, *strict)
+    finite = np.stack([np.isfinite(sheet.columns[name]) for name in needed], axis=1)
     kept = np.flatnonzero(finite.all(axis=1))
     _refuse_few(len(kept), len(finite), sheet)
     time_s = sheet.columns[TIME][kept] - clock_s
-    lost = zip((TIME, *strict), np.count_nonzero(~finite, axis=0).tolist(), strict=True)
     columns: dict[str, Any] = {signal.name: _signal(signal, sheet, present, kept) for signal in used}
     table = kind(
         time_s=time_s,
         row=kept + sheet.first_row,
         segments=_segments(time_s, kept),
         source=sheet.source,
-        dropped={name: count for name, count in lost if count},
+        dropped=_lost(needed, finite),
         dropped_rows=len(finite) - len(kept),
         ignored=tuple(name for name in sheet.names if name not in columns_of(kind)),
         missing=tuple(name for name in _expected(kind, used) if name not in present),
-        constant=tuple(name for name in strict if np.ptp(sheet.columns[name][kept]) == 0.0),
+        constant=_constant(strict, sheet, kept),
         **columns,
     )
     first_lost = int(np.argmin(finite.all(axis=1))) + sheet.first_row
     return replace(table, issues=(*sheet.issues, *_findings(table, first_lost)))
+
+
+def _lost(names: Sequence[str], finite: Bools) -> dict[str, int]:
+    """Return of each column that lacks values how many."""
+    counts = zip(names, np.count_nonzero(~finite, axis=0).tolist(), strict=True)
+    return {name: count for name, count in counts if count}
+
+
+def _constant(names: Sequence[str], sheet: Sheet, kept: Ints) -> tuple[str, ...]:
+    """Return the columns that have one value in all rows that are kept."""
+    return tuple(name for name in names if np.ptp(sheet.columns[name][kept]) == 0.0)
 
 
 def _expected(kind: type[Measured], used: list[Signal]) -> Iterator[str]:

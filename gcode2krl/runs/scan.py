@@ -101,8 +101,17 @@ def _ply_header(data: bytes, file: Path) -> tuple[str, int, list[tuple[str, str]
     body = data.find(b"\n", end) + 1
     if not data.startswith(b"ply") or end < 0 or body == 0:
         _refuse(file, "no PLY header")
+    order, count, fields = _header_lines(data[:end].decode("latin-1").splitlines(), file)
+    names = [name for name, _ in fields]
+    if order is None or count < 0 or not {"x", "y", "z"} <= set(names) or len(set(names)) < len(names):
+        _refuse(file, "the header names no format, or no vertices with x, y, z")
+    return order, count, fields, body
+
+
+def _header_lines(lines: list[str], file: Path) -> tuple[str | None, int, list[tuple[str, str]]]:
+    """Return byte order, number of vertices and their fields, each as far as the lines name it."""
     order, count, fields, element = None, -1, [], ""
-    for number, line in enumerate(data[:end].decode("latin-1").splitlines(), start=1):
+    for number, line in enumerate(lines, start=1):
         words = line.split()
         if words[:1] == ["format"] and len(words) > 1 and words[1] in _ORDERS:
             order = _ORDERS[words[1]]
@@ -115,10 +124,7 @@ def _ply_header(data: bytes, file: Path) -> tuple[str, int, list[tuple[str, str]
             if len(words) != 3 or words[1] not in _TYPES:
                 _refuse(file, f"property {' '.join(words[1:])!r} of the vertices", number)
             fields.append((words[2], _TYPES[words[1]]))
-    names = [name for name, _ in fields]
-    if order is None or count < 0 or not {"x", "y", "z"} <= set(names) or len(set(names)) < len(names):
-        _refuse(file, "the header names no format, or no vertices with x, y, z")
-    return order, count, fields, body
+    return order, count, fields
 
 
 def _ascii_vertices(

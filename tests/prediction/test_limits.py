@@ -10,8 +10,9 @@ import pytest
 from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
-from gcode2krl.prediction.limits import GRAVITY_M_S2, cycle_acceleration
+from gcode2krl.prediction.limits import cycle_acceleration
 from gcode2krl.tables import Motion
+from gcode2krl.units import GRAVITY_M_S2
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"
 SLOT = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\n"

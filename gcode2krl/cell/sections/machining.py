@@ -62,6 +62,11 @@ class Tool(Provenance):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        self._refuse_lengths()
+        self._refuse_half_a_frame()
+        return self
+
+    def _refuse_lengths(self) -> None:
         if self.corner_radius_mm > self.diameter_mm / 2 + 1e-9:
             raise ValueError("corner_radius_mm is larger than half the diameter")
         if (
@@ -83,6 +88,8 @@ class Tool(Provenance):
                 f"corner_radius_mm {self.corner_radius_mm:g} of a ball is half its diameter, "
                 f"{self.diameter_mm / 2:g}: correct it or leave it out"
             )
+
+    def _refuse_half_a_frame(self) -> None:
         if self.tool_data is not None and self.axis is None:
             raise ValueError('axis is required with tool_data: "+x", "-x", "+y", "-y", "+z" or "-z"')
         if self.tool_data is not None and self.frame is None:
@@ -91,7 +98,6 @@ class Tool(Provenance):
             )
         if self.axis not in (None, "+z") and self.frame is None:
             raise ValueError("axis other than +z needs frame, the TCP as the controller has it")
-        return self
 
     def _is_half_of_diameter(self) -> bool:
         return abs(self.corner_radius_mm - self.diameter_mm / 2) <= _ROUNDED_SHARE * self.diameter_mm
