@@ -8,27 +8,15 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-RSI_INTERRUPT = 21
-STOP_INTERRUPT = 3
+from gcode2krl import krl_words as w
+
 _SWITCHED = frozenset(["OUT", "ANOUT", "FLAG", "CYCFLAG", "TIMER", "TIMER_STOP", "TIMER_FLAG"])
 """System variables that a template may set; all others belong to the planner or to safety."""
 _PLANNER_DATA = re.compile(
     r"(BASE_|TOOL_|LOAD_|MACHINE_|IPO_|BAS_|DEF_|PDAT|FDAT|LDAT|XHOME|HOME|XP|GK_|POS_ACT|AXIS_ACT|P\d)"
 )
 """Names of ``$CONFIG.DAT``, of inline forms and of this program's own variables."""
-_OPEN = {
-    "IF": "ENDIF",
-    "WHILE": "ENDWHILE",
-    "FOR": "ENDFOR",
-    "LOOP": "ENDLOOP",
-    "REPEAT": "UNTIL",
-    "SWITCH": "ENDSWITCH",
-}
-_CLOSE = {close: begin for begin, close in _OPEN.items()}
-_MOTIONS = frozenset(["PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL", "SPLINE", "ENDSPLINE", "PTP_REL",
-                      "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "ASYPTP", "ASYCONT",
-                      "ASYCANCEL", "ASYSTOP", "TIME_BLOCK", "CONST_VEL", "STOP"])  # fmt: skip  # word list
-_JUMPS = frozenset(["GOTO", "RETURN", "RESUME", "BRAKE"])
+_CLOSE = {close: begin for begin, close in w.BLOCKS.items()}
 _ASSIGNED = re.compile(r"(\$?)([A-Z_][A-Z0-9_]*)((?:\.[A-Z0-9_]+|\[[^\]=]*\])*) ?=(?!=)")
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*) ?\(")
 _PULSE = re.compile(r"PULSE ?\( ?(\$OUT\[ ?\d+ ?\]) ?, ?(TRUE|FALSE) ?,[^()]*\)$")
@@ -41,7 +29,7 @@ _OF_CONTROLLER = re.compile(
     r"(BAS|IR_STOPM|SPS|GK_.*|RSI_.*|SETVAR|CWRITE|SYNCCMD|[A-Z]*_KRLMSG|[A-Z]*_KRLDLG)"
 )
 """Subprograms of the controller that move, set frames, or belong to the program itself."""
-_WORDS_INSIDE = [*_MOTIONS, *_JUMPS, "DO", "TRIGGER", "BAS", "C_DIS", "C_PTP", "C_ORI", "C_VEL", "C_SPL"]
+_WORDS_INSIDE = [*w.MOTIONS, *w.JUMPS, w.DO, w.TRIGGER, w.BAS, *w.APPROXIMATIONS]
 _INSIDE = re.compile(rf"(?<![$.#\w])(?:{'|'.join(_WORDS_INSIDE)})(?!\w)")
 """Words that move or jump; a controller may read on after a complete statement."""
 _ALONE = frozenset(
@@ -87,12 +75,12 @@ def problem(text: str, externals: Iterable[str] = ()) -> str:
 def external_problem(external: str) -> str:
     """Return why a subprogram may not be declared for templates, empty where it may."""
     name = external.split("(")[0].strip().upper()
-    is_reserved = name in _MOTIONS | _JUMPS | _CONDITIONS | _FUNCTIONS | {
+    is_reserved = name in w.MOTIONS | w.JUMPS | _CONDITIONS | _FUNCTIONS | {
         "DO",
-        "TRIGGER",
-        "HALT",
-        "WAIT",
-        "INTERRUPT",
+        w.TRIGGER,
+        w.HALT,
+        w.WAIT,
+        w.INTERRUPT,
     }
     if is_reserved or _OF_CONTROLLER.fullmatch(name):
         return f"{name} belongs to the controller or to KRL: a template may not call it"
@@ -104,7 +92,7 @@ def switched(text: str) -> list[Switched]:
     depth, outputs = 0, []
     for statement in statements(text):
         word = _first(statement)
-        depth += (word in _OPEN) - (word in _CLOSE)
+        depth += (word in w.BLOCKS) - (word in _CLOSE)
         match = _OUTPUT.match(statement)
         pulse = _PULSE.match(statement)
         if pulse:  # a pulse ends by itself in the other state
@@ -162,18 +150,18 @@ def _first(statement: str) -> str:
 def _wrong(statement: str, callable_names: set[str]) -> str:
     """Return why a statement is not allowed, empty where it is."""
     word = _first(statement)
-    if word in _MOTIONS:
+    if word in w.MOTIONS:
         return "moves the robot"
-    if word in _JUMPS or re.match(r"[A-Z_][A-Z0-9_]* ?:", statement):
+    if word in w.JUMPS or re.match(r"[A-Z_][A-Z0-9_]* ?:", statement):
         return "leaves the order of the program"
     bare = re.sub(r'"[^"]*"', '""', statement)
-    inside = _INSIDE.search(bare if word not in ("INTERRUPT", "GLOBAL") else bare.partition(" DO ")[0])
+    inside = _INSIDE.search(bare if word not in (w.INTERRUPT, w.GLOBAL) else bare.partition(" DO ")[0])
     if inside:
         return f"has {inside[0]} in it, which moves the robot or leaves the order of the program"
     outputs = re.findall(r"\$OUT\[ ?(\d+) ?\]", bare)
     if not all(1 <= int(number[:6]) <= _HIGHEST_OUTPUT for number in outputs):
         return f"names an output that no controller has: 1 to {_HIGHEST_OUTPUT}"
-    if word in ("INTERRUPT", "GLOBAL"):
+    if word in (w.INTERRUPT, w.GLOBAL):
         return _wrong_interrupt(statement, callable_names)
     for name in _called(statement):
         if name not in callable_names and name not in _FUNCTIONS:
@@ -191,7 +179,7 @@ def _wrong_form(word: str, statement: str, callable_names: set[str]) -> str:
         return f"has more than {word}"
     if word in _CONDITIONS:
         return "assigns in a condition" if _assignments(statement) else ""
-    if word in ("HALT", "CONTINUE", "EXIT") and statement == word:
+    if word in (w.HALT, w.CONTINUE, w.EXIT) and statement == word:
         return ""
     assigned = _ASSIGNED.match(statement)
     if assigned:
@@ -215,9 +203,9 @@ def _wrong_wait(statement: str) -> str:
     return "" if waits else "is not WAIT SEC or WAIT FOR"
 
 
-_FORMS: dict[str, Callable[[str], str]] = {"PULSE": _wrong_pulse, "FOR": _wrong_for, "WAIT": _wrong_wait}
-_CONDITIONS = frozenset([*_OPEN, *_CLOSE, "ELSE", "CASE", "DEFAULT"])
-_FUNCTIONS = frozenset(["ABS", "SIN", "COS", "SQRT", "ROUND", "STRFIND", "STRLEN", "PULSE", "AND",
+_FORMS: dict[str, Callable[[str], str]] = {w.PULSE: _wrong_pulse, w.FOR: _wrong_for, w.WAIT: _wrong_wait}
+_CONDITIONS = frozenset([*w.BLOCKS, *_CLOSE, *w.BRANCHES])
+_FUNCTIONS = frozenset(["ABS", "SIN", "COS", "SQRT", "ROUND", "STRFIND", "STRLEN", w.PULSE, "AND",
                         "OR", "NOT", "EXOR", "IF", "WHILE", "UNTIL", "FOR", "CASE", "SWITCH", "SEC", "B_AND",
                         "B_OR", "B_NOT", "TO"])  # fmt: skip  # word list
 """Names that may stand before a bracket without being a subprogram."""
@@ -246,8 +234,8 @@ def _wrong_assignment(assigned: re.Match[str]) -> str:
 def _wrong_interrupt(statement: str, callable_names: set[str]) -> str:
     match = _INTERRUPT.match(statement)
     number = int(match[1] or match[3]) if match else 0
-    if match is None or number in (RSI_INTERRUPT, STOP_INTERRUPT):
-        return f"touches an interrupt of the program ({STOP_INTERRUPT}, {RSI_INTERRUPT}, or all of them)"
+    if match is None or number in (w.RSI_INTERRUPT, w.STOP_INTERRUPT):
+        return f"touches an interrupt of the program ({w.STOP_INTERRUPT}, {w.RSI_INTERRUPT}, or all of them)"
     if match[1] and match[2] not in callable_names:
         return f"calls {match[2]}, which program.externals does not declare"
     return ""
@@ -258,19 +246,19 @@ def _unbalanced(text: str) -> str:
     open_blocks: list[str] = []
     for statement in statements(text):
         word = _first(statement)
-        if word in _OPEN:
+        if word in w.BLOCKS:
             open_blocks.append(word)
         elif word in _CLOSE:
             if not open_blocks or open_blocks.pop() != _CLOSE[word]:
                 return f"{word} without {_CLOSE[word]}"
-        elif word in ("ELSE", "CASE", "DEFAULT") and not open_blocks:
+        elif word in w.BRANCHES and not open_blocks:
             return f"{word} outside of a block"
-        elif word == "EXIT" and "LOOP" not in open_blocks:
+        elif word == w.EXIT and "LOOP" not in open_blocks:
             return "EXIT outside of a LOOP leaves the program"
     if open_blocks:
-        return f"{open_blocks[-1]} without {_OPEN[open_blocks[-1]]}"
+        return f"{open_blocks[-1]} without {w.BLOCKS[open_blocks[-1]]}"
     folds = [line.strip().upper() for line in text.split("\n")]
-    opened = sum(line.startswith(";FOLD") for line in folds)
-    if opened != sum(line.startswith(";ENDFOLD") for line in folds):
+    opened = sum(line.startswith(w.FOLD) for line in folds)
+    if opened != sum(line.startswith(w.ENDFOLD) for line in folds):
         return ";FOLD and ;ENDFOLD do not match"
     return ""

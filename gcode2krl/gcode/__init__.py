@@ -11,6 +11,8 @@ load_numba()  # what the first kernel needs
 # compiled kernels are looked up when they are first called
 drop_stale(
     Path(__file__).parent,
+    "../ascii_codes.py",
+    "../units.py",
     "arcs.py",
     "findings.py",
     "block_words.py",
@@ -19,4 +21,6 @@ drop_stale(
     "rows.py",
     "settings.py",
     "state.py",
+    "vocabulary.py",
+    "words.py",
 )

@@ -1,11 +1,11 @@
-"""How far chords may leave an arc: what is plausible, and what is none."""
+"""How far chords may be from their arc: which tolerances are plausible, doubtful or refused."""
 
 from collections.abc import Iterator
 
 from gcode2krl.errors import Issue, input_error
 
 WIDE_MM = 1.0
-"""Assumed: facets that high are seen and felt on any part."""
+"""Assumed: facets this deep are visible on any part."""
 MOST_MM = 10.0
 """Assumed: arcs of most parts would be one chord."""
 

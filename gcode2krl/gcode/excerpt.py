@@ -1,8 +1,10 @@
-"""The culprit of a finding, quoted: its block on one line, with a caret before the word that is wrong."""
+"""The block of a finding, quoted on one line, with a caret before the word that is wrong."""
 
 import re
 
+from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
@@ -10,18 +12,38 @@ _FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
 _ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
 _OF_LETTER_A = {f.NUMBER_TOO_LONG, f.UNKNOWN_LETTER, f.ROTARY_WORD, f.BAD_INTEGER, f.ARC_WRONG_OFFSET}
 _FIXED = {
-    f.COMMENT_OPEN: r"\((?!.*\))", f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()", f.O_WORD: "O",
+    f.COMMENT_OPEN: r"\((?!.*\))",
+    f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()",
+    f.O_WORD: "O",
     f.EXPRESSION: r"[A-Z]?\s*[-+]?\s*[#\[\]=]|[A-Z](?=[A-Z]+\[)",
-    f.NEGATIVE_FEED: "F", f.NEGATIVE_SPEED: "S", f.DWELL_NEGATIVE: "P", f.NEGATIVE_TOLERANCE: "P",
-    f.ARC_TURNS: "P", f.NO_FEED: _FEED_WORD, f.NO_INVERSE_TIME: _FEED_WORD,
+    f.NEGATIVE_FEED: "F",
+    f.NEGATIVE_SPEED: "S",
+    f.DWELL_NEGATIVE: "P",
+    f.NEGATIVE_TOLERANCE: "P",
+    f.ARC_TURNS: "P",
+    f.NO_FEED: _FEED_WORD,
+    f.NO_INVERSE_TIME: _FEED_WORD,
     f.FEED_PER_REV_STOPPED: _FEED_WORD,
-    f.NO_MOTION_MODE: "[XYZABCUVW]", f.TOOL_NOT_SELECTED: r"M\s*0*6(?!\d)", f.DWELL_NO_P: r"G\s*0*4(?![\d.])",
-    f.ARC_NO_CENTRE: r"G\s*0*[23](?![\d.])|[XYZ]", f.ARC_BOTH_FORMATS: "R", f.ARC_RADIUS_MISMATCH: _ARC_WORD,
-    f.ARC_RADIUS_TOO_SMALL: "R", f.ARC_R_FULL_CIRCLE: "R", f.ARC_ZERO_RADIUS: _ARC_WORD,
-    f.ARC_NEEDS_OFFSETS: "[IJK]", f.N_NOT_FIRST: "N", f.BAD_LINE_NUMBER: "N", f.TOO_FAR: "[XYZ]",
-    f.G53_NEEDS_RAPID_OR_FEED: r"G\s*53", f.G53_INCREMENTAL: r"G\s*53", f.DWELL_WITH_ARC: r"G\s*0*4(?![\d.])",
-    f.H_DIFFERS: "H", f.TOO_MANY_M: r"M(?=[^M]*$)", f.BAD_M: "M",
-}  # fmt: skip
+    f.NO_MOTION_MODE: "[XYZABCUVW]",
+    f.TOOL_NOT_SELECTED: r"M\s*0*6(?!\d)",
+    f.DWELL_NO_P: r"G\s*0*4(?![\d.])",
+    f.ARC_NO_CENTRE: r"G\s*0*[23](?![\d.])|[XYZ]",
+    f.ARC_BOTH_FORMATS: "R",
+    f.ARC_RADIUS_MISMATCH: _ARC_WORD,
+    f.ARC_RADIUS_TOO_SMALL: "R",
+    f.ARC_R_FULL_CIRCLE: "R",
+    f.ARC_ZERO_RADIUS: _ARC_WORD,
+    f.ARC_NEEDS_OFFSETS: "[IJK]",
+    f.N_NOT_FIRST: "N",
+    f.BAD_LINE_NUMBER: "N",
+    f.TOO_FAR: "[XYZ]",
+    f.G53_NEEDS_RAPID_OR_FEED: r"G\s*53",
+    f.G53_INCREMENTAL: r"G\s*53",
+    f.DWELL_WITH_ARC: r"G\s*0*4(?![\d.])",
+    f.H_DIFFERS: "H",
+    f.TOO_MANY_M: r"M(?=[^M]*$)",
+    f.BAD_M: "M",
+}
 
 
 def quote(block: bytes, number: int, a: float, b: float) -> str:
@@ -52,7 +74,7 @@ def _place(text: str, number: int, a: float, b: float) -> int:
 def _pattern(number: int, a: float, b: float) -> str:
     letter = re.escape(chr(int(a))) if 0 <= a < 256 else "?"
     if number == f.BAD_CHARACTER:
-        return letter if a < f.FIRST_FOREIGN else r"[^\x00-\x7f]"
+        return letter if a < FIRST_FOREIGN else r"[^\x00-\x7f]"
     if number == f.NO_NUMBER:
         return letter + r"(?!\s*[-+]?\s*\.?\s*\d)"
     if number == f.REPEATED_WORD:
@@ -72,4 +94,4 @@ def _pattern(number: int, a: float, b: float) -> str:
 
 def _word(letter: str, tenfold: float) -> str:
     """Return the pattern of a G or M word, its number given as ten times its value."""
-    return rf"{letter}\s*0*{re.escape(f'{tenfold / 10:g}')}(?:\.0*)?(?![\d.])"
+    return rf"{letter}\s*0*{re.escape(f'{tenfold / TENFOLD:g}')}(?:\.0*)?(?![\d.])"

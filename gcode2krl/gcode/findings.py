@@ -10,10 +10,10 @@ import math
 import unicodedata
 from typing import NamedTuple
 
+from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
-
-FIRST_FOREIGN = 128
-"""Characters from here on are not those of the keyboard's ASCII."""
+from gcode2krl.gcode import vocabulary as v
+from gcode2krl.units import MM_PER_INCH
 
 
 class Finding(NamedTuple):
@@ -294,32 +294,39 @@ _OF_CHARACTER = {
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
+_SHIFT_REMEDY = "put the offset into [work_offsets] of the cell"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
-    50: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
-    70: ("lathe diameter mode", "this is a milling translator"),
-    80: ("lathe radius mode", "this is a milling translator"),
-    100: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
-    330: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
-    380: ("probing is not a motion this program can make", "probe on the controller"),
-    410: (
+    v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
+    v.G7: ("lathe diameter mode", "this is a milling translator"),
+    v.G8: ("lathe radius mode", "this is a milling translator"),
+    v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
+    v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
+    v.G38: ("probing is not a motion this program can make", "probe on the controller"),
+    v.G41: (
         f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
-    430: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
-    520: (f"local offsets: {_LATER}", "let the post write final coordinates"),
-    700: ("lathe cycle", "this is a milling translator"),
-    730: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
-    760: ("threading cycle of a lathe", "mill the thread"),
-    810: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
-    920: (f"coordinate shifts in the program: {_LATER}", "put the offset into [work_offsets] of the cell"),
-    960: ("constant surface speed is for lathes", "program S in rpm"),
+    v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
+    v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
+    v.G70: ("lathe cycle", "this is a milling translator"),
+    v.G73: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
+    v.G76: ("threading cycle of a lathe", "mill the thread"),
+    v.G81: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
+    v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
+    v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
-    190: ("spindle orientation is not mapped", "map it in [m_code] of the cell once it is read"),
-    610: ("setting the tool number without a change is not read", "use T and M6"),
-    620: (f"digital and analogue I/O words: {_LATER}", "map an own M-code in [m_code] of the cell"),
-    700: (f"saving modal state: {_LATER}", "remove it"),
-    980: (f"subprograms: {_LATER}", "let the post write the program out"),
+    v.TENFOLD * v.M19: (
+        "spindle orientation is not mapped",
+        "map it in [m_code] of the cell once it is read",
+    ),
+    v.TENFOLD * v.M61: ("setting the tool number without a change is not read", "use T and M6"),
+    v.TENFOLD * v.M62: (
+        f"digital and analogue I/O words: {_LATER}",
+        "map an own M-code in [m_code] of the cell",
+    ),
+    v.TENFOLD * v.M70: (f"saving modal state: {_LATER}", "remove it"),
+    v.TENFOLD * v.M98: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
 
@@ -341,7 +348,7 @@ def decimals_needed(unit_mm: float) -> int:
 
 def letters_of(bits: float) -> str:
     """Return the letters whose bits are set, A first."""
-    return "".join(chr(65 + k) for k in range(26) if int(bits) >> k & 1)
+    return "".join(chr(LETTER_A + k) for k in range(v.LETTERS) if int(bits) >> k & 1)
 
 
 def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0, excerpt: str = "") -> Issue:
@@ -356,14 +363,14 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "a": a,
         "b": b,
         "c": c,
-        "word": chr(int(a)) if 0 < a < 128 else "?",
+        "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
         "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
         "char": _printable(character),
         "replacement": _replacement(character),
-        "g": f"{a / 10:g}",
-        "h": f"{b / 10:g}",
+        "g": f"{a / v.TENFOLD:g}",
+        "h": f"{b / v.TENFOLD:g}",
         "difference": abs(a - b),
-        "decimals": decimals_needed(25.4 if c < 0 else 1.0),
+        "decimals": decimals_needed(MM_PER_INCH if c < 0 else 1.0),
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
@@ -386,7 +393,7 @@ def _sentence(finding: Finding, number: int, a: float, b: float) -> str:
 
 def _remedy(finding: Finding, number: int, a: float, b: float) -> str:
     """Return the remedy of a finding, where it depends on what was found."""
-    if number == BAD_CHARACTER and 0 < a < 128:
+    if number == BAD_CHARACTER and 0 < a < FIRST_FOREIGN:
         return _OF_CHARACTER.get(chr(int(a)), finding.remedy)
     if number in (SAME_GROUP_G, SAME_GROUP_M) and a == b:
         return "keep one"

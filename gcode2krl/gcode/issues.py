@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
 from gcode2krl.gcode.reporting import CONSEQUENCES, DROPPED, FINDINGS
 from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
+from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
 Record = Any
 """A numpy record; numpy does not type its fields."""
@@ -92,7 +94,7 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
         message += f"; so do {count - 1} more ({lines_word} {others}{rest})"
     if state["misfits_other_centre"] == count:
         now, other, how = (
-            ("G91.1", "G90.1", "absolute") if abs(row["c"]) == 911 else ("G90.1", "G91.1", "relative")
+            ("G91.1", "G90.1", "absolute") if abs(row["c"]) == G91_1 else ("G90.1", "G91.1", "relative")
         )
         message += f"; {now} is in force, and with {other} the radii fit"
         remedy = f"write {other} before the first arc: I, J, K look {how}"
@@ -145,7 +147,7 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         count, line, word = (int(state[name][which]) for name in ("note_count", "note_line", "note_word"))
         if not count:
             continue
-        values = {"word": chr(word) if word < 128 else "", "home": word // 10, "number": word}
+        values = {"word": chr(word) if word < FIRST_FOREIGN else "", "home": word // TENFOLD, "number": word}
         blocks = "in one block" if count == 1 else f"in {count} blocks"
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
 

@@ -5,7 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
+from gcode2krl import ascii_codes as ch
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.arcs import (
     FITS,
     MISFIT,
@@ -19,7 +21,6 @@ from gcode2krl.gcode.reporting import CONSEQUENCES, MUTE, ROWS, note, report, re
 from gcode2krl.gcode.rows import emit, follow, learn, target
 from gcode2krl.gcode.settings import whole
 from gcode2krl.gcode.state import (
-    CANCELLED,
     DOUBT_CENTRE,
     DOUBT_DISTANCE,
     DOUBT_FEED,
@@ -33,11 +34,13 @@ from gcode2krl.gcode.state import (
     DOUBT_Z,
     NOTE_CENTRE,
 )
+from gcode2krl.units import S_PER_MIN
 
-_FAR_MM = 1e6
+FAR_MM = 1e6
+"""No coordinate of a part is larger."""
 _SLOWEST = 0.1  # units/min, LinuxCNC's floor under inverse time
 _MOST_MISFITS = 10  # arcs whose lines are kept
-_F, _I, _J, _K, _P, _R, _X, _Y, _Z = (ord(c) - 65 for c in "FIJKPRXYZ")
+_MOST_TURNS = 1000
 
 
 @njit(cache=True)
@@ -46,21 +49,21 @@ def move(line, s, rows, counts, found, options, offsets, has, word, special):
     if s.doubt & DOUBT_MOTION:
         follow(s, offsets, has, word)
         s.doubt |= DOUBT_Z  # a cycle may end anywhere along the tool
-    elif s.motion == CANCELLED:
+    elif s.motion == v.MOTION_CANCELLED:
         report(found, counts, f.NO_MOTION_MODE, line, s.motion_line, 0.0)
         s.doubt |= DOUBT_MOTION
         follow(s, offsets, has, word)
-    elif special == 530 and s.motion > 1:
+    elif special == v.G53 and s.motion >= v.MOTION_ARC_CW:
         report(found, counts, f.G53_NEEDS_RAPID_OR_FEED, line, 0.0, 0.0)
         s.doubt |= DOUBT_POSITION
-    elif special == 530 and not s.absolute:
+    elif special == v.G53 and not s.absolute:
         report_unless(s, DOUBT_DISTANCE, found, counts, f.G53_INCREMENTAL, line, 0.0, 0.0)
         s.doubt |= DOUBT_POSITION
-    elif special == 40 and s.motion > 1:
+    elif special == v.G4 and s.motion >= v.MOTION_ARC_CW:
         report(found, counts, f.DWELL_WITH_ARC, line, 0.0, 0.0)
         follow(s, offsets, has, word)
-    elif s.motion <= 1:
-        _straight(line, s, rows, counts, found, offsets, has, word, special == 530)
+    elif s.motion <= v.MOTION_LINE:
+        _straight(line, s, rows, counts, found, offsets, has, word, special == v.G53)
     else:
         _note_unknown_start(s, line)
         end = target(s, offsets, has, word)
@@ -70,7 +73,7 @@ def move(line, s, rows, counts, found, options, offsets, has, word, special):
         learn(s, has)
     largest = max(abs(s.x), abs(s.y), abs(s.z))
     s.largest_mm = max(s.largest_mm, largest)
-    if largest > _FAR_MM:
+    if largest > FAR_MM:
         in_doubt = DOUBT_POSITION | DOUBT_UNIT | DOUBT_DISTANCE
         report_unless(s, in_doubt, found, counts, f.TOO_FAR, line, largest, 0.0)
         s.x, s.y, s.z = 0.0, 0.0, 0.0
@@ -84,17 +87,17 @@ def machine_home(line, s, rows, counts, offsets, has, word, code, any_axis):
     s.x, s.y, s.z = target(s, offsets, has, word)
     emit(s, rows, counts[ROWS], line, np.inf, 1, 1, -1)
     counts[ROWS] += 1
-    home = s.home_28 if code == 280 else s.home_30
+    home = s.home_28 if code == v.G28 else s.home_30
     offset = 0.0 if math.isnan(s.length_offset) else s.length_offset
-    if has[_X] or not any_axis:
+    if has[v.WORD_X] or not any_axis:
         s.x = home[0]
         s.known_x = 0
-    if has[_Y] or not any_axis:
+    if has[v.WORD_Y] or not any_axis:
         s.y = home[1]
         s.known_y = 0
-    if has[_X] and has[_Y]:
+    if has[v.WORD_X] and has[v.WORD_Y]:
         s.known_z = 0  # the robot goes to HOME: the old height must not come back by itself
-    if has[_Z] or not any_axis:
+    if has[v.WORD_Z] or not any_axis:
         s.z = home[2] - offset
         s.known_z = 0
     emit(s, rows, counts[ROWS], line, np.inf, 1, 1, -1)
@@ -110,19 +113,19 @@ def _note_unknown_start(s, line):
 @njit(cache=True)
 def _feed_speed(s, has, word, length_mm):
     """Return (finding, speed in mm/s) of a feed move of the given whole length."""
-    if s.feed_mode == 93:
-        if not has[_F]:
+    if s.feed_mode == v.INVERSE_TIME:
+        if not has[v.WORD_F]:
             return f.NO_INVERSE_TIME, 0.0
-        if word[_F] <= 0.0:
+        if word[v.WORD_F] <= 0.0:
             return f.NO_FEED, 0.0
-        return f.OK, max(length_mm * word[_F], _SLOWEST * s.unit_mm) / 60.0
+        return f.OK, max(length_mm * word[v.WORD_F], _SLOWEST * s.unit_mm) / S_PER_MIN
     if s.feed <= 0.0:
         return f.NO_FEED, 0.0
-    if s.feed_mode == 95:
+    if s.feed_mode == v.PER_REVOLUTION:
         if s.rpm <= 0.0:
             return f.FEED_PER_REV_STOPPED, 0.0
-        return f.OK, s.feed * s.rpm / 60.0
-    return f.OK, s.feed / 60.0
+        return f.OK, s.feed * s.rpm / S_PER_MIN
+    return f.OK, s.feed / S_PER_MIN
 
 
 @njit(cache=True)
@@ -134,7 +137,7 @@ def _report_speed(s, found, counts, finding, line):
         report_unless(s, DOUBT_SPEED | DOUBT_FEED_MODE, found, counts, finding, line, s.feed_mode_line, 0.0)
         s.doubt |= DOUBT_SPEED
     else:
-        dropped = s.feed_mode_line if s.feed_mode != 93 else 0
+        dropped = s.feed_mode_line if s.feed_mode != v.INVERSE_TIME else 0
         report_unless(s, DOUBT_FEED | DOUBT_FEED_MODE, found, counts, finding, line, dropped, s.feed_mode)
         s.doubt |= DOUBT_FEED
 
@@ -144,13 +147,13 @@ def _straight(line, s, rows, counts, found, offsets, has, word, machine):
     """G0 and G1, also under G53."""
     if machine:
         offset = 0.0 if math.isnan(s.length_offset) else s.length_offset
-        x = word[_X] * s.unit_mm if has[_X] else s.x
-        y = word[_Y] * s.unit_mm if has[_Y] else s.y
-        z = word[_Z] * s.unit_mm - offset if has[_Z] else s.z
+        x = word[v.WORD_X] * s.unit_mm if has[v.WORD_X] else s.x
+        y = word[v.WORD_Y] * s.unit_mm if has[v.WORD_Y] else s.y
+        z = word[v.WORD_Z] * s.unit_mm - offset if has[v.WORD_Z] else s.z
     else:
         x, y, z = target(s, offsets, has, word)
     speed = np.inf
-    if s.motion == 1:
+    if s.motion == v.MOTION_LINE:
         _note_unknown_start(s, line)
         length = math.sqrt((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2)
         finding, speed = _feed_speed(s, has, word, length)
@@ -158,66 +161,45 @@ def _straight(line, s, rows, counts, found, offsets, has, word, machine):
             _report_speed(s, found, counts, finding, line)
     s.x, s.y, s.z = x, y, z
     if machine:
-        s.known_x &= not has[_X]
-        s.known_y &= not has[_Y]
-        s.known_z &= not has[_Z]
+        s.known_x &= not has[v.WORD_X]
+        s.known_y &= not has[v.WORD_Y]
+        s.known_z &= not has[v.WORD_Z]
     else:
         learn(s, has)
-    emit(s, rows, counts[ROWS], line, speed, s.motion == 0, machine, -1)
+    emit(s, rows, counts[ROWS], line, speed, s.motion == v.MOTION_RAPID, machine, -1)
     counts[ROWS] += 1
 
 
 @njit(cache=True)
 def _arc(line, s, rows, counts, found, options, offsets, has, word):
     """G2 and G3 as chords; return False where the row buffer is too small."""
-    ccw = s.motion == 3
+    ccw = s.motion == v.MOTION_ARC_CCW
     start = (s.x, s.y, s.z)
     end = target(s, offsets, has, word)
-    first = 0 if s.plane == 17 else (2 if s.plane == 18 else 1)  # index of u
-    second = (first + 1) % 3
-    third = (first + 2) % 3
+    first = _first_axis(s.plane)
+    second, third = (first + 1) % 3, (first + 2) % 3
     in_doubt = (
         (DOUBT_X << first) | (DOUBT_X << second) | DOUBT_UNIT | DOUBT_PLANE | DOUBT_DISTANCE | DOUBT_CENTRE
     )
     u0, v0, w0 = start[first], start[second], start[third]
     u1, v1, w1 = end[first], end[second], end[third]
-    has_u, has_v = has[_I + first], has[_I + second]
-    if has[_I + third]:
-        value = word[_I + third]
-        if value != 0.0:
-            report_unless(s, DOUBT_PLANE, found, counts, f.ARC_WRONG_OFFSET, line, 73 + third, value, s.plane)
-            return True
-        if not counts[MUTE]:
-            note(s, NOTE_CENTRE, line, 73 + third)
-    if has[_R]:
-        if has_u or has_v:
-            report(found, counts, f.ARC_BOTH_FORMATS, line, 0.0, 0.0)
-            return True
-        finding, cu, cv = centre_from_radius(u0, v0, u1, v1, word[_R] * s.unit_mm, ccw)
-        if finding != f.OK:
-            radius, chord = abs(word[_R]) * s.unit_mm, math.hypot(u1 - u0, v1 - v0)
-            report_unless(s, in_doubt, found, counts, finding, line, radius, chord)
-            return True
+    if not _axis_word_is_harmless(line, s, counts, found, has, word, third):
+        return True
+    if has[v.WORD_R]:
+        good, cu, cv = _centre_by_radius(
+            line, s, counts, found, has, word, first, second, u0, v0, u1, v1, in_doubt
+        )
     else:
-        if not has_u and not has_v:
-            report(found, counts, f.ARC_NO_CENTRE, line, s.motion * 10, s.motion_line)
-            return True
-        if s.arc_absolute and not (has_u and has_v):
-            report_unless(s, DOUBT_CENTRE, found, counts, f.ARC_NEEDS_OFFSETS, line, 0.0, 0.0)
-            return True
-        i = word[_I + first] * s.unit_mm if has_u else 0.0
-        j = word[_I + second] * s.unit_mm if has_v else 0.0
-        cu = i + (offsets[s.work_offset, first] if s.arc_absolute else u0)
-        cv = j + (offsets[s.work_offset, second] if s.arc_absolute else v0)
-    turns = 1
-    if has[_P]:
-        turns = whole(word[_P])
-        if turns < 1 or turns > 1000:
-            report(found, counts, f.ARC_TURNS, line, word[_P], 0.0)
-            return True
+        good, cu, cv = _centre_by_words(line, s, counts, found, offsets, has, word, first, second, u0, v0)
+    if not good:
+        return True
+    turns = whole(word[v.WORD_P]) if has[v.WORD_P] else 1
+    if turns < 1 or turns > _MOST_TURNS:
+        report(found, counts, f.ARC_TURNS, line, word[v.WORD_P], 0.0)
+        return True
     r0 = math.hypot(u0 - cu, v0 - cv)
     r1 = math.hypot(u1 - cu, v1 - cv)
-    if r0 < SMALLEST_RADIUS_MM or r1 < SMALLEST_RADIUS_MM:
+    if min(r0, r1) < SMALLEST_RADIUS_MM:
         report_unless(s, in_doubt, found, counts, f.ARC_ZERO_RADIUS, line, 0.0, 0.0)
         return True
     fit = radii_fit(r0, r1, s.unit_mm)
@@ -226,10 +208,7 @@ def _arc(line, s, rows, counts, found, options, offsets, has, word):
         if not (known[first] and known[second]):
             _report_unknown_start(s, counts, found, line)
         elif not rests_on_doubt(s, counts, in_doubt):
-            cu += u0 - offsets[s.work_offset, first] if s.arc_absolute else offsets[s.work_offset, first] - u0
-            cv += (
-                v0 - offsets[s.work_offset, second] if s.arc_absolute else offsets[s.work_offset, second] - v0
-            )
+            cu, cv = _other_centre(s, offsets, first, second, u0, v0, cu, cv)
             other = radii_fit(math.hypot(u0 - cu, v0 - cv), math.hypot(u1 - cu, v1 - cv), s.unit_mm) != MISFIT
             _report_misfit(s, counts, found, line, r0, r1, other)
         return True
@@ -245,20 +224,88 @@ def _arc(line, s, rows, counts, found, options, offsets, has, word):
     if fit != FITS:
         _note_spiral(s, line, r0, r1)
     learn(s, has)
+    axes, centre, radii, along = (first, second, third), (cu, cv), (r0, r1), (w0, w1)
+    _emit_chords(line, s, rows, counts, axes, centre, radii, along, angle, sweep, chords, end, speed)
+    return True
+
+
+@njit(cache=True)
+def _emit_chords(line, s, rows, counts, axes, centre, radii, along, angle, sweep, chords, end, speed):
+    """Write the rows of an arc; the last ends exactly where the block says."""
+    r0, w0 = radii[0], along[0]
     point = np.empty(3)
     for k in range(1, chords + 1):
         part = k / chords
-        r = r0 + (r1 - r0) * part
-        point[first] = cu + r * math.cos(angle + sweep * part)
-        point[second] = cv + r * math.sin(angle + sweep * part)
-        point[third] = w0 + (w1 - w0) * part
+        r = r0 + (radii[1] - r0) * part
+        point[axes[0]] = centre[0] + r * math.cos(angle + sweep * part)
+        point[axes[1]] = centre[1] + r * math.sin(angle + sweep * part)
+        point[axes[2]] = w0 + (along[1] - w0) * part
         s.x, s.y, s.z = point[0], point[1], point[2]
         if k == chords:
             s.x, s.y, s.z = end
         emit(s, rows, counts[ROWS], line, speed, 0, 0, s.arcs)
         counts[ROWS] += 1
     s.arcs += 1
+
+
+@njit(cache=True)
+def _first_axis(plane):
+    """Return the number of the axis u of a plane; v and w follow in turn."""
+    if plane == v.PLANE_XY:
+        return 0
+    return 2 if plane == v.PLANE_ZX else 1
+
+
+@njit(cache=True)
+def _axis_word_is_harmless(line, s, counts, found, has, word, third):
+    """Tell whether the centre word along the arc's axis is 0 or missing; report it where it is not."""
+    if not has[v.WORD_I + third]:
+        return True
+    value, letter = word[v.WORD_I + third], ch.LETTER_I + third
+    if value != 0.0:
+        report_unless(s, DOUBT_PLANE, found, counts, f.ARC_WRONG_OFFSET, line, letter, value, s.plane)
+        return False
+    if not counts[MUTE]:
+        note(s, NOTE_CENTRE, line, letter)
     return True
+
+
+@njit(cache=True)
+def _centre_by_radius(line, s, counts, found, has, word, first, second, u0, v0, u1, v1, in_doubt):
+    """Return (True where there is one, u, v) of the centre of an arc with R."""
+    if has[v.WORD_I + first] or has[v.WORD_I + second]:
+        report(found, counts, f.ARC_BOTH_FORMATS, line, 0.0, 0.0)
+        return False, 0.0, 0.0
+    radius = word[v.WORD_R] * s.unit_mm
+    finding, cu, cv = centre_from_radius(u0, v0, u1, v1, radius, s.motion == v.MOTION_ARC_CCW)
+    if finding != f.OK:
+        report_unless(s, in_doubt, found, counts, finding, line, abs(radius), math.hypot(u1 - u0, v1 - v0))
+    return finding == f.OK, cu, cv
+
+
+@njit(cache=True)
+def _centre_by_words(line, s, counts, found, offsets, has, word, first, second, u0, v0):
+    """Return (True where there is one, u, v) of the centre of an arc with I, J, K."""
+    has_u, has_v = has[v.WORD_I + first], has[v.WORD_I + second]
+    if not has_u and not has_v:
+        report(found, counts, f.ARC_NO_CENTRE, line, s.motion * v.TENFOLD, s.motion_line)
+        return False, 0.0, 0.0
+    if s.arc_absolute and not (has_u and has_v):
+        report_unless(s, DOUBT_CENTRE, found, counts, f.ARC_NEEDS_OFFSETS, line, 0.0, 0.0)
+        return False, 0.0, 0.0
+    i = word[v.WORD_I + first] * s.unit_mm if has_u else 0.0
+    j = word[v.WORD_I + second] * s.unit_mm if has_v else 0.0
+    base = offsets[s.work_offset]
+    return True, i + (base[first] if s.arc_absolute else u0), j + (base[second] if s.arc_absolute else v0)
+
+
+@njit(cache=True)
+def _other_centre(s, offsets, first, second, u0, v0, cu, cv):
+    """Return (u, v) of the centre as the other of G90.1 and G91.1 would have it."""
+    base = offsets[s.work_offset]
+    if s.arc_absolute:
+        return cu + (u0 - base[first]), cv + (v0 - base[second])
+    return cu + (base[first] - u0), cv + (base[second] - v0)
 
 
 @njit(cache=True)
@@ -279,7 +326,7 @@ def _report_misfit(s, counts, found, line, r0, r1, other_centre_fits):
     s.misfits += 1
     s.misfits_other_centre += other_centre_fits
     if s.misfits <= _MOST_MISFITS:
-        centre = 901 if s.arc_absolute else 911
+        centre = v.G90_1 if s.arc_absolute else v.G91_1
         report(found, counts, f.ARC_RADIUS_MISMATCH, line, r0, r1, centre if s.unit_mm == 1.0 else -centre)
 
 

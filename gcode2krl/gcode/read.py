@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
@@ -36,11 +38,11 @@ if TYPE_CHECKING:  # a cell file costs its library a noticeable start
 CHORD_TOLERANCE_MM = 0.01
 _PIECE_BYTES = 1_000_000
 _ROOM = 1.25
-"""Rows to make room for, over the lines that a file of its size has by its first piece."""
+"""Room for rows is made for the estimated lines of the file, from its first piece, times this."""
 _BUFFER_ROWS = 8192
 """Rows between the interpreter and the table: they stay in the processor's cache."""
 _MOST_REST_BYTES = 8_000_000
-"""How much behind the program's end is looked at for lines that are not read."""
+"""Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -83,10 +85,15 @@ def read_gcode(
     try:
         with Path(path).open("rb") as stream:
             return read_stream(
-                stream, name, cell,
-                dialect=dialect, tools=tools, chord_tolerance_mm=chord_tolerance_mm,
-                block_delete=block_delete, progress=progress,
-            )  # fmt: skip
+                stream,
+                name,
+                cell,
+                dialect=dialect,
+                tools=tools,
+                chord_tolerance_mm=chord_tolerance_mm,
+                block_delete=block_delete,
+                progress=progress,
+            )
     except OSError as error:
         raise input_error(
             "file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name
@@ -284,7 +291,7 @@ class _Interpreter:
         self.counts[MARKS] = 0
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         first_message = len(self.messages)
-        words.value[words.letter == ord("(")] += first_message
+        words.value[words.letter == PAREN_OPEN] += first_message
         self.messages += [_decode(text[a:b]) for a, b in words.message_span]
         if not self.columns.count and len(words.line):
             lines = int(words.line[-1] - words.line[0]) + 1
@@ -293,9 +300,18 @@ class _Interpreter:
         while True:
             before = at
             at = machine.run(
-                columns, at, self.state, self.rows, self.counts, self.events, self.found,
-                self.options, self.offsets, self.offset_known, self.tool_length,
-            )  # fmt: skip
+                columns,
+                at,
+                self.state,
+                self.rows,
+                self.counts,
+                self.events,
+                self.found,
+                self.options,
+                self.offsets,
+                self.offset_known,
+                self.tool_length,
+            )
             if at >= len(words.letter) or self.ended:
                 return
             self._make_room(stuck=at == before)
@@ -306,7 +322,7 @@ class _Interpreter:
         wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
         if not wanted:
             return
-        ends = np.flatnonzero(text == ord("\n"))
+        ends = np.flatnonzero(text == NEWLINE)
         starts = np.concatenate([[0], ends + 1])
         for number in wanted:
             row = number - first_line
@@ -340,9 +356,12 @@ class _Interpreter:
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
         whole = program_issues(
-            self.state[0], self.texts,
-            rest_line=self.rest_line, most_decimals=self.most_decimals, head=head,
-        )  # fmt: skip
+            self.state[0],
+            self.texts,
+            rest_line=self.rest_line,
+            most_decimals=self.most_decimals,
+            head=head,
+        )
         return self._toolpath((*found, *whole))
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
@@ -361,10 +380,10 @@ class _Interpreter:
         state, row = self.state[0], self.columns.count - 1
         line = int(state["end_line"])
         if state["direction"]:
-            yield Event(row, "spindle", {"rpm": 0.0, "m": 5, "line": line, "implied": True})
+            yield Event(row, "spindle", {"rpm": 0.0, "m": v.M5, "line": line, "implied": True})
         if state["mist"] or state["flood"]:
             yield Event(
-                row, "coolant", {"mist": False, "flood": False, "m": 9, "line": line, "implied": True}
+                row, "coolant", {"mist": False, "flood": False, "m": v.M9, "line": line, "implied": True}
             )
 
     def _events(self) -> Iterator[Event]:

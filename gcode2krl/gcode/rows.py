@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 
 from gcode2krl.gcode.state import DOUBT_DISTANCE, DOUBT_UNIT, DOUBT_X, DOUBT_Y, DOUBT_Z
+from gcode2krl.gcode.vocabulary import WORD_X, WORD_Y, WORD_Z
+from gcode2krl.units import S_PER_MIN
 
 ROW = np.dtype(
     [
@@ -29,7 +31,6 @@ ROW = np.dtype(
         ("known_z", "i1"),
     ]
 )
-X, Y, Z = (ord(c) - 65 for c in "XYZ")
 
 
 @njit(cache=True)
@@ -38,7 +39,7 @@ def emit(s, rows, count, line, feed, rapid, machine, arc):
     row = rows[count]
     row.x, row.y, row.z = s.x, s.y, s.z
     row.feed = feed
-    row.spindle = s.rpm * s.direction * 2.0 * math.pi / 60.0
+    row.spindle = s.rpm * s.direction * 2.0 * math.pi / S_PER_MIN
     row.tolerance = s.tolerance
     row.dwell = 0.0
     row.length_offset = s.length_offset
@@ -57,12 +58,12 @@ def target(s, offsets, has, word):
     """Return the tip position the axis words ask for; axes not named stay."""
     x, y, z = s.x, s.y, s.z
     base_x, base_y, base_z = offsets[s.work_offset]
-    if has[X]:
-        x = word[X] * s.unit_mm + (base_x if s.absolute else x)
-    if has[Y]:
-        y = word[Y] * s.unit_mm + (base_y if s.absolute else y)
-    if has[Z]:
-        z = word[Z] * s.unit_mm + (base_z if s.absolute else z)
+    if has[WORD_X]:
+        x = word[WORD_X] * s.unit_mm + (base_x if s.absolute else x)
+    if has[WORD_Y]:
+        y = word[WORD_Y] * s.unit_mm + (base_y if s.absolute else y)
+    if has[WORD_Z]:
+        z = word[WORD_Z] * s.unit_mm + (base_z if s.absolute else z)
     return x, y, z
 
 
@@ -70,12 +71,12 @@ def target(s, offsets, has, word):
 def learn(s, has):
     """Note which axes have been programmed: in absolute mode always, else if they were known before."""
     if s.absolute:
-        s.known_x |= has[X]
-        s.known_y |= has[Y]
-        s.known_z |= has[Z]
+        s.known_x |= has[WORD_X]
+        s.known_y |= has[WORD_Y]
+        s.known_z |= has[WORD_Z]
     if s.doubt == 0:
         return
-    named = has[X] * DOUBT_X + has[Y] * DOUBT_Y + has[Z] * DOUBT_Z
+    named = has[WORD_X] * DOUBT_X + has[WORD_Y] * DOUBT_Y + has[WORD_Z] * DOUBT_Z
     if s.doubt & (DOUBT_UNIT | DOUBT_DISTANCE):
         s.doubt |= named
     elif s.absolute:

@@ -11,8 +11,7 @@ reported. What is stated anew is out of doubt. Doubt begins only with an error, 
 import numpy as np
 from numpy.typing import NDArray
 
-CANCELLED = -1
-"""Motion mode after G80 and before the first motion code."""
+from gcode2krl.gcode import vocabulary as v
 
 STATE = np.dtype(
     [
@@ -25,9 +24,9 @@ STATE = np.dtype(
         ("unit_mm", "f8"),  # mm per programmed unit
         ("absolute", "i1"),
         ("arc_absolute", "i1"),
-        ("plane", "i4"),  # 17, 18, 19
-        ("motion", "i4"),  # 0, 1, 2, 3 or CANCELLED
-        ("feed_mode", "i4"),  # 93, 94, 95
+        ("plane", "i4"),  # PLANE_…
+        ("motion", "i4"),  # MOTION_…
+        ("feed_mode", "i4"),  # INVERSE_TIME, PER_MINUTE or PER_REVOLUTION
         ("feed", "f8"),  # mm/min, mm/rev; 0 = none yet
         ("rpm", "f8"),
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
@@ -83,9 +82,9 @@ def initial_state() -> NDArray[np.void]:
     state = np.zeros(1, dtype=STATE)
     state["unit_mm"] = 1.0
     state["absolute"] = 1
-    state["plane"] = 17
-    state["motion"] = CANCELLED
-    state["feed_mode"] = 94
+    state["plane"] = v.PLANE_XY
+    state["motion"] = v.MOTION_CANCELLED
+    state["feed_mode"] = v.PER_MINUTE
     state["selected_tool"] = -1
     state["length_offset"] = np.nan
     state["offset_tool"] = -1
@@ -96,97 +95,91 @@ def initial_state() -> NDArray[np.void]:
 UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2
 
 
+_GROUPS: dict[int, tuple[float, ...]] = {
+    v.NON_MODAL: (4, 28, 28.1, 30, 30.1, 53),
+    v.MOTION: (0, 1, 2, 3, 80),
+    v.PLANE: (17, 18, 19),
+    v.DISTANCE: (90, 91),
+    v.CENTRE: (90.1, 91.1),
+    v.FEED_MODE: (93, 94, 95),
+    v.UNIT: (20, 21),
+    v.RADIUS_COMPENSATION: (40,),
+    v.LENGTH_OFFSET: (43, 49),
+    v.RETRACT: (98, 99),
+    v.WORK_OFFSET: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
+    v.PATH_CONTROL: (61, 61.1, 64),
+    v.SPINDLE_MODE: (97,),
+}
+"""Modal group: the G-codes in it that are read."""
+_UNSUPPORTED = (
+    *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
+    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76),
+    *(81, 82, 83, 84, 85, 86, 87, 88, 89, 92, 92.1, 92.2, 92.3, 96),
+)
+"""G-codes of this and other dialects that are known and not read."""
+
+
 def _group_table() -> NDArray[np.int8]:
-    groups: dict[int, tuple[float, ...]] = {
-        0: (4, 28, 28.1, 30, 30.1, 53),
-        1: (0, 1, 2, 3, 80),
-        2: (17, 18, 19),
-        3: (90, 91),
-        4: (90.1, 91.1),
-        5: (93, 94, 95),
-        6: (20, 21),
-        7: (40,),
-        8: (43, 49),
-        9: (98, 99),
-        10: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
-        11: (61, 61.1, 64),
-        12: (97,),
-    }
-    unsupported = (
-        *(
-            5,
-            5.1,
-            5.2,
-            5.3,
-            6,
-            6.1,
-            6.2,
-            6.3,
-            7,
-            8,
-            10,
-            33,
-            33.1,
-            38.2,
-            38.3,
-            38.4,
-            38.5,
-            41,
-            41.1,
-            42,
-            42.1,
-            43.1,
-            43.2,
-        ),
-        *(43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89),
-        *(92, 92.1, 92.2, 92.3, 96),
-    )
-    table = np.full(1000, UNKNOWN_GROUP, dtype=np.int8)
-    for group, codes in groups.items():
+    table = np.full(v.LARGEST_G + 1, UNKNOWN_GROUP, dtype=np.int8)
+    for group, codes in _GROUPS.items():
         for code in codes:
-            table[round(code * 10)] = group
-    for code in unsupported:
-        table[round(code * 10)] = UNSUPPORTED_GROUP
+            table[round(code * v.TENFOLD)] = group
+    for code in _UNSUPPORTED:
+        table[round(code * v.TENFOLD)] = UNSUPPORTED_GROUP
     return table
 
 
 GROUP_OF_G = _group_table()
 """Modal group of a G-code given as ten times its number, (1000,)."""
-GROUPS = 13
+_DOUBTS: dict[int, tuple[float, ...]] = {
+    DOUBT_X: (7, 8),
+    DOUBT_Z: (43.1, 43.2),
+    DOUBT_POSITION: (10, 43.4, 43.5, 52, 92, 92.1, 92.2, 92.3),
+    DOUBT_SPEED: (96,),
+    0: (41, 41.1, 42, 42.1),
+}
+"""What is in doubt: after which G-codes that are not read."""
 
 
 def _doubt_table() -> NDArray[np.int32]:
-    table = np.full(1000, DOUBT_MOTION | DOUBT_POSITION, dtype=np.int32)  # of a code nobody knows
-    effects: dict[int, tuple[float, ...]] = {
-        DOUBT_X: (7, 8),
-        DOUBT_Z: (43.1, 43.2),
-        DOUBT_POSITION: (10, 43.4, 43.5, 52, 92, 92.1, 92.2, 92.3),
-        DOUBT_SPEED: (96,),
-        0: (41, 41.1, 42, 42.1),
-    }
-    for doubt, codes in effects.items():
+    of_unknown = DOUBT_MOTION | DOUBT_POSITION
+    table = np.full(v.LARGEST_G + 1, of_unknown, dtype=np.int32)
+    for doubt, codes in _DOUBTS.items():
         for code in codes:
-            table[round(code * 10)] = doubt
+            table[round(code * v.TENFOLD)] = doubt
     return table
 
 
 DOUBT_OF_G = _doubt_table()
 """What is in doubt after a G-code that is not read, given as ten times its number, (1000,)."""
-DOUBT_OF_GROUP = np.array(
-    [
-        DOUBT_POSITION, DOUBT_MOTION, DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE | DOUBT_FEED,
-        DOUBT_UNIT, 0, DOUBT_Z, 0, DOUBT_POSITION, 0, DOUBT_SPEED,
-    ],
-    dtype=np.int32,
-)  # fmt: skip
+_DOUBTS_OF_GROUP = {
+    v.NON_MODAL: DOUBT_POSITION,
+    v.MOTION: DOUBT_MOTION,
+    v.PLANE: DOUBT_PLANE,
+    v.DISTANCE: DOUBT_DISTANCE,
+    v.CENTRE: DOUBT_CENTRE,
+    v.FEED_MODE: DOUBT_FEED_MODE | DOUBT_FEED,
+    v.UNIT: DOUBT_UNIT,
+    v.LENGTH_OFFSET: DOUBT_Z,
+    v.WORK_OFFSET: DOUBT_POSITION,
+    v.SPINDLE_MODE: DOUBT_SPEED,
+}
+DOUBT_OF_GROUP = np.array([_DOUBTS_OF_GROUP.get(group, 0) for group in range(v.GROUPS)], dtype=np.int32)
 """What is in doubt after two codes of one modal group, (GROUPS,)."""
-DOUBT_OF_LETTER = np.zeros(26, dtype=np.int32)
+_DOUBTS_OF_LETTER = {
+    "X": DOUBT_X,
+    "Y": DOUBT_Y,
+    "Z": DOUBT_Z,
+    "F": DOUBT_FEED,
+    "S": DOUBT_SPEED,
+    "T": DOUBT_TOOL,
+    "G": DOUBT_ALL,
+    "M": DOUBT_ALL,
+    "O": DOUBT_ALL,
+}
+_ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in _ALPHABET], dtype=np.int32)
 """What is in doubt after a word whose value cannot be read, by its letter, (26,)."""
-for _letter, _doubt in {
-    "X": DOUBT_X, "Y": DOUBT_Y, "Z": DOUBT_Z, "F": DOUBT_FEED, "S": DOUBT_SPEED, "T": DOUBT_TOOL,
-    "G": DOUBT_ALL, "M": DOUBT_ALL, "O": DOUBT_ALL,
-}.items():  # fmt: skip
-    DOUBT_OF_LETTER[ord(_letter) - 65] = _doubt
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5

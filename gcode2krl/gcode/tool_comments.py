@@ -1,9 +1,9 @@
 """Diameters that a CAM system names in comments, against those of the cell's tools.
 
 The tool in the comment is the one that the path was made for; another in the cell gives another part, and
-forces that mean nothing. Read are the forms that posts write (`_DIAMETER`), and only where it is plain which
-tool is meant; what is not plain is passed over. A scan for a few words comes first, so that a file without
-them costs next to nothing.
+wrong forces. The forms that posts write (`_DIAMETER`) are read, where it is certain which tool is meant;
+other comments are ignored. A search for a few words comes first, so that a file without them takes almost no
+time.
 """
 
 import re
@@ -98,15 +98,14 @@ def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") ->
     """
     used = {int(number) or (cell.mounted_tool or 0) for number in np.unique(toolpath.tool[1:])}
     used -= {0} if len(used) > 1 else set()
+    only = next(iter(used)) if len(used) == 1 else 0
     told: set[int] = set()
     for said in named:
-        number = said.tool if said.tool is not None else next(iter(used)) if len(used) == 1 else 0
+        number = said.tool if said.tool is not None else only
         tool = cell.tool.get(number)
         if number in told or number not in used or tool is None or tool.kind == "tapered":
             continue
-        in_mm = {"mm": (1.0,), "inch": (MM_PER_INCH,), "": (1.0, MM_PER_INCH)}[said.unit]
-        slack = _SLACK * tool.diameter_mm + _SLACK_MM
-        if any(abs(said.value * factor - tool.diameter_mm) <= slack for factor in in_mm) or said.value <= 0.0:
+        if _may_be(said, tool.diameter_mm):
             continue
         told.add(number)
         unit = f" {said.unit}" if said.unit else ""
@@ -118,3 +117,10 @@ def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") ->
             f"{tool.diameter_mm:g} mm",
             f"correct tool.{number}.diameter_mm in the cell, or put the right tool into the magazine",
         )
+
+
+def _may_be(said: NamedDiameter, diameter_mm: float) -> bool:
+    """Tell whether a comment may mean this diameter; a comment without a unit may mean mm or inches."""
+    in_mm = {"mm": (1.0,), "inch": (MM_PER_INCH,), "": (1.0, MM_PER_INCH)}[said.unit]
+    slack_mm = _SLACK * diameter_mm + _SLACK_MM
+    return said.value <= 0.0 or any(abs(said.value * f - diameter_mm) <= slack_mm for f in in_mm)

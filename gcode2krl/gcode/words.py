@@ -4,7 +4,7 @@ A word is (letter, value, line). Things that are not words travel in the same st
 kept: ``/`` (block delete), ``%`` (tape mark), ``(`` (a message comment; value = its number), ``!`` (something
 cannot be read; value = number of the finding, ``extra`` = what was found) and a small letter (a word whose
 value cannot be read). A line has at most one ``!`` of its characters; the words around it are still read, so
-that what follows is judged by its own faults.
+that later mistakes in the line are found too.
 """
 
 from typing import NamedTuple
@@ -13,13 +13,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcode2krl import ascii_codes as ch
 from gcode2krl.gcode import findings as f
 
 LINE_LIMIT = 4096
-"""Longest line that is read, in bytes; anything longer is not a part program."""
+"""Longest line that is read, in bytes; a part program has none that long."""
+MARK = ch.EXCLAMATION
+"""Stands in the column of letters where something cannot be read."""
+UNREAD_NUMBER = ch.CASE_BIT
+"""Added to a letter whose value cannot be read: the small letter."""
 
-_SPACE, _TAB, _RETURN, _NEWLINE, _END_OF_TAPE = 32, 9, 13, 10, 26
-_TEN_TO = 10.0 ** np.arange(19)
+_NOTHING, _LINE_NUMBER = -1, 0
+"""Kinds of an item that makes no word: a comment; a line or program number. Other kinds are letters."""
+_LETTER_BEFORE = -1
+"""Instead of a letter: the one of the word before in the line has lost its value."""
+_MOST_DIGITS, _MOST_DECIMALS = 15, 18
+_TEN_TO = 10.0 ** np.arange(_MOST_DECIMALS + 1)
 
 
 class Words(NamedTuple):
@@ -42,34 +51,56 @@ def scan(text: NDArray[np.uint8], first_line: int) -> Words:
     values = np.empty(len(letters))
     lines = np.empty(len(letters), dtype=np.int32)
     extras = np.zeros(1024)  # only the first findings are ever shown
-    spans = np.empty((int(np.count_nonzero(text == ord("("))), 2), dtype=np.int64)
+    spans = np.empty((int(np.count_nonzero(text == ch.PAREN_OPEN)), 2), dtype=np.int64)
     count, messages, decimals = _scan(text, first_line, letters, values, lines, extras, spans)
     return Words(letters[:count], values[:count], extras, lines[:count], spans[:messages], decimals)
 
 
 @njit(cache=True)
+def _blank(c):
+    return c in (ch.SPACE, ch.TAB, ch.RETURN)
+
+
+@njit(cache=True)
+def _is_nothing(c):
+    return _blank(c) or c == ch.END_OF_TAPE
+
+
+@njit(cache=True)
+def _is_digit(c):
+    return c >= ch.DIGIT_0 and c <= ch.DIGIT_9
+
+
+@njit(cache=True)
+def _is_sign(c):
+    return c == ch.MINUS or c == ch.PLUS
+
+
+@njit(cache=True)
+def _is_letter(c):
+    """Tell whether a byte is a letter, small or capital."""
+    return (c | ch.CASE_BIT) >= ch.SMALL_A and (c | ch.CASE_BIT) <= ch.SMALL_Z
+
+
+@njit(cache=True)
 def _is_message(text, i, end):
     """Tell whether a comment's content begins with MSG, as ``(MSG, …)`` does."""
-    while i < end and (text[i] == 32 or text[i] == 9):
+    while i < end and (text[i] == ch.SPACE or text[i] == ch.TAB):
         i += 1
     if i + 3 > end:
         return False
-    return (text[i] | 32) == 109 and (text[i + 1] | 32) == 115 and (text[i + 2] | 32) == 103
+    m, s, g = text[i] | ch.CASE_BIT, text[i + 1] | ch.CASE_BIT, text[i + 2] | ch.CASE_BIT
+    return m == ch.SMALL_M and s == ch.SMALL_S and g == ch.SMALL_G
 
 
 @njit(cache=True)
 def _is_function(text, i):
     """Tell whether a function with its argument stands at ``i``, as in ``XABS[#1]``."""
     letters = 0
-    while i < len(text) and (text[i] | 32) >= 97 and (text[i] | 32) <= 122:
+    while i < len(text) and _is_letter(text[i]):
         letters += 1
         i += 1
-    return letters > 1 and i < len(text) and text[i] == 91
-
-
-@njit(cache=True)
-def _blank(c):
-    return c in (_SPACE, _TAB, _RETURN)
+    return letters > 1 and i < len(text) and text[i] == ch.BRACKET_OPEN
 
 
 @njit(cache=True)
@@ -77,9 +108,9 @@ def _after_bracket(text, i, end):
     """Return the place behind the bracket expression that opens at ``i``."""
     depth = 0
     while i < end:
-        if text[i] == 91:
+        if text[i] == ch.BRACKET_OPEN:
             depth += 1
-        elif text[i] == 93:
+        elif text[i] == ch.BRACKET_CLOSE:
             depth -= 1
             if depth == 0:
                 return i + 1
@@ -88,22 +119,33 @@ def _after_bracket(text, i, end):
 
 
 @njit(cache=True)
+def _opens_bracket(text, i, end):
+    """Tell whether ``[``, or the ``/[`` of ATAN, stands at ``i``."""
+    if text[i] == ch.SLASH and i + 1 < end:
+        return text[i + 1] == ch.BRACKET_OPEN
+    return text[i] == ch.BRACKET_OPEN
+
+
+@njit(cache=True)
+def _precedes_value(c):
+    return _blank(c) or _is_sign(c) or c == ch.HASH
+
+
+@njit(cache=True)
 def _after_value(text, i, end):
     """Return the place behind a number, parameter, function or bracket expression that begins at ``i``."""
-    while i < end and (_blank(text[i]) or text[i] == 35 or text[i] == 43 or text[i] == 45):  # blanks # + -
+    while i < end and _precedes_value(text[i]):
         i += 1
-    if i < end and text[i] == 60:  # <name>
-        while i < end and text[i] != 62:
+    if i < end and text[i] == ch.LESS:  # <name>
+        while i < end and text[i] != ch.GREATER:
             i += 1
         return min(i + 1, end)
-    while i < end and (text[i] | 32) >= 97 and (text[i] | 32) <= 122:  # a function: its name, its argument
+    while i < end and _is_letter(text[i]):  # a function: its name, its argument
         i += 1
-    while i < end and (text[i] == 46 or (text[i] >= 48 and text[i] <= 57)):
+    while i < end and (text[i] == ch.POINT or _is_digit(text[i])):
         i += 1
-    while i < end and (
-        text[i] == 91 or (text[i] == 47 and i + 1 < end and text[i + 1] == 91)
-    ):  # a/[b] of ATAN
-        i = _after_bracket(text, i + (text[i] == 47), end)
+    while i < end and _opens_bracket(text, i, end):
+        i = _after_bracket(text, i + (text[i] == ch.SLASH), end)
     return i
 
 
@@ -113,9 +155,9 @@ def _is_line_number(text, i, end):
     before, behind, point = 0, 0, False
     for k in range(i, end):
         c = text[k]
-        if c == 43 or c == 45:
+        if _is_sign(c):
             return False
-        if c == 46:
+        if c == ch.POINT:
             point = True
         elif not _blank(c):
             before += not point
@@ -124,16 +166,19 @@ def _is_line_number(text, i, end):
 
 
 @njit(cache=True)
-def _previous_letter(letters, lines, count, line):
-    """Return the letter of the word before in the line, 0 = none."""
-    if count == 0 or lines[count - 1] != line or letters[count - 1] < 65 or letters[count - 1] > 90:
+def _lost_letter(lost, letters, lines, count, line):
+    """Return the letter whose value is lost, that of the word before for `_LETTER_BEFORE`; 0 = none."""
+    if lost != _LETTER_BEFORE:
+        return lost
+    if count == 0 or lines[count - 1] != line:
         return 0
-    return letters[count - 1]
+    letter = letters[count - 1]
+    return letter if letter >= ch.LETTER_A and letter <= ch.LETTER_Z else 0
 
 
 @njit(cache=True)
 def _line_end(text, i):
-    while i < len(text) and text[i] != _NEWLINE:
+    while i < len(text) and text[i] != ch.NEWLINE:
         i += 1
     return i
 
@@ -141,13 +186,13 @@ def _line_end(text, i):
 @njit(cache=True)
 def _without_number(text, i, letter):
     """Return (finding, letter whose value is lost, place behind) of a letter with no number behind it."""
-    if letter == 79:
-        return f.O_WORD, letter, i
-    if letter == 78:
+    if letter == ch.LETTER_O:
+        return f.O_WORD, letter, _line_end(text, i)
+    if letter == ch.LETTER_N:
         return f.BAD_LINE_NUMBER, 0, i
-    if i < len(text) and (text[i] == 35 or text[i] == 91 or _is_function(text, i)):
+    if i < len(text) and (text[i] == ch.HASH or text[i] == ch.BRACKET_OPEN or _is_function(text, i)):
         return f.EXPRESSION, letter, _after_value(text, i, _line_end(text, i))
-    if i < len(text) and text[i] >= f.FIRST_FOREIGN:
+    if i < len(text) and text[i] >= ch.FIRST_FOREIGN:
         return f.BAD_CHARACTER, letter, i
     return f.NO_NUMBER, letter, i
 
@@ -174,7 +219,7 @@ def _after_assignment(text, i):
     i = _after_value(text, i, end)
     while i < end and _blank(text[i]):
         i += 1
-    if i < end and text[i] == 61:
+    if i < end and text[i] == ch.EQUALS:
         i = _after_value(text, i + 1, end)
     return i
 
@@ -184,162 +229,196 @@ def _after_comment(text, i):
     """Return (finding, place behind) of the comment ``( )`` that opens at ``i``."""
     n = len(text)
     end = i + 1
-    while end < n and text[end] != 41 and text[end] != _NEWLINE and text[end] != 40:
+    while end < n and text[end] not in (ch.PAREN_OPEN, ch.PAREN_CLOSE, ch.NEWLINE):
         end += 1
-    if end < n and text[end] == 41:
+    if end < n and text[end] == ch.PAREN_CLOSE:
         return f.OK, end + 1
-    if end >= n or text[end] == _NEWLINE:
+    if end >= n or text[end] == ch.NEWLINE:
         return f.COMMENT_OPEN, end
     depth = 1
-    while end < n and text[end] != _NEWLINE and depth > 0:
-        depth += 1 if text[end] == 40 else (-1 if text[end] == 41 else 0)
+    while end < n and text[end] != ch.NEWLINE and depth > 0:
+        depth += 1 if text[end] == ch.PAREN_OPEN else (-1 if text[end] == ch.PAREN_CLOSE else 0)
         end += 1
     return f.COMMENT_NESTED, end
 
 
-@njit(cache=True, nogil=True)
-def _scan(text, first_line, letters, values, lines, extras, spans):
+@njit(cache=True, inline="always")  # as a call it takes as long as the number itself
+def _number(text, i):
+    """Return (finding, value, digits, decimals, True for a plain whole number, place behind) from ``i`` on.
+
+    Blanks inside a number mean nothing; digits beyond what a float holds are dropped behind the point.
+    """
+    finding = f.OK
+    sign, mantissa = 1.0, 0.0
+    digits, significant, decimals = 0, 0, 0
+    point, started = False, False
     n = len(text)
-    i = 0
-    count = 0
-    marks = 0
-    messages = 0
-    most_decimals = 0
-    line = first_line
-    line_start = 0
-    words_in_line = 0
-    marked_line = 0
     while i < n:
         c = text[i]
-        if c in (_SPACE, _TAB, _RETURN, _END_OF_TAPE):
-            i += 1
-            continue
-        if c == _NEWLINE:
+        if _is_digit(c):
+            started = True
+            digits += 1
+            if significant > 0 or c != ch.DIGIT_0:
+                significant += 1
+            if significant <= _MOST_DIGITS:
+                mantissa = mantissa * 10.0 + (c - ch.DIGIT_0)
+                decimals += point
+            elif not point:
+                finding = f.NUMBER_TOO_LONG
+        elif c == ch.POINT and not point:
+            point, started = True, True
+        elif _is_sign(c) and not started:
+            started = True
+            if c == ch.MINUS:
+                sign = -1.0
+        elif c not in (ch.SPACE, ch.TAB):
+            break
+        i += 1
+    decimals = min(decimals, _MOST_DECIMALS)
+    return finding, sign * mantissa / _TEN_TO[decimals], digits, decimals, not point and sign > 0.0, i
+
+
+@njit(cache=True)
+def _program_number(text, i, may_be_one):
+    """Return the item of O and its number, which ends at ``i``: alone in its line it says nothing."""
+    while i < len(text) and _blank(text[i]):
+        i += 1
+    alone = i >= len(text) or text[i] in (ch.NEWLINE, ch.PAREN_OPEN, ch.SEMICOLON)
+    if may_be_one and alone:
+        return _LINE_NUMBER, f.OK, 0.0, 0, i
+    return MARK, f.O_WORD, float(ch.LETTER_O), ch.LETTER_O, _line_end(text, i)
+
+
+@njit(cache=True)
+def _is_plain(letter, finding, digits):
+    """Tell whether a letter and the number behind it are a word: the bulk of a file."""
+    return digits > 0 and finding == f.OK and letter != ch.LETTER_N and letter != ch.LETTER_O
+
+
+@njit(cache=True)
+def _odd_word(text, i, letter, finding, digits, end, first, may_be_program):
+    """Return the item, see `_item`, of the letter at ``i`` that makes no plain word.
+
+    ``finding``, ``digits`` and ``end`` are of the number behind it.
+    """
+    if digits == 0:
+        finding, lost, behind = _without_number(text, end, letter)
+        what = _character(text, end) if finding == f.BAD_CHARACTER else letter
+        return MARK, finding, float(what), lost, behind
+    if finding != f.OK:
+        return MARK, finding, float(letter), letter, end
+    if letter == ch.LETTER_O:
+        return _program_number(text, end, may_be_program)
+    if not first:
+        return MARK, f.N_NOT_FIRST, float(letter), 0, end
+    if not _is_line_number(text, i + 1, end):
+        return MARK, f.BAD_LINE_NUMBER, float(letter), 0, end
+    return _LINE_NUMBER, f.OK, 0.0, 0, end
+
+
+@njit(cache=True)
+def _comment(text, i):
+    """Return the item, see `_item`, of the comment ``( )`` that opens at ``i``."""
+    finding, end = _after_comment(text, i)
+    if finding != f.OK:
+        return MARK, finding, float(ch.PAREN_OPEN), 0, end
+    return (ch.PAREN_OPEN if _is_message(text, i + 1, end - 1) else _NOTHING), f.OK, 0.0, 0, end
+
+
+@njit(cache=True)
+def _item(text, i, first):
+    """Read what stands at ``i`` and is no letter; ``first`` is True where the line has no word before.
+
+    Returns (kind, finding, what was found, letter whose value is lost, place behind). The kind is what goes
+    into the column of letters, or `_NOTHING` or `_LINE_NUMBER`.
+    """
+    c = text[i]
+    if c == ch.SEMICOLON:
+        return _NOTHING, f.OK, 0.0, 0, _line_end(text, i)
+    if c == ch.PAREN_OPEN:
+        return _comment(text, i)
+    if c == ch.PERCENT or (c == ch.SLASH and first):
+        return int(c), f.OK, 0.0, 0, i + 1
+    if c == ch.HASH:  # #1 = value: an assignment; what is no assignment is a lone parameter
+        return MARK, f.EXPRESSION, float(c), 0, _after_assignment(text, i)
+    if c in (ch.BRACKET_OPEN, ch.BRACKET_CLOSE, ch.EQUALS):
+        return MARK, f.EXPRESSION, float(c), _LETTER_BEFORE, i + 1
+    return MARK, f.BAD_CHARACTER, float(_character(text, i)), _LETTER_BEFORE, i + 1
+
+
+@njit(cache=True)
+def _put(letters, values, lines, count, letter, value, line):
+    """Write a word; return the number of words."""
+    letters[count], values[count], lines[count] = letter, value, line
+    return count + 1
+
+
+@njit(cache=True)
+def _mark(letters, values, lines, extras, count, marks, finding, found, line):
+    """Write a mark, and what was found while there is room; return the numbers of words and of marks."""
+    if marks < len(extras):
+        extras[marks] = found
+    return _put(letters, values, lines, count, MARK, finding, line), marks + 1
+
+
+@njit(cache=True)
+def _put_lost(letters, values, lines, count, lost, line):
+    """Write a letter whose value is lost, if any; return the number of words."""
+    if lost > 0:
+        return _put(letters, values, lines, count, lost + UNREAD_NUMBER, 0.0, line)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _scan(text, first_line, letters, values, lines, extras, spans):
+    """Fill the columns from whole lines; return (words, messages, most decimals of X, Y, Z)."""
+    count, marks, messages, most_decimals = 0, 0, 0, 0
+    line, line_start, marked_line = first_line, 0, 0
+    first = True
+    i, n = 0, len(text)
+    while i < n:
+        c = text[i]
+        if c == ch.NEWLINE:
             if i - line_start > LINE_LIMIT:
-                letters[count], values[count], lines[count] = 33, f.LINE_TOO_LONG, line
-                if marks < len(extras):
-                    extras[marks] = LINE_LIMIT
-                marks += 1
-                count += 1
+                count, marks = _mark(
+                    letters, values, lines, extras, count, marks, f.LINE_TOO_LONG, LINE_LIMIT, line
+                )
             i += 1
             line += 1
             line_start = i
-            words_in_line = 0
+            first = True
             continue
-        error = 0
-        lost = 0  # letter of the word whose value cannot be read
-        found = float(c)
-        upper = c & 223 if c >= 97 and c <= 122 else c
-        if c == 59:  # ; comment to the end of the line
-            i = _line_end(text, i)
+        if _is_nothing(c):
+            i += 1
             continue
-        if c == 40:  # ( comment )
-            error, end = _after_comment(text, i)
-            if error == f.OK:
-                if _is_message(text, i + 1, end - 1) and messages < len(spans):
-                    letters[count], values[count], lines[count] = 40, messages, line
-                    spans[messages, 0], spans[messages, 1] = i + 1, end - 1
-                    messages += 1
-                    count += 1
+        start = i
+        if _is_letter(c):
+            letter = c & ~ch.CASE_BIT
+            finding, value, digits, decimals, plain, end = _number(text, i + 1)
+            if _is_plain(letter, finding, digits):
+                count = _put(letters, values, lines, count, letter, value, line)
+                if letter >= ch.LETTER_X:
+                    most_decimals = max(most_decimals, decimals)
                 i = end
+                first = False
                 continue
-            i = end
-        elif c == 37 or (c == 47 and words_in_line == 0):  # % and /
-            letters[count], values[count], lines[count] = c, 0.0, line
-            count += 1
-            i += 1
-            continue
-        elif upper >= 65 and upper <= 90:
-            letter_at = i
-            i += 1
-            sign = 1.0
-            mantissa = 0.0
-            digits = 0
-            significant = 0
-            decimals = 0
-            point = False
-            started = False
-            while i < n:
-                d = text[i]
-                if d >= 48 and d <= 57:
-                    started = True
-                    digits += 1
-                    if significant > 0 or d != 48:
-                        significant += 1
-                    if significant <= 15:
-                        mantissa = mantissa * 10.0 + (d - 48)
-                        if point:
-                            decimals += 1
-                    elif not point:
-                        error = f.NUMBER_TOO_LONG
-                elif d == 46 and not point:
-                    point = True
-                    started = True
-                elif (d == 45 or d == 43) and not started:
-                    started = True
-                    if d == 45:
-                        sign = -1.0
-                elif d != _SPACE and d != _TAB:
-                    break
-                i += 1
-            if digits == 0:
-                found = float(upper)
-                error, lost, i = _without_number(text, i, upper)
-                if error == f.BAD_CHARACTER:
-                    found = float(_character(text, i))
-            elif error != 0:
-                found = float(upper)
-                lost = upper
-            elif upper == 79:
-                while i < n and _blank(text[i]):
-                    i += 1
-                alone = i >= n or text[i] == _NEWLINE or text[i] == 40 or text[i] == 59
-                if words_in_line == 0 and alone and not point and sign > 0:
-                    words_in_line += 1  # a program number, O1001, says nothing about motion
-                    continue
-                error = f.O_WORD
-                lost = upper
-            elif upper == 78:  # N: line number, no word; digits, or digits.digits, as LinuxCNC reads it
-                if words_in_line > 0:
-                    error = f.N_NOT_FIRST
-                elif not _is_line_number(text, letter_at + 1, i):
-                    error = f.BAD_LINE_NUMBER
-                else:
-                    words_in_line += 1
-                    continue
-            else:
-                decimals = min(decimals, 18)
-                letters[count] = upper
-                values[count] = sign * mantissa / _TEN_TO[decimals]
-                lines[count] = line
-                count += 1
-                words_in_line += 1
-                if upper >= 88 and decimals > most_decimals:
-                    most_decimals = decimals
-                continue
-        elif c == 35:  # #1 = value: an assignment; what is no assignment is a lone parameter
-            error = f.EXPRESSION
-            i = _after_assignment(text, i)
-        elif c == 91 or c == 93 or c == 61:  # [ ] =
-            error = f.EXPRESSION
-            lost = _previous_letter(letters, lines, count, line)
-            i += 1
+            may_be_program = first and plain
+            kind, finding, found, lost, i = _odd_word(
+                text, i, letter, finding, digits, end, first, may_be_program
+            )
         else:
-            error = f.BAD_CHARACTER
-            found = float(_character(text, i))
-            lost = _previous_letter(letters, lines, count, line)
-            i += 1
-        words_in_line += 1
-        if marked_line != line:
-            letters[count], values[count], lines[count] = 33, error, line
-            if marks < len(extras):
-                extras[marks] = found
-            marks += 1
-            count += 1
+            kind, finding, found, lost, i = _item(text, i, first)
+        if kind == MARK:
+            lost = _lost_letter(lost, letters, lines, count, line)
+            if marked_line != line:
+                count, marks = _mark(letters, values, lines, extras, count, marks, finding, found, line)
             marked_line = line
-        if lost > 0:
-            letters[count], values[count], lines[count] = lost + 32, 0.0, line
-            count += 1
-        if error == f.O_WORD:
-            i = _line_end(text, i)
+            count = _put_lost(letters, values, lines, count, lost, line)
+        elif kind == ch.PAREN_OPEN:
+            count = _put(letters, values, lines, count, kind, messages, line)
+            spans[messages, 0], spans[messages, 1] = start + 1, i - 1
+            messages += 1
+        elif kind > _LINE_NUMBER:
+            count = _put(letters, values, lines, count, kind, 0.0, line)
+        first = first and kind != MARK and kind != _LINE_NUMBER
     return count, messages, most_decimals

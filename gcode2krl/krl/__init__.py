@@ -21,4 +21,6 @@ __all__ = [
     "write_krl",
 ]
 
-drop_stale(Path(__file__).parent, "../units.py")  # compiled kernels are looked up when they are first called
+drop_stale(
+    Path(__file__).parent, "../ascii_codes.py", "../krl_words.py", "../units.py"
+)  # compiled kernels are looked up when they are first called

@@ -1,9 +1,10 @@
-"""What the advance run has read: whose triggers wait at the same time, and what holds it up."""
+"""The advance run: which triggers wait at the same time, and which statements halt it."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Rows
 from gcode2krl.cell import Cell
 
@@ -24,10 +25,11 @@ def most_active(row: Rows, in_view: int) -> int:
 
 
 def read_order(motions: int, halts: Rows, cell: Cell) -> Rows:
-    """Return numbers (p + 1,) of motions between which as many are in view as the advance run reads ahead.
+    """Return a number (p + 1,) for each motion; triggers whose numbers differ by less than `view` may wait
+    at the same time.
 
-    It reads nothing behind a wait or a halt before that is over: where one stands behind a motion
-    (``halts``), the next is as far as if others lay between, so their triggers never wait together.
+    The advance run reads nothing beyond a wait or a halt before it is over, so the numbers jump by `view`
+    behind each motion in ``halts``: triggers before and behind it never wait at the same time.
     """
     after = np.zeros(motions + 1, dtype=np.int64)
     after[np.unique(halts) + 1] = view(cell)
@@ -37,5 +39,5 @@ def read_order(motions: int, halts: Rows, cell: Cell) -> Rows:
 def halts_advance(statements: Sequence[str]) -> bool:
     """Tell whether statements hold the advance run: a WAIT or a HALT that no CONTINUE precedes."""
     first = [text.split(maxsplit=1)[0].upper() for text in statements if text.strip()]
-    holds = [word in ("WAIT", "HALT") for word in first]
-    return any(hold and before != "CONTINUE" for before, hold in zip(["", *first], holds, strict=False))
+    holds = [word in (w.WAIT, w.HALT) for word in first]
+    return any(hold and before != w.CONTINUE for before, hold in zip(["", *first], holds, strict=False))

@@ -30,13 +30,13 @@ _SHARP = np.sin(30.0 * RAD_PER_DEG / 2.0)
 """cos(alpha/2) from which a corner is a change of direction: it turns by 30° or more. Our choice; what turns
 less is left to the tolerance of the knots."""
 _LITTLE_SOONER_S, _MOST_SOONER_S = 0.2, 1.0
-"""How much earlier than needed a knot may be announced, rather than that motions are cut, and at most."""
+"""A knot may be announced earlier than needed: by the first before motions are cut, by the second at most."""
 _SAFE_S = 0.002
-"""Added to the lead: what an instant read from the samples of a Motion may be off by."""
+"""Added to the lead: the error of an instant that is read from the samples of a Motion."""
 _TRIALS = 4
-"""How often pieces that cost time are left out."""
+"""Attempts to leave out pieces that slow the program down."""
 _SAME_TIME = 0.5
-"""Share of a cycle by which pieces may change the time of a program."""
+"""Pieces may change the time of a program by this share of a cycle."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Layout(NamedTuple):
 
 
 class Planner:
-    """What stays the same while knots are tried."""
+    """A program and its predicted forces; announces sets of knots in it."""
 
     def __init__(self, prediction: Prediction, joints: Joints, form: Form, sidecar: bool) -> None:
         self.targets, self.joints, self.cell = prediction.targets, joints, prediction.cell
@@ -140,13 +140,13 @@ class Planner:
             pieces = pieces.before(slow - view(self.cell))
 
     def all_in_time(self, knots: Knots, layout: Layout) -> bool:
-        """Tell whether all these knots can be announced, none much earlier than it needs to be."""
+        """Tell whether all these knots can be announced in time, and none too early."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True)
         in_time = (triggers.row >= 0) & (triggers.fire_s <= knots.time_s) & (sooner_s <= _MOST_SOONER_S)
         return bool(in_time.all()) and not self._too_many(triggers)
 
     def announce_ending(self, knots: Knots, end_line: int, layout: Layout) -> PilotPlan | Issue:
-        """Announce knots and, the lead ahead of the last one, that no knot follows."""
+        """Announce knots and, a lead before the last one, that none follows."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True, ends=True)
         if sooner_s.max(initial=0.0) > _MOST_SOONER_S or self._too_many(triggers):
             return self._too_dense(knots)
@@ -203,7 +203,7 @@ class Planner:
     def _place(
         self, knots: Knots, windows: Windows, spread: bool = False, ends: bool = False
     ) -> tuple[Triggers, Floats]:
-        """Return the trigger of each knot, and (k,) by how much it is earlier than it needs to be.
+        """Return the trigger of each knot, and (k,) the time in s by which it is earlier than needed.
 
         A receiver of values ramps towards the knot it has been told, so it must hear of it before the knot
         before; one that has the sidecar need not. ``ends`` adds one that acts the lead ahead of the last

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
-from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.pilot_text import PilotText, checksum
 from gcode2krl.krl.provenance import provenance_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
@@ -22,7 +23,6 @@ from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
 
 NEWLINE = b"\r\n"
-SIDECAR = ".pilot.csv"
 DECLARATIONS = """DECL KRLMSG_T GK_MSG
 DECL KRLMSGPAR_T GK_PAR[3]
 DECL KRLMSGOPT_T GK_OPT
@@ -33,7 +33,6 @@ GK_PAR[3]={PAR_TYPE #EMPTY}
 GK_OPT={VL_STOP TRUE,CLEAR_P_RESET TRUE,CLEAR_P_SAW FALSE,LOG_TO_DB FALSE}"""
 FRAME_DECLARATIONS = """DECL FRAME GK_INV
 DECL FRAME GK_DIFF"""
-EXT_BAS = "EXT BAS (BAS_COMMAND :IN,REAL :IN )"
 _T_GRID_RAD = 1e-4 / DEG_PER_RAD
 _LOOK_BACK = 0.2
 """Share of a subprogram within which a standstill is preferred as its end."""
@@ -119,7 +118,7 @@ class _Composer:
                     continue
                 part = part_name(self.name, len(subprograms) + 1)
                 body.append(_text(f"{part}( )"))
-                self.state[:] = -1.0, -1.0, 0.0  # each part says its speed and CDIS again
+                self.state[:] = -1.0, -1.0, 0.0  # each part states its speed and CDIS
                 subprograms.append((part, self._motions(start, end)))
                 self.state[:] = -1.0, -1.0, 0.0
         return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
@@ -173,10 +172,15 @@ class _Composer:
     def _lines(self, start: int, end: int) -> bytes:
         rows = slice(start, end)
         return motion_lines(
-            self.position[rows], self.abc_deg[rows], self.speed_m_s[rows], self.targets.cdis_mm[rows],
-            self.targets.source_line[rows], self.state, self.cell.program.comment_every,
+            self.position[rows],
+            self.abc_deg[rows],
+            self.speed_m_s[rows],
+            self.targets.cdis_mm[rows],
+            self.targets.source_line[rows],
+            self.state,
+            self.cell.program.comment_every,
             self._triggers_before(start, end),
-        )  # fmt: skip
+        )
 
     def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
         """Return the text of the triggers of rows start..end, and where that of each row begins."""
@@ -191,12 +195,17 @@ class _Composer:
         targets, home = self.targets, self.targets.home[:, None]
         q_deg = self.joints.q_rad * DEG_PER_RAD
         return checksum(
-            np.where(home, np.nan, self.position), np.where(home, np.nan, self.abc_deg),
-            np.where(home, q_deg, np.nan), targets.ptp, targets.speed_mm_s, targets.cdis_mm, pilot.rows,
-        )  # fmt: skip
+            np.where(home, np.nan, self.position),
+            np.where(home, np.nan, self.abc_deg),
+            np.where(home, q_deg, np.nan),
+            targets.ptp,
+            targets.speed_mm_s,
+            targets.cdis_mm,
+            pilot.rows,
+        )
 
     def _around(self, row: int) -> bytes:
-        """What stands at a special row: its PTP, then dwell and events; RSI is on or off without them."""
+        """Return the PTP, dwell and events of a row; where the row switches RSI, it is off during them."""
         lines: list[str] = []
         targets = self.targets
         if targets.ptp[row]:
@@ -219,18 +228,18 @@ class _Composer:
 
     def _ptp(self, row: int) -> str:
         if self.targets.home[row]:
-            return f"PTP {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
+            return f"{w.PTP} {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
         values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
-        pose = ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True))
+        pose = ",".join(f"{key} {value}" for key, value in zip(w.POSE_KEYS, values, strict=True))
         turn = turn_bits(self.joints.q_rad[row])
-        return f"PTP {{{pose},S {int(self.joints.status[row])},T {turn}}}"
+        return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
     def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
         tools = sorted({int(number) for number in np.unique(self.targets.tool)})
         checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
-        declarations = [EXT_BAS] if self.layout.single_file else []
+        declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
-            declarations += [f"EXT {name}( )" for name, _ in subprograms]
+            declarations += [f"{w.EXT} {name}( )" for name, _ in subprograms]
         declarations.append(DECLARATIONS)
         if checks:
             declarations.append(FRAME_DECLARATIONS)
@@ -253,6 +262,7 @@ class _Composer:
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
             frame_checks=checks,
             unnumbered=st.unnumbered(self.cell, tools),
+            no_guard=w.NO_GUARD,
             declarations="\n".join(declarations),
             message_setup=MESSAGE_SETUP,
             base=st.base_statement(self.cell),
@@ -261,28 +271,28 @@ class _Composer:
         return _text(text) + _text(st.render(self.cell, "program.prologue"))
 
     def _foot(self) -> bytes:
-        return _text(st.render(self.cell, "program.epilogue")) + _text("END")
+        return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)
 
     def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
         parts: dict[str, bytes] = {}
-        needs = f" {SUBPROGRAM}(".encode("ascii")
+        needs = f" {w.PILOT_SUBPROGRAM}(".encode("ascii")
         called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
         for name, motions in subprograms:
             needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
-            text = [_text(f"DEF {name}( )\n{needed}"), motions, _text("END")]
+            text = [_text(f"{w.DEF} {name}( )\n{needed}"), motions, _text(w.END)]
             if self.layout.split == "files":
                 head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
                 own = called if needs in motions else []  # a local subprogram is known in its file only
-                parts[f"{name}.src"] = b"".join([head, *text, *own])
+                parts[f"{name}{w.SOURCE_SUFFIX}"] = b"".join([head, *text, *own])
             else:
                 main += [NEWLINE, *text]
         lost = [NEWLINE, _text(self.rsi.lost)] if self.rsi is not None else []
-        files = {f"{self.name}.src": b"".join([*main, *called, *lost]), **parts}
+        files = {f"{self.name}{w.SOURCE_SUFFIX}": b"".join([*main, *called, *lost]), **parts}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
-            files[f"{self.name}.dat"] = _text(data.render(source=self.source, name=self.name))
+            files[f"{self.name}{w.DATA_SUFFIX}"] = _text(data.render(source=self.source, name=self.name))
         if self.pilot is not None and self.pilot.sidecar:
-            files[f"{self.name}{SIDECAR}"] = self.pilot.file(self.checksum)
+            files[f"{self.name}{w.SIDECAR_SUFFIX}"] = self.pilot.file(self.checksum)
         if self.rsi is not None:
             files |= {name: _text(text) for name, text in self.rsi.files.items()}
         return files
@@ -309,7 +319,7 @@ def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
 
 def _dwell(seconds: float) -> list[str]:
     """Return a dwell, marked so that it is not taken for a wait of a template."""
-    return [f"WAIT SEC {fixed(seconds, 3)} ; dwell"] if seconds > 0 else []
+    return [f"{w.WAIT} {w.SEC} {fixed(seconds, 3)} ; {w.DWELL}"] if seconds > 0 else []
 
 
 def _text(text: str) -> bytes:

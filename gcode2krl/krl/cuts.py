@@ -46,17 +46,35 @@ def cut_for(
     room = np.floor(np.maximum(high - low, 0.0) / apart).sum() + len(low)
     cuts = np.empty(int(min(room, len(fire_s) * view(cell))) + 1)
     count = _cut(
-        triggers.order, here_mm, before_mm, np.searchsorted(windows.row, triggers.row), windows.begin_mm,
-        low, high, apart, cell.pilot.max_active, view(cell), cuts,
-    )  # fmt: skip
+        triggers.order,
+        here_mm,
+        before_mm,
+        np.searchsorted(windows.row, triggers.row),
+        windows.begin_mm,
+        low,
+        high,
+        apart,
+        cell.pilot.max_active,
+        view(cell),
+        cuts,
+    )
     return _pieces(cuts[:count], windows, targets, cell) if count else None
 
 
 @njit(cache=True, nogil=True)
 def _cut(
-    row: Rows, here: Floats, before: Floats, window: Rows, begin: Floats, low: Floats, high: Floats,
-    apart: Floats, most: int, in_view: int, cuts: Floats,
-) -> int:  # fmt: skip
+    row: Rows,
+    here: Floats,
+    before: Floats,
+    window: Rows,
+    begin: Floats,
+    low: Floats,
+    high: Floats,
+    apart: Floats,
+    most: int,
+    in_view: int,
+    cuts: Floats,
+) -> int:
     """Write paths at which to cut, in order; return how many.
 
     A cut lies between two triggers, where a motion may be cut, as far from others as can be.

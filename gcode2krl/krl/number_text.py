@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gcode2krl import ascii_codes as ch
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 
 BYTES_PER_TARGET = 240
@@ -75,7 +77,7 @@ def _fixed(buffer, at, value, decimals):
         unit *= 10
     scaled = (nano + unit // 2) // unit
     if value < 0 and scaled > 0:
-        buffer[at] = 45
+        buffer[at] = ch.MINUS
         at += 1
     ten = 1
     for _ in range(decimals):
@@ -84,11 +86,11 @@ def _fixed(buffer, at, value, decimals):
     rest = scaled % ten
     at = _integer(buffer, at, whole)
     if decimals > 0:
-        buffer[at] = 46
+        buffer[at] = ch.POINT
         at += 1
         for _ in range(decimals):
             ten //= 10
-            buffer[at] = 48 + rest // ten % 10
+            buffer[at] = ch.DIGIT_0 + rest // ten % 10
             at += 1
     return at
 
@@ -101,7 +103,7 @@ def _integer(buffer, at, value):
         power *= 10
         digits += 1
     for k in range(digits):
-        buffer[at + digits - 1 - k] = 48 + value % 10
+        buffer[at + digits - 1 - k] = ch.DIGIT_0 + value % 10
         value //= 10
     return at + digits
 
@@ -113,14 +115,14 @@ def _put(buffer, at, text):
     return at + len(text)
 
 
-_LIN, _BLEND, _EXACT = (
-    np.frombuffer(t, dtype=np.uint8).copy() for t in (b"LIN {X ", b"} C_DIS\r\n", b"}\r\n")
-)
-_VEL, _CDIS, _LINE = (
-    np.frombuffer(t, dtype=np.uint8).copy() for t in (b"$VEL.CP=", b"$APO.CDIS=", b"; line ")
-)
-_KEYS = np.frombuffer(b",Y ,Z ,A ,B ,C ", dtype=np.uint8).reshape(5, 3).copy()
-_CRLF = np.frombuffer(b"\r\n", dtype=np.uint8).copy()
+def _bytes(text: str) -> NDArray[np.uint8]:
+    return np.frombuffer(text.encode("ascii"), dtype=np.uint8).copy()
+
+
+_LIN, _BLEND, _EXACT = _bytes(f"{w.LIN} {{{w.POSE_KEYS[0]} "), _bytes(f"}} {w.C_DIS}\r\n"), _bytes("}\r\n")
+_VEL, _CDIS, _LINE = _bytes(f"{w.VEL_CP}="), _bytes(f"{w.APO_CDIS}="), _bytes("; line ")
+_KEYS = np.stack([_bytes(f",{key} ") for key in w.POSE_KEYS[1:]])
+_CRLF = _bytes("\r\n")
 
 
 @njit(cache=True)

@@ -78,9 +78,16 @@ def pieces_in(
 
 @njit(cache=True, nogil=True)
 def _align(
-    position: Floats, ptp: NDArray[np.bool_], cdis: Floats, target: Floats, target_ptp: NDArray[np.bool_],
-    start: Floats, limit: float, row: Rows, share: Floats,
-) -> None:  # fmt: skip
+    position: Floats,
+    ptp: NDArray[np.bool_],
+    cdis: Floats,
+    target: Floats,
+    target_ptp: NDArray[np.bool_],
+    start: Floats,
+    limit: float,
+    row: Rows,
+    share: Floats,
+) -> None:
     """Walk both in step; a motion that ends on the way to the next target belongs to it."""
     at, before = 0, 0.0
     for i in range(len(position)):

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import krc4
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
-from gcode2krl.krl.pilot_text import NO_KNOT_YET, SUBPROGRAM, PilotText, checksum
+from gcode2krl.krl.pilot_text import NO_KNOT_YET, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, force_at, in_contact
@@ -27,7 +28,7 @@ _REMEDY = "translate again"
 
 @dataclass(frozen=True)
 class PilotFigures:
-    """What the pilot force of a program is like; None where it cannot be known."""
+    """Figures of a program's pilot force; None where a figure is not known."""
 
     knots: int
     tolerance_N: float | None
@@ -61,8 +62,8 @@ def check_pilot(
 ) -> tuple[PilotFigures, list[Issue]]:
     """Carry out the triggers of a program along a Motion, and compare with the knots of its sidecar.
 
-    ``targets`` are those of the program, motion by motion. What is not as the sidecar says, or not as the
-    controller can do it, is an error.
+    ``targets`` are those of the program, motion by motion. What differs from the sidecar, and what the
+    controller cannot do, is an error.
     """
     pilot, knots = case.text, case.text.knots
     ends = _ends_early(program, pilot)
@@ -145,7 +146,7 @@ def _errors_of(
     """Return the largest and the RMS distance of forces to the ramps that the online side makes of knots.
 
     The figures of the compression count the ramps along the path as well; the larger ones are returned.
-    Behind a pilot force that ends early nothing is said of the force.
+    Where a pilot force ends early, the forces behind its end are not compared.
     """
     if force_N is None:
         return _known(knots.max_error_N), _known(knots.rms_error_N)
@@ -180,7 +181,7 @@ def _form_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
     if count == 0:
         return []
     by_index = header.form == "index"
-    name = (header.variable if by_index else SUBPROGRAM).upper()
+    name = (header.variable if by_index else w.PILOT_SUBPROGRAM).upper()
     if read.names != (name,) or (read.calls == by_index).any():
         row = int(np.argmax(read.calls == by_index))
         sentence = f"triggers write to {', '.join(read.names)}, the sidecar says {name}"

@@ -1,4 +1,4 @@
-"""From predicted forces to what a program says of them, and where it stops saying it."""
+"""From predicted forces to the pilot force of a program, coarser or shorter where that is needed."""
 
 from dataclasses import fields, replace
 
@@ -12,7 +12,7 @@ _COARSER = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0)
 """What the default tolerance is multiplied by until the knots can be announced; a stated one stays."""
 _LEAST_KNOTS = 2
 _TRIALS = 8
-"""How often a pilot force is shortened before it is left out."""
+"""Attempts to shorten a pilot force before it is left out."""
 
 
 def plan_pilot(

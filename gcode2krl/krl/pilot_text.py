@@ -1,4 +1,4 @@
-"""What of the pilot force stands in a program's text: triggers, subprogram, checksum."""
+"""The pilot force in a program's text: triggers, subprogram, checksum."""
 
 import zlib
 from dataclasses import dataclass, replace
@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.krl.number_text import in_decimals
 from gcode2krl.krl.triggers import Triggers
@@ -14,12 +15,12 @@ from gcode2krl.pilot import Knots, PilotHeader, knot_rows, sidecar_head
 from gcode2krl.pilot.knots import FORCE_DECIMALS, LEAD_DECIMALS
 from gcode2krl.units import MM_PER_M
 
-SUBPROGRAM = "GK_PILOT"
 NO_KNOT_YET = -1
 """What the variable of the form ``index`` holds before knot 0 is announced."""
 VALUES = 4
 """Components written by the form ``values``: force x, y, z and the seconds until it."""
 _CHECKSUM_BITS = 0x7FFFFFFF
+_PRIO = f"{w.PRIO}={w.PRIO_BY_CONTROLLER}"
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class PilotText:
         if triggers is None:
             return np.zeros(0, dtype=np.uint8), np.zeros(motions + 1, dtype=np.int64)
         lines = [
-            f"TRIGGER WHEN DISTANCE=0 DELAY={delay} DO {action}\r\n"
+            f"{w.TRIGGER} {w.WHEN} {w.DISTANCE}=0 {w.DELAY}={delay} {w.DO} {action}\r\n"
             for delay, action in zip(triggers.delay_ms.tolist(), self._actions(), strict=True)
         ]
         size = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
@@ -60,7 +61,7 @@ class PilotText:
         columns = [*self.knots.force_N.T.tolist(), self.knots.lead_s.tolist()]
         n, s = FORCE_DECIMALS, LEAD_DECIMALS
         told = [
-            f"{SUBPROGRAM}({x:.{n}f},{y:.{n}f},{z:.{n}f},{lead_s:.{s}f}) PRIO=-1"
+            f"{w.PILOT_SUBPROGRAM}({x:.{n}f},{y:.{n}f},{z:.{n}f},{lead_s:.{s}f}) {_PRIO}"
             for x, y, z, lead_s in zip(*columns, strict=True)
         ]
         return [*told, *end]
@@ -69,7 +70,7 @@ class PilotText:
         """Return what puts the receiver back to where it was before the first knot: it knows no force."""
         if self.header.form == "index":
             return f"{self.header.variable}={NO_KNOT_YET}"
-        return f"{SUBPROGRAM}({','.join(['0.0'] * VALUES)}) PRIO=-1"
+        return f"{w.PILOT_SUBPROGRAM}({','.join(['0.0'] * VALUES)}) {_PRIO}"
 
     def start_statements(self, checksum: int) -> str:
         """Return what the program sets before its first motion."""
@@ -89,7 +90,7 @@ class PilotText:
         assignments = "\n".join(
             f"{self.header.variable}[{k}]={name}" for k, name in enumerate(names, start=1)
         )
-        return f"DEF {SUBPROGRAM}({parameters})\nREAL {','.join(names)}\n{assignments}\nEND"
+        return f"{w.DEF} {w.PILOT_SUBPROGRAM}({parameters})\nREAL {','.join(names)}\n{assignments}\n{w.END}"
 
     @cached_property
     def rows(self) -> bytes:
@@ -112,8 +113,8 @@ def checksum(
 ) -> int:
     """Return 31 bits over the targets and knots as written; what is not stated of a motion is NaN.
 
-    Targets count as the decimals they are written in, so the text's layout has no say; ``rows`` are those of
-    the sidecar.
+    Targets count as the decimals they are written in, so the text's layout does not matter; ``rows`` are
+    those of the sidecar.
     """
     columns = (
         *(in_decimals(column, 3) for column in position_mm.T),

@@ -1,4 +1,4 @@
-"""Where the values of a program come from: comment lines of its header, a cell's values of others named."""
+"""Comment lines of a program's header: values taken over from other cells, and defaults."""
 
 import textwrap
 from collections.abc import Iterator

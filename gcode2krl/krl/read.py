@@ -9,16 +9,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.units import MM_PER_M
 
-_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
+_DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
-_DECLARATION = re.compile(r"(?:DECL|EXT|EXTFCT|INT|REAL|BOOL|CHAR|FRAME|SIGNAL)\b", re.IGNORECASE)
-_EXTERNAL = re.compile(r"^\s*EXT\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
+_DECLARATION = re.compile(rf"(?:{'|'.join(w.DECLARING)})\b", re.IGNORECASE)
+_EXTERNAL = re.compile(rf"^\s*{w.EXT}\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
 _COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
+_COUNTED = ("WHILE", "IF", "FOR", "LOOP")
+"""Blocks whose ends are counted in a file."""
 
 
 class Statement(NamedTuple):
@@ -106,7 +109,7 @@ def _read_bytes(file: Path) -> bytes:
 
 def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
     """Read a program from file name → bytes; ``main`` names the main file."""
-    sources = [name for name in texts if name.lower().endswith(".src")]
+    sources = [name for name in texts if name.lower().endswith(w.SOURCE_SUFFIX)]
     sources.sort(key=lambda name: name != main)
     return _Reader({name: texts[name] for name in sources}, main).read()
 
@@ -145,9 +148,9 @@ class _Reader:
         blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
         file_of = np.concatenate([np.full(b - a, f, dtype=np.int32) for f, a, b in runs])
         where = np.concatenate([np.arange(a, b) for _, a, b in runs])
-        axes = kind == sc.PTP_AXES
-        motion = (kind == sc.LIN) | (kind == sc.PTP) | axes
-        for row in np.flatnonzero(blend == sc.MALFORMED)[:MOST_PLACES]:
+        axes = kind == w.KIND_PTP_AXES
+        motion = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | axes
+        for row in np.flatnonzero(blend == w.MALFORMED)[:MOST_PLACES]:
             self._issue(
                 "krl-malformed",
                 int(line[row]),
@@ -162,20 +165,20 @@ class _Reader:
                 self.names[file_of[row]],
                 int(line[row]),
             )
-            for row in np.flatnonzero((kind == sc.OTHER) | (kind == sc.WAIT_SEC))
+            for row in np.flatnonzero((kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC))
         )
         rows = np.flatnonzero(motion)
-        speed = _in_force(np.where(kind == sc.VEL_CP, value[:, 0], np.nan))[rows] * MM_PER_M
+        speed = _in_force(np.where(kind == w.KIND_VEL_CP, value[:, 0], np.nan))[rows] * MM_PER_M
         cdis = np.where(
-            blend[rows] == 1, _in_force(np.where(kind == sc.APO_CDIS, value[:, 0], np.nan))[rows], 0.0
+            blend[rows] == 1, _in_force(np.where(kind == w.KIND_APO_CDIS, value[:, 0], np.nan))[rows], 0.0
         )
-        ptp = kind[rows] != sc.LIN
+        ptp = kind[rows] != w.KIND_LIN
         joint_rows = np.flatnonzero(axes[rows])
         pose = value[rows]
         q_deg = np.full((len(rows), 6), np.nan)
         q_deg[joint_rows] = pose[joint_rows, :6]
         pose[joint_rows] = np.nan
-        guard = b"(--no-guard)" not in b"".join(text[:6000] for text in self.texts.values())
+        guard = w.NO_GUARD.encode("ascii") not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
             name=main[1],
             position_mm=pose[:, 0:3],
@@ -185,7 +188,7 @@ class _Reader:
             ptp=ptp,
             speed_mm_s=np.where(ptp, np.nan, speed),
             cdis_mm=cdis,
-            wait_s=_dwells((kind == sc.WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
+            wait_s=_dwells((kind == w.KIND_WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
             line=line[rows],
             file=self.names,
             file_of=file_of[rows],
@@ -212,14 +215,14 @@ class _Reader:
         line: NDArray[np.int32],
         file_of: NDArray[np.int32],
     ) -> ReadTriggers:
-        rows = np.flatnonzero(kind == sc.TRIGGER)
+        rows = np.flatnonzero(kind == w.KIND_TRIGGER)
         values = value[rows]
         return ReadTriggers(
             motion=before[rows].astype(np.int64),
             distance=values[:, sc.DISTANCE],
             delay_ms=values[:, sc.DELAY],
-            written=values[:, sc.WRITTEN : sc.WRITTEN + 4],
-            calls=blend[rows] == sc.CALLS,
+            written=values[:, sc.WRITTEN : sc.WRITTEN + sc.NUMBERS],
+            calls=blend[rows] == w.CALLS,
             names=self._names_written(values[:, sc.NAME :].astype(np.int64), file_of[rows]),
             line=line[rows],
             file_of=file_of[rows],
@@ -255,7 +258,7 @@ class _Reader:
     def _find_blocks(self, file: int) -> None:
         scanned = self.scanned[file]
         name, start = "", 0
-        for row in np.flatnonzero(scanned.kind == sc.OTHER):
+        for row in np.flatnonzero(scanned.kind == w.KIND_OTHER):
             text = self._statement(file, int(row))
             found = _DEF.match(text)
             if found:
@@ -263,7 +266,7 @@ class _Reader:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} has no END", file)
                 name, start = found.group(1).upper(), int(row) + 1
                 self.def_lines.setdefault(name, int(scanned.line[row]))
-            elif text.upper() == "END":
+            elif text.upper() == w.END:
                 if not name:
                     self._issue("krl-structure", int(scanned.line[row]), "END without DEF", file)
                     continue
@@ -289,7 +292,7 @@ class _Reader:
         file, start, end = self.blocks[block]
         scanned = self.scanned[file]
         at = start
-        for row in np.flatnonzero(scanned.kind[start:end] == sc.OTHER) + start:
+        for row in np.flatnonzero(scanned.kind[start:end] == w.KIND_OTHER) + start:
             text = self._statement(file, int(row))
             call = _CALL.match(text)
             if _DECLARATION.match(text):
@@ -313,7 +316,7 @@ class _Reader:
     def _last_declaration(self, file: int, start: int, end: int) -> int:
         """Return the last row of the run of declarations with which a block begins."""
         kind, at = self.scanned[file].kind, start
-        while at < end and kind[at] == sc.OTHER and _DECLARATION.match(self._statement(file, at)):
+        while at < end and kind[at] == w.KIND_OTHER and _DECLARATION.match(self._statement(file, at)):
             at += 1
         return at - 1
 
@@ -323,16 +326,17 @@ class _Reader:
         if scanned.not_ascii:
             self._issue("krl-not-ascii", scanned.not_ascii, "a character that is not ASCII", file)
         if scanned.too_long:
-            text = f"more than {sc.LONGEST_LINE} characters"
+            text = f"more than {w.LONGEST_LINE} characters"
             self._issue("krl-line-too-long", scanned.too_long, text, file)
         if scanned.open_folds:
             self._issue("krl-structure", 0, ";FOLD and ;ENDFOLD do not match", file)
         words = [
             self._statement(file, int(row)).split("(")[0].split()
-            for row in np.flatnonzero(self.scanned[file].kind == sc.OTHER)
+            for row in np.flatnonzero(self.scanned[file].kind == w.KIND_OTHER)
         ]
         first = [word[0].upper() for word in words if word]
-        for begin, close in (("WHILE", "ENDWHILE"), ("IF", "ENDIF"), ("FOR", "ENDFOR"), ("LOOP", "ENDLOOP")):
+        for begin in _COUNTED:
+            close = w.BLOCKS[begin]
             if first.count(begin) != first.count(close):
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
 

@@ -9,19 +9,16 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell.sections import Pilot
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.krl.names import DEVICES
 
 Form = Literal["index", "values", "none"]
-LONGEST_NAME = 16
 MOST_TURN_DEG = 0.1
 """We correct positions, no orientations: a turn beyond is none of ours."""
 MONITOR_SHARE = 1.2
 """The monitor of the sum stops the program; the limits themselves only clip, and come first."""
-_XYZABC = ("X", "Y", "Z", "A", "B", "C")
-_AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _IN_BASE = 1
 """``RefCorrSys``: the corrections are along ``$BASE``."""
 _INTEGER, _REAL = r"\$SEN_PINT\[(\d{1,2})\]", r"\$SEN_PREA"
@@ -54,17 +51,17 @@ class _Channel:
 
 def is_file_name(name: str) -> bool:
     """Tell whether files of that name can be named on a controller."""
-    return re.fullmatch(rf"[A-Za-z0-9_]{{1,{LONGEST_NAME}}}", name) is not None and (
-        name.upper() not in DEVICES
+    return re.fullmatch(rf"[A-Za-z0-9_]{{1,{w.LONGEST_RSI_NAME}}}", name) is not None and (
+        name.upper() not in w.DEVICES
     )
 
 
 def file_names(name: str) -> tuple[str, str]:
     """Return the names of the Ethernet file and the signal flow; raises where the name is none for KUKA."""
     if not is_file_name(name):
-        allowed = f"1 to {LONGEST_NAME} letters, digits and _, and no name of a device"
+        allowed = f"1 to {w.LONGEST_RSI_NAME} letters, digits and _, and no name of a device"
         raise input_error("option-value", f"name of the RSI files: found {name!r}, allowed: {allowed}")
-    return f"{name}_ETH.xml", f"{name}.rsi.xml"
+    return f"{name}{w.ETHERNET_SUFFIX}", f"{name}{w.SIGNAL_FLOW_SUFFIX}"
 
 
 def rsi_texts(name: str, settings: Online, pilot: Pilot, form: Form) -> dict[str, str]:
@@ -136,8 +133,8 @@ def signal_flow_xml(settings: Online, pilot: Pilot, form: Form, ethernet_file: s
 
 def _correction_tags(settings: Online) -> list[str]:
     if settings.mode == "cartesian":
-        return [f"RKorr.{name}" for name in _XYZABC]
-    return [f"AKorr.{name}" for name in _AXES]
+        return [f"RKorr.{name}" for name in w.POSE_KEYS]
+    return [f"AKorr.{name}" for name in w.AXIS_KEYS]
 
 
 def _channels(settings: Online, form: Form) -> list[_Channel]:
@@ -145,7 +142,8 @@ def _channels(settings: Online, form: Form) -> list[_Channel]:
     channels = [_Channel("OvPro", "LONG", "OV_PRO1"), _Channel("T1", "LONG", "DIGOUT1")]
     if settings.mode == "cartesian":
         channels += [
-            _Channel(f"PosCorrMon.{n}", "DOUBLE", "POSCORRMON1", k) for k, n in enumerate("XYZ", start=1)
+            _Channel(f"PosCorrMon.{n}", "DOUBLE", "POSCORRMON1", k)
+            for k, n in enumerate(w.POSE_KEYS[:3], start=1)
         ]
     if form == "index":
         channels.append(_Channel("SenPInt1", "LONG", "SEN_PINT1"))
@@ -188,8 +186,8 @@ def _corrections(settings: Online) -> list[_Object]:
     wires = tuple((k, "ETHERNET1", k) for k in range(1, 7))
     most = settings.most_mm
     if settings.mode == "cartesian":
-        limits = [(f"LowerLim{n}", k, -most, True) for k, n in enumerate("XYZ", start=1)]
-        limits += [(f"UpperLim{n}", k, most, True) for k, n in enumerate("XYZ", start=4)]
+        limits = [(f"LowerLim{n}", k, -most, True) for k, n in enumerate(w.POSE_KEYS[:3], start=1)]
+        limits += [(f"UpperLim{n}", k, most, True) for k, n in enumerate(w.POSE_KEYS[:3], start=4)]
         limits.append(("MaxRotAngle", 7, MOST_TURN_DEG, True))
         corrects = _Object("POSCORR", 27, "POSCORR1", wires, (*limits, ("RefCorrSys", 1, _IN_BASE, False)))
         sums = (("MaxTrans", 1, MONITOR_SHARE * most, True), ("MaxRotAngle", 2, MOST_TURN_DEG, True))

@@ -1,4 +1,4 @@
-"""Which programs must not be corrected online, or only with a person's word."""
+"""Which programs must not be corrected online, or only after a person has read a warning."""
 
 import re
 from collections.abc import Iterator
@@ -6,13 +6,14 @@ from ipaddress import IPv4Address
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.krl.rsi_text import rsi_rows
 from gcode2krl.krl.statements import event_statements
 from gcode2krl.tables import Targets
 
-_HALT = re.compile(r"^\s*HALT\b", re.IGNORECASE | re.MULTILINE)
+_HALT = re.compile(rf"^\s*{w.HALT}\b", re.IGNORECASE | re.MULTILINE)
 
 
 def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
@@ -23,8 +24,13 @@ def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
     """
     on, off = rsi_rows(targets)
     if off <= on:
-        yield Issue("error", "online-nothing", 0, "there is no move that could be corrected online",
-                    "leave out --online")  # fmt: skip
+        yield Issue(
+            "error",
+            "online-nothing",
+            0,
+            "there is no move that could be corrected online",
+            "leave out --online",
+        )
         return
     yield from _tools(targets, on, off)
     yield from _homes(targets, on, off)
@@ -44,8 +50,13 @@ def _tools(targets: Targets, on: int, off: int) -> Iterator[Issue]:
     tools = np.unique(targets.tool[on + 1 : off + 1])
     if changes or len(tools) > 1:
         line = int(changes[0].values["line"]) if changes else _line_of_change(targets, on)
-        yield Issue("error", "online-tool", line, "a tool change between cuts that are corrected online",
-                    "translate a program for each tool")  # fmt: skip
+        yield Issue(
+            "error",
+            "online-tool",
+            line,
+            "a tool change between cuts that are corrected online",
+            "translate a program for each tool",
+        )
 
 
 def _line_of_change(targets: Targets, on: int) -> int:
@@ -57,14 +68,22 @@ def _homes(targets: Targets, on: int, off: int) -> Iterator[Issue]:
     """A PTP moves the axes together, not the tip along a line: no correction has a direction there."""
     for row in on + 1 + np.flatnonzero(targets.ptp[on + 1 : off + 1]):
         if targets.home[row]:
-            yield Issue("error", "online-home", int(targets.source_line[row]),
-                        "a way over HOME between cuts that are corrected online",
-                        "retract in Z only (G28 Z, G53 Z), or one program for each stretch")  # fmt: skip
+            yield Issue(
+                "error",
+                "online-home",
+                int(targets.source_line[row]),
+                "a way over HOME between cuts that are corrected online",
+                "retract in Z only (G28 Z, G53 Z), or one program for each stretch",
+            )
 
 
 def _halts(targets: Targets, cell: Cell, on: int, off: int) -> Iterator[Issue]:
     for event in targets.events:
         if on < event.row < off and event.kind != "tool" and _HALT.search(event_statements(event, cell)):
-            yield Issue("error", "online-halt", int(event.values["line"]),
-                        "the program halts for a person while the robot follows corrections",
-                        "leave the halt out, or one program for each stretch")  # fmt: skip
+            yield Issue(
+                "error",
+                "online-halt",
+                int(event.values["line"]),
+                "the program halts for a person while the robot follows corrections",
+                "leave the halt out, or one program for each stretch",
+            )

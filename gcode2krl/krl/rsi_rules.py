@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.krl.read import KrlProgram, Statement
 from gcode2krl.krl.rsi_files import file_names, is_file_name
-from gcode2krl.krl.rsi_text import INTERRUPT, LOST_SUBPROGRAM
 
-_OURS = "GK_RSI_"
 _CALL = re.compile(r"\bRSI_(\w+)\(")
 _NAME = re.compile(r'RSI_CREATE\(\s*"(\w+)\.rsi"', re.IGNORECASE)
-_ORDER = ["CREATE", "ON", "OFF", "DELETE"]
+_ORDER = list(w.RSI_CALLS)
 _SAME_HEIGHT_MM = 0.002
 _REMEDY = "translate again"
 
@@ -27,7 +26,7 @@ def rsi_name(program: KrlProgram, folder: Path) -> str:
     """
     found = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
     name = next((match[1] for match in found if match and is_file_name(match[1])), "")
-    spelled = _beside(folder).get(f"{name}.rsi.xml".casefold())
+    spelled = _beside(folder).get(f"{name}{w.SIGNAL_FLOW_SUFFIX}".casefold())
     return spelled.name[: len(name)] if spelled is not None else name
 
 
@@ -46,8 +45,8 @@ def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
         yield _issue("rsi-order", line, f"RSI calls are {found}; allowed: {', '.join(_ORDER)}, once each")
         return
     create, on, off = (statement for _, statement, _ in calls[:3])
-    cycle = "#IPO_FAST" if cell.online.cycle_s < 0.012 else "#IPO"
-    if calls[1][2] != f"GK_RSI_RET=RSI_ON(#ABSOLUTE,{cycle})":
+    cycle = w.RSI_FAST if cell.online.cycle_s < w.RSI_SLOW_CYCLE_S else w.RSI_SLOW
+    if calls[1][2] != f"{w.RSI_RESULT}=RSI_ON(#ABSOLUTE,{cycle})":
         yield _issue("rsi-mode", on.line, f"{on.text!r}; allowed: RSI_ON(#ABSOLUTE,{cycle}) only")
     yield from _place_issues(program, cell, create, on, off)
     yield from _ready_issues(program, cell, create, on, off)
@@ -88,31 +87,38 @@ def _ready_issues(
     program: KrlProgram, cell: Cell, create: Statement, on: Statement, off: Statement
 ) -> Iterator[Issue]:
     """The program waits, standing, for readiness, is stopped without it, and nothing else sets it."""
-    ready = f"$OUT[{cell.online.link.ready_output}]"
-    switched = (f"INTERRUPTON{INTERRUPT}", f"INTERRUPTOFF{INTERRUPT}")
+    ready = f"{w.OUT}[{cell.online.link.ready_output}]"
+    switched = (f"{w.INTERRUPT}ON{w.RSI_INTERRUPT}", f"{w.INTERRUPT}OFF{w.RSI_INTERRUPT}")
     normal = ((_normal(s.text), s) for s in program.statements)
     touching = [(text, s) for text, s in normal if ready in text or text.startswith(switched)]
     wanted = [
         f"{ready}=FALSE",
-        f"WAITFOR{ready}",
-        f"INTERRUPTDECL{INTERRUPT}WHEN{ready}==FALSEDO{LOST_SUBPROGRAM}()",
+        f"{w.WAIT}{w.FOR}{ready}",
+        f"{w.INTERRUPT}{w.DECL}{w.RSI_INTERRUPT}{w.WHEN}{ready}==FALSE{w.DO}{w.LOST_SUBPROGRAM}()",
         switched[0],
-        f"WAITFOR{ready}",
+        f"{w.WAIT}{w.FOR}{ready}",
         switched[1],
         f"{ready}=FALSE",
     ]
     motions = [on.motion] * 5 + [off.motion] * 2
     line = [s.line for _, s in touching]
     if [text for text, _ in touching] != wanted or [s.motion for _, s in touching] != motions:
-        text = f"{ready} must be put out, waited for, watched by interrupt {INTERRUPT}, and nothing else"
+        text = (
+            f"{ready} must be put out, waited for, watched by interrupt {w.RSI_INTERRUPT}, and nothing else"
+        )
         yield _issue("rsi-ready", on.line, text)
     elif not (line[0] < create.line < on.line < line[1] and line[5] < off.line < line[6]):
         text = f"{ready} must be out before RSI_CREATE and after RSI_OFF, and waited for after RSI_ON"
         yield _issue("rsi-ready", on.line, text)
-    lost = program.uncalled.get(f"{program.file[0]}/{LOST_SUBPROGRAM}", ())
+    yield from _lost_issues(program, on)
+
+
+def _lost_issues(program: KrlProgram, on: Statement) -> Iterator[Issue]:
+    """The subprogram of the interrupt stops the robot, and no subprogram outside the program touches RSI."""
+    lost = program.uncalled.get(f"{program.file[0]}/{w.LOST_SUBPROGRAM}", ())
     elsewhere = (text for texts in program.uncalled.values() for text in texts)
-    if "BRAKE" not in lost or any(_CALL.search(text) for text in elsewhere):
-        yield _issue("rsi-ready", on.line, f"{LOST_SUBPROGRAM} must stop the robot and leave RSI alone")
+    if w.BRAKE not in lost or any(_CALL.search(text) for text in elsewhere):
+        yield _issue("rsi-ready", on.line, f"{w.LOST_SUBPROGRAM} must stop the robot and leave RSI alone")
 
 
 def _beside(folder: Path) -> dict[str, Path]:
@@ -124,7 +130,7 @@ def _is_clear(z_mm: float, cell: Cell) -> bool:
 
 
 def _is_ours(text: str) -> bool:
-    return _OURS in text.upper()
+    return w.RSI_PREFIX in text.upper()
 
 
 def _normal(text: str) -> str:

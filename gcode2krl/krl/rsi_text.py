@@ -9,14 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.krl.rsi_files import Form, file_names, rsi_texts
 from gcode2krl.tables import Targets
 
-INTERRUPT = 21
-LOST_SUBPROGRAM = "GK_RSI_LOST"
-DECLARATIONS = "DECL INT GK_RSI_RET,GK_RSI_ID"
+DECLARATIONS = f"{w.DECL} INT {w.RSI_RESULT},{w.RSI_ID}"
 
 
 @dataclass(frozen=True)
@@ -73,22 +72,22 @@ def start_statements(name: str, settings: Online) -> str:
     The output that shows readiness keeps its value when RSI ends, so it is put out first. An interrupt sees
     it fall, not that it is out already, so the program looks again once the interrupt is on.
     """
-    cycle = "#IPO_FAST" if settings.cycle_s < 0.012 else "#IPO"
-    ready = f"$OUT[{settings.link.ready_output}]"
+    cycle = w.RSI_FAST if settings.cycle_s < w.RSI_SLOW_CYCLE_S else w.RSI_SLOW
+    ready = f"{w.OUT}[{settings.link.ready_output}]"
     return "\n".join(
         [
-            ";FOLD RSI on: gcode2krl online serve must listen before",
-            "WAIT SEC 0.0",
+            f"{w.FOLD} RSI on: gcode2krl online serve must listen before",
+            f"{w.WAIT} {w.SEC} 0.0",
             f"{ready}=FALSE",
-            f'GK_RSI_RET=RSI_CREATE("{name}.rsi",GK_RSI_ID,TRUE)',
+            f'{w.RSI_RESULT}=RSI_CREATE("{name}.rsi",{w.RSI_ID},TRUE)',
             *_until_ok("RSI_CREATE failed"),
-            f"GK_RSI_RET=RSI_ON(#ABSOLUTE,{cycle})",
+            f"{w.RSI_RESULT}=RSI_ON(#ABSOLUTE,{cycle})",
             *_until_ok("RSI_ON failed"),
-            f"WAIT FOR {ready} ; the absolute mode is proven",
-            f"INTERRUPT DECL {INTERRUPT} WHEN {ready}==FALSE DO {LOST_SUBPROGRAM}( )",
-            f"INTERRUPT ON {INTERRUPT}",
-            f"WAIT FOR {ready}",
-            ";ENDFOLD (RSI on)",
+            f"{w.WAIT} {w.FOR} {ready} ; the absolute mode is proven",
+            f"{w.INTERRUPT} {w.DECL} {w.RSI_INTERRUPT} {w.WHEN} {ready}==FALSE {w.DO} {w.LOST_SUBPROGRAM}( )",
+            f"{w.INTERRUPT} ON {w.RSI_INTERRUPT}",
+            f"{w.WAIT} {w.FOR} {ready}",
+            f"{w.ENDFOLD} (RSI on)",
         ]
     )
 
@@ -97,14 +96,14 @@ def end_statements(settings: Online) -> str:
     """Return the KRL that switches RSI off: on the clearance plane, behind the last retract."""
     return "\n".join(
         [
-            ";FOLD RSI off",
-            "WAIT SEC 0.0",
-            f"INTERRUPT OFF {INTERRUPT}",
-            "GK_RSI_RET=RSI_OFF()",
+            f"{w.FOLD} RSI off",
+            f"{w.WAIT} {w.SEC} 0.0",
+            f"{w.INTERRUPT} OFF {w.RSI_INTERRUPT}",
+            f"{w.RSI_RESULT}=RSI_OFF()",
             *_until_ok("RSI_OFF failed"),
-            "GK_RSI_RET=RSI_DELETE(GK_RSI_ID)",
-            f"$OUT[{settings.link.ready_output}]=FALSE",
-            ";ENDFOLD (RSI off)",
+            f"{w.RSI_RESULT}=RSI_DELETE({w.RSI_ID})",
+            f"{w.OUT}[{settings.link.ready_output}]=FALSE",
+            f"{w.ENDFOLD} (RSI off)",
         ]
     )
 
@@ -119,14 +118,14 @@ def lost_subprogram(settings: Online, cell: Cell, tool: int) -> str:
     away = settings.link.retract_mm if axis[0] == "+" else -settings.link.retract_mm
     return "\n".join(
         [
-            f"DEF {LOST_SUBPROGRAM}( )",
-            f"INTERRUPT OFF {INTERRUPT}",
-            "BRAKE",
+            f"{w.DEF} {w.LOST_SUBPROGRAM}( )",
+            f"{w.INTERRUPT} OFF {w.RSI_INTERRUPT}",
+            w.BRAKE,
             f"LIN_REL {{{axis[1].upper()} {away:.3f}}} #TOOL",
             "LOOP",
-            "HALT ; the RSI link is lost: switch the spindle off, cancel the program",
-            "ENDLOOP",
-            "END",
+            f"{w.HALT} ; the RSI link is lost: switch the spindle off, cancel the program",
+            w.BLOCKS["LOOP"],
+            w.END,
         ]
     )
 
@@ -146,4 +145,8 @@ def used_variables(cell: Cell, form: Form) -> list[str]:
 
 
 def _until_ok(message: str) -> tuple[str, ...]:
-    return ("WHILE GK_RSI_RET<>RSIOK", f"HALT ; {message}: cancel the program", "ENDWHILE")
+    return (
+        f"WHILE {w.RSI_RESULT}<>RSIOK",
+        f"{w.HALT} ; {message}: cancel the program",
+        w.BLOCKS["WHILE"],
+    )

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.names import name_problem
@@ -15,51 +16,36 @@ from gcode2krl.units import MM_PER_M
 _FIRST_WORD = re.compile(r"\$?[A-Z_][A-Z0-9_]*", re.IGNORECASE)
 _KNOWN_WORDS = frozenset(
     [
-        "BAS",
-        "HALT",
-        "WAIT",
-        "IF",
-        "THEN",
-        "ELSE",
-        "ENDIF",
-        "WHILE",
-        "ENDWHILE",
-        "FOR",
-        "ENDFOR",
-        "LOOP",
-        "ENDLOOP",
-        "EXIT",
-        "REPEAT",
-        "UNTIL",
-        "SWITCH",
-        "CASE",
-        "DEFAULT",
-        "ENDSWITCH",
-        "RETURN",
-        "PULSE",
-        "INTERRUPT",
-        "GLOBAL",
-        "TRIGGER",
-        "CONTINUE",
+        *(w.BLOCKS.keys() | w.BLOCKS.values() | set(w.BRANCHES)),
+        *(
+            "THEN",
+            "RETURN",
+            w.BAS,
+            w.HALT,
+            w.WAIT,
+            w.EXIT,
+            w.PULSE,
+            w.INTERRUPT,
+            w.GLOBAL,
+            w.TRIGGER,
+            w.CONTINUE,
+        ),
     ]
 )
-_WITHOUT_STOP = re.compile(r"(TRIGGER\b|CONTINUE\b|\$(VEL|ACC|APO|ORI_TYPE)\b)", re.IGNORECASE)
+_WITHOUT_STOP = re.compile(rf"({w.TRIGGER}\b|{w.CONTINUE}\b|\$(VEL|ACC|APO|ORI_TYPE)\b)", re.IGNORECASE)
 """Statements known to leave the advance run alone."""
 _SETTING = re.compile(
     r"(\$(?:BASE|TOOL|LOAD\w*|ADVANCE|IPO_MODE|ACC\w*|ORI_TYPE|OV_\w+|ACT_\w+|VEL_\w+|RED_\w+)|(?:BASE|TOOL|LOAD)_DATA)"
     r"[\[\].A-Z0-9_]*=(?!=)|BAS\(#(?!TOOL)"
 )
-_SET_WITH_THE_TOOL = frozenset(["$LOAD", "$ACT_TOOL", "$ACT_BASE"])
+_SET_WITH_THE_TOOL = frozenset([w.LOAD, w.ACT_TOOL, w.ACT_BASE])
 _REMEDY = "take it out of the template in the cell (m_code, tool_change, program.epilogue)"
 _REMEDY_OF_TOOL = f"translate again, with the cell it was made with; or {_REMEDY}"
 _JUMP = re.compile(r"(GOTO|RESUME|ASYPTP)")
-_MOTION_WORDS = frozenset(
-    ["CIRC", "SPLINE", "ENDSPLINE", "SLIN", "SPTP", "SCIRC", "LIN_REL", "PTP_REL", "CIRC_REL", "SPL"]
-)
 
 
 def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
-    """Return what a controller would refuse, or do other than a blended program asks for."""
+    """Return what a controller would refuse, and what would stop the robot in a blended corner."""
     issues = []
     problem = name_problem(program.name)
     if problem:
@@ -98,7 +84,7 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
 
 def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
     """Behind the first motion only speeds and the tool of a tool change are set, and nothing jumps."""
-    tools = {_squeezed(f"$TOOL={frame_text(written_tool(cell, number))}") for number in _tools(cell)}
+    tools = {_squeezed(f"{w.TOOL}={frame_text(written_tool(cell, number))}") for number in _tools(cell)}
     issues = []
     for statement in program.statements:
         text = _squeezed(statement.text)
@@ -111,7 +97,7 @@ def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
                     "krl-setting-changed",
                     statement.line,
                     in_file(program, statement.file) + f"{statement.text[:50]!r} behind the first motion",
-                    _REMEDY_OF_TOOL if set_here and set_here[1] == "$TOOL" else _REMEDY,
+                    _REMEDY_OF_TOOL if set_here and set_here[1] == w.TOOL else _REMEDY,
                 )
             )
     return issues[:MOST_PLACES]
@@ -153,9 +139,9 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
         word = _FIRST_WORD.match(statement.text)
         first = word.group(0).upper() if word else statement.text[:10]
         rest = statement.text[len(first) :].lstrip()
-        if "#INITMOV" in statement.text.upper():
+        if w.INITMOV in statement.text.upper():
             starts += 1
-        if first in _MOTION_WORDS:
+        if first in w.MOTIONS_NOT_WRITTEN:
             issues.append(
                 Issue(
                     "error",

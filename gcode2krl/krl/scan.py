@@ -9,16 +9,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-LIN, PTP, VEL_CP, APO_CDIS, WAIT_SEC, OTHER, PTP_AXES, TRIGGER = 0, 1, 2, 3, 4, 5, 6, 7
-ASSIGNS, CALLS = 1, 2
-"""What a trigger does, in ``blend``: write one number to a variable, or call with four and ``PRIO=-1``."""
+from gcode2krl import ascii_codes as ch
+from gcode2krl import krl_words as w
+
 DISTANCE, DELAY, WRITTEN, NAME = 0, 1, 2, 6
 """Columns of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
-KEYS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
-"""Columns of a Cartesian target; of ``PTP_AXES`` the first six are A1 to A6."""
-LONGEST_LINE = 471
-"""Characters in a line of KRL, as KUKA's documentation is remembered."""
-MALFORMED = -1
+NUMBERS = 4
+"""Numbers that a trigger writes when it calls."""
+COLUMNS = len(w.POSE_KEYS) + len(w.STATUS_TURN)
+_MOST_DIGITS = 15
+_AXIS_BITS = COLUMNS
+"""Components A1 to A6 have the bits from here on, the others those of their columns."""
+_CARTESIAN = (1 << COLUMNS) - 1
 
 
 class Scanned(NamedTuple):
@@ -29,8 +31,8 @@ class Scanned(NamedTuple):
     span: NDArray[np.int64]
     """(k, 2) first and last byte of the statement."""
     value: NDArray[np.float64]
-    """(k, 8) components by `KEYS`, NaN where absent; a lone number stands in column 0. Of a trigger see
-    above; other triggers than those two are ``OTHER``."""
+    """(k, 8) components X, Y, Z, A, B, C, S, T, or A1 to A6, NaN where absent; a lone number stands in
+    column 0. The columns of a trigger are named above; any other trigger is `KIND_OTHER`."""
     blend: NDArray[np.int8]
     """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
     too_long: int
@@ -47,55 +49,75 @@ def scan_krl(text: bytes) -> Scanned:
     most = text.count(b"\n") + 2
     kind, blend = np.empty(most, dtype=np.int8), np.empty(most, dtype=np.int8)
     line, span = np.empty(most, dtype=np.int32), np.empty((most, 2), dtype=np.int64)
-    value = np.empty((most, len(KEYS)))
+    value = np.empty((most, COLUMNS))
     count, too_long, not_ascii, folds = _scan(data, kind, line, span, value, blend)
     rows = slice(count)
     return Scanned(kind[rows], line[rows], span[rows], value[rows], blend[rows], too_long, not_ascii, folds)
 
 
-_LIN_WORD, _PTP_WORD, _VEL_WORD, _CDIS_WORD, _WAIT_WORD, _BLEND_WORD = (
-    np.frombuffer(word, dtype=np.uint8).copy()
-    for word in (b"LIN", b"PTP", b"$VEL.CP", b"$APO.CDIS", b"WAIT", b"C_DIS")
-)
+def _bytes(word: str) -> NDArray[np.uint8]:
+    return np.frombuffer(word.encode("ascii"), dtype=np.uint8).copy()
 
 
-_TRIGGER_WORDS = tuple(
-    np.frombuffer(word, dtype=np.uint8).copy()
-    for word in (b"TRIGGER", b"WHEN", b"DISTANCE", b"=", b"DELAY", b"=", b"DO")
-)
-_PRIO_WORDS = tuple(np.frombuffer(word, dtype=np.uint8).copy() for word in (b"PRIO", b"="))
-_SEC_WORD = np.frombuffer(b"SEC", dtype=np.uint8).copy()
-_DWELL_WORD = np.frombuffer(b"DWELL", dtype=np.uint8).copy()
-_FOLD_WORD = np.frombuffer(b";FOLD", dtype=np.uint8).copy()
-_ENDFOLD_WORD = np.frombuffer(b";ENDFOLD", dtype=np.uint8).copy()
+_LIN_WORD, _PTP_WORD, _BLEND_WORD = _bytes(w.LIN), _bytes(w.PTP), _bytes(w.C_DIS)
+_VEL_WORD, _CDIS_WORD = _bytes(w.VEL_CP), _bytes(w.APO_CDIS)
+_WAIT_WORD, _SEC_WORD, _DWELL_WORD = _bytes(w.WAIT), _bytes(w.SEC), _bytes(w.DWELL.upper())
+_DISTANCE_WORDS = tuple(_bytes(word) for word in (w.TRIGGER, w.WHEN, w.DISTANCE, "="))
+_DELAY_WORDS = tuple(_bytes(word) for word in (w.DELAY, "="))
+_DO_WORDS = (_bytes(w.DO),)
+_PRIO_WORDS = tuple(_bytes(word) for word in (w.PRIO, "="))
+_FOLD_WORD, _ENDFOLD_WORD = _bytes(w.FOLD), _bytes(w.ENDFOLD)
 
 
 @njit(cache=True)
 def _starts(data, at, end, word):
+    """Tell whether a word of capitals stands at a place, in capitals or small letters."""
     if at + len(word) > end:
         return False
     for k in range(len(word)):
         c = data[at + k]
-        if c >= 97 and c <= 122:
-            c -= 32
+        if c >= ch.SMALL_A and c <= ch.SMALL_Z:
+            c -= ch.CASE_BIT
         if c != word[k]:
             return False
     return True
 
 
 @njit(cache=True)
+def _is_blank(c):
+    return c == ch.SPACE or c == ch.TAB
+
+
+@njit(cache=True)
+def _is_digit(c):
+    return c >= ch.DIGIT_0 and c <= ch.DIGIT_9
+
+
+@njit(cache=True)
 def _blank(data, at, end):
-    while at < end and (data[at] == 32 or data[at] == 9):
+    """Return the place behind blanks."""
+    while at < end and _is_blank(data[at]):
         at += 1
     return at
+
+
+@njit(cache=True)
+def _is(data, at, end, c):
+    return at < end and data[at] == c
+
+
+@njit(cache=True)
+def _ends_here(data, at, end):
+    """Tell whether nothing but a comment follows."""
+    return at >= end or data[at] == ch.SEMICOLON
 
 
 @njit(cache=True)
 def _number(data, at, end):
     """Return (position behind the number, value); NaN where there is none."""
     sign = 1.0
-    if at < end and (data[at] == 45 or data[at] == 43):
-        if data[at] == 45:
+    if at < end and (data[at] == ch.MINUS or data[at] == ch.PLUS):
+        if data[at] == ch.MINUS:
             sign = -1.0
         at += 1
     mantissa = 0.0
@@ -104,109 +126,215 @@ def _number(data, at, end):
     point = False
     while at < end:
         c = data[at]
-        if c >= 48 and c <= 57:
-            mantissa = mantissa * 10.0 + (c - 48)
+        if _is_digit(c):
+            mantissa = mantissa * 10.0 + (c - ch.DIGIT_0)
             if point:
                 scale *= 10.0
             digits += 1
-        elif c == 46 and not point:
+        elif c == ch.POINT and not point:
             point = True
         else:
             break
         at += 1
-    if digits == 0 or digits > 15:
+    if digits == 0 or digits > _MOST_DIGITS:
         return at, np.nan
     return at, sign * mantissa / scale
+
+
+@njit(cache=True)
+def _component(data, at, end):
+    """Return (position behind the name of a component, its bit), -1 for no such component."""
+    letter = data[at] - ch.CASE_BIT if data[at] >= ch.SMALL_A else data[at]
+    at += 1
+    if letter >= ch.LETTER_X and letter <= ch.LETTER_Z:
+        return at, letter - ch.LETTER_X
+    if letter == ch.LETTER_A and at < end and data[at] >= ch.DIGIT_1 and data[at] <= ch.DIGIT_6:
+        return at + 1, _AXIS_BITS + data[at] - ch.DIGIT_1
+    if letter >= ch.LETTER_A and letter <= ch.LETTER_C:
+        return at, 3 + letter - ch.LETTER_A
+    if letter == ch.LETTER_S:
+        return at, 6
+    return at, 7 if letter == ch.LETTER_T else -1
 
 
 @njit(cache=True)
 def _components(data, at, end, value):
     """Read ``{X 1.0,Y 2.0,…}`` into value; return (position behind the brace or -1, components as bits)."""
     found = 0
-    if at >= end or data[at] != 123:
+    if not _is(data, at, end, ch.BRACE_OPEN):
         return -1, found
     at += 1
     while True:
         at = _blank(data, at, end)
         if at >= end:
             return -1, found
-        letter = data[at] - 32 if data[at] >= 97 else data[at]
-        at += 1
-        column = -1
-        if letter >= 88 and letter <= 90:
-            column = letter - 88
-        elif letter >= 65 and letter <= 67:
-            column = 3 + letter - 65
-            if letter == 65 and at < end and data[at] >= 49 and data[at] <= 54:
-                column = 8 + data[at] - 49  # A1 to A6: columns 0 to 5, bits 8 to 13
-                at += 1
-        elif letter == 83:
-            column = 6
-        elif letter == 84:
-            column = 7
-        if column < 0 or at >= end or (data[at] != 32 and data[at] != 9):
+        at, bit = _component(data, at, end)
+        if bit < 0 or at >= end or not _is_blank(data[at]):
             return -1, found
-        at = _blank(data, at, end)
-        at, number = _number(data, at, end)
-        if np.isnan(number) or found & (1 << column):
+        at, number = _number(data, _blank(data, at, end), end)
+        if np.isnan(number) or found & (1 << bit):
             return -1, found
-        found |= 1 << column
-        value[column - 8 if column >= 8 else column] = number
+        found |= 1 << bit
+        value[bit - _AXIS_BITS if bit >= _AXIS_BITS else bit] = number
         at = _blank(data, at, end)
-        if at < end and data[at] == 44:
-            at += 1
-        elif at < end and data[at] == 125:
+        if _is(data, at, end, ch.BRACE_CLOSE):
             return at + 1, found
-        else:
+        if not _is(data, at, end, ch.COMMA):
             return -1, found
+        at += 1
+
+
+@njit(cache=True)
+def _behind(data, at, end, words):
+    """Return the place behind words and the blanks after each, -1 where they do not stand there."""
+    for k in range(len(words)):
+        if at < 0 or not _starts(data, at, end, words[k]):
+            return -1
+        at = _blank(data, at + len(words[k]), end)
+    return at
+
+
+@njit(cache=True)
+def _number_behind(data, at, end, words):
+    """Return (place behind words and a number, the number), (-1, NaN) where they do not stand there."""
+    at = _behind(data, at, end, words)
+    if at < 0:
+        return -1, np.nan
+    at, number = _number(data, at, end)
+    return (-1 if np.isnan(number) else _blank(data, at, end)), number
+
+
+@njit(cache=True)
+def _written_name(data, at, end, value):
+    """Read the name that is assigned to or called; return the place of the ``=`` or ``(``, -1 without one."""
+    first = at
+    while at < end and data[at] not in (ch.EQUALS, ch.PAREN_OPEN, ch.SEMICOLON):
+        at += 1
+    last = at
+    while last > first and _is_blank(data[last - 1]):
+        last -= 1
+    value[NAME], value[NAME + 1] = first, last - first
+    return -1 if _ends_here(data, at, end) or last == first else at
+
+
+@njit(cache=True)
+def _arguments(data, at, end, value):
+    """Read the numbers of a call from its ``(`` on; return the place behind ``)``, -1 where it is another."""
+    for k in range(NUMBERS):
+        at, number = _number(data, _blank(data, at + 1, end), end)
+        at = _blank(data, at, end)
+        value[WRITTEN + k] = number
+        if np.isnan(number) or not _is(data, at, end, ch.COMMA if k < NUMBERS - 1 else ch.PAREN_CLOSE):
+            return -1
+    return _blank(data, at + 1, end)
 
 
 @njit(cache=True)
 def _trigger(data, at, end, value):
     """Read ``TRIGGER WHEN DISTANCE=0 DELAY=7 DO …`` into value; return what it does, 0 for anything else."""
-    for k in range(len(_TRIGGER_WORDS)):
-        if not _starts(data, at, end, _TRIGGER_WORDS[k]):
-            return 0
-        at = _blank(data, at + len(_TRIGGER_WORDS[k]), end)
-        if k == 3 or k == 5:
-            at, number = _number(data, at, end)
-            value[DISTANCE if k == 3 else DELAY] = number
-            if np.isnan(number):
-                return 0
-            at = _blank(data, at, end)
-    first = at
-    while at < end and data[at] != 61 and data[at] != 40 and data[at] != 59:  # = ( ;
-        at += 1
-    last = at
-    while last > first and (data[last - 1] == 32 or data[last - 1] == 9):
-        last -= 1
-    value[NAME], value[NAME + 1] = first, last - first
-    if at >= end or last == first or data[at] == 59:
+    at, value[DISTANCE] = _number_behind(data, at, end, _DISTANCE_WORDS)
+    at, value[DELAY] = _number_behind(data, at, end, _DELAY_WORDS)
+    at = _behind(data, at, end, _DO_WORDS)
+    at = _written_name(data, at, end, value) if at >= 0 else -1
+    if at < 0:
         return 0
-    calls = data[at] == 40
-    for k in range(4 if calls else 1):
-        at, number = _number(data, _blank(data, at + 1, end), end)
-        at = _blank(data, at, end)
-        value[WRITTEN + k] = number
-        if np.isnan(number) or (calls and (at >= end or data[at] != (44 if k < 3 else 41))):
-            return 0
+    calls = data[at] == ch.PAREN_OPEN
     if calls:
-        at = _blank(data, at + 1, end)
-        for k in range(len(_PRIO_WORDS)):
-            if not _starts(data, at, end, _PRIO_WORDS[k]):
-                return 0
-            at = _blank(data, at + len(_PRIO_WORDS[k]), end)
-        at, number = _number(data, at, end)
-        at = _blank(data, at, end)
-        if number != -1.0:
+        at = _arguments(data, at, end, value)
+        at, prio = _number_behind(data, at, end, _PRIO_WORDS)
+        if at < 0 or prio != w.PRIO_BY_CONTROLLER:
             return 0
-    if at < end and data[at] != 59:
+    else:
+        at, value[WRITTEN] = _number(data, _blank(data, at + 1, end), end)
+        at = _blank(data, at, end)
+        if np.isnan(value[WRITTEN]):
+            return 0
+    if not _ends_here(data, at, end):
         return 0
-    return CALLS if calls else ASSIGNS
+    return w.CALLS if calls else w.ASSIGNS
+
+
+@njit(cache=True)
+def _motion(data, begin, end, value):
+    """Read a LIN or PTP into value; return its kind (-1 for no motion) and its blending."""
+    if _starts(data, begin, end, _LIN_WORD):
+        kind = w.KIND_LIN
+    elif _starts(data, begin, end, _PTP_WORD):
+        kind = w.KIND_PTP
+    else:
+        return -1, 0
+    at, found = _components(data, _blank(data, begin + 3, end), end, value)
+    axes = found > _CARTESIAN
+    linear = kind == w.KIND_LIN
+    if axes and not linear:
+        kind = w.KIND_PTP_AXES
+    if at < 0 or (axes and (linear or found & _CARTESIAN)):
+        return kind, w.MALFORMED
+    at = _blank(data, at, end)
+    blend = 0
+    if _starts(data, at, end, _BLEND_WORD):
+        blend = 1
+        at = _blank(data, at + len(_BLEND_WORD), end)
+    return kind, blend if _ends_here(data, at, end) else w.MALFORMED
+
+
+@njit(cache=True)
+def _setting(data, begin, end):
+    """Return (kind, place behind the words) of $VEL.CP, $APO.CDIS and WAIT SEC; the kind is -1 for others."""
+    if _starts(data, begin, end, _VEL_WORD):
+        return w.KIND_VEL_CP, begin + len(_VEL_WORD)
+    if _starts(data, begin, end, _CDIS_WORD):
+        return w.KIND_APO_CDIS, begin + len(_CDIS_WORD)
+    if _starts(data, begin, end, _WAIT_WORD):
+        behind = begin + len(_WAIT_WORD)
+        second = _blank(data, behind, end)
+        if second > behind and _starts(data, second, end, _SEC_WORD):
+            return w.KIND_WAIT_SEC, second + len(_SEC_WORD)
+    return -1, begin
+
+
+@njit(cache=True)
+def _set_to(data, at, end, kind, value):
+    """Read what a setting is set to into value; return its blending: 1 for a dwell, `MALFORMED`, else 0."""
+    blend = 0
+    at = _blank(data, at, end)
+    if kind != w.KIND_WAIT_SEC:
+        if not _is(data, at, end, ch.EQUALS):
+            blend = w.MALFORMED
+        at = _blank(data, at + 1, end)
+    at, value[0] = _number(data, at, end)
+    at = _blank(data, at, end)
+    if np.isnan(value[0]) or not _ends_here(data, at, end):
+        return w.MALFORMED
+    if kind == w.KIND_WAIT_SEC and at < end:
+        return int(_starts(data, _blank(data, at + 1, end), end, _DWELL_WORD))
+    return blend
+
+
+@njit(cache=True)
+def _statement(data, begin, end, value):
+    """Read a statement into value; return its kind and its blending."""
+    kind, blend = _motion(data, begin, end, value)
+    if kind >= 0:
+        return kind, blend
+    kind, at = _setting(data, begin, end)
+    if kind >= 0:
+        return kind, _set_to(data, at, end, kind, value)
+    does = _trigger(data, begin, end, value)
+    return (w.KIND_TRIGGER, does) if does > 0 else (w.KIND_OTHER, 0)
+
+
+@njit(cache=True)
+def _fold(data, begin, end):
+    """Return 1 for a comment that opens a fold, -1 for one that closes it, else 0."""
+    if _starts(data, begin, end, _FOLD_WORD):
+        return 1
+    return -1 if _starts(data, begin, end, _ENDFOLD_WORD) else 0
 
 
 @njit(cache=True)
 def _scan(data, kind, line, span, value, blend):
+    """Fill the columns; return (statements, first line too long, first that is not ASCII, open folds)."""
     n = len(data)
     at = 0
     number = 0
@@ -215,72 +343,21 @@ def _scan(data, kind, line, span, value, blend):
     while at < n:
         number += 1
         end = at
-        while end < n and data[end] != 10:
-            if data[end] > 127 and not_ascii == 0:
+        while end < n and data[end] != ch.NEWLINE:
+            if data[end] >= ch.FIRST_FOREIGN and not_ascii == 0:
                 not_ascii = number
             end += 1
-        if end - at > LONGEST_LINE + 1 and too_long == 0:
+        if end - at > w.LONGEST_LINE + 1 and too_long == 0:
             too_long = number
         begin = _blank(data, at, end)
         at = end + 1
-        while end > begin and (data[end - 1] == 13 or data[end - 1] == 32 or data[end - 1] == 9):
+        while end > begin and (data[end - 1] == ch.RETURN or _is_blank(data[end - 1])):
             end -= 1
-        if begin == end or data[begin] == 59 or data[begin] == 38:
-            if _starts(data, begin, end, _FOLD_WORD):
-                folds += 1
-            elif _starts(data, begin, end, _ENDFOLD_WORD):
-                folds -= 1
+        if begin == end or data[begin] == ch.SEMICOLON or data[begin] == ch.AMPERSAND:
+            folds += _fold(data, begin, end)
             continue
-        kind[count], blend[count], line[count] = OTHER, 0, number
-        span[count, 0], span[count, 1] = begin, end
+        line[count], span[count, 0], span[count, 1] = number, begin, end
         value[count, :] = np.nan
-        motion = -1
-        if _starts(data, begin, end, _LIN_WORD):
-            motion = LIN
-        elif _starts(data, begin, end, _PTP_WORD):
-            motion = PTP
-        if motion >= 0:
-            kind[count] = motion
-            behind, found = _components(data, _blank(data, begin + 3, end), end, value[count])
-            axes = found >= 256
-            if axes and motion == PTP:
-                kind[count] = PTP_AXES
-            if behind < 0 or (axes and (motion == LIN or found & 255)):
-                blend[count] = MALFORMED
-            else:
-                behind = _blank(data, behind, end)
-                if _starts(data, behind, end, _BLEND_WORD):
-                    blend[count] = 1
-                    behind = _blank(data, behind + 5, end)
-                if behind < end and data[behind] != 59:
-                    blend[count] = MALFORMED
-        else:
-            setting = -1
-            behind = begin
-            if _starts(data, begin, end, _VEL_WORD):
-                setting, behind = VEL_CP, begin + 7
-            elif _starts(data, begin, end, _CDIS_WORD):
-                setting, behind = APO_CDIS, begin + 9
-            elif _starts(data, begin, end, _WAIT_WORD):
-                second = _blank(data, begin + 4, end)
-                if second > begin + 4 and _starts(data, second, end, _SEC_WORD):
-                    setting, behind = WAIT_SEC, second + 3
-            else:
-                does = _trigger(data, begin, end, value[count])
-                if does > 0:
-                    kind[count], blend[count] = TRIGGER, does
-            if setting >= 0:
-                kind[count] = setting
-                behind = _blank(data, behind, end)
-                if setting != WAIT_SEC:
-                    if behind >= end or data[behind] != 61:
-                        blend[count] = MALFORMED
-                    behind = _blank(data, behind + 1, end)
-                behind, value[count, 0] = _number(data, behind, end)
-                behind = _blank(data, behind, end)
-                if np.isnan(value[count, 0]) or (behind < end and data[behind] != 59):
-                    blend[count] = MALFORMED
-                elif setting == WAIT_SEC and behind < end:
-                    blend[count] = _starts(data, _blank(data, behind + 1, end), end, _DWELL_WORD)
+        kind[count], blend[count] = _statement(data, begin, end, value[count])
         count += 1
     return count, too_long, not_ascii, folds

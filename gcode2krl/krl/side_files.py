@@ -1,4 +1,4 @@
-"""The files beside a program's ``.src``: data list, parts, sidecar; which of them is missing or is another.
+"""The files beside a program's ``.src``: data list, parts, sidecar; which is missing or of another program.
 
 A controller's Windows does not tell names by their case, so neither do we.
 """
@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from gcode2krl import krl_words as w
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.krl.read import KrlProgram
 
-_PART = re.compile(r"EXT\s+(\w+_\d{3,})\s*\(\s*\)", re.IGNORECASE)
+_PART = re.compile(rf"{w.EXT}\s+(\w+_\d{{3,}})\s*\(\s*\)", re.IGNORECASE)
 _COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
 _KEEP = "keep it beside the program, or translate again"
 
@@ -26,7 +27,7 @@ def beside(path: Path, suffix: str) -> Path:
 
 def declares_itself(program: KrlProgram) -> bool:
     """Tell whether a program brings its declarations, as on standard output, and needs no data list."""
-    return any(_normal(statement.text).startswith("EXTBAS(") for statement in program.declarations)
+    return any(_normal(statement.text).startswith(f"{w.EXT}{w.BAS}(") for statement in program.declarations)
 
 
 def missing_parts(program: KrlProgram, externals: Iterable[str]) -> list[Issue]:
@@ -35,7 +36,7 @@ def missing_parts(program: KrlProgram, externals: Iterable[str]) -> list[Issue]:
     there |= {external.split("(")[0].strip().casefold() for external in externals}
     named = ((_PART.match(statement.text), statement.line) for statement in program.declarations)
     return [
-        missing(f"{found[1]}.src", "krl-part", line, "the program calls it")
+        missing(f"{found[1]}{w.SOURCE_SUFFIX}", "krl-part", line, "the program calls it")
         for found, line in named
         if found and found[1].casefold() not in there
     ]
@@ -47,8 +48,8 @@ def missing(name: str, code: str, line: int, why: str) -> Issue:
 
 
 def data_issues(path: Path, program: KrlProgram, intended: bytes) -> Iterator[Issue]:
-    """Compare the data list beside a program with the intended one; its layout has no say."""
-    file = beside(path, ".dat")
+    """Compare the data list beside a program with the intended one; its layout does not matter."""
+    file = beside(path, w.DATA_SUFFIX)
     if not file.is_file():
         yield missing(file.name, "krl-data", 0, "the program has no declarations without it")
         return

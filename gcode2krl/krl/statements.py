@@ -7,6 +7,7 @@ from typing import Any
 import jinja2
 
 from gcode2krl import frames as fr
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, controller_axes, plain_view, template_rules
 from gcode2krl.cell import templates as cell_templates
@@ -24,12 +25,16 @@ def frame_text(matrix: Floats) -> str:
     """Return a transform (4, 4) as a KRL frame, mm and degrees."""
     abc = fr.abc_from_rotation(matrix[:3, :3]) * DEG_PER_RAD
     values = [*(fixed(v, 3) for v in matrix[:3, 3]), *(fixed(v, 4) for v in abc)]
-    return "{" + ",".join(f"{key} {value}" for key, value in zip("XYZABC", values, strict=True)) + "}"
+    return "{" + ",".join(f"{key} {value}" for key, value in zip(w.POSE_KEYS, values, strict=True)) + "}"
 
 
 def axes_text(q_deg: Floats) -> str:
     """Return joint angles (6,) in degrees as a KRL axis target."""
-    return "{" + ",".join(f"A{k} {fixed(angle, 4)}" for k, angle in enumerate(q_deg, start=1)) + "}"
+    return (
+        "{"
+        + ",".join(f"{key} {fixed(angle, 4)}" for key, angle in zip(w.AXIS_KEYS, q_deg, strict=True))
+        + "}"
+    )
 
 
 def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
@@ -40,7 +45,9 @@ def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
 def base_statement(cell: Cell) -> str:
     """Return the statement that sets ``$BASE``."""
     number = cell.frames.base_data
-    return f"BAS (#BASE,{number} )" if number is not None else f"$BASE={frame_text(cell.base_matrix())}"
+    if number is not None:
+        return f"{w.BAS} (#BASE,{number} )"
+    return f"{w.BASE}={frame_text(cell.base_matrix())}"
 
 
 def unnumbered(cell: Cell, tools: list[int]) -> str:
@@ -50,8 +57,8 @@ def unnumbered(cell: Cell, tools: list[int]) -> str:
     them at what ``BAS(#INITMOV,0)`` or the last number set (KUKA's BAS.SRC of KSS 8).
     """
     by_value = {
-        "$ACT_BASE": cell.frames.base_data is None,
-        "$ACT_TOOL": any(cell.tool[number].tool_data is None for number in tools),
+        w.ACT_BASE: cell.frames.base_data is None,
+        w.ACT_TOOL: any(cell.tool[number].tool_data is None for number in tools),
     }
     return ", ".join(name for name, stale in by_value.items() if stale)
 
@@ -60,7 +67,7 @@ def tool_statements(cell: Cell, number: int) -> str:
     """Return the statements that set ``$TOOL`` and ``$LOAD`` for a tool."""
     tool = cell.tool[number]
     if tool.tool_data is not None:
-        return f"BAS (#TOOL,{tool.tool_data} )"
+        return f"{w.BAS} (#TOOL,{tool.tool_data} )"
     load = cell.load
     if load.mass_kg is None:
         raise missing("load.mass_kg")
@@ -69,7 +76,7 @@ def tool_statements(cell: Cell, number: int) -> str:
     )
     inertia = f"J {{X {fixed(load.jx_kgm2, 4)},Y {fixed(load.jy_kgm2, 4)},Z {fixed(load.jz_kgm2, 4)}}}"
     load_text = f"{{M {fixed(load.mass_kg, 3)},{centre},{inertia}}}"
-    return f"$TOOL={frame_text(written_tool(cell, number))}\n$LOAD={load_text}"
+    return f"{w.TOOL}={frame_text(written_tool(cell, number))}\n{w.LOAD}={load_text}"
 
 
 def written_tool(cell: Cell, number: int) -> Floats:
@@ -83,7 +90,7 @@ def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
     if cell.frames.base_data is not None:
         checks.append(
             {
-                "variable": f"BASE_DATA[{cell.frames.base_data}]",
+                "variable": f"{w.BASE_DATA}[{cell.frames.base_data}]",
                 "inverse": frame_text(fr.invert(cell.base_matrix())),
             }
         )
@@ -92,7 +99,7 @@ def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
         if data is not None:
             checks.append(
                 {
-                    "variable": f"TOOL_DATA[{data}]",
+                    "variable": f"{w.TOOL_DATA}[{data}]",
                     "inverse": frame_text(fr.invert(written_tool(cell, number))),
                 }
             )
@@ -119,9 +126,14 @@ def event_statements(event: Event, cell: Cell) -> str:
         return f"; line {line}: M{code} HAS NO KRL IN THE CELL AND WAS RELEASED BY HAND"
     rpm = abs(event.values.get("rpm", 0.0))
     text = render(
-        cell, f"m_code.M{code}", rpm=rpm, m=code, p=event.values.get("p"),
-        text=ascii_text(event.values.get("text", "")), line=line,
-    )  # fmt: skip
+        cell,
+        f"m_code.M{code}",
+        rpm=rpm,
+        m=code,
+        p=event.values.get("p"),
+        text=ascii_text(event.values.get("text", "")),
+        line=line,
+    )
     return f"; {place}: M{code}" + (f" S{rpm:g}" if rpm else "") + f"\n{text}"
 
 

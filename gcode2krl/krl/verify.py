@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from gcode2krl import frames as fr
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.announce import pilot_forces
-from gcode2krl.krl.composition import SIDECAR, Layout, compose, turn_bits
+from gcode2krl.krl.composition import Layout, compose, turn_bits
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
-from gcode2krl.krl.pilot_text import SUBPROGRAM, PilotText
+from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
@@ -116,10 +117,10 @@ def verify_krl(
     layout = Layout(guard=program.guard, online=online, single_file=alone)
     expected = compose(targets, joints, cell, program.name, layout, pilot)
     if not alone:
-        issues += data_issues(Path(path), program, expected[f"{program.name}.dat"])
+        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"])
     if online:
         issues += rsi_file_issues(Path(path), online, expected)
-    intended = read_texts(expected, f"{program.name}.src")
+    intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
     return compare(program, targets, joints, cell, intended, issues, case)
 
 
@@ -134,7 +135,7 @@ def _pilot_of(program: KrlProgram, path: Path, cell: Cell) -> tuple[PilotText | 
     variable = _normal(cell.pilot.hash_variable)
     announced = any(_normal(statement.text).startswith(f"{variable}=") for statement in program.statements)
     announced |= len(program.triggers.motion) > 0
-    sidecar = beside(path, SIDECAR)
+    sidecar = beside(path, w.SIDECAR_SUFFIX)
     if not sidecar.is_file() or not announced:
         return None, announced
     knots, header = read_pilot(sidecar)
@@ -143,7 +144,7 @@ def _pilot_of(program: KrlProgram, path: Path, cell: Cell) -> tuple[PilotText | 
 
 
 def _no_sidecar(program: KrlProgram, path: Path) -> Issue:
-    name, lines = path.with_suffix(SIDECAR).name, program.triggers.line
+    name, lines = path.with_suffix(w.SIDECAR_SUFFIX).name, program.triggers.line
     why = "the pilot force that the program announces is not known to fit"
     return missing(name, "pilot-sidecar", int(lines[0]) if len(lines) else 0, why)
 
@@ -153,7 +154,9 @@ def _without_pilot(program: KrlProgram, cell: Cell) -> KrlProgram:
     own = (cell.pilot.index_variable, cell.pilot.hash_variable, f"{cell.pilot.value_variable}[")
     prefixes = tuple(_normal(name) for name in own)
     statements = tuple(s for s in program.statements if not _normal(s.text).startswith(prefixes))
-    uncalled = {key: text for key, text in program.uncalled.items() if not key.endswith(f"/{SUBPROGRAM}")}
+    uncalled = {
+        key: text for key, text in program.uncalled.items() if not key.endswith(f"/{w.PILOT_SUBPROGRAM}")
+    }
     return replace(program, statements=statements, uncalled=uncalled)
 
 
@@ -314,7 +317,7 @@ def _start_issues(program: KrlProgram, targets: Targets) -> list[Issue]:
 def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, ...]:
     """Return the declarations but those of the program's own parts, which depend on how it is split."""
     return tuple(
-        s for s in declarations if not re.match(r"EXT\s+\w+_\d{3,}\s*\(\s*\)", s.text, re.IGNORECASE)
+        s for s in declarations if not re.match(rf"{w.EXT}\s+\w+_\d{{3,}}\s*\(\s*\)", s.text, re.IGNORECASE)
     )
 
 

@@ -66,9 +66,14 @@ def windows_of(targets: Targets, chain: Chain, motion: Motion, cell: Cell) -> Wi
     total, path = float(arrive_mm[-1]) if len(arrive_mm) else 0.0, float(motion.path_mm[-1])
     if abs(total - path) > _SAME_PATH * max(total, 1.0):
         raise RefusedError(
-            Issue("error", "pilot-motion", 0, f"the motion is {path:.3f} mm long, the program {total:.3f} mm",
-                  "predict again")
-        )  # fmt: skip
+            Issue(
+                "error",
+                "pilot-motion",
+                0,
+                f"the motion is {path:.3f} mm long, the program {total:.3f} mm",
+                "predict again",
+            )
+        )
     scale = path / total if total > 0 else 1.0
     arrive_mm, leave_mm = arrive_mm * scale, leave_mm * scale
     stops = np.concatenate([[True], chain.stop])

@@ -8,11 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.composition import SIDECAR, Layout, compose
+from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
@@ -27,7 +28,6 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
 
-SUFFIX = ".src"
 _ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
@@ -96,15 +96,11 @@ def write_krl(
     NotUnderstoodError
         Where the output cannot be written or is an input, or a name or release is wrong.
     """
+    # the steps of writing in their order, kept together: most branches are the function's options
     targets, cell = (source.targets, source.cell) if isinstance(source, Prediction) else (source, cell)
     if cell is None:
         raise input_error("option-value", "write_krl needs a cell with Targets")
-    file: Path | None = None
-    issues: list[Issue] = []
-    if path is not None:
-        file, issues = program_file(path, name, targets.source, cell.program.externals)
-    elif name is not None:
-        _require_name(name, cell.program.externals)
+    file, issues = _named(path, name, targets.source, cell)
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
     if online is not None:
         _refuse_name(online, file)
@@ -126,12 +122,11 @@ def write_krl(
     bare = _Content(targets, joints)
     content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
     texts, report = _composed(content, cell, program_name, layout)
-    failed = [issue for issue in report.issues if issue.severity == "error"]
-    if pilot is None and failed and all(issue.code.startswith("pilot-") for issue in failed):
-        plan, content = left_out(failed[0]), bare
+    failure = _pilot_failure(report) if pilot is None else None
+    if failure is not None:
+        plan, content = left_out(failure), bare
         texts, report = _composed(content, cell, program_name, layout)
-    if plan is not None:
-        issues += released([plan] if isinstance(plan, Issue) else plan.issues, (), strict)
+    issues += released(_issues_of(plan), (), strict)
     targets = content.targets
     issues += released(_size_issues(texts, targets, cell), (), strict)
     if not report.ok:
@@ -163,7 +158,9 @@ def _composed(
     """Return the files of a program, and what reading them back finds."""
     targets, joints = content.targets, content.joints
     texts = compose(targets, joints, cell, name, layout, content.text)
-    return texts, compare(read_texts(texts, f"{name}.src"), targets, joints, cell, pilot=content.case)
+    return texts, compare(
+        read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
+    )
 
 
 def _pilot_plan(
@@ -189,6 +186,31 @@ def _pilot_plan(
     return plan_pilot(source, joints, form, sidecar, asked=asked)
 
 
+def _named(
+    path: str | Path | None, name: str | None, source: str, cell: Cell
+) -> tuple[Path | None, list[Issue]]:
+    """Return the file of a program, None where nothing is written, and what there is to say of its name."""
+    if path is not None:
+        return program_file(path, name, source, cell.program.externals)
+    if name is not None:
+        _require_name(name, cell.program.externals)
+    return None, []
+
+
+def _issues_of(plan: PilotPlan | Issue | None) -> Sequence[Issue]:
+    """Return what there is to say of a pilot force, or of its absence."""
+    if plan is None:
+        return ()
+    return [plan] if isinstance(plan, Issue) else plan.issues
+
+
+def _pilot_failure(report: VerifyReport) -> Issue | None:
+    """Return the first error of a program whose only errors are those of its pilot force, else None."""
+    failed = [issue for issue in report.issues if issue.severity == "error"]
+    alone = all(issue.code.startswith("pilot-") for issue in failed)
+    return failed[0] if failed and alone else None
+
+
 def _refuse_name(online: str, file: Path | None) -> None:
     """Raise where RSI files of that name cannot be written."""
     file_names(online)
@@ -200,13 +222,13 @@ def _refuse_name(online: str, file: Path | None) -> None:
 def output_files(file: Path, online: str | None) -> list[Path]:
     """Return the files that a program may consist of, but for its parts."""
     rsi = [file.with_name(name) for name in file_names(online)] if online is not None else []
-    return [file, file.with_suffix(".dat"), file.with_suffix(SIDECAR), *rsi]
+    return [file, file.with_suffix(w.DATA_SUFFIX), file.with_suffix(w.SIDECAR_SUFFIX), *rsi]
 
 
 def _place(file: Path, part: str, program_name: str) -> Path:
-    if part == f"{program_name}.src":
+    if part == f"{program_name}{w.SOURCE_SUFFIX}":
         return file
-    for suffix in (".dat", SIDECAR):
+    for suffix in (w.DATA_SUFFIX, w.SIDECAR_SUFFIX):
         if part == f"{program_name}{suffix}":
             return file.with_suffix(suffix)
     return file.with_name(part)
@@ -228,16 +250,18 @@ def program_file(
     place = Path(path)
     if name is not None:
         _require_name(name, taken)
-    if place.is_dir() and place.suffix.lower() != SUFFIX:
+    if place.is_dir() and place.suffix.lower() != w.SOURCE_SUFFIX:
         return _file_in(place, name, Path(_last_step(source)).stem, taken)
-    if place.suffix.lower() != SUFFIX:
+    if place.suffix.lower() != w.SOURCE_SUFFIX:
         sentence = f"the output {place.name!r} does not end in .src and is no folder"
         raise input_error("option-value", sentence, "name it part.src, or create the folder first")
     problem = name_problem(place.stem, taken)
     good = suggested_name(name if name is not None else place.stem, taken)
     if problem:
         sentence = f"{place.stem!r} cannot be a program's name: {problem}{_ALIKE}"
-        raise input_error("krl-name", sentence, f"-o {place.with_name(good)}.src", source=place.name)
+        raise input_error(
+            "krl-name", sentence, f"-o {place.with_name(good)}{w.SOURCE_SUFFIX}", source=place.name
+        )
     if name is not None and name.upper() != place.stem.upper():
         sentence = f"--name {name} and the file {place.name} differ{_ALIKE}"
         remedy = f"-o {place.with_name(name)}.src, or leave out --name"
@@ -248,13 +272,13 @@ def program_file(
 def _file_in(folder: Path, name: str | None, stem: str, taken: Sequence[str]) -> tuple[Path, list[Issue]]:
     """Return the file in a folder, of a given name or of one made from a stem."""
     if name is not None:
-        return folder / f"{name}{SUFFIX}", []
+        return folder / f"{name}{w.SOURCE_SUFFIX}", []
     problem = name_problem(stem, taken)
     if not problem:
-        return folder / f"{stem}{SUFFIX}", []
+        return folder / f"{stem}{w.SOURCE_SUFFIX}", []
     good = suggested_name(stem, taken)
     sentence = f"the program is called {good}: {stem!r} cannot be a program's name ({problem})"
-    return folder / f"{good}{SUFFIX}", [
+    return folder / f"{good}{w.SOURCE_SUFFIX}", [
         Issue("note", "krl-name", 0, sentence, "or choose a name with --name")
     ]
 
@@ -278,16 +302,18 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
 
 
 def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
-    program = (text for name, text in texts.items() if not name.endswith((SIDECAR, ".xml")))
+    program = (text for name, text in texts.items() if not name.endswith((w.SIDECAR_SUFFIX, ".xml")))
     size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []
     return [
         Issue(
-            "warning", "program-large", 0,
+            "warning",
+            "program-large",
+            0,
             f"{size_mb:.1f} MB, {motions} LIN: more than controllers are known to hold "
             f"({cell.program.warn_size_mb:g} MB, {cell.program.memory_moves} LIN)",
             "use --split files, a larger arc chord tolerance, or split the job in the CAM",
         )
-    ]  # fmt: skip
+    ]

@@ -25,11 +25,25 @@ def errors(text, head=HEAD):
 @pytest.mark.parametrize(
     "fault",
     [
-        "G41 D1 G1 X10", "G1 X10 E5", "G1 X10 $", "G1 X10 (open", "G1 X10 G187", "X10 G1 A5",
-        "G1 X10 T1.5", "G1 X10 S-1", "G1 X10 M66 P1", "G1 X10 G64 P-1", "G0 G1 X10", "G1 X10 F#1",
-        "G4 P-1 G1 X10", "G1 X10 N5", "N10.G1 X10", "G1 X10 [", "G1 X10 J5",
+        "G41 D1 G1 X10",
+        "G1 X10 E5",
+        "G1 X10 $",
+        "G1 X10 (open",
+        "G1 X10 G187",
+        "X10 G1 A5",
+        "G1 X10 T1.5",
+        "G1 X10 S-1",
+        "G1 X10 M66 P1",
+        "G1 X10 G64 P-1",
+        "G0 G1 X10",
+        "G1 X10 F#1",
+        "G4 P-1 G1 X10",
+        "G1 X10 N5",
+        "N10.G1 X10",
+        "G1 X10 [",
+        "G1 X10 J5",
     ],
-)  # fmt: skip
+)
 def test_a_correct_arc_behind_a_refused_block_is_not_blamed(fault):
     found = errors(f"{fault}\nG2 X20 I5 F100\nG3 X10 Y0 I-5\nM2\n")
     assert [line for _, line in found] == [3]
@@ -154,9 +168,30 @@ def test_lines_left_out_by_block_delete_keep_later_findings_right():
 
 
 BLOCKS = [
-    "G1 X1", "G2 X5 I2", "I1", "G81 X1 Z-1 R1", "X#1", "G0 X0 Y0 Z0", "Y[2]", "$", "G91", "G20", "F10",
-    "O1 if [1]", "A1", "N1.G2", "G18", "K0", "M98 P1", "G90.1", "Z5 (a", "G93", "M6", "G4 P#2", "X9 E1",
-]  # fmt: skip
+    "G1 X1",
+    "G2 X5 I2",
+    "I1",
+    "G81 X1 Z-1 R1",
+    "X#1",
+    "G0 X0 Y0 Z0",
+    "Y[2]",
+    "$",
+    "G91",
+    "G20",
+    "F10",
+    "O1 if [1]",
+    "A1",
+    "N1.G2",
+    "G18",
+    "K0",
+    "M98 P1",
+    "G90.1",
+    "Z5 (a",
+    "G93",
+    "M6",
+    "G4 P#2",
+    "X9 E1",
+]
 
 
 @settings(max_examples=150, deadline=None)

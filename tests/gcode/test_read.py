@@ -46,9 +46,17 @@ def test_events_stand_at_the_row_where_the_tool_stands():
     toolpath = read("G21 (MSG, look out)\nT3 M6\nS500 M3 M8\nG0 X1 Y1 Z1\nS700\nM7\nG0 X2\nM0\nM30\n")
     kinds = [(event.row, event.kind, event.values.get("m")) for event in toolpath.events]
     assert kinds == [
-        (0, "message", -1), (0, "tool", None), (0, "spindle", 3), (0, "coolant", 8), (1, "spindle", 3),
-        (1, "coolant", 7), (2, "message", 0), (2, "message", 30), (2, "spindle", 5), (2, "coolant", 9),
-    ]  # fmt: skip
+        (0, "message", -1),
+        (0, "tool", None),
+        (0, "spindle", 3),
+        (0, "coolant", 8),
+        (1, "spindle", 3),
+        (1, "coolant", 7),
+        (2, "message", 0),
+        (2, "message", 30),
+        (2, "spindle", 5),
+        (2, "coolant", 9),
+    ]
     assert toolpath.events[0].values["text"] == "look out"
     assert toolpath.events[5].values["flood"]
     assert toolpath.events[5].values["mist"]
@@ -75,9 +83,12 @@ def test_chords_of_an_arc_share_a_number_and_end_exactly():
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.floats(0.01, 500), st.floats(0, 2 * np.pi), st.floats(0.05, 2 * np.pi - 0.05), st.booleans(),
+    st.floats(0.01, 500),
+    st.floats(0, 2 * np.pi),
+    st.floats(0.05, 2 * np.pi - 0.05),
+    st.booleans(),
     st.sampled_from([0.001, 0.01, 0.1]),
-)  # fmt: skip
+)
 def test_chords_stay_within_the_tolerance(radius, start, sweep, ccw, tolerance):
     end = start + sweep if ccw else start - sweep
     x0, y0 = radius * np.cos(start), radius * np.sin(start)

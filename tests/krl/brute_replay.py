@@ -407,6 +407,10 @@ def _move(lines, k):
     way = line.pose.translation - start.translation
     length = float(np.linalg.norm(way))
     return Move(
-        start.translation, way / max(length, 1e-300), length, line.speed_mm_s, line.acceleration_mm_s2,
+        start.translation,
+        way / max(length, 1e-300),
+        length,
+        line.speed_mm_s,
+        line.acceleration_mm_s2,
         line.cdis_mm if line.blend else 0.0,
-    )  # fmt: skip
+    )

@@ -147,9 +147,16 @@ class Kr300:
 
     def __init__(self) -> None:
         model = opw.KinematicModel(
-            a1=350, a2=41, b=0, c1=675, c2=1150, c3=1000, c4=240,
-            offsets=(0, -90, 0, 0, 0, 0), flip_axes=(True, False, False, True, False, True),
-        )  # fmt: skip
+            a1=350,
+            a2=41,
+            b=0,
+            c1=675,
+            c2=1150,
+            c3=1000,
+            c4=240,
+            offsets=(0, -90, 0, 0, 0, 0),
+            flip_axes=(True, False, False, True, False, True),
+        )
         self.solver = opw.Robot(model, degrees=True)
 
     def forward(self, joints_deg: np.ndarray) -> RigidTransform:

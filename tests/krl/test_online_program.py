@@ -180,8 +180,12 @@ def test_settings_of_the_cell_reach_program_and_files(make, cycle_s):
 def test_the_retract_is_along_the_tool_axis_of_the_controller(online, cell, axis):
     turned = cell.tool_matrix(1) @ np.linalg.inv(controller_axes(axis))
     a, b, c = np.degrees(abc_from_rotation(turned[:3, :3])).tolist()
-    frame = {**dict(zip(("x_mm", "y_mm", "z_mm"), turned[:3, 3].tolist(), strict=True)),
-             "a_deg": a, "b_deg": b, "c_deg": c}  # fmt: skip
+    frame = {
+        **dict(zip(("x_mm", "y_mm", "z_mm"), turned[:3, 3].tolist(), strict=True)),
+        "a_deg": a,
+        "b_deg": b,
+        "c_deg": c,
+    }
     text = text_of(online(data={"tool": {"1": {"tool_data": 5, "axis": axis, "frame": frame}}}))
     size = {"+": "50.000", "-": "-50.000"}[axis[0]]
     assert f"LIN_REL {{{axis[1].upper()} {size}}} #TOOL" in text
@@ -305,7 +309,8 @@ TAMPERINGS = {
     "OFF before the last retract": (move(r"^INTERRUPT OFF", r"^LIN \{", -1, 6), "rsi-place"),
     "OFF after HOME": (move(r"^INTERRUPT OFF", r"^END\s*$", 0, 6), "rsi-place"),
     "OFF behind a blended corner": (
-        change(r"^(LIN \{.*Z 100.000.*\})", lambda text: text + " C_DIS", -1), "rsi-place"
+        change(r"^(LIN \{.*Z 100.000.*\})", lambda text: text + " C_DIS", -1),
+        "rsi-place",
     ),
     "relative": (change(r"RSI_ON\((#ABSOLUTE)", lambda _: "#RELATIVE"), "rsi-mode"),
     "default mode": (change(r"RSI_ON\((.*)\)", lambda _: ""), "rsi-mode"),
@@ -330,7 +335,7 @@ TAMPERINGS = {
     "RSI off in the interrupt": (insert("GK_RSI_RET=RSI_OFF()", r"^BRAKE"), "rsi-ready"),
     "declaration": (delete(r"^DECL INT GK_RSI_RET"), "verify-statement"),
     "subprogram": (change(r"^DEF (GK_RSI_LOST)", lambda _: "GK_RSI_GONE"), "rsi-ready"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", TAMPERINGS)

@@ -268,7 +268,7 @@ TAMPERINGS = {
     "a target by a micrometre": (edit(TARGET, "LIN {X 20.001,Y 40"), "pilot-checksum"),
     "a target by more": (edit(TARGET, "LIN {X 20.010,Y 40"), "verify-position"),
     "speed": (edit(r"^\$VEL\.CP=(0\.0250000)", "0.0240000"), "verify-speed"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", TAMPERINGS)
@@ -321,7 +321,7 @@ def test_tampering_with_values_is_noticed(made, name):
         lambda text: text.replace("PRIO=-1", " PRIO = -1").replace("$SEN_PINT[1]=", "$SEN_PINT[1] = "),
     ],
     ids=["lower case", "comments", "spaces", "spaces behind"],
-)  # fmt: skip
+)
 def test_equal_program_by_hand_verifies(made, form, change):
     prediction, _, src = made(pilot=form)
     text = src.read_bytes().decode("ascii")
@@ -357,7 +357,7 @@ def head(pattern, new):
         (head("form=index", "form=values"), "pilot-form"),
     ],
     ids=["force", "lead", "knot deleted", "checksum", "form"],
-)  # fmt: skip
+)
 def test_changed_sidecar_is_noticed(made, tmp_path, change, code):
     prediction, _, src = made()
     file = tmp_path / "part.pilot.csv"
@@ -396,8 +396,13 @@ def test_figures_for_other_programs(made):
     prediction, program, src = made()
     figures = program.pilot.as_dict()
     assert set(figures) == {
-        "knots", "tolerance_N", "max_error_N", "rms_error_N", "min_lead_s", "max_active",
-    }  # fmt: skip
+        "knots",
+        "tolerance_N",
+        "max_error_N",
+        "rms_error_N",
+        "min_lead_s",
+        "max_active",
+    }
     assert program.report.as_dict()["pilot"] == figures
     read_back = verify_krl(src, prediction.toolpath, prediction.cell).as_dict()["pilot"]
     assert read_back["max_error_N"] is None

@@ -76,10 +76,13 @@ def test_what_is_switched_on_at_home_is_switched_off_after_it(make):
 # --- base and tool without a number -----------------------------------------------------------------------
 
 FRAME = {"x_mm": 250.0, "y_mm": 0.0, "z_mm": 250.0, "a_deg": 0.0, "b_deg": -90.0, "c_deg": 0.0}
-NUMBERED_TOOL = {"1": {"diameter_mm": 16.0, "teeth": 3, "length_mm": 100.0, "tool_data": 4, "axis": "+z",
-                       "frame": FRAME}}  # fmt: skip
-NUMBERED_BASE = {"base": {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 0.0, "b_deg": 0.0,
-                          "c_deg": 0.0}, "base_data": 3}  # fmt: skip
+NUMBERED_TOOL = {
+    "1": {"diameter_mm": 16.0, "teeth": 3, "length_mm": 100.0, "tool_data": 4, "axis": "+z", "frame": FRAME}
+}
+NUMBERED_BASE = {
+    "base": {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0},
+    "base_data": 3,
+}
 
 
 @pytest.mark.parametrize("numbered_base", [False, True])

@@ -29,9 +29,16 @@ def run(request, tmp_path_factory):
     robot = Kr300()
     rows, joints = replay_joints(program, robot, THINNED.get(part.stem, 1))
     return SimpleNamespace(
-        cell=cell, toolpath=toolpath, targets=targets, program=program, motions=program.motions, robot=robot,
-        rows=rows, joints=joints, paired=pair(toolpath, program.motions, cell.clearance_z_mm),
-    )  # fmt: skip
+        cell=cell,
+        toolpath=toolpath,
+        targets=targets,
+        program=program,
+        motions=program.motions,
+        robot=robot,
+        rows=rows,
+        joints=joints,
+        paired=pair(toolpath, program.motions, cell.clearance_z_mm),
+    )
 
 
 def pair(toolpath, motions, clearance_mm):

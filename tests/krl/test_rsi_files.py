@@ -36,9 +36,11 @@ def test_channels_of_both_files_fit(mode, form):
     assert all(w.get("OutObjID") in flow for w in wires)
     received = {int(e.get("INDX")): e.get("TAG") for e in root.iter("ELEMENT") if e.get("HOLDON")}
     wired = {
-        (name, int(w.get("OutIdx"))) for name, one in flow.items() for w in one.iter("Input")
+        (name, int(w.get("OutIdx")))
+        for name, one in flow.items()
+        for w in one.iter("Input")
         if w.get("OutObjID") == "ETHERNET1"
-    }  # fmt: skip
+    }
     assert {index for _, index in wired} == set(received)
     assert received[7] == "Ready"
     corrects = "POSCORR1" if mode == "cartesian" else "AXISCORR1"
@@ -74,22 +76,33 @@ def test_limits_stand_in_the_controllers_files_too():
 
 
 def test_both_files_say_what_the_cell_says():
-    own = resolve_cell({"based_on": "demonstration",
-        "online": {
-            "most_mm": 1.25,
-            "link": {
-                "address": "192.168.7.3", "port": 50123, "sensor_type": "Mine", "timeout_cycles": 3,
-                "decimals": 6, "t1_output": 41, "ready_output": 42,
+    own = resolve_cell(
+        {
+            "based_on": "demonstration",
+            "online": {
+                "most_mm": 1.25,
+                "link": {
+                    "address": "192.168.7.3",
+                    "port": 50123,
+                    "sensor_type": "Mine",
+                    "timeout_cycles": 3,
+                    "decimals": 6,
+                    "t1_output": 41,
+                    "ready_output": 42,
+                },
             },
-        },
-        "pilot": {"index_variable": "$SEN_PINT[7]", "hash_variable": "$SEN_PINT[9]"},
-    })  # fmt: skip
+            "pilot": {"index_variable": "$SEN_PINT[7]", "hash_variable": "$SEN_PINT[9]"},
+        }
+    )
     texts = rsi_texts("RSI_7", own.online, own.pilot, "index")
     assert list(texts) == ["RSI_7_ETH.xml", "RSI_7.rsi.xml"]
     config = ET.fromstring(texts["RSI_7_ETH.xml"]).find("CONFIG")
     assert {e.tag: e.text for e in config} == {
-        "IP_NUMBER": "192.168.7.3", "PORT": "50123", "SENTYPE": "Mine", "ONLYSEND": "FALSE",
-    }  # fmt: skip
+        "IP_NUMBER": "192.168.7.3",
+        "PORT": "50123",
+        "SENTYPE": "Mine",
+        "ONLYSEND": "FALSE",
+    }
     flow = {one.get("ObjID"): parameters(one) for one in ET.fromstring(texts["RSI_7.rsi.xml"].encode())}
     assert flow["ETHERNET1"] == {"ConfigFile": "RSI_7_ETH.xml", "Timeout": "3", "Precision": "6"}
     assert flow["DIGOUT1"]["Index"] == "41"

@@ -48,13 +48,12 @@ CHANGES = {
     "another name": (lambda t: t.replace("DEFDAT PART", "DEFDAT PARTS"), "krl-data"),
     "public": (lambda t: t.replace("DEFDAT PART", "DEFDAT PART PUBLIC"), "krl-data"),
     "a variable added": (lambda t: t.replace("ENDDAT", "DECL INT I=1\r\nENDDAT"), "krl-data"),
-    "lines swapped": (
-        lambda t: t.replace("ENDDAT", "").replace("DEFDAT", "ENDDAT\r\nDEFDAT"), "krl-data"),
+    "lines swapped": (lambda t: t.replace("ENDDAT", "").replace("DEFDAT", "ENDDAT\r\nDEFDAT"), "krl-data"),
     "a fold open": (lambda t: t.replace(";ENDFOLD (BASISTECH EXT)", "; nothing"), "krl-structure"),
     "cut off": (lambda t: t[: t.index("ENDDAT")], "krl-data"),
     "empty": (lambda t: "", "krl-data"),
     "not ASCII": (lambda t: t.replace("ENDDAT", "; größe\r\nENDDAT"), "krl-not-ascii"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -71,9 +70,14 @@ def test_a_changed_data_list_is_noticed(make, name):
 
 @pytest.mark.parametrize(
     "change",
-    [str.lower, lambda t: t.replace("\r\n", "\n"), lambda t: t.replace(" :IN", ":IN"),
-     lambda t: t.replace("ENDDAT", "; by hand\r\nENDDAT ; the end"), lambda t: "\r\n" + t],
-)  # fmt: skip
+    [
+        str.lower,
+        lambda t: t.replace("\r\n", "\n"),
+        lambda t: t.replace(" :IN", ":IN"),
+        lambda t: t.replace("ENDDAT", "; by hand\r\nENDDAT ; the end"),
+        lambda t: "\r\n" + t,
+    ],
+)
 def test_a_data_list_laid_out_anew_is_the_same(make, change):
     made = make()
     data = made.src.with_suffix(".dat")

@@ -137,7 +137,7 @@ TAMPERINGS = {
     "DEF renamed": (change(r"^DEF (PART)", lambda _: "OTHER"), None),
     "END missing": (delete(r"^END\s*$"), "krl-structure"),
     "second INITMOV": (insert("BAS (#INITMOV,0 )", LIN), "krl-initmov"),
-}  # fmt: skip
+}
 SOMEWHERE_IN_THE_FILE = {"krl-structure", "krl-initmov"}
 NEXT_MOTION = {"VEL.CP by 1 %", "VEL.CP deleted", "APO.CDIS", "dwell", "dwell deleted", "LIN deleted"}
 """Noticed at a motion that the changed line has a say in, not at the line itself."""
@@ -255,7 +255,7 @@ REWRITINGS = {
     ),
     "fewer zeros": lambda text: re.sub(r"(?m)(?<= 0)\.0+(?=[,}]\S* ?C_DIS)", "", text),
     "more zeros": lambda text: text.replace("X 40.000", "X +040.0000"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REWRITINGS)

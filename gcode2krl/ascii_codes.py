@@ -1,0 +1,23 @@
+"""Bytes of ASCII by name, for the compiled scanners of G-code and of KRL: a kernel has no characters.
+
+Plain module constants: numba puts their values into the compiled code.
+"""
+
+TAB, NEWLINE, RETURN, SPACE = 9, 10, 13, 32
+END_OF_TAPE = 26
+"""Control-Z, which old editors put behind the last line of a file."""
+EXCLAMATION, HASH, PERCENT, AMPERSAND = 33, 35, 37, 38
+PAREN_OPEN, PAREN_CLOSE = 40, 41
+PLUS, COMMA, MINUS, POINT, SLASH = 43, 44, 45, 46, 47
+DIGIT_0, DIGIT_1, DIGIT_6, DIGIT_9 = 48, 49, 54, 57
+SEMICOLON, LESS, EQUALS, GREATER = 59, 60, 61, 62
+LETTER_A, LETTER_C, LETTER_F, LETTER_G, LETTER_I, LETTER_K = 65, 67, 70, 71, 73, 75
+LETTER_M, LETTER_N, LETTER_O, LETTER_R, LETTER_S, LETTER_T = 77, 78, 79, 82, 83, 84
+LETTER_X, LETTER_Y, LETTER_Z = 88, 89, 90
+BRACKET_OPEN, BRACKET_CLOSE = 91, 93
+SMALL_A, SMALL_G, SMALL_M, SMALL_S, SMALL_Z = 97, 103, 109, 115, 122
+BRACE_OPEN, BRACE_CLOSE = 123, 125
+CASE_BIT = 32
+"""Set in small letters, not set in capitals."""
+FIRST_FOREIGN = 128
+"""Bytes from here on are not ASCII."""

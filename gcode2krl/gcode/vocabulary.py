@@ -1,0 +1,69 @@
+"""The words of the dialect (LinuxCNC's RS274/NGC) by name: letters, G and M numbers, modal groups.
+
+Plain module constants: numba puts their values into the compiled code. In the kernels a G number is ten
+times its value, so that G28.1 is a whole number, 281; an M number is its value.
+"""
+
+from gcode2krl.ascii_codes import LETTER_A
+
+LETTERS = 26
+
+
+def index_of(letter: str) -> int:
+    """Return the place of a capital letter in arrays by letter (26,): A is 0."""
+    return ord(letter) - LETTER_A
+
+
+WORD_E, WORD_F, WORD_H, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (index_of(letter) for letter in "EFHPQRST")
+WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
+WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
+OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
+"""Rotary and secondary axes."""
+
+TENFOLD = 10
+LARGEST_G = 999
+"""Largest G number in the kernels, G99.9."""
+LARGEST_M = 9999
+
+G0 = 0
+G4 = 40  # dwell
+G5, G7, G8, G10 = 50, 70, 80, 100  # splines, lathe diameter and radius, offsets
+G20 = 200  # inch; else mm
+G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
+G33 = 330  # spindle-synchronised motion
+G38 = 380  # probing, G38.2 to G38.5
+G41 = 410  # cutter radius compensation, G41 to G42.1
+G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
+G52, G53 = 520, 530  # local offset, machine coordinates
+G54, G59 = 540, 590  # the first work offset, and the last before G59.1
+G64 = 640  # blending; else exact stop
+G70, G73, G76, G81 = 700, 730, 760, 810  # lathe cycles, chip-breaking drilling, threading, drilling cycles
+G80 = 800  # ends the motion mode
+G90 = 900  # absolute distances; else incremental
+G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
+G92, G96 = 920, 960  # coordinate shift, constant surface speed
+
+M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change
+M3, M4, M5 = 3, 4, 5  # spindle clockwise, counter-clockwise, off
+M6 = 6  # tool change
+M7, M9 = 7, 9  # mist, both off; M8 between them is flood
+M19 = 19  # spindle orientation
+M48, M53 = 48, 53  # overrides, M48 to M53
+M61, M62, M70, M72, M73 = 61, 62, 70, 72, 73  # tool number, inputs and outputs, modal state
+M98, M99 = 98, 99  # subprograms
+
+MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3
+"""Motion modes of the state: none after G80 and before the first motion code, else the G number."""
+PLANE_XY, PLANE_ZX = 17, 18
+"""Planes of the state: the G number; 19 is Y Z."""
+INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
+"""Feed modes of the state: the G number."""
+
+NON_MODAL, MOTION, PLANE, DISTANCE, CENTRE, FEED_MODE, UNIT = range(7)
+RADIUS_COMPENSATION, LENGTH_OFFSET, RETRACT, WORK_OFFSET, PATH_CONTROL, SPINDLE_MODE = range(7, 13)
+GROUPS = 13
+"""Modal groups of G-codes, numbered in the order of the tables in `state`."""
+M_STOP, M_TOOL_CHANGE, M_SPINDLE, M_COOLANT, M_OVERRIDE = 4, 6, 7, 8, 9
+"""Modal groups of M-codes as RS274/NGC numbers them; M-codes of no group are 0."""
+M_CODES = 4
+"""M-codes that a block may have."""

@@ -1,0 +1,59 @@
+"""KRL words, ASCII codes and G numbers stand once; the read-back shares only words with the writer."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import gcode2krl
+from gcode2krl import krl_words
+
+PACKAGE = Path(gcode2krl.__file__).parent
+KERNELS = ["gcode/words.py", "gcode/block_words.py", "gcode/machine.py", "gcode/motion.py",
+           "gcode/settings.py", "krl/scan.py"]  # fmt: skip  # one list of files
+WRITERS = {"composition", "number_text", "statements", "pilot_text", "rsi_text", "write", "provenance"}
+SHORTEST_WORD = 4
+
+
+def nodes(file, kind):
+    """Return the nodes of a kind in a file of the package."""
+    tree = ast.parse((PACKAGE / file).read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, kind)]
+
+
+@pytest.mark.parametrize("file", KERNELS)
+def test_kernels_compare_with_names_instead_of_codes(file):
+    """A byte or a G number is at least 10; smaller numbers are counts and signs."""
+    bare = [
+        (node.lineno, side.value)
+        for node in nodes(file, ast.Compare)
+        for side in (node.left, *node.comparators)
+        if isinstance(side, ast.Constant) and isinstance(side.value, int) and 10 <= side.value < 0x80
+    ]
+    assert bare == []
+
+
+def words_of_krl():
+    """Return the words of the vocabulary that are long enough to be no English ones."""
+    values = [value for name, value in vars(krl_words).items() if name.isupper()]
+    return {value for value in values if isinstance(value, str) and len(value) >= SHORTEST_WORD}
+
+
+def test_no_other_module_states_a_word_of_the_vocabulary():
+    files = [*sorted((PACKAGE / "krl").glob("*.py")), *PACKAGE.rglob("template_rules.py")]
+    words = words_of_krl()
+    again = {
+        (file.name, node.value)
+        for file in files
+        for node in nodes(file.relative_to(PACKAGE), ast.Constant)
+        if isinstance(node.value, str) and node.value in words
+    }
+    assert {"$VEL.CP", "GK_PILOT", ".pilot.csv"} <= words
+    assert again == set()
+
+
+@pytest.mark.parametrize("file", ["krl/scan.py", "krl/read.py"])
+def test_reading_back_imports_nothing_of_the_writer(file):
+    modules = {(node.module or "").split(".")[-1] for node in nodes(file, ast.ImportFrom)}
+    names = {alias.name for node in nodes(file, ast.ImportFrom) for alias in node.names}
+    assert (modules | names) & WRITERS == set()
