@@ -76,7 +76,7 @@ def with_effects(
     """Return the prediction with effects; what instruments see is at the prediction's own times.
 
     Motion and Joints stay what is commanded, planned anew where an effect does that; Forces are the true
-    ones; the deflection is all that parts the tip from its commanded place; ``added`` holds the columns of
+    ones; the deflection is the whole way from the commanded place to the tip; ``added`` holds the columns of
     the motor side, of what is behind the gears, and of the force sensor.
     """
     if not applied:
@@ -167,7 +167,7 @@ def _forces(signals: Signals, nominal: Forces | None) -> Forces | None:
 
 
 def _deflection(signals: Signals, prediction: Prediction) -> Deflection:
-    """Return what parts the tip from its commanded place, and its correction normal to the feed (eq. 10)."""
+    """Return the way from the commanded place to the tip, and its correction normal to the feed (eq. 10)."""
     inputs = signals.inputs
     deflection = signals.seen("tcp_base_mm") - inputs.position_mm
     before = prediction.deflection

@@ -85,9 +85,17 @@ def bend(
     tips = model.tips(cell, tool, len(q_rad))
     base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
     chain.displaced_rows(
-        _frozen(q_rad), _frozen(force_N), _frozen(moment_Nmm), model.frames(cell), softness, base,
-        tips.position_mm, tips.tool, shift, turn if turned else turn[:0],
-    )  # fmt: skip
+        _frozen(q_rad),
+        _frozen(force_N),
+        _frozen(moment_Nmm),
+        model.frames(cell),
+        softness,
+        base,
+        tips.position_mm,
+        tips.tool,
+        shift,
+        turn if turned else turn[:0],
+    )
     return shift, turn
 
 

@@ -8,25 +8,25 @@ from gcode2krl.cell.sections import LinearEdge, Material, Tool
 _KIENZLE = {"radial": "radial_ratio", "axial": "axial_ratio"}
 
 
-def with_scaled_part(cell: Cell, part: str, scale: float) -> Cell:
-    """Return the cell with the tangential, radial or axial part of the force law scaled.
+def with_scaled_direction(cell: Cell, direction: str, scale: float) -> Cell:
+    """Return the cell with the tangential, radial or axial direction of the force law scaled.
 
     In Kienzle's law the radial and axial forces are shares of the tangential one, scaled here so that the
-    other two parts stay as they are.
+    other two stay as they are.
     """
     material = cell.material
     if material is None:
         return cell
     if material.kienzle is not None:
         law = material.kienzle
-        if part == "tangential":
+        if direction == "tangential":
             change = {"kc11": law.kc11 * scale} | {
                 name: getattr(law, name) / scale for name in _KIENZLE.values()
             }
         else:
-            change = {_KIENZLE[part]: getattr(law, _KIENZLE[part]) * scale}
+            change = {_KIENZLE[direction]: getattr(law, _KIENZLE[direction]) * scale}
         return _with_material(cell, material.model_copy(update={"kienzle": law.model_copy(update=change)}))
-    letter = part[0]
+    letter = direction[0]
     return _with_edge(cell, {f"K{letter}c": scale, f"K{letter}e": scale})
 
 
@@ -39,14 +39,18 @@ def edge_only(material: Material) -> Material:
     """Return the material with nothing but its edge forces; Kienzle's law has none."""
     law = material.linear_edge
     edges = LinearEdge(
-        Ktc=0.0, Krc=0.0, Kac=0.0,
-        Kte=law.Kte if law else 0.0, Kre=law.Kre if law else 0.0, Kae=(law.Kae or 0.0) if law else 0.0,
-    )  # fmt: skip
+        Ktc=0.0,
+        Krc=0.0,
+        Kac=0.0,
+        Kte=law.Kte if law else 0.0,
+        Kre=law.Kre if law else 0.0,
+        Kae=(law.Kae or 0.0) if law else 0.0,
+    )
     return material.model_copy(update={"linear_edge": edges, "kienzle": None})
 
 
 def with_larger_tools(cell: Cell, offset_mm: float) -> Cell:
-    """Return the cell with all cutters larger in diameter; a corner radius stays within the half of it."""
+    """Return the cell with all cutters larger in diameter; a corner radius stays within half of it."""
     return cell.model_copy(update={"tool": {n: _larger(tool, offset_mm) for n, tool in cell.tool.items()}})
 
 

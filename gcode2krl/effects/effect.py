@@ -2,12 +2,13 @@
 
 An effect is one physical thing that the nominal model leaves out. It overrides the hooks of the stages it
 touches; `chain.simulate` calls them in the order of the physics, each with the signal so far, and each
-returns the signal with the effect. A hook never changes an array it is given.
+returns the signal with the effect. A hook never changes an array it is given. What a diagnosis must know of
+an effect is stated here too, so that no other module knows it by its name.
 """
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
@@ -17,6 +18,9 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role
 
 if TYPE_CHECKING:
     from gcode2krl.effects.inputs import Inputs
@@ -30,7 +34,6 @@ Load = tuple[Floats, Floats]
 LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
 JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 NO_TARGET: tuple[Target, ...] = (None,)
-DIRECTION = ("direction_x", "direction_y", "direction_z")
 _DOWNSTREAM = {
     "timing": "path",
     "path": "servo",
@@ -39,35 +42,9 @@ _DOWNSTREAM = {
     "force": "mechanics",
     "mechanics": "part",
 }
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of an effect, in the unit that its name carries."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    """Plausible range: the bounds of a fit."""
-    nominal: float | None
-    """Value at which the effect is not there; NaN = the model's own value (see `Effect.nominal`), None = the
-    parameter only shapes an effect whose size another one gives."""
-    start: float
-    """A typical value: where a fit begins, and what a shape takes when it is not given."""
-    source: str
-    """Where the plausible range comes from."""
-    linear: bool = False
-    """True where the signals are proportional to (value - nominal), exactly or for small values."""
-    grid: tuple[float, ...] = ()
-    """Values of a shape from which a search should begin."""
-    minimum: float = -math.inf
-    """Below this the effect has no meaning; such a value is refused."""
-
-    @property
-    def is_shape(self) -> bool:
-        """Tell whether the parameter gives a form, not a size."""
-        return self.nominal is None
+_MODELLED = ("timing", "force", "mechanics")
+"""Links behind which the model's signal stays at work when they are measured. Behind the others the measured
+joints replace it: the mismatch of a drive is then in the data."""
 
 
 @dataclass(frozen=True)
@@ -130,16 +107,24 @@ class Effect:
     direction: tuple[str, str, str] | None = None
     """Three parameters that are a direction only: their length does not matter, the size has its own."""
     searched_in: frozenset[str] = frozenset()
-    """Links in which a slip is tried as a cause is."""
+    """Links in which a slip is tried like a cause."""
     is_clock: bool = False
     """It is the clock of a table, or of some of its columns: the target says which."""
     own_model: bool = False
     """The controller moves by a model of the robot other than the cell's: joints differ, the tip does not."""
+    where: frozenset[Where] = frozenset()
+    depends_on: frozenset[Dependence] = frozenset()
+    """Of what it is a function; with ``where`` its family. Empty: not stated."""
+    is_nuisance: bool = False
+    """Its usual size is at work in every run, the same in all, and a fit allows for it: see `disturbed`.
+
+    False where the mismatch of an instrument (a clock, a frame, a zero, run by run) already stands for it.
+    """
 
     # What it is
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
-        """Return what the effect can be at in this cell: ``(None,)`` where it has no target, () nowhere."""
+        """Return its targets in this cell: ``(None,)`` where it has no target, () if it is not possible."""
         return NO_TARGET
 
     def why_not(self, cell: Cell, target: Target) -> str:
@@ -155,14 +140,14 @@ class Effect:
 
         Without a load encoder, say, a backlash shows in the mechanics.
         """
-        found = set()
+        visible = set()
         for link in self.links_at(target):
             here: str | None = link
             while here is not None and here not in examined:
                 here = _DOWNSTREAM.get(here)
             if here is not None:
-                found.add(here)
-        return frozenset(found)
+                visible.add(here)
+        return frozenset(visible)
 
     def searched(self, link: str, target: Target, examined: frozenset[str]) -> bool:
         """Tell whether a diagnosis tries the effect in a link, given the links that have data.
@@ -173,11 +158,35 @@ class Effect:
         return tried and link in self.visible_links(examined, target)
 
     def learned(self, applied: Applied, link: str) -> Applied | None:
-        """Return what later links take over of the effect as fitted in a link; None where that is nothing.
+        """Return the effect as later links take it over from a link where it was fitted; None for not at all.
 
-        What only the force sensor shows does not bend the arm.
+        An error of the force sensor does not bend the arm.
         """
         return None if self.family == "sensor" else applied
+
+    # Normal mismatch
+
+    def usual(self, mismatch: Mismatch, duration_s: float, clocks: int = 1) -> dict[str, float]:
+        """Return by how much each size may be off its nominal value and be no finding, in its own unit.
+
+        ``clocks``: how many clocks of their own the compared signals have. What is not named may not be off
+        at all.
+        """
+        return {p.name: p.usual(mismatch) for p in self.parameters if p.usual is not None}
+
+    def disturbed(self, target: Target, unmeasured: frozenset[str]) -> Iterator[str]:
+        """Yield the links in which its usual size is a nuisance, given those without data.
+
+        It goes down the chain from its own links to the first where measured joints replace the model's.
+        """
+        if not self.is_nuisance:
+            return
+        for link in sorted(self.links_at(target)):
+            here: str | None = link
+            while here is not None:
+                yield here
+                goes_on = here in unmeasured or here in _MODELLED
+                here = _DOWNSTREAM.get(here) if goes_on else None
 
     # Its values
 
@@ -190,40 +199,56 @@ class Effect:
         """Return the names of the parameters."""
         return tuple(p.name for p in self.parameters)
 
+    @property
+    def sizes(self) -> tuple[Parameter, ...]:
+        """Return the parameters that say how much of the effect there is."""
+        return tuple(p for p in self.parameters if p.role is Role.SIZE)
+
+    @property
+    def phase(self) -> Parameter | None:
+        """Return the parameter that is the phase of a sine; None where it is no sine."""
+        return self._with_role(Role.PHASE)
+
+    @property
+    def frequency(self) -> Parameter | None:
+        """Return the parameter that is a frequency in Hz; None where there is none."""
+        return self._with_role(Role.FREQUENCY)
+
+    def _with_role(self, role: Role) -> Parameter | None:
+        return next((p for p in self.parameters if p.role is role), None)
+
     def nominal(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
         """Return the values at which the effect is not there, the model's own where they depend on the cell.
 
         Shapes have their typical value.
         """
-        return {p.name: p.start if p.nominal is None else p.nominal for p in self.parameters}
+        return {p.name: p.unset for p in self.parameters}
 
     def start(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
         """Return typical values with the effect."""
         return {p.name: p.start for p in self.parameters}
 
     def shapes(self) -> tuple[dict[str, float], ...]:
-        """Return the combinations of the shape parameters' grids; one empty one where there is no shape."""
-        shape = [p for p in self.parameters if p.is_shape and p.name not in (self.direction or ())]
-        grids = [[(p.name, value) for value in p.grid or (p.start,)] for p in shape]
+        """Return the combinations of the shapes' grids; a single empty one for an effect without shapes."""
+        forms = [p for p in self.parameters if p.is_shape and p.name not in (self.direction or ())]
+        grids = [[(p.name, value) for value in p.grid or (p.start,)] for p in forms]
         return tuple(dict(combination) for combination in itertools.product(*grids))
 
     def settings(
         self, inputs: "Inputs", target: Target = None, shape: Values | None = None, size: float = 1.0
     ) -> tuple[dict[str, float], ...]:
-        """Return values of all parameters whose signals, less the nominal ones, span the effect.
+        """Return settings of all parameters whose signals, minus the nominal ones, span the effect.
 
-        One a size parameter at nominal + ``size``·(start - nominal), the others nominal; where there is a
-        direction, one along each axis.
+        One setting for each size, at nominal + ``size``·(start - nominal) with the other sizes nominal; where
+        the effect has a direction, one for each size along each axis.
         """
         base = self.nominal(inputs, target) | dict(shape or {})
         start = self.start(inputs, target)
-        found = []
-        for p in self._sizes():
-            value = base[p.name] + size * (start[p.name] - base[p.name])
-            for along in np.eye(3) if self.direction else (None,):
-                turned = {} if along is None else dict(zip(self.direction or (), along.tolist(), strict=True))
-                found.append(base | {p.name: float(value)} | turned)
-        return tuple(found)
+        axes: list[dict[str, float]] = [{}]
+        if self.direction:
+            axes = [dict(zip(self.direction, axis.tolist(), strict=True)) for axis in np.eye(3)]
+        values = {p.name: float(base[p.name] + size * (start[p.name] - base[p.name])) for p in self.sizes}
+        return tuple(base | {name: value} | axis for name, value in values.items() for axis in axes)
 
     def combined(
         self, coefficients: Floats, inputs: "Inputs", target: Target = None, shape: Values | None = None
@@ -231,30 +256,27 @@ class Effect:
         """Return the values of a combination of `settings` (at size 1) with these coefficients."""
         base = self.nominal(inputs, target) | dict(shape or {})
         start = self.start(inputs, target)
-        parts = np.asarray(coefficients, dtype=float).reshape(-1, 3 if self.direction else 1)
-        for p, part in zip(self._sizes(), parts, strict=True):
-            length = float(np.linalg.norm(part)) if self.direction else float(part[0])
+        vectors = np.asarray(coefficients, dtype=float).reshape(-1, 3 if self.direction else 1)
+        for p, vector in zip(self.sizes, vectors, strict=True):
+            length = float(np.linalg.norm(vector)) if self.direction else float(vector[0])
             base[p.name] = base[p.name] + length * (start[p.name] - base[p.name])
             if self.direction and length > 0.0:
-                base |= dict(zip(self.direction, (part / length).tolist(), strict=True))
+                base |= dict(zip(self.direction, (vector / length).tolist(), strict=True))
         return base
 
     def alternatives(self, values: Values) -> tuple[dict[str, float], ...]:
         """Return values that look the same to first order: a fit begins at the best of them."""
         return (dict(values),)
 
-    def _sizes(self) -> tuple[Parameter, ...]:
-        return tuple(p for p in self.parameters if not p.is_shape and p.name not in (self.direction or ()))
-
     @property
     def plans_anew(self) -> bool:
-        """Tell whether the motion is planned again: a signature then tells little of the effect's size."""
+        """Tell whether the motion is planned again. Signals are then far from linear in the size."""
         return "plan" in self.needs
 
     @property
     def is_linear(self) -> bool:
         """Tell whether the signals are proportional to its size."""
-        return all(p.linear for p in self._sizes())
+        return all(p.linear for p in self.sizes)
 
     # What it does: the hooks, in the order in which `simulate` calls them
 
@@ -309,14 +331,6 @@ class Effect:
     def instruments(self, signals: "Signals", applied: Applied) -> "Signals":
         """Return the signals with what belongs to the instruments: clocks, units, the finished part."""
         return signals
-
-
-def direction_parameters(source: str) -> tuple[Parameter, ...]:
-    """Return the three components of a direction, along z where nothing is given."""
-    return tuple(
-        Parameter(name, "", -1.0, 1.0, nominal=None, start=float(name == DIRECTION[2]), source=source)
-        for name in DIRECTION
-    )
 
 
 def every_joint(cell: Cell) -> tuple[Target, ...]:

@@ -1,23 +1,41 @@
-"""What the effects that move or turn a whole frame share."""
+"""Parameters and matrix of effects that move or turn a whole frame."""
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Frame
-from gcode2krl.effects.effect import Applied, Parameter
+from gcode2krl.effects.effect import Applied
+from gcode2krl.effects.parameter import Bound, Parameter, Role
 
 FRAME_NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
 def frame_parameters(
-    most_mm: float, most_deg: float, start_mm: float, start_deg: float, source: str
+    most_mm: float,
+    most_deg: float,
+    start_mm: float,
+    start_deg: float,
+    source: str,
+    usual_mm: Bound | None = None,
+    usual_deg: Bound | None = None,
 ) -> tuple[Parameter, ...]:
     """Return the six parameters of a frame, X to C as KUKA has them."""
     return tuple(
-        Parameter(name, "mm", -most_mm, most_mm, nominal=0.0, start=start_mm, linear=True, source=source)
-        if name.endswith("_mm")
-        else Parameter(
-            name, "deg", -most_deg, most_deg, nominal=0.0, start=start_deg, linear=True, source=source
+        Parameter(
+            name=name,
+            unit=unit,
+            low=-most,
+            high=most,
+            nominal=0.0,
+            start=start,
+            linear=True,
+            role=Role.SIZE,
+            usual=usual,
+            source=source,
         )
-        for name in FRAME_NAMES
+        for names, unit, most, start, usual in (
+            (FRAME_NAMES[:3], "mm", most_mm, start_mm, usual_mm),
+            (FRAME_NAMES[3:], "deg", most_deg, start_deg, usual_deg),
+        )
+        for name in names
     )
 
 

@@ -1,9 +1,11 @@
-"""Normal mismatch: what a sound robot, tool and sensor differ by from their model, and nobody calls a gap."""
+"""Normal mismatch: by how much a sound robot, tool and sensor differ from their model. It is never a gap.
+
+The table of bounds, which a user may change. Each effect says which bound is that of which of its parameters.
+"""
 
 import math
 from dataclasses import dataclass
 
-from gcode2krl.effects import Applied
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 
@@ -31,33 +33,17 @@ class Mismatch:
     acc_m_s2: float = 0.1
     """What 2 ms in the time law are worth in its constants."""
     joint_zero_rad: float = math.radians(1.0)
-    """Between two encoders of one joint: their zeros are set by hand, so this is no finding at all."""
+    """Between two encoders of one joint: their zeros are set by hand, so it is never reported."""
 
-    def limits(self, applied: Applied, duration_s: float, clocks: int = 1) -> dict[str, float]:
-        """Return by how much each parameter of an effect may be off its nominal value and be no finding.
+    @property
+    def play_deg(self) -> float:
+        """Return the play in degrees."""
+        return self.play_rad * DEG_PER_RAD
 
-        ``clocks``: how many clocks of their own the compared signals have. Parameters that are not named may
-        not be off at all.
-        """
-        degrees = self.play_rad * DEG_PER_RAD
-        frame = dict.fromkeys(("x_mm", "y_mm", "z_mm"), self.frame_mm)
-        turn = dict.fromkeys(("a_deg", "b_deg", "c_deg"), self.frame_rad * DEG_PER_RAD)
-        known: dict[str, dict[str, float]] = {
-            "stiffness": {"scale": self.stiffness},
-            "force_scale": {"scale": self.coefficients},
-            "edge_force": {"scale": self.coefficients},
-            "clock": {"offset_s": clocks * self.clock_s, "skew": clocks * self.clock_s / duration_s},
-            "force_delay": {"delay_s": clocks * self.clock_s},
-            "servo_lag": {"tau_s": self.lag_s},
-            "backlash": {"gap_deg": degrees},
-            "transmission": {"amplitude_deg": degrees},
-            "base_frame": frame | turn,
-            "tool_frame": frame | turn,
-            "tool_diameter": {"offset_mm": self.diameter_mm},
-            "velocity_rule": {"k_s": self.k_s, "acc_cp_m_s2": self.acc_m_s2},
-            "force_offset": dict.fromkeys(("fx_N", "fy_N", "fz_N"), self.force_zero_N),
-        }
-        return known.get(applied.effect.name, {})
+    @property
+    def frame_deg(self) -> float:
+        """Return the turn of the frame in degrees."""
+        return self.frame_rad * DEG_PER_RAD
 
 
 def sigma(bound: float) -> float:

@@ -12,7 +12,9 @@ from typing import Any
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import builtin
-from gcode2krl.effects.effect import LINKS, Applied, Effect, Parameter, Target
+from gcode2krl.effects.consistency import what_is_wrong
+from gcode2krl.effects.effect import Applied, Effect, Target
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.prediction import Prediction
 
@@ -24,17 +26,17 @@ _FILE = "docs/effects.md shows a file of one's own"
 def library(extra: Iterable[str | Path] = ()) -> dict[str, Effect]:
     """Return all effects by name: the built-in ones and those of the ``.py`` files of some folders.
 
-    A file of one's own defines ``EFFECT``, an `Effect` or several; its name begins with a letter. Raises an
+    A user's file defines ``EFFECT``, an `Effect` or several; its name begins with a letter. Raises an
     input error that names file and line where it cannot be taken.
     """
-    found = {effect.name: effect for effect in _builtin()}
+    known = {effect.name: effect for effect in _builtin()}
     for folder in extra:
         for file in _files_of(Path(folder)):
             for effect in _effects_of(_loaded(file), str(file)):
-                if effect.name in found:
+                if effect.name in known:
                     raise _bad_file(file, f"the name {effect.name!r} is taken", "give it another name")
-                found[effect.name] = effect
-    return found
+                known[effect.name] = effect
+    return known
 
 
 def parse(text: str, known: Library, cell: Cell) -> Applied:
@@ -76,7 +78,7 @@ def effects_in(prediction: Prediction, known: Library | None = None) -> list[App
 
 
 def resolve(effects: Iterable[str | Applied], known: Library, cell: Cell) -> list[Applied]:
-    """Return effects given as texts or as they are; a name alone may not be enough, see `parse`."""
+    """Return effects given as texts or as they are; texts are read by `parse`."""
     return [parse(effect, known, cell) if isinstance(effect, str) else effect for effect in effects]
 
 
@@ -89,7 +91,7 @@ def build(
     if effect is None:
         raise _wrong(where, f"found effect {name!r}, allowed: {', '.join(sorted(known))}", _near(name, known))
     _check_target(where, effect, target, cell)
-    values = {p.name: p.start if p.nominal is None else p.nominal for p in effect.parameters}
+    values = {p.name: p.unset for p in effect.parameters}
     for key, value in given.items():
         for parameter, number in _components(where, effect, key, value):
             _check_value(where, parameter, number)
@@ -206,31 +208,16 @@ def _line_in(file: Path, error: Exception) -> int:
 
 
 def _effects_of(module: ModuleType, source: str) -> Iterator[Effect]:
-    """Yield the effects of a file, each checked for what the rest relies on."""
+    """Yield the effects of a file, each checked by `what_is_wrong`."""
     stated = getattr(module, "EFFECT", None)
     for effect in stated if isinstance(stated, tuple | list) else (stated,):
         if not isinstance(effect, Effect):
             kind = "nothing" if effect is None else type(effect).__name__
             raise _bad_file(source, f"EFFECT: found {kind}, allowed: an Effect or several", _FILE)
-        wrong = _what_is_wrong(effect)
+        wrong = what_is_wrong(effect)
         if wrong:
             raise _bad_file(source, f"effect {effect.name!r}: {wrong}", _FILE)
         yield effect
-
-
-def _what_is_wrong(effect: Effect) -> str:
-    if not effect.name.replace("_", "").isalnum():
-        return "its name must be letters, digits and _"
-    if not effect.links <= set(LINKS):
-        return f"links: found {', '.join(sorted(effect.links))}, allowed: {', '.join(LINKS)}"
-    if len(set(effect.names)) < len(effect.names):
-        return "a parameter stands twice"
-    for p in effect.parameters:
-        if not p.low <= p.start <= p.high:
-            return f"{p.name}: start {p.start:g} is not within {p.low:g} to {p.high:g}"
-    parts = {name for names in effect.vectors.values() for name in names} | set(effect.direction or ())
-    missing = parts - set(effect.names)
-    return f"vectors: there is no parameter {', '.join(sorted(missing))}" if missing else ""
 
 
 def _bad_file(file: str | Path, message: str, remedy: str, line: int = 0) -> NotUnderstoodError:

@@ -10,9 +10,16 @@ from gcode2krl.effects import Applied, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 
 SIGNALS = (
-    "q_cmd_rad", "q_act_rad", "q_load_rad", "q_true_rad", "tcp_base_mm", "force_base_N", "moment_base_Nmm",
-    "force_meas_base_N", "moment_meas_base_Nmm",
-)  # fmt: skip
+    "q_cmd_rad",
+    "q_act_rad",
+    "q_load_rad",
+    "q_true_rad",
+    "tcp_base_mm",
+    "force_base_N",
+    "moment_base_Nmm",
+    "force_meas_base_N",
+    "moment_meas_base_Nmm",
+)
 
 
 def test_nominal_is_the_commanded_tip_and_the_deflection(milling, part):
@@ -25,8 +32,11 @@ def test_nominal_is_the_commanded_tip_and_the_deflection(milling, part):
 
 
 def test_nominal_orientation_is_the_commanded_one_where_nothing_pulls(swinging):
-    free = replace(swinging, force_base_N=np.zeros_like(swinging.force_base_N),
-                   moment_base_Nmm=np.zeros_like(swinging.force_base_N))  # fmt: skip
+    free = replace(
+        swinging,
+        force_base_N=np.zeros_like(swinging.force_base_N),
+        moment_base_Nmm=np.zeros_like(swinging.force_base_N),
+    )
     found = simulate(free, rotation=True).tcp_rotation
     np.testing.assert_allclose(np.abs(np.sum(found * free.rotation, axis=1)), 1.0, atol=1e-12)
 

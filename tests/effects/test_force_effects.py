@@ -139,12 +139,21 @@ def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, angle
     forces = replace(no_forces(motion), a_p_mm=np.full(count, 2.0), phi_rad=phi)
     whole = inputs_of(part)
     inputs = replace(
-        whole, motion=motion, forces=forces, time_s=motion.time_s, tool=motion.tool,
-        position_mm=straight, rotation=motion.rotation, spindle_rad_s=np.full(count, 13000 * np.pi / 30),
-        q_cmd_rad=whole.q_cmd_rad[rows], path_mm=whole.path_mm[rows], move=whole.move[rows],
-        source_line=whole.source_line[rows], force_base_N=np.zeros((count, 3)),
+        whole,
+        motion=motion,
+        forces=forces,
+        time_s=motion.time_s,
+        tool=motion.tool,
+        position_mm=straight,
+        rotation=motion.rotation,
+        spindle_rad_s=np.full(count, 13000 * np.pi / 30),
+        q_cmd_rad=whole.q_cmd_rad[rows],
+        path_mm=whole.path_mm[rows],
+        move=whole.move[rows],
+        source_line=whole.source_line[rows],
+        force_base_N=np.zeros((count, 3)),
         moment_base_Nmm=np.zeros((count, 3)),
-    )  # fmt: skip
+    )
     signals = run(inputs, known, f"runout:runout_mm={runout_mm},angle_deg={angle_deg}")
     law, f_z = part.cell.material.linear_edge, 25.0 / (13000 / 60) / tool.teeth
     feed, normal, axial = idle_edge_force(

@@ -48,8 +48,9 @@ def test_base_frame(swinging, known):
     np.testing.assert_allclose(signals.tcp_base_mm, before.tcp_base_mm @ r.T + [1.0, -2.0, 0.5], atol=1e-9)
     np.testing.assert_allclose(
         rotation_from_quaternion(signals.tcp_rotation),
-        r @ rotation_from_quaternion(before.tcp_rotation), atol=1e-12,
-    )  # fmt: skip
+        r @ rotation_from_quaternion(before.tcp_rotation),
+        atol=1e-12,
+    )
     np.testing.assert_array_equal(signals.q_cmd_rad, swinging.q_cmd_rad)
 
 
@@ -58,12 +59,14 @@ def test_tool_frame(swinging, known):
     before = simulate(swinging, rotation=True)
     np.testing.assert_allclose(
         signals.tcp_base_mm - before.tcp_base_mm,
-        np.einsum("nij,j->ni", turned(swinging), [1.0, -2.0, 0.5]), atol=1e-9,
-    )  # fmt: skip
+        np.einsum("nij,j->ni", turned(swinging), [1.0, -2.0, 0.5]),
+        atol=1e-9,
+    )
     np.testing.assert_allclose(
         rotation_from_quaternion(signals.tcp_rotation),
-        rotation_from_quaternion(before.tcp_rotation) @ kuka(0.3, -0.2, 0.1), atol=1e-12,
-    )  # fmt: skip
+        rotation_from_quaternion(before.tcp_rotation) @ kuka(0.3, -0.2, 0.1),
+        atol=1e-12,
+    )
 
 
 def test_thermal(swinging, known):
@@ -127,9 +130,14 @@ def held(inputs, force, moment=0.0):
         for name in ("q_cmd_rad", "position_mm", "rotation", "tool", "move", "source_line")
     }
     return replace(
-        inputs, time_s=np.arange(count) * 0.012, path_mm=np.zeros(count), spindle_rad_s=np.zeros(count),
-        force_base_N=force, moment_base_Nmm=np.zeros((count, 3)) + moment, **same,
-    )  # fmt: skip
+        inputs,
+        time_s=np.arange(count) * 0.012,
+        path_mm=np.zeros(count),
+        spindle_rad_s=np.zeros(count),
+        force_base_N=force,
+        moment_base_Nmm=np.zeros((count, 3)) + moment,
+        **same,
+    )
 
 
 def test_hysteresis_loses_between_the_branches(swinging, known):

@@ -49,9 +49,16 @@ TABLE = {
     "tool_diameter": ("offset_mm",),
 }
 SLIPS = (
-    "tool_number", "base_number", "override", "rsi_on", "load", "absolute_accuracy", "other_program", "unit",
+    "tool_number",
+    "base_number",
+    "override",
+    "rsi_on",
+    "load",
+    "absolute_accuracy",
+    "other_program",
+    "unit",
     "swapped_tool",
-)  # fmt: skip
+)
 
 
 SLIP_PARAMETERS = {"load": ("mass_kg", "dx_mm", "dy_mm", "dz_mm", "further_mm")}
@@ -192,6 +199,14 @@ def test_an_effect_of_ones_own_takes_part(tmp_path, swinging, cell):
         (OWN.replace('"sag"', '"backlash"'), "the name 'backlash' is taken"),
         (OWN.replace('"mechanics"', '"mechanic"'), "links: found mechanic, allowed: timing"),
         (OWN.replace("start=0.5", "start=9.0"), "start 9 is not within 0 to 5"),
+        (
+            OWN.replace("Role.SIZE", "Role.PHASE"),
+            "own.py: error: effect 'sag': um_per_N: a phase has no nominal",
+        ),
+        (
+            OWN.replace("Dependence.FORCE", "'force'"),
+            "depends_on: found .*, allowed: a frozenset of Dependence",
+        ),
     ],
 )
 def test_errors_of_ones_own_file(tmp_path, text, said):

@@ -135,9 +135,12 @@ def test_the_true_orientation_includes_the_bending(swinging):
     signals = simulate(swinging, rotation=True)
     root = swinging.cell.base_matrix()[:3, :3]
     _, turn = displace(
-        swinging.q_cmd_rad, swinging.force_base_N @ root.T, swinging.moment_base_Nmm @ root.T,
-        swinging.cell, 1,
-    )  # fmt: skip
+        swinging.q_cmd_rad,
+        swinging.force_base_N @ root.T,
+        swinging.moment_base_Nmm @ root.T,
+        swinging.cell,
+        1,
+    )
     apart = rotation_from_quaternion(signals.tcp_rotation) @ np.swapaxes(
         rotation_from_quaternion(swinging.rotation), 1, 2
     )

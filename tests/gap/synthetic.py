@@ -12,6 +12,7 @@ from gcode2krl.cell import resolve_cell
 from gcode2krl.compliance import deflect
 from gcode2krl.effects import Applied, inputs_of, library, parse, simulate
 from gcode2krl.effects.chain import Inputs
+from gcode2krl.gap.beside.fine_prediction import refined_prediction
 from gcode2krl.gcode import read_stream
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Controller, Force, Run, RunHead, Tracker
@@ -64,6 +65,12 @@ def prediction(program: str = PROGRAM, dt_s: float = 0.012) -> Prediction:
         return nominal
     forces = cutting.cut(toolpath, nominal.motion, cell)
     return replace(nominal, forces=forces, deflection=deflect(nominal.joints, forces, cell))
+
+
+@functools.cache
+def refined() -> Prediction:
+    """Return the prediction on the grid of a diagnosis, which so need not remove the material again."""
+    return refined_prediction(prediction())
 
 
 def applied(*texts: str) -> list[Applied]:

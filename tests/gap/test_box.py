@@ -120,3 +120,30 @@ def test_numbers_within_the_box_are_those_of_least_squares():
 def test_a_number_at_its_bound_is_exactly_there():
     for scale in (1.0, 3.0, 0.7, 1e5):
         assert boxed(np.array([[scale]]), np.array([5.0 * scale])).tolist() == [MOST]
+
+
+def test_chains_of_correlated_columns_agree_with_a_general_solver_number_by_number():
+    """Correlation falls with distance, as r to the power |i - j|: the least is sharp, so numbers agree."""
+    for seed in range(60):
+        generator = np.random.default_rng(1000 + seed)
+        width, r = int(generator.integers(3, 25)), generator.uniform(0.5, 0.95)
+        covariance = r ** np.abs(np.subtract.outer(np.arange(width), np.arange(width)))
+        n = generator.multivariate_normal(np.zeros(width), covariance, 4 * width)
+        y = n @ generator.uniform(-4.0, 4.0, width) + generator.standard_normal(len(n))
+        most = float(generator.uniform(0.5, 3.0))
+        a, right = normal(n, y)
+        stacked, wanted = np.vstack([n, np.eye(width)]), np.concatenate([y, np.zeros(width)])
+        best = lsq_linear(stacked, wanted, (-most, most), method="bvls", tol=1e-14, max_iter=2000).x
+        np.testing.assert_allclose(boxed(a, right, most), best, atol=1e-6)
+
+
+def test_slopes_are_zero_inside_and_point_outwards_at_the_bounds():
+    for kind in ("independent", "correlated"):
+        for n, y in fits(kind, 60):
+            a, right = normal(n, y)
+            b = boxed(a, right)
+            slope = right - a @ b
+            size = np.abs(a) @ np.abs(b) + np.abs(right)
+            inside = np.abs(b) < MOST
+            assert np.all(np.abs(slope[inside]) < 1e-9 * size[inside])
+            assert np.all(slope[~inside] * np.sign(b[~inside]) > -1e-9 * size[~inside])

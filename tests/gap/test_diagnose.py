@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap import Gap, diagnose, text_report
-from gcode2krl.gap.tell.result import SCHEMA
+from gcode2krl.gap.tell.as_json import SCHEMA
 from gcode2krl.runs import RunHead
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
@@ -45,17 +45,17 @@ def test_an_effect_is_named_with_its_target_and_size(text, signals, parameter, t
     truth = applied(text)[0]
     gap = _gap(text, **signals)
     first = gap.causes[0]
-    alike = [(each["effect"], each["target"]) for each in first["indistinguishable_from"]]
-    assert (truth.effect.name, truth.target) in [(first["effect"], first["target"]), *alike]
+    alike = [(each.effect, each.target) for each in first.indistinguishable_from]
+    assert (truth.effect.name, truth.target) in [(first.effect, first.target), *alike]
     assert len(gap.named_causes) == 1
-    assert first["probability"] > 0.5
+    assert first.probability > 0.5
     assert gap.verdict == "explained"
-    assert gap.gap["held_out"]
-    assert gap.gap["shrink"] > 0.9
-    if first["effect"] == truth.effect.name:
-        value = first["parameters"][parameter]
-        assert value["value"] == pytest.approx(truth.values[parameter], rel=tolerance)
-        assert value["low"] <= value["value"] <= value["high"]
+    assert gap.gap.held_out
+    assert gap.gap.shrink > 0.9
+    if first.effect == truth.effect.name:
+        value = first.parameters[parameter]
+        assert value.value == pytest.approx(truth.values[parameter], rel=tolerance)
+        assert value.low <= value.value <= value.high
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -63,7 +63,7 @@ def test_normal_mismatch_is_no_gap(seed):
     signals = [SERVO, GEAR, FORCE, {}][seed]
     gap = _gap(seed=200 + seed, **signals)
     assert gap.verdict == "no_gap"
-    assert gap.causes == []
+    assert gap.causes == ()
 
 
 def test_runs_of_different_programs_are_compared_with_their_own_predictions(tmp_path):
@@ -86,66 +86,66 @@ def test_an_effect_that_the_library_lacks_is_not_blamed_on_another():
     gap = diagnose(prediction(), runs([], 2, 3, extra=bump, **SERVO))
     assert gap.verdict == "unexplained"
     assert not gap.named_causes
-    assert gap.where["joints"][0]["joint"] == "A4"
-    assert gap.unexplained["significant"]
+    assert gap.where.joints[0].joint == "A4"
+    assert gap.unexplained.significant
 
 
 def test_two_effects_are_both_named():
     gap = _gap("friction:target=A1,spike_deg=0.008,decay_s=0.15", "servo_lag:target=A4,tau_s=0.01", **SERVO)
-    found = {(each["effect"], each["target"]) for each in gap.named_causes}
+    found = {(each.effect, each.target) for each in gap.named_causes}
     assert found == {("friction", "A1"), ("servo_lag", "A4")}
 
 
 def test_commands_with_a_clock_of_their_own_are_named_once():
     """They differ from the plan and from the drives; the table's own clock and the tracker's are right."""
     gap = _gap("clock:target=q_cmd,offset_s=0.012", force=False)
-    assert [(each["effect"], each["target"]) for each in gap.named_causes] == [("clock", "q_cmd")]
+    assert [(each.effect, each.target) for each in gap.named_causes] == [("clock", "q_cmd")]
     assert gap.verdict == "explained"
 
 
 def test_what_the_data_do_not_see_is_not_said_to_be_known():
     gap = _gap("tool_frame:x_mm=0.3,y_mm=-0.2,c_deg=0.02", **TIP)
-    alike = {each["effect"] for cause in gap.causes for each in cause["indistinguishable_from"]}
-    assert {"tool_frame", "base_frame"} & ({gap.causes[0]["effect"]} | alike)
-    angle = gap.causes[0]["parameters"].get("c_deg")
-    if gap.causes[0]["effect"] == "tool_frame":  # the tracker sees the tip, which a turn about it leaves
-        assert angle["low"] < -0.1
-        assert angle["high"] > 0.1
+    alike = {each.effect for cause in gap.causes for each in cause.indistinguishable_from}
+    assert {"tool_frame", "base_frame"} & ({gap.causes[0].effect} | alike)
+    angle = gap.causes[0].parameters.get("c_deg")
+    if gap.causes[0].effect == "tool_frame":  # the tracker sees the tip, which a turn about it leaves
+        assert angle.low < -0.1
+        assert angle.high > 0.1
 
 
 def test_what_rings_is_told_from_noise():
     gap = _gap("vibration:hz=13,damping=0.02,participation=0.6,direction=0.6/0.5/-0.62", **TIP)
     cause = gap.causes[0]
-    assert (cause["effect"], gap.verdict) == ("vibration", "explained")
-    assert cause["parameters"]["hz"]["value"] == pytest.approx(13.0, rel=0.005)
-    found = np.array([cause["parameters"][f"direction_{axis}"]["value"] for axis in "xyz"])
+    assert (cause.effect, gap.verdict) == ("vibration", "explained")
+    assert cause.parameters["hz"].value == pytest.approx(13.0, rel=0.005)
+    found = np.array([cause.parameters[f"direction_{axis}"].value for axis in "xyz"])
     wanted = np.array([0.6, 0.5, -0.62]) / np.linalg.norm([0.6, 0.5, -0.62])
     assert abs(found @ wanted) > 0.995  # a line, not an arrow
-    assert gap.gap["noise_floor"] < 1.3 * 0.02 * np.sqrt(3.0)
+    assert gap.gap.noise_floor < 1.3 * 0.02 * np.sqrt(3.0)
 
 
 def test_the_place_of_a_spike_is_after_the_reversals_of_its_joint():
     gap = _gap("friction:target=A2,spike_deg=0.01,decay_s=0.15", **SERVO)
-    assert gap.where["phases"][0]["phase"] in ("reversal", "corner")
-    assert gap.where["joints"][0]["joint"] == "A2"
-    assert {each["what"] for each in gap.where["intervals"]} & {"reversal of A2"}
-    for each in gap.where["intervals"]:
-        assert each["t_end_s"] - each["t_start_s"] < 1.0
+    assert gap.where.phases[0].phase in ("reversal", "corner")
+    assert gap.where.joints[0].joint == "A2"
+    assert {each.what for each in gap.where.intervals} & {"reversal of A2"}
+    for each in gap.where.intervals:
+        assert each.t_end_s - each.t_start_s < 1.0
 
 
 def test_a_held_out_run_is_reported_on_and_not_used():
     some = runs(applied("servo_lag:target=A3,tau_s=0.012"), 3, 6, **SERVO)
     gap = diagnose(prediction(), some[:2], some[2:])
-    assert gap.gap["held_out"]
-    assert gap.gap["shrink"] > 0.95
+    assert gap.gap.held_out
+    assert gap.gap.shrink > 0.95
     other = runs([], 1, 7, **SERVO)  # held out and without the effect: it must not shrink there
-    assert diagnose(prediction(), some[:2], other).gap["shrink"] == 0.0
+    assert diagnose(prediction(), some[:2], other).gap.shrink == 0.0
 
 
 def test_a_single_run_is_split_with_guard_gaps():
     gap = _gap("servo_lag:target=A3,tau_s=0.012", count=1, **SERVO)
-    assert [(each["effect"], each["target"]) for each in gap.named_causes] == [("servo_lag", "A3")]
-    assert gap.gap["held_out"]
+    assert [(each.effect, each.target) for each in gap.named_causes] == [("servo_lag", "A3")]
+    assert gap.gap.held_out
 
 
 def test_the_json_has_every_key_and_plain_values():

@@ -48,3 +48,54 @@ def test_noise_is_no_more_than_it_is_stated_to_be():
     assert at_most(loud, 1.4).sigma == 1.4
     assert not at_most(loud, 1.4).a.any()
     assert at_most(white(1.0), 1.4).sigma == 1.0
+
+
+def test_whitening_is_the_sum_over_lags_row_by_row():
+    model = Noise(np.array([0.5, -0.3, 0.2]), 0.7, 0.9)
+    values = np.random.default_rng(2).standard_normal((40, 2))
+    segments = np.array([[0, 17], [17, 19], [19, 40]], dtype=np.int64)
+    expected = np.empty_like(values)
+    for first, last in segments:
+        for row in range(first, last):
+            past = sum(model.a[lag] * values[row - 1 - lag] for lag in range(3) if row - first >= 3)
+            expected[row] = (values[row] - past) / 0.7 if row - first >= 3 else values[row] / 0.9
+    np.testing.assert_allclose(model.whiten(values, segments), expected, rtol=1e-12)
+
+
+def test_a_jump_at_a_gap_is_no_innovation():
+    model = Noise(np.array([0.9, 0.0, 0.0]), 1.0, 2.3)
+    x = np.concatenate([drawn_noise(model, 500, np.random.default_rng(i)) for i in (3, 4)])
+    joined = model.whiten(x[:, None], _segments(1000))[3:, 0]
+    parted = model.whiten(x[:, None], np.array([[0, 500], [500, 1000]]))[:, 0]
+    np.testing.assert_allclose(np.delete(joined, range(497, 500)), np.delete(parted[3:], range(497, 500)))
+    assert np.mean(parted**2) == pytest.approx(1.0, rel=0.15)
+
+
+def test_the_fit_is_that_of_all_segments_together():
+    """Against least squares on lags that were stacked by hand; the ridge is below the last digits shown."""
+    generator = np.random.default_rng(5)
+    x = drawn_noise(Noise(np.array([0.6, 0.2, -0.1]), 1.0, 1.0), 900, generator)
+    segments = np.array([[0, 300], [300, 310], [310, 900]], dtype=np.int64)
+    rows = [r for first, last in segments for r in range(first + 3, last)]
+    past = np.array([[x[r - 1], x[r - 2], x[r - 3]] for r in rows])
+    expected, left, _, _ = np.linalg.lstsq(past, x[rows], rcond=None)
+    found = fit([(x, segments)], 1e-9)
+    np.testing.assert_allclose(found.a, expected, rtol=1e-4, atol=1e-5)
+    assert found.scale == pytest.approx(float(np.sqrt(left[0] / len(rows))), rel=1e-6)
+
+
+def test_few_rows_are_white_and_no_noise_is_below_the_last_decimal():
+    x = np.random.default_rng(6).standard_normal(30)
+    short = fit([(x, _segments(30))], 1e-9)
+    assert len(short.a) == 0
+    assert short.sigma == pytest.approx(float(np.sqrt(np.mean(x**2))))
+    assert fit([(0.0 * x, _segments(30))], 0.25).sigma == 0.25
+    still = fit([(np.zeros(400), _segments(400))], 0.25)
+    assert (still.sigma, still.scale) == (0.25, pytest.approx(0.3 * 0.25))
+
+
+def test_what_hardly_decays_is_brought_to_decay():
+    x = np.cumsum(np.random.default_rng(7).standard_normal(5000))
+    found = fit([(x, _segments(len(x)))], 1e-9)
+    poles = np.roots(np.concatenate([[1.0], -found.a]))
+    assert np.abs(poles).max() <= 0.98 + 1e-9

@@ -12,8 +12,9 @@ from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.diagnosis import known_effects
 from gcode2krl.runs.scan import Scan
-from tests.gap.synthetic import prediction, runs
+from tests.gap.synthetic import prediction, refined, runs
 
+COVERS = ("gcode2krl.gap.choose.surface",)
 SHIFT_MM = np.array([0.03, -0.02, 0.15])
 
 
@@ -21,7 +22,7 @@ def _side(larger_mm: float = 0.0, noise_mm: float = 0.03, seed: int = 1):
     """Return a run whose scan is that of walls and floors of the nominal motion with another diameter."""
     generator = np.random.default_rng(seed)
     some = runs([], 1, 5, controller=False, tracker=False, normal=False)
-    (pair,) = pairs_of(prediction(), some)
+    (pair,) = pairs_of(refined(), some)
     inputs = pair.inputs
     tip = inputs.position_mm + inputs.deflection_mm
     radius = prediction().cell.tool[1].diameter_mm / 2.0 + larger_mm / 2.0

@@ -9,11 +9,14 @@ from gcode2krl.effects import inputs_of, simulate
 from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.gap.beside.commanded import commanded_path, on_the_curve
 from gcode2krl.gap.beside.interpolation import cubic
+from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.slips.order import first_slip
 from gcode2krl.gap.slips.program import other_program
 from gcode2krl.runs import Controller, Run
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
+
+COVERS = ("gcode2krl.gap.beside.own_model",)
 
 FIRST, SECOND = PROGRAM.split("G0 X140 Y40\n")
 SHIFTED = f"{FIRST}G0 X140 Y42\n{SECOND.replace('Y60 F2400', 'Y62 F2400').replace('Y-40', 'Y-38')}"
@@ -132,9 +135,9 @@ def test_the_controllers_joints_come_back_to_the_plan_and_its_drives_stay():
         _side(applied("servo_lag:target=A1,tau_s=0.01", "clock:target=controller,offset_s=0.003"))
     )
     before, planned = pair.run.controller, pair.inputs
-    on_time = pair.with_own_model()
+    on_time = with_own_model(pair)
     assert on_time.clock_s["controller"] == pytest.approx(0.003, abs=2e-5)
-    nominal = replace(on_time, inputs=planned).with_nominal_joints()
+    nominal = with_nominal_joints(replace(on_time, inputs=planned))
     after = nominal.run.controller
     wanted = cubic(nominal.stamps(after), planned.time_s, planned.q_cmd_rad)
     assert np.abs(before.q_cmd_rad - wanted).max() > 5e-4

@@ -7,13 +7,13 @@ from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.diagnosis import known_effects
 from gcode2krl.gap.fit.place_times import gone
 from gcode2krl.gap.slips.stops import unplanned_stops
-from tests.gap.synthetic import applied, prediction, runs
+from tests.gap.synthetic import applied, refined, runs
 
 SERVO = {"tracker": False, "force": False}
 
 
 def _pairs(some):
-    return list(pairs_of(prediction(), some))
+    return list(pairs_of(refined(), some))
 
 
 def test_stops_are_found_with_their_hold():

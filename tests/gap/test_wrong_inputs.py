@@ -16,7 +16,7 @@ SERVO = {"tracker": False, "force": False}
 
 
 def _named(gap):
-    return [(each["effect"], each["target"]) for each in gap.named_causes]
+    return [(each.effect, each.target) for each in gap.named_causes]
 
 
 def test_another_unit_in_a_file_is_named(tmp_path):
@@ -47,13 +47,13 @@ def test_another_program_is_named():
 def test_a_clock_two_seconds_off_is_named():
     gap = diagnose(prediction(), runs(applied("clock:target=controller,offset_s=2"), 2, 5, **SERVO))
     assert _named(gap) == [("clock", "controller")]
-    assert gap.causes[0]["parameters"]["offset_s"]["value"] == pytest.approx(2.0, abs=0.005)
+    assert gap.causes[0].parameters["offset_s"].value == pytest.approx(2.0, abs=0.005)
 
 
 def test_an_override_of_50_percent_is_named():
     gap = diagnose(prediction(), runs(applied("override:percent=50"), 2, 5, **SERVO))
     assert _named(gap) == [("override", None)]
-    assert gap.causes[0]["parameters"]["percent"]["value"] == pytest.approx(50.0, abs=0.1)
+    assert gap.causes[0].parameters["percent"].value == pytest.approx(50.0, abs=0.1)
 
 
 def test_a_tracker_in_another_frame_is_named():
@@ -69,7 +69,7 @@ def test_a_tracker_in_another_frame_is_named():
 
 def test_missing_signals_are_listed_with_what_they_would_need():
     gap = diagnose(prediction(), runs([], 1, 5, **SERVO))
-    needs = {each["link"]: each["needs"] for each in gap.not_examined}
+    needs = {each.link: each.needs for each in gap.not_examined}
     assert "tracker.csv" in needs["mechanics"]
     assert "force.csv" in needs["force"]
 

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.arrays import Ints
-from gcode2krl.effects.effect import Applied, Effect, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class AdvanceStop(Effect):
@@ -19,17 +21,34 @@ class AdvanceStop(Effect):
     name = "advance_stop"
     family = "timing"
     links = frozenset({"timing", "path"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.PLACE, Dependence.RUN_TIME_STEP})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(
-            "count", "", 0.0, 50.0, nominal=0.0, start=3.0, minimum=0.0,
+            name="count",
+            unit="",
+            low=0.0,
+            high=50.0,
+            nominal=0.0,
+            start=3.0,
+            minimum=0.0,
+            role=Role.SIZE,
             source="each WAIT or output outside a TRIGGER is one",
         ),
         Parameter(
-            "hold_s", "s", 0.0, 5.0, nominal=None, start=0.1, grid=(0.0, 0.1, 0.5), minimum=0.0,
+            name="hold_s",
+            unit="s",
+            low=0.0,
+            high=5.0,
+            nominal=None,
+            start=0.1,
+            grid=(0.0, 0.1, 0.5),
+            minimum=0.0,
+            role=Role.SHAPE,
             source="a mere stop, a cycle of the submit interpreter, a WAIT SEC",
         ),
-    )  # fmt: skip
+    )
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs of the motion with these stops."""

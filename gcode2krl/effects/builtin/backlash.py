@@ -3,9 +3,11 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -19,13 +21,24 @@ class Backlash(Effect):
     name = "backlash"
     family = "joint"
     links = frozenset({"gear"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.REVERSALS})
+    is_nuisance = True
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "gap_deg", "deg", 0.0, 0.1, nominal=0.0, start=0.01, linear=False, minimum=0.0,
+            name="gap_deg",
+            unit="deg",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.01,
+            minimum=0.0,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.play_deg,
             source="reversal error of a large KUKA 0.3-1 arcmin; worn gears several times that",
         ),
-    )  # fmt: skip
+    )
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gear."""

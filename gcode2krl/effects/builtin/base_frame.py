@@ -1,6 +1,7 @@
 """The measured tip is moved by a frame in $BASE."""
 
 from gcode2krl.arrays import Floats
+from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.frame_effect import frame_of, frame_parameters, is_nothing
 from gcode2krl.effects.inputs import Inputs
@@ -12,10 +13,17 @@ class BaseFrame(Effect):
     name = "base_frame"
     family = "geometry"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     parameters = frame_parameters(
-        20.0, 2.0, 0.5, 0.02,
+        most_mm=20.0,
+        most_deg=2.0,
+        start_mm=0.5,
+        start_deg=0.02,
+        usual_mm=lambda mismatch: mismatch.frame_mm,
+        usual_deg=lambda mismatch: mismatch.frame_deg,
         source="touch-up with a probe tip 0.2-1 mm over some 500 mm; registration of a tracker 0.05-0.2 mm",
-    )  # fmt: skip
+    )
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the moved tip."""

@@ -3,7 +3,10 @@
 from dataclasses import replace
 
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.signals import CLOCKS, Clock, Signals
 
 _LINKS = {
@@ -27,16 +30,31 @@ class WrongClock(Effect):
     family = "timing"
     is_clock = True
     links = frozenset().union(*_LINKS.values())
+    where = frozenset({Where.JOINT, Where.TIP, Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.VELOCITY, Dependence.RUN_TIME})
     parameters = (
         Parameter(
-            "offset_s", "s", -0.5, 0.5, nominal=0.0, start=0.01,
+            name="offset_s",
+            unit="s",
+            low=-0.5,
+            high=0.5,
+            nominal=0.0,
+            start=0.01,
+            role=Role.SIZE,
             source="tables started by hand or over a network up to some 0.1 s; interpolator 40-100 ms ahead",
         ),
         Parameter(
-            "skew", "", -1e-3, 1e-3, nominal=0.0, start=1e-4, linear=True,
+            name="skew",
+            unit="",
+            low=-1e-3,
+            high=1e-3,
+            nominal=0.0,
+            start=1e-4,
+            linear=True,
+            role=Role.SIZE,
             source="free quartz oscillators 10-100 ppm, a wrong cycle time 1000 ppm",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return the tables and columns with a clock."""
@@ -55,6 +73,11 @@ class WrongClock(Effect):
         if link == "servo":
             return target == "q_cmd"
         return target != "controller" or "path" not in examined
+
+    def usual(self, mismatch: Mismatch, duration_s: float, clocks: int = 1) -> dict[str, float]:
+        """Return what the clocks may be off by; the skew adds that much over the run."""
+        offset_s = clocks * mismatch.clock_s
+        return {"offset_s": offset_s, "skew": offset_s / duration_s}
 
     def instruments(self, signals: Signals, applied: Applied) -> Signals:
         """Return the signals with that clock."""

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class Corner(Effect):
@@ -18,13 +20,22 @@ class Corner(Effect):
     name = "corner"
     family = "timing"
     links = frozenset({"timing", "path"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.PLACE, Dependence.TRAVEL})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(
-            "cdis_mm", "mm", 0.0, 50.0, nominal=math.nan, start=1.0, minimum=0.0,
+            name="cdis_mm",
+            unit="mm",
+            low=0.0,
+            high=50.0,
+            nominal=math.nan,
+            start=1.0,
+            minimum=0.0,
+            role=Role.SIZE,
             source="$APO.CDIS of milling programs 0.05-5 mm; KUKA's examples up to 50 mm",
         ),
-    )  # fmt: skip
+    )
 
     def nominal(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return the distance that most corners have."""

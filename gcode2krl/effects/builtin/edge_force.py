@@ -2,8 +2,10 @@
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects.coefficients import with_scaled_edge
-from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class EdgeForce(Effect):
@@ -15,13 +17,25 @@ class EdgeForce(Effect):
     name = "edge_force"
     family = "force"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.FORCE})
+    is_nuisance = True
     needs = frozenset({"cut"})
     parameters = (
         Parameter(
-            "scale", "", 0.0, 5.0, nominal=1.0, start=1.5, linear=True, minimum=0.0,
+            name="scale",
+            unit="",
+            low=0.0,
+            high=5.0,
+            nominal=1.0,
+            start=1.5,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.coefficients,
             source="edge coefficients grow by factors over a tool's life, cutting ones hardly",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return (None,) where the material has edge coefficients."""

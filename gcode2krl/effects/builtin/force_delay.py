@@ -1,7 +1,10 @@
 """The force signal comes late."""
 
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs, resampled
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class ForceDelay(Effect):
@@ -13,12 +16,25 @@ class ForceDelay(Effect):
     name = "force_delay"
     family = "sensor"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.FORCE})
     parameters = (
         Parameter(
-            "delay_s", "s", 0.0, 0.5, nominal=0.0, start=0.02, minimum=0.0,
+            name="delay_s",
+            unit="s",
+            low=0.0,
+            high=0.5,
+            nominal=0.0,
+            start=0.02,
+            minimum=0.0,
+            role=Role.SIZE,
             source="force chain plus the robot's reaction 100-150 ms, the chain alone 5-50 ms",
         ),
-    )  # fmt: skip
+    )
+
+    def usual(self, mismatch: Mismatch, duration_s: float, clocks: int = 1) -> dict[str, float]:
+        """Return what the clocks may be off by: a delay shows as a clock does."""
+        return {"delay_s": clocks * mismatch.clock_s}
 
     def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return what the sensor states."""

@@ -2,8 +2,10 @@
 
 from types import MappingProxyType
 
-from gcode2krl.effects.effect import DIRECTION, Applied, Effect, Load, Parameter, direction_parameters
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
 
 
 class ForceDrift(Effect):
@@ -12,15 +14,25 @@ class ForceDrift(Effect):
     name = "force_drift"
     family = "sensor"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.RUN_TIME, Dependence.WALL_CLOCK})
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
         Parameter(
-            "N_per_h", "N/h", 0.0, 100.0, nominal=0.0, start=5.0, linear=True, minimum=0.0,
+            name="N_per_h",
+            unit="N/h",
+            low=0.0,
+            high=100.0,
+            nominal=0.0,
+            start=5.0,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="1-5 N/h once warm, more while it warms up",
         ),
         *direction_parameters("any"),
-    )  # fmt: skip
+    )
 
     def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return what the sensor states."""

@@ -2,8 +2,10 @@
 
 from types import MappingProxyType
 
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 _NAMES = ("fx_N", "fy_N", "fz_N")
 
@@ -14,12 +16,24 @@ class ForceOffset(Effect):
     name = "force_offset"
     family = "sensor"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.CONSTANT})
     vectors = MappingProxyType({"offset_N": _NAMES})
     parameters = tuple(
-        Parameter(name, "N", -200.0, 200.0, nominal=0.0, start=10.0, linear=True,
-                  source="zeroed under a load, or in another orientation: up to the tool's weight")
+        Parameter(
+            name=name,
+            unit="N",
+            low=-200.0,
+            high=200.0,
+            nominal=0.0,
+            start=10.0,
+            linear=True,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.force_zero_N,
+            source="zeroed under a load, or in another orientation: up to the tool's weight",
+        )
         for name in _NAMES
-    )  # fmt: skip
+    )
 
     def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return what the sensor states."""

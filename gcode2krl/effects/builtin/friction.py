@@ -3,9 +3,11 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import since_reversal
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -19,17 +21,35 @@ class Friction(Effect):
     name = "friction"
     family = "joint"
     links = frozenset({"servo"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.REVERSALS})
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "spike_deg", "deg", 0.0, 0.1, nominal=0.0, start=0.01, linear=True, minimum=0.0,
+            name="spike_deg",
+            unit="deg",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.01,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="reversal spikes of geared axes 0.3-3 arcmin",
         ),
         Parameter(
-            "decay_s", "s", 0.01, 2.0, nominal=None, start=0.15, grid=(0.05, 0.15, 0.4), minimum=1e-4,
+            name="decay_s",
+            unit="s",
+            low=0.01,
+            high=2.0,
+            nominal=None,
+            start=0.15,
+            grid=(0.05, 0.15, 0.4),
+            minimum=1e-4,
+            role=Role.SHAPE,
             source="integral action of position loops 0.05-0.5 s",
         ),
-    )  # fmt: skip
+    )
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""

@@ -2,8 +2,10 @@
 
 from types import MappingProxyType
 
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.weight import with_weight
 
 _CENTRE = ("cx_mm", "cy_mm", "cz_mm")
@@ -18,18 +20,35 @@ class Gravity(Effect):
     name = "gravity"
     family = "compliance"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     vectors = MappingProxyType({"centre_mm": _CENTRE})
     parameters = (
         Parameter(
-            "payload_kg", "kg", -50.0, 100.0, nominal=0.0, start=10.0, linear=True,
+            name="payload_kg",
+            unit="kg",
+            low=-50.0,
+            high=100.0,
+            nominal=0.0,
+            start=10.0,
+            linear=True,
+            role=Role.SIZE,
             source="stated payloads are 2-5 % off; a forgotten part of the end effector 5-50 kg",
         ),
         *(
-            Parameter(name, "mm", -1000.0, 1000.0, nominal=None, start=start,
-                      source="from the tip, z towards the holder; an end effector is 100-500 mm long")
+            Parameter(
+                name=name,
+                unit="mm",
+                low=-1000.0,
+                high=1000.0,
+                nominal=None,
+                start=start,
+                role=Role.SHAPE,
+                source="from the tip, z towards the holder; an end effector is 100-500 mm long",
+            )
             for name, start in zip(_CENTRE, (0.0, 0.0, 200.0), strict=True)
         ),
-    )  # fmt: skip
+    )
 
     def load(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load with this weight."""

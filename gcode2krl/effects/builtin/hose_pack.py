@@ -6,8 +6,10 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 _H0 = ("h0_x_N", "h0_y_N", "h0_z_N")
 _H = tuple(f"H_{row}{column}_N_rad" for row in "xyz" for column in "xyz")
@@ -24,14 +26,36 @@ class HosePack(Effect):
     name = "hose_pack"
     family = "sensor"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.PLACE})
     vectors = MappingProxyType({"h0_N": _H0, "H_N_rad": _H})
     parameters = (
         *(
-            Parameter(name, "N", -100.0, 100.0, nominal=0.0, start=10.0, linear=True, source=_SOURCE)
+            Parameter(
+                name=name,
+                unit="N",
+                low=-100.0,
+                high=100.0,
+                nominal=0.0,
+                start=10.0,
+                linear=True,
+                role=Role.SIZE,
+                source=_SOURCE,
+            )
             for name in _H0
         ),
         *(
-            Parameter(name, "N/rad", -200.0, 200.0, nominal=0.0, start=20.0, linear=True, source=_SOURCE)
+            Parameter(
+                name=name,
+                unit="N/rad",
+                low=-200.0,
+                high=200.0,
+                nominal=0.0,
+                start=20.0,
+                linear=True,
+                role=Role.SIZE,
+                source=_SOURCE,
+            )
             for name in _H
         ),
     )

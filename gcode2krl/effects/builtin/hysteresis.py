@@ -3,9 +3,11 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -21,13 +23,23 @@ class Hysteresis(Effect):
     name = "hysteresis"
     family = "compliance"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.OWN_TORQUE, Dependence.REVERSALS})
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "loss_deg", "deg", 0.0, 0.1, nominal=0.0, start=0.01, linear=True, minimum=0.0,
+            name="loss_deg",
+            unit="deg",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.01,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="hysteresis loss of cycloidal and wave gears 0.5-2 arcmin",
         ),
-    )  # fmt: skip
+    )
 
     def elastic(self, angle_rad: Floats, torque_Nm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the angles with the lagging part."""

@@ -4,8 +4,10 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 _LENGTHS = ("a1", "a2", "c1", "c2", "c3", "c4")
 
@@ -16,12 +18,21 @@ class LinkLength(Effect):
     name = "link_length"
     family = "geometry"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     parameters = (
         Parameter(
-            "mm", "mm", -5.0, 5.0, nominal=0.0, start=0.5, linear=True,
+            name="mm",
+            unit="mm",
+            low=-5.0,
+            high=5.0,
+            nominal=0.0,
+            start=0.5,
+            linear=True,
+            role=Role.SIZE,
             source="uncalibrated absolute accuracy of large arms 1-3 mm",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return a1, a2, c1, c2, c3, c4."""

@@ -3,8 +3,10 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -14,13 +16,22 @@ class Mastering(Effect):
     name = "mastering"
     family = "joint"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.CONSTANT})
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "offset_deg", "deg", -2.0, 2.0, nominal=0.0, start=0.02, linear=True,
+            name="offset_deg",
+            unit="deg",
+            low=-2.0,
+            high=2.0,
+            nominal=0.0,
+            start=0.02,
+            linear=True,
+            role=Role.SIZE,
             source="uncalibrated accuracy of 1-3 mm is 0.02-0.1 deg; a slipped mark up to 2 deg",
         ),
-    )  # fmt: skip
+    )
 
     def joints(self, q_true_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the true joints."""

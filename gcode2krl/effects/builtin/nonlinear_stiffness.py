@@ -3,8 +3,10 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -18,17 +20,35 @@ class NonlinearStiffness(Effect):
     name = "nonlinear_stiffness"
     family = "compliance"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "soft_deg", "deg", 0.0, 0.1, nominal=0.0, start=0.01, linear=True, minimum=0.0,
+            name="soft_deg",
+            unit="deg",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.01,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="lost motion of cycloidal gears about 1 arcmin at 3 % of the rated torque",
         ),
         Parameter(
-            "torque_Nm", "N·m", 1.0, 3000.0, nominal=None, start=100.0, grid=(30.0, 100.0, 300.0),
-            minimum=1e-3, source="3 % of the rated torque of gears of 1-10 kN·m",
+            name="torque_Nm",
+            unit="N·m",
+            low=1.0,
+            high=3000.0,
+            nominal=None,
+            start=100.0,
+            grid=(30.0, 100.0, 300.0),
+            minimum=1e-3,
+            role=Role.SHAPE,
+            source="3 % of the rated torque of gears of 1-10 kN·m",
         ),
-    )  # fmt: skip
+    )
 
     def elastic(self, angle_rad: Floats, torque_Nm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the angles with the soft part."""

@@ -10,8 +10,10 @@ from gcode2krl.cutting import cutting_load
 from gcode2krl.cutting.law import feed_per_tooth, law_array
 from gcode2krl.effects import arm
 from gcode2krl.effects.coefficients import edge_only
-from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 
@@ -29,17 +31,33 @@ class Runout(Effect):
     name = "runout"
     family = "force"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.FORCE, Dependence.SPINDLE_SPEED})
     needs = frozenset({"cut"})
     parameters = (
         Parameter(
-            "runout_mm", "mm", 0.0, 0.1, nominal=0.0, start=0.02, minimum=0.0,
+            name="runout_mm",
+            unit="mm",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.02,
+            minimum=0.0,
+            role=Role.SIZE,
             source="10-30 µm of a milling spindle with collet",
         ),
         Parameter(
-            "angle_deg", "deg", 0.0, 180.0, nominal=None, start=0.0, grid=(0.0, 30.0, 60.0, 90.0),
+            name="angle_deg",
+            unit="deg",
+            low=0.0,
+            high=180.0,
+            nominal=None,
+            start=0.0,
+            grid=(0.0, 30.0, 60.0, 90.0),
+            role=Role.SHAPE,
             source="between the offset and a tooth: as the cutter happens to sit in its collet",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return (None,) where the material has edge coefficients."""

@@ -3,9 +3,11 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter, every_joint
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class ServoLag(Effect):
@@ -14,13 +16,25 @@ class ServoLag(Effect):
     name = "servo_lag"
     family = "timing"
     links = frozenset({"servo"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.VELOCITY})
+    is_nuisance = True
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(
-            "tau_s", "s", 0.0, 0.1, nominal=0.0, start=0.01, linear=True, minimum=0.0,
+            name="tau_s",
+            unit="s",
+            low=0.0,
+            high=0.1,
+            nominal=0.0,
+            start=0.01,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.lag_s,
             source="servo lag of large arms 10-30 ms",
         ),
-    )  # fmt: skip
+    )
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""

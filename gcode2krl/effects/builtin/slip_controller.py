@@ -8,8 +8,10 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.compliance import project_normal
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.weight import with_weight
 from gcode2krl.units import RAD_PER_DEG
 
@@ -24,18 +26,35 @@ class RsiOn(Effect):
     name = "rsi_on"
     family = "set-up slips"
     links = frozenset({"servo"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.FORCE_BY_PLACE})
     kind = "slip"
     searched_in = frozenset({"servo"})
     parameters = (
         Parameter(
-            "gain", "", 0.0, 1.5, nominal=0.0, start=1.0, linear=True, minimum=0.0,
+            name="gain",
+            unit="",
+            low=0.0,
+            high=1.5,
+            nominal=0.0,
+            start=1.0,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="1 takes all of the modelled deflection back",
         ),
         Parameter(
-            "delay_s", "s", 0.0, 0.5, nominal=None, start=0.1, grid=(0.0, 0.05, 0.1, 0.15),
+            name="delay_s",
+            unit="s",
+            low=0.0,
+            high=0.5,
+            nominal=None,
+            start=0.1,
+            grid=(0.0, 0.05, 0.1, 0.15),
+            role=Role.SHAPE,
             source="force chain and robot's reaction 100-150 ms; pilot forces take it off",
         ),
-    )  # fmt: skip
+    )
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""
@@ -62,20 +81,37 @@ class WrongLoad(Effect):
     name = "load"
     family = "set-up slips"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     kind = "slip"
     searched_in = frozenset({"mechanics"})
     vectors = MappingProxyType({"further_mm": _FURTHER})
     parameters = (
         Parameter(
-            "mass_kg", "kg", -300.0, 300.0, nominal=0.0, start=30.0, linear=True,
+            name="mass_kg",
+            unit="kg",
+            low=-300.0,
+            high=300.0,
+            nominal=0.0,
+            start=30.0,
+            linear=True,
+            role=Role.SIZE,
             source="load data of another tool, or none: up to the rated payload",
         ),
         *(
-            Parameter(name, "mm", -500.0, 500.0, nominal=None, start=0.0,
-                      source="centres of the tools of one cell: some hundred millimetres apart")
+            Parameter(
+                name=name,
+                unit="mm",
+                low=-500.0,
+                high=500.0,
+                nominal=None,
+                start=0.0,
+                role=Role.SHAPE,
+                source="centres of the tools of one cell: some hundred millimetres apart",
+            )
             for name in _FURTHER
         ),
-    )  # fmt: skip
+    )
 
     def load(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load with the weight that is not accounted for."""
@@ -103,15 +139,26 @@ class AbsoluteAccuracy(Effect):
     name = "absolute_accuracy"
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.CONSTANT})
     kind = "slip"
     searched_in = frozenset({"path"})
     own_model = True
     vectors = MappingProxyType({"offsets_deg": _OFFSETS})
     parameters = tuple(
-        Parameter(name, "deg", -1.0, 1.0, nominal=0.0, start=0.02, linear=True,
-                  source="uncalibrated accuracy of 1-3 mm is 0.02-0.1 deg")
+        Parameter(
+            name=name,
+            unit="deg",
+            low=-1.0,
+            high=1.0,
+            nominal=0.0,
+            start=0.02,
+            linear=True,
+            role=Role.SIZE,
+            source="uncalibrated accuracy of 1-3 mm is 0.02-0.1 deg",
+        )
         for name in _OFFSETS
-    )  # fmt: skip
+    )
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs with these joints."""

@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.signals import Signals
 from gcode2krl.errors import input_error
 
@@ -22,6 +24,8 @@ class OtherProgram(Effect):
     name = "other_program"
     family = "set-up slips"
     links = frozenset({"path", "timing"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.TRAVEL})
     kind = "slip"
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
@@ -39,13 +43,22 @@ class Unit(Effect):
     name = "unit"
     family = "set-up slips"
     links = frozenset(_LINKS.values())
+    where = frozenset({Where.JOINT, Where.TIP, Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.OWN_ANGLE, Dependence.PLACE, Dependence.FORCE})
     kind = "slip"
     parameters = (
         Parameter(
-            "factor", "", 1e-4, 1e4, nominal=1.0, start=1000.0, minimum=1e-9,
+            name="factor",
+            unit="",
+            low=1e-4,
+            high=1e4,
+            nominal=1.0,
+            start=1000.0,
+            minimum=1e-9,
+            role=Role.SIZE,
             source="1000, 25.4, 57.3 and their inverses",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return the tables."""

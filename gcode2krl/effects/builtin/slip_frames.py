@@ -9,6 +9,7 @@ from gcode2krl import robot
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.effects import arm
+from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.frame_effect import frame_of, frame_parameters, is_nothing
 from gcode2krl.effects.inputs import Inputs
@@ -25,6 +26,8 @@ class ToolNumber(Effect):
     name = "tool_number"
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
+    where = frozenset({Where.JOINT, Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     kind = "slip"
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
@@ -51,6 +54,8 @@ class BaseNumber(Effect):
     name = "base_number"
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
+    where = frozenset({Where.JOINT, Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     kind = "slip"
     parameters = frame_parameters(2000.0, 180.0, 10.0, 1.0, source="another base of the cell: anything")
 

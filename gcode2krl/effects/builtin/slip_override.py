@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
-from gcode2krl.effects.effect import Applied, Effect, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class Override(Effect):
@@ -15,14 +17,23 @@ class Override(Effect):
     name = "override"
     family = "set-up slips"
     links = frozenset({"timing"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.VELOCITY, Dependence.TRAVEL})
     kind = "slip"
     needs = frozenset({"plan"})
     parameters = (
         Parameter(
-            "percent", "%", 1.0, 200.0, nominal=100.0, start=50.0, minimum=0.1,
+            name="percent",
+            unit="%",
+            low=1.0,
+            high=200.0,
+            nominal=100.0,
+            start=50.0,
+            minimum=0.1,
+            role=Role.SIZE,
             source="the switch goes to 100 %; programs made at half speed look like 200 %",
         ),
-    )  # fmt: skip
+    )
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs at that speed."""

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.coefficients import with_larger_tools
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.signals import Signals
 
 _SURE_LENGTH_MM = 0.1
@@ -22,18 +24,33 @@ class SwappedTool(Effect):
     name = "swapped_tool"
     family = "set-up slips"
     links = frozenset({"mechanics", "force", "part"})
+    where = frozenset({Where.TIP, Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.PLACE, Dependence.FORCE})
     kind = "slip"
     searched_in = frozenset({"force", "mechanics"})
     parameters = (
         Parameter(
-            "diameter_mm", "mm", -30.0, 30.0, nominal=0.0, start=2.0,
+            name="diameter_mm",
+            unit="mm",
+            low=-30.0,
+            high=30.0,
+            nominal=0.0,
+            start=2.0,
+            role=Role.SIZE,
             source="the next tool of a rack: 1-10 mm",
         ),
         Parameter(
-            "length_mm", "mm", -200.0, 200.0, nominal=0.0, start=5.0, linear=True,
+            name="length_mm",
+            unit="mm",
+            low=-200.0,
+            high=200.0,
+            nominal=0.0,
+            start=5.0,
+            linear=True,
+            role=Role.SIZE,
             source="another length of the same cutter: 5-100 mm",
         ),
-    )  # fmt: skip
+    )
 
     def searched(self, link: str, target: Target, examined: frozenset[str]) -> bool:
         """Try it against forces, against the tip only without them: each try removes the material again."""

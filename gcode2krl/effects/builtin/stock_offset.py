@@ -3,8 +3,10 @@
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 _AXES = ("x", "y")
 
@@ -18,13 +20,21 @@ class StockOffset(Effect):
     name = "stock_offset"
     family = "force"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.FORCE_BY_PLACE})
     needs = frozenset({"cut"})
     parameters = (
         Parameter(
-            "offset_mm", "mm", -10.0, 10.0, nominal=0.0, start=0.5,
+            name="offset_mm",
+            unit="mm",
+            low=-10.0,
+            high=10.0,
+            nominal=0.0,
+            start=0.5,
+            role=Role.SIZE,
             source="a sawn block against stops 0.5-2 mm, clamped by eye several mm",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return x and y."""

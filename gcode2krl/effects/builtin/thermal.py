@@ -5,8 +5,10 @@ from types import MappingProxyType
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import DIRECTION, Applied, Effect, Parameter, direction_parameters
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
 
 
 class Thermal(Effect):
@@ -19,19 +21,37 @@ class Thermal(Effect):
     name = "thermal"
     family = "geometry"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.RUN_TIME, Dependence.WALL_CLOCK})
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
         Parameter(
-            "mm_per_h", "mm/h", 0.0, 2.0, nominal=0.0, start=0.2, linear=True, minimum=0.0,
+            name="mm_per_h",
+            unit="mm/h",
+            low=0.0,
+            high=2.0,
+            nominal=0.0,
+            start=0.2,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="0.1-0.5 mm in 1-3 h of warming up",
         ),
         Parameter(
-            "time_constant_h", "h", 0.05, 5.0, nominal=None, start=1.0, grid=(0.3, 1.0, 3.0), minimum=1e-3,
+            name="time_constant_h",
+            unit="h",
+            low=0.05,
+            high=5.0,
+            nominal=None,
+            start=1.0,
+            grid=(0.3, 1.0, 3.0),
+            minimum=1e-3,
+            role=Role.SHAPE,
             source="warming up of large arms takes 1-3 h",
         ),
         *direction_parameters("along the arm and downwards are usual"),
-    )  # fmt: skip
+    )
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the tip as it has drifted."""

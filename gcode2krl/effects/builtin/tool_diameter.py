@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 from gcode2krl.effects.coefficients import with_larger_tools
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.signals import Signals
 
 
@@ -17,12 +19,21 @@ class ToolDiameter(Effect):
     name = "tool_diameter"
     family = "part"
     links = frozenset({"part", "force"})
+    where = frozenset({Where.TIP, Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.FORCE})
     parameters = (
         Parameter(
-            "offset_mm", "mm", -2.0, 2.0, nominal=0.0, start=0.05,
+            name="offset_mm",
+            unit="mm",
+            low=-2.0,
+            high=2.0,
+            nominal=0.0,
+            start=0.05,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.diameter_mm,
             source="new end mills -0.03 mm, reground ones to -0.5 mm",
         ),
-    )  # fmt: skip
+    )
 
     def cut(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load of the true cutter."""

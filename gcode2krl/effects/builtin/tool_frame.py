@@ -1,6 +1,7 @@
 """The measured tip is moved by a frame in the tool."""
 
 from gcode2krl.arrays import Floats
+from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.frame_effect import FRAME_NAMES, frame_of, frame_parameters, is_nothing
 from gcode2krl.effects.inputs import Inputs
@@ -15,8 +16,16 @@ class ToolFrame(Effect):
     name = "tool_frame"
     family = "geometry"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.PLACE})
     parameters = frame_parameters(
-        20.0, 2.0, 0.3, 0.05, source="XYZ 4-point measurement of a tool 0.3-1 mm; ABC 0.05-0.5 deg"
+        most_mm=20.0,
+        most_deg=2.0,
+        start_mm=0.3,
+        start_deg=0.05,
+        usual_mm=lambda mismatch: mismatch.frame_mm,
+        usual_deg=lambda mismatch: mismatch.frame_deg,
+        source="XYZ 4-point measurement of a tool 0.3-1 mm; ABC 0.05-0.5 deg",
     )
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:

@@ -4,8 +4,10 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import MM_PER_M
 
 
@@ -18,12 +20,22 @@ class ToolWear(Effect):
     name = "tool_wear"
     family = "force"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.FORCE, Dependence.METRES_CUT})
     parameters = (
         Parameter(
-            "growth_per_m", "1/m", 0.0, 3.0, nominal=0.0, start=0.05, linear=True, minimum=0.0,
+            name="growth_per_m",
+            unit="1/m",
+            low=0.0,
+            high=3.0,
+            nominal=0.0,
+            start=0.05,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
             source="+20-100 % force over a tool's life of 0.5 m (hard steel) to kilometres (aluminium)",
         ),
-    )  # fmt: skip
+    )
 
     def cut(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load of the worn tool."""

@@ -1,7 +1,9 @@
 """Weight of the end effector in the reading of the force sensor."""
 
-from gcode2krl.effects.effect import Applied, Effect, Load, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Load
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class ToolWeight(Effect):
@@ -13,12 +15,21 @@ class ToolWeight(Effect):
     name = "tool_weight"
     family = "sensor"
     links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.PLACE})
     parameters = (
         Parameter(
-            "weight_N", "N", -500.0, 500.0, nominal=0.0, start=20.0, linear=True,
+            name="weight_N",
+            unit="N",
+            low=-500.0,
+            high=500.0,
+            nominal=0.0,
+            start=20.0,
+            linear=True,
+            role=Role.SIZE,
             source="a tool and holder weigh 10-50 N, a spindle 200-500 N",
         ),
-    )  # fmt: skip
+    )
 
     def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return what the sensor states."""

@@ -6,8 +6,10 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.effects.effect import JOINTS, Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -20,20 +22,47 @@ class Transmission(Effect):
     name = "transmission"
     family = "joint"
     links = frozenset({"gear"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.MOTOR_ANGLE})
+    is_nuisance = True
     parameters = (
         Parameter(
-            "amplitude_deg", "deg", 0.0, 0.02, nominal=0.0, start=0.004, linear=True, minimum=0.0,
+            name="amplitude_deg",
+            unit="deg",
+            low=0.0,
+            high=0.02,
+            nominal=0.0,
+            start=0.004,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.play_deg,
             source="1-60 arcsec at once and twice a turn of the motor",
         ),
         Parameter(
-            "harmonic", "", 0.1, 12.0, nominal=None, start=1.0, grid=(1.0, 2.0), minimum=0.0,
+            name="harmonic",
+            unit="",
+            low=0.1,
+            high=12.0,
+            nominal=None,
+            start=1.0,
+            grid=(1.0, 2.0),
+            minimum=0.0,
+            role=Role.COUNT,
             source="once and twice a turn of the motor are the strongest; tooth meshes are higher",
         ),
         Parameter(
-            "phase", "rad", -math.pi, math.pi, nominal=None, start=0.0, grid=(0.0, math.pi / 2.0),
+            name="phase",
+            unit="rad",
+            low=-math.pi,
+            high=math.pi,
+            nominal=None,
+            start=0.0,
+            grid=(0.0, math.pi / 2.0),
+            role=Role.PHASE,
             source="any",
         ),
-    )  # fmt: skip
+    )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
         """Return the joints whose gear ratio the cell states."""

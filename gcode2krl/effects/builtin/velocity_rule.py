@@ -2,8 +2,10 @@
 
 import math
 
-from gcode2krl.effects.effect import Applied, Effect, Parameter, Target
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 _OWN = math.nan
 
@@ -18,17 +20,35 @@ class VelocityRule(Effect):
     name = "velocity_rule"
     family = "timing"
     links = frozenset({"timing", "path"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.VELOCITY, Dependence.TRAVEL})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(
-            "k_s", "s", 0.0, 0.5, nominal=_OWN, start=0.2, minimum=0.0,
+            name="k_s",
+            unit="s",
+            low=0.0,
+            high=0.5,
+            nominal=_OWN,
+            start=0.2,
+            minimum=0.0,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.k_s,
             source="0.168 s measured on one KR 210 (Bigliardi et al. 2022); others unknown",
         ),
         Parameter(
-            "acc_cp_m_s2", "m/s2", 0.2, 10.0, nominal=_OWN, start=1.5, minimum=0.01,
+            name="acc_cp_m_s2",
+            unit="m/s2",
+            low=0.2,
+            high=10.0,
+            nominal=_OWN,
+            start=1.5,
+            minimum=0.01,
+            role=Role.SIZE,
+            usual=lambda mismatch: mismatch.acc_m_s2,
             source="$ACC.CP of programs 0.5-5 m/s2, drives of large arms up to 10",
         ),
-    )  # fmt: skip
+    )
 
     def nominal(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return the cell's own constants."""

@@ -5,17 +5,11 @@ from types import MappingProxyType
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import (
-    DIRECTION,
-    Applied,
-    Effect,
-    Parameter,
-    Target,
-    Values,
-    direction_parameters,
-)
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, Target, Values
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import second_order
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
 from gcode2krl.units import RAD_PER_REV
 
 _NEARBY = (0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1.03)
@@ -33,23 +27,48 @@ class Vibration(Effect):
     name = "vibration"
     family = "compliance"
     links = frozenset({"mechanics"})
+    where = frozenset({Where.TIP})
+    depends_on = frozenset({Dependence.TONE, Dependence.FORCE})
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
         Parameter(
-            "hz", "Hz", 3.0, 40.0, nominal=None, start=12.0, grid=(7.0, 10.0, 14.0, 19.0, 25.0), minimum=0.1,
+            name="hz",
+            unit="Hz",
+            low=3.0,
+            high=40.0,
+            nominal=None,
+            start=12.0,
+            grid=(7.0, 10.0, 14.0, 19.0, 25.0),
+            minimum=0.1,
+            role=Role.FREQUENCY,
             source="modes of large arms 7-25 Hz",
         ),
         Parameter(
-            "damping", "", 0.005, 0.2, nominal=None, start=0.03, grid=(0.03,), minimum=0.0,
+            name="damping",
+            unit="",
+            low=0.005,
+            high=0.2,
+            nominal=None,
+            start=0.03,
+            grid=(0.03,),
+            minimum=0.0,
+            role=Role.SHAPE,
             source="structural damping 1-6 %",
         ),
         Parameter(
-            "participation", "", 0.0, 3.0, nominal=0.0, start=0.5, minimum=0.0,
+            name="participation",
+            unit="",
+            low=0.0,
+            high=3.0,
+            nominal=0.0,
+            start=0.5,
+            minimum=0.0,
+            role=Role.SIZE,
             source="share of the mode in the static deflection; above 1 where several act as one",
         ),
         *direction_parameters("any"),
-    )  # fmt: skip
+    )
 
     def combined(
         self, coefficients: Floats, inputs: Inputs, target: Target = None, shape: Values | None = None

@@ -3,8 +3,10 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Applied, Effect, Parameter
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
 
 
 class WristCoupling(Effect):
@@ -17,12 +19,21 @@ class WristCoupling(Effect):
     name = "wrist_coupling"
     family = "joint"
     links = frozenset({"gear"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.PLACE})
     parameters = (
         Parameter(
-            "ratio", "", -0.05, 0.05, nominal=0.0, start=0.001, linear=True,
+            name="ratio",
+            unit="",
+            low=-0.05,
+            high=0.05,
+            nominal=0.0,
+            start=0.001,
+            linear=True,
+            role=Role.SIZE,
             source="couplings of hollow wrists are 1/50-1/200 before the controller takes them out",
         ),
-    )  # fmt: skip
+    )
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gears of the wrist."""

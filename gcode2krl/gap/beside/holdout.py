@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.gap.beside.stretches import STRETCH_S
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 LIMITS = THRESHOLDS.beside
-
-STRETCH_S = LIMITS.stretch_s
 
 
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:

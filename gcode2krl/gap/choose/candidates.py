@@ -8,8 +8,8 @@ from gcode2krl.effects import Effect
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links import SIGNALS, Link
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.selection import Question
-from gcode2krl.gap.fit.signatures import HZ, Block, blocks_at, blocks_of, strongest_hz
+from gcode2krl.gap.fit.design import Question
+from gcode2krl.gap.fit.signatures import Block, blocks_at, blocks_of, strongest_hz
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
@@ -37,10 +37,10 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
 
 def _blocks(effect: Effect, target: str | None, traces: Sequence[Trace]) -> Iterator[Block]:
     """Yield the blocks of an effect; one with a frequency is tried at the strongest of the residuals."""
-    if HZ not in effect.names:
+    p = effect.frequency
+    if p is None:
         yield from blocks_of(effect, target)
         return
-    p = effect.parameter(HZ)
     residuals = [trace.residual for trace in traces]
     step_s = float(np.median(np.diff(traces[0].time_s)))
     peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)

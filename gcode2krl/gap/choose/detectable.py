@@ -4,33 +4,48 @@ from typing import Any
 
 import numpy as np
 
-from gcode2krl.gap.choose.scoring import LEAST_RATIO
-from gcode2krl.gap.choose.selection import Examination
+from gcode2krl.gap.choose.examination import Examination, Key
+from gcode2krl.gap.fit.signatures import Block
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-SEEN = 0.02
-"""A block of whose power less than this is left beside the nuisance is not observable (design/gap.md)."""
+_LIMITS = THRESHOLDS.choose
 
 
 def observable(found: Examination) -> list[dict[str, Any]]:
-    """Return for each effect with one size the smallest that would have been a finding in this link.
+    """Return for each effect with one size the smallest that would have been reported in this link.
 
     From the first order of its signature; nothing of a path that is sound. ``seen`` is false where mismatch
     could do nearly all that it does.
     """
-    best: dict[tuple[str, str | None], dict[str, Any]] = {}
-    for column, (share, power) in zip(found.columns, found.seen, strict=False):
-        block = found.blocks[column.block]
-        sizes = [p for p in block.effect.parameters if not p.is_shape]
-        if column.width != 1 or len(sizes) != 1 or power <= 0.0:
+    smallest: dict[Key, dict[str, Any]] = {}
+    needed = max(2.0 * found.first_level, _LIMITS.least_ratio**2 * found.data.times)
+    candidates = found.data.candidates
+    for column, (share, power) in zip(candidates.columns, found.observable, strict=False):
+        block = candidates.block(column)
+        name = _only_size(block)
+        if column.width != 1 or name is None or power <= 0.0:
             continue
-        inputs, name = found.traces[0].inputs, sizes[0].name
-        start, nominal = (f(inputs, block.target)[name] for f in (block.effect.start, block.effect.nominal))
-        needed = max(2.0 * found.first_level, LEAST_RATIO**2 * found.times)
-        smallest = abs(start - nominal) * float(np.sqrt(needed / power))
         entry = {
-            "link": found.link.name, "effect": block.effect.name, "target": block.target, "parameter": name,
-            "smallest": smallest, "seen": share >= SEEN,
-        }  # fmt: skip
-        if block.key not in best or smallest < best[block.key]["smallest"]:
-            best[block.key] = entry
-    return list(best.values())
+            "link": found.link.name,
+            "effect": block.effect.name,
+            "target": block.target,
+            "parameter": name,
+            "smallest": _typical(found, block, name) * float(np.sqrt(needed / power)),
+            "seen": share >= _LIMITS.observable_share,
+        }
+        if block.key not in smallest or entry["smallest"] < smallest[block.key]["smallest"]:
+            smallest[block.key] = entry
+    return list(smallest.values())
+
+
+def _only_size(block: Block) -> str | None:
+    """Return the name of an effect's size, where it has one."""
+    sizes = [p.name for p in block.effect.parameters if not p.is_shape]
+    return sizes[0] if len(sizes) == 1 else None
+
+
+def _typical(found: Examination, block: Block, name: str) -> float:
+    """Return by how much a typical effect is away from nominal."""
+    inputs = found.traces[0].inputs
+    start, nominal = (f(inputs, block.target)[name] for f in (block.effect.start, block.effect.nominal))
+    return abs(start - nominal)

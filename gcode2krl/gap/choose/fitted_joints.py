@@ -11,7 +11,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.selection import Examination, nuisance_for
+from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.fit.design import nuisance_for
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.fit.signatures import Signatures
 
@@ -20,19 +21,10 @@ def fitted_signal(trace: Trace, examination: Examination) -> Floats:
     """Return what the link does to the joints (n, k): its effects and the mismatch that fits best."""
     applied = examination.applied
     nuisance = nuisance_for([trace], examination.question, Signatures())
-    target = Likelihood([trace], nuisance, examination.noise)
-    b = target.nuisance_of(target.whiten([trace.measured - trace.sample(applied)]))
+    likelihood = Likelihood([trace], nuisance, examination.noise)
+    b = likelihood.nuisance_of(likelihood.whiten([trace.measured - trace.sample(applied)]))
     if trace.link.instrument:
         trace = replace(trace, plus_late_s=0.0)
-        applied = tuple(one for one in applied if not one.effect.is_clock)
-        widths = [
-            (each.name, each.columns.shape[2])
-            for shared in (True, False)
-            for each in nuisance[0]
-            if each.shared is shared
-        ]
-        kept = np.concatenate([np.full(width, name not in trace.link.instrument) for name, width in widths])
-        b = np.where(kept, b, 0.0)
-    n, k = trace.shape
-    model: Floats = trace.sample(applied) + (target.raw(nuisance)[0] @ b).reshape(k, n).T
-    return model
+        applied = tuple(each for each in applied if not each.effect.is_clock)
+        b[np.isin(likelihood.design.names(0), trace.link.instrument)] = 0.0
+    return trace.sample(applied) + likelihood.design.effect(0, trace, b)

@@ -1,26 +1,21 @@
-"""Intervals of parameters: curvature of chi2, with a sandwich over stretches of time for coloured rests."""
+"""90 % intervals of parameters: the covariance of a fit by clusters, and what the model itself is off by."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.selection import Examination
-from gcode2krl.gap.fit.gram import PRIOR, stretches_of_all
-from gcode2krl.gap.fit.numbers import FIXED
-from gcode2krl.gap.fit.sensitivity import unbounded_jacobian
-from gcode2krl.gap.fit.signatures import PHASE
+from gcode2krl.effects import Parameter, Role
+from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.fit.clusters import clustered_covariance
+from gcode2krl.gap.fit.fitted import Fitted
+from gcode2krl.gap.fit.likelihood import Likelihood
+from gcode2krl.gap.thresholds import THRESHOLDS
 
+_LIMITS = THRESHOLDS.choose
 _DRAWS = 400
-_MODEL, _LAW = 0.03, 0.1
-"""Shares of a number that models are off by, whatever the noise: of all effects, of those that plan anew.
-
-As half-widths of 90 % intervals; from calibration runs of `tests/plant`, not from those that are scored.
-"""
-_INSIDE = 0.9
-"""Of a uniform draw nine in ten are within this share of its bound."""
-_SHARED = ("tau_s", "gap_deg", "amplitude_deg")
-_LEAST_STRETCHES = 8
+"""Quantiles at 5 and 95 % are then known to a tenth of a deviation."""
+_ENDS = (0.05, 0.95)
 
 
 class Interval(NamedTuple):
@@ -34,77 +29,75 @@ class Interval(NamedTuple):
 def intervals_of(found: Examination) -> list[dict[str, Interval]]:
     """Return the interval of every parameter of every accepted effect.
 
-    The covariance of the fit's numbers is H⁻¹·B·H⁻¹ with H the curvature and B the sum over stretches of time
-    of the outer products of their scores (White 1980, by clusters); never less than H⁻¹ alone. H holds what
-    was known before: a size is expected within `PRIOR` typical ones.
+    Quantiles of draws from the fit's covariance, added in quadrature to the errors of models.
     """
     if not found.applied:
         return []
-    covariance = _covariance(found)
-    generator = np.random.default_rng(0)
+    draws = _draws(found.fitted, covariance_of(found.likelihood, found.fitted))
+    return [_effect_intervals(found, number, draws) for number in range(len(found.applied))]
+
+
+def _draws(fitted: Fitted, covariance: Floats) -> Floats:
+    """Return draws (d, p) of the numbers."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = found.fitted.x + generator.standard_normal((_DRAWS, len(found.fitted.x))) @ root.T
-    result, at = [], 0
-    for number, free in enumerate(found.fitted.free):
-        width = len(free.names)
-        mine = np.clip(draws[:, at : at + width], free.low, free.high)
-        at += width
-        drawn = [free.applied(x).values for x in mine]
-        own = found.applied[number].values
-        share = _LAW if free.effect.plans_anew else _MODEL
-        usual = _usual(found, number)
-        result.append(
-            {
-                name: _interval(
-                    name,
-                    own[name],
-                    np.array([d[name] for d in drawn]),
-                    float(np.hypot(share * own[name], usual.get(name, 0.0))),
-                )
-                for name in own
-            }
+    normal = np.random.default_rng(0).standard_normal((_DRAWS, len(fitted.x)))
+    draws: Floats = fitted.x + normal @ root.T
+    return draws
+
+
+def _effect_intervals(found: Examination, number: int, draws: Floats) -> dict[str, Interval]:
+    """Return the interval of each parameter of an accepted effect."""
+    numbers, values = found.fitted.numbers, found.applied[number].values
+    free, own = numbers.free[number], draws[:, numbers.slices[number]]
+    drawn = [free.applied(x).values for x in np.clip(own, free.low, free.high)]
+    share = _LIMITS.law_error if free.effect.plans_anew else _LIMITS.model_error
+    mismatch = _mismatch(found, number)
+    return {
+        name: _interval(
+            free.effect.parameter(name),
+            value,
+            np.array([each[name] for each in drawn]),
+            float(np.hypot(share * value, mismatch.get(name, 0.0))),
         )
-    return result
+        for name, value in values.items()
+    }
 
 
-def _usual(found: Examination, number: int) -> dict[str, float]:
-    """Return what normal mismatch of the same form adds to the numbers of an effect in a joint, nine in ten.
+def _mismatch(found: Examination, number: int) -> dict[str, float]:
+    """Return the half-widths that normal mismatch of the same form adds to an effect in a joint.
 
-    It is a nuisance of the fit at its own small size, which at the size of the effect has another shape.
+    It is nuisance of the fit at its own small size, which at the size of the effect has another shape.
     """
-    if not found.link.of_joints or found.link.tells_time:
+    effect = found.applied[number].effect
+    if not found.link.of_joints or found.link.tells_time or not effect.is_nuisance:
         return {}
-    limits = found.question.mismatch.limits(found.applied[number], 1.0)
-    return {name: _INSIDE * limit for name, limit in limits.items() if name in _SHARED}
+    bounds = effect.usual(found.question.mismatch, 1.0)
+    return {name: _LIMITS.inside_bound * bound for name, bound in bounds.items()}
 
 
-def _interval(name: str, value: float, drawn: Floats, model: float) -> Interval:
-    """Return the 90 % interval of draws (d,), an angle's about its value, and of what the model is off by."""
+def _interval(parameter: Parameter, value: float, drawn: Floats, model: float) -> Interval:
+    """Return the interval of draws (d,), an angle's about its value, and of what the model is off by."""
     away = drawn - value
-    model = 0.0 if name in FIXED else model
-    if name == PHASE:
+    model = 0.0 if parameter.role is Role.COUNT else model
+    if parameter.role is Role.PHASE:
         away = (away + np.pi) % (2.0 * np.pi) - np.pi
-    low, high = np.quantile(away, [0.05, 0.95]).tolist()
+    low, high = np.quantile(away, _ENDS).tolist()
     return Interval(value, value - float(np.hypot(low, model)), value + float(np.hypot(high, model)))
 
 
-def _covariance(found: Examination) -> Floats:
-    residual = found.target.residual(found.applied)
-    scale = np.concatenate([free.scale for free in found.fitted.free])
-    scaled = unbounded_jacobian(found.target, found.fitted) * scale
-    # what the data do not see at all is as uncertain as it was before them
-    inverse = np.linalg.inv(scaled.T @ scaled + PRIOR**-2 * np.eye(len(scale)))
-    clusters = stretches_of_all(found.traces)
-    rows = len(clusters)
-    scores = scaled[:rows] * residual[:rows, None]
-    names = np.unique(clusters)
-    sums = np.stack([scores[clusters == name].sum(axis=0) for name in names])
-    plain: Floats = inverse * np.outer(scale, scale)
-    if len(names) < _LEAST_STRETCHES:
-        return plain
-    meat = sums.T @ sums * len(names) / (len(names) - 1.0)
-    robust: Floats = inverse @ meat @ inverse * np.outer(scale, scale)
-    grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(plain), 1e-300), 1.0))
-    widened: Floats = plain * np.outer(grown, grown)
-    return widened
+def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
+    """Return the covariance (p, p) of a fit's numbers by stretches of time.
+
+    The information holds the prior of `prior_sizes`: what the data do not see stays as uncertain as it was.
+    Fewer stretches than `least_stretches` cannot tell how scores scatter.
+    """
+    scale = fitted.numbers.box.scale
+    jacobian = likelihood.jacobian(fitted.numbers, fitted.x, bounded=False)
+    information = jacobian.T @ jacobian + THRESHOLDS.fit.prior_sizes**-2 * np.eye(len(scale))
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    scores = likelihood.scores(jacobian, likelihood.residual(fitted.applied))
+    if len(scores) >= _LIMITS.least_stretches:
+        covariance = clustered_covariance(covariance, scores, small_sample=True)
+    scaled: Floats = covariance * np.outer(scale, scale)
+    return scaled

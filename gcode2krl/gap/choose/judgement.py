@@ -1,6 +1,6 @@
 """One link, from its traces to a judgement: causes, their probability, and what held-out data say of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,30 +10,20 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.fitted_joints import fitted_signal
-from gcode2krl.gap.choose.gap_size import Size, size_of_gap
+from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import Interval, intervals_of
-from gcode2krl.gap.choose.rivals import (
-    UNKNOWN_SHARE,
-    Rival,
-    probabilities,
-    rivals_of,
-    unknown_probability,
-)
-from gcode2krl.gap.choose.selection import PRUNE, Examination, Question, acts, examine, nuisance_for
+from gcode2krl.gap.choose.rivals import Rival, probabilities, rivals_of, unknown_probability
+from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
-from gcode2krl.gap.fit.noise import Noise
+from gcode2krl.gap.fit.design import Question, nuisance_for
 from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-NAMED = 0.5
-MOST_TOGETHER = 2
-"""More effects in one link than this at once imitate something that the library does not have."""
-LEAST_BROUGHT = 0.4
-"""A cause that takes less than this of what those above it leave on held-out data is not named."""
-_TOGETHER = 0.5
-"""Share of an effect's data from which on it acts where others do."""
-CROWDED = 0.4
-"""Times this, or at most one less this: what is left for a cause that nothing on held-out data supports."""
+_LIMITS = THRESHOLDS.choose
+NAMED = _LIMITS.named
+"""A cause counts as named from this probability on."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +52,9 @@ class Judgement:
     held_out: bool
     examination: Examination
     usual: tuple[Applied, ...] = field(default=())
+    """Accepted effects that are within normal mismatch."""
     every: tuple[Trace, ...] = field(default=())
-    """The parts with the held-out ones."""
+    """The traces with the held-out ones."""
 
     @property
     def applied(self) -> tuple[Applied, ...]:
@@ -80,144 +71,128 @@ class Judgement:
 
 
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
-    """Examine a link on some traces and report on the held-out ones; without any, each trace by turns."""
+    """Examine a link on some traces and report on the held-out ones; without any, each held out in turn."""
     known = Signatures()
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
     found = examine(link, traces, question, known)
-    usual = tuple(each for each in found.applied if each not in found.causes)
     if not found.causes:
-        everything = [*traces, *held]
-        size = _size(everything, found, question, known, (), usual)
-        verdict = "unexplained" if size.significant else "no_gap"
-        return Judgement(link, tuple(traces), verdict, (), size, True, found, usual, tuple(everything))
-    trials = _trials(link, traces, held, question, known, found)
+        return _without_causes(found, (*traces, *held))
+    trials = list(_trials(found, held))
     counts = range(len(found.causes) + 1)
     if trials:
-        sizes = [_pooled([trial(count) for trial in trials]) for count in counts]
+        sizes = [pooled([trial.size(count) for trial in trials]) for count in counts]
     else:
-        sizes = [_size(traces, found, question, known, found.causes[:count], usual) for count in counts]
-    whole = _size(traces, found, question, known, found.causes, usual)
-    judged = _judgement(link, traces, found, usual, sizes, whole, bool(trials))
-    return replace(judged, every=(*traces, *held))
+        sizes = [_size(found, traces, found.causes[:count]) for count in counts]
+    whole = _size(found, traces, found.causes)
+    return replace(_judgement(found, sizes, whole, bool(trials)), every=(*traces, *held))
 
 
-def _trials(
-    link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question, known: Signatures,
-    found: Examination,
-) -> list["_Trial"]:  # fmt: skip
-    """Return one trial a split: what was chosen without the held-out data, and these."""
-    if held:
-        return [_Trial(found, list(held), question, known, found)]
-    return [
-        _Trial(examine(link, train, question, known, found.noise), test, question, known, found)
-        for train, test in folds_of(traces, _power(traces, found))
-    ]
+def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]) -> Size:
+    """Return the size of the gap of some traces, with and without causes."""
+    nuisance = nuisance_for(traces, found.question, found.data.known)
+    return size_of_gap(traces, nuisance, found.noise, causes, found.mismatch)
 
 
-def _power(traces: Sequence[Trace], found: Examination) -> list[Floats]:
-    """Return the power (n,) of what the causes do in each row of each trace."""
-    return [np.sum((trace.sample(found.causes) - trace.nominal) ** 2, axis=1) for trace in traces]
+def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
+    size = _size(found, every, ())
+    verdict = "unexplained" if size.significant else "no_gap"
+    return Judgement(found.link, found.traces, verdict, (), size, True, found, found.mismatch, every)
+
+
+# Held-out data
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Held-out parts and what the other parts say is at work."""
+    """Held-out traces and what the other traces say is at work."""
 
     chosen: Examination
-    held: list[Trace]
-    question: Question
-    known: Signatures
+    held: Sequence[Trace]
     main: Examination
 
-    def __call__(self, count: int) -> Size:
+    def size(self, count: int) -> Size:
         """Return the size of the held-out gap with those of its effects that are among the first causes."""
-        names = [(each.effect.name, each.target) for each in self.main.causes[:count]]
-        mine = [each for each in self.chosen.causes if (each.effect.name, each.target) in names]
-        if count == len(self.main.causes):
-            mine = list(self.chosen.causes)
-        usual = [each for each in self.chosen.applied if each not in self.chosen.causes]
-        return _size(self.held, self.chosen, self.question, self.known, mine, usual)
+        causes = self.chosen.causes
+        if count < len(self.main.causes):
+            names = [(each.effect.name, each.target) for each in self.main.causes[:count]]
+            causes = tuple(each for each in causes if (each.effect.name, each.target) in names)
+        return _size(self.chosen, self.held, causes)
 
 
-def _size(
-    traces: Sequence[Trace], found: Examination, question: Question, known: Signatures,
-    applied: Sequence[Applied], usual: Sequence[Applied],
-) -> Size:  # fmt: skip
-    noise: list[Noise] = found.noise
-    return size_of_gap(traces, nuisance_for(traces, question, known), noise, applied, usual)
+def _trials(found: Examination, held: Sequence[Trace]) -> Iterator[_Trial]:
+    """Yield one trial a split: what was chosen without the held-out data, and these."""
+    if held:
+        yield _Trial(found, held, found)
+        return
+    power = [
+        np.sum((trace.sample(found.causes) - trace.nominal) ** 2, axis=1) for trace in found.traces
+    ]  # of what the causes do in each row
+    for train, test in folds_of(found.traces, power):
+        chosen = examine(found.link, train, found.question, found.data.known, found.noise)
+        yield _Trial(chosen, test, found)
 
 
-def _pooled(sizes: Sequence[Size]) -> Size:
-    """Return the mean over splits, each by its rows."""
-    rows = sum(size.rows for size in sizes)
-
-    def mean(name: str) -> float:
-        return sum(float(getattr(size, name)) * size.rows for size in sizes) / rows
-
-    return Size(
-        rows=rows,
-        before=mean("before"),
-        after=mean("after"),
-        floor=mean("floor"),
-        noise=mean("noise"),
-        excess=mean("excess"),
-        excess_before=mean("excess_before"),
-        deviation=mean("deviation") / len(sizes) ** 0.5,
-        largest_before=max(size.largest_before for size in sizes),
-        largest_after=max(size.largest_after for size in sizes),
-    )
+# Causes and verdict
 
 
-def _beside_others(found: Examination, positions: Sequence[int]) -> bool:
-    """Tell whether the last of some accepted effects acts where those before it do: in the same joints, say.
+def _judgement(found: Examination, sizes: Sequence[Size], whole: Size, held_out: bool) -> Judgement:
+    """Return the judgement from the sizes of the gap with the first 0, 1, 2 … causes.
 
-    Only there can it be what is left of their form.
+    ``whole`` is the size on the data that the causes were fitted to.
     """
-    if len(positions) == 1:
-        return True
-    mine = acts(found, positions[-1])
-    others = np.any([acts(found, position) for position in positions[:-1]], axis=0)
-    return float(np.mean(others[mine])) > _TOGETHER if mine.any() else True
-
-
-def _judgement(
-    link: Link, traces: Sequence[Trace], found: Examination, usual: tuple[Applied, ...], sizes: list[Size],
-    whole: Size, held_out: bool,
-) -> Judgement:  # fmt: skip
     last = sizes[-1]
     # what is left on held-out data alone is what few runs do not settle of a cause's numbers
     left = last.significant and whole.significant
     unknown = unknown_probability(last.share_left, left)
-    if len(found.causes) > MOST_TOGETHER:
-        unknown = max(unknown, 1.0 - CROWDED)
-    causes = []
-    positions = [i for i, flag in enumerate(found.usual) if not flag]
+    if len(found.causes) > _LIMITS.most_together:
+        unknown = max(unknown, 1.0 - _LIMITS.unsupported)
+    causes = sorted(_causes(found, sizes, unknown, held_out), key=lambda cause: -cause.probability)
+    rest = left and last.share_left > _LIMITS.unknown_share
+    verdict = _verdict(any(cause.probability >= NAMED for cause in causes), rest, sizes[0].significant)
+    return Judgement(found.link, found.traces, verdict, tuple(causes), last, held_out, found, found.mismatch)
+
+
+def _verdict(named: bool, rest: bool, gap: bool) -> str:
+    if named:
+        return "partly_explained" if rest else "explained"
+    return "unexplained" if gap else "no_gap"
+
+
+def _causes(found: Examination, sizes: Sequence[Size], unknown: float, held_out: bool) -> Iterator[Cause]:
+    """Yield the causes in the order in which they were accepted."""
     intervals = intervals_of(found)
-    for order, number in enumerate(positions):
+    for order, number in enumerate(found.cause_numbers):
         rivals = rivals_of(found, number)
-        own, others = probabilities(rivals, found.surprises[number], found.level, unknown)
-        brings = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        least = PRUNE if _beside_others(found, positions[: order + 1]) else 0.0
-        if held_out and brings < max(least, LEAST_BROUGHT * (1.0 - sizes[order].shrink)):
-            own *= CROWDED
-        causes.append(
-            Cause(
-                applied=found.applied[number],
-                link=link.name,
-                probability=own,
-                parameters=intervals[number],
-                shrink=brings if held_out else None,
-                rms_after=sizes[order + 1].after ** 0.5,
-                rivals=tuple(zip(rivals, others, strict=True)),
-            )
+        probability, others = probabilities(rivals, found.surprises[number], found.level, unknown)
+        shrink = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
+        if held_out and shrink < _least_shrink(found, sizes, order):
+            probability *= _LIMITS.unsupported
+        yield Cause(
+            applied=found.applied[number],
+            link=found.link.name,
+            probability=probability,
+            parameters=intervals[number],
+            shrink=shrink if held_out else None,
+            rms_after=sizes[order + 1].after ** 0.5,
+            rivals=tuple(zip(rivals, others, strict=True)),
         )
-    causes.sort(key=lambda cause: -cause.probability)
-    named = [cause for cause in causes if cause.probability >= NAMED]
-    if named and not (left and last.share_left > UNKNOWN_SHARE):
-        verdict = "explained"
-    elif named:
-        verdict = "partly_explained"
-    else:
-        verdict = "unexplained" if sizes[0].significant else "no_gap"
-    return Judgement(link, tuple(traces), verdict, tuple(causes), last, held_out, found, usual)
+
+
+def _least_shrink(found: Examination, sizes: Sequence[Size], order: int) -> float:
+    """Return the share of the held-out gap that a cause must take to be named."""
+    least = _LIMITS.prune_share if _acts_where_others_do(found, order) else 0.0
+    return max(least, _LIMITS.least_share_of_rest * (1.0 - sizes[order].shrink))
+
+
+def _acts_where_others_do(found: Examination, order: int) -> bool:
+    """Tell whether a cause acts where those before it do: in the same joints, say.
+
+    Only there can it be what is left of their form. True of the first one.
+    """
+    if order == 0:
+        return True
+    *before, number = found.cause_numbers[: order + 1]
+    rows = found.rows_changed(number)
+    others = np.any([found.rows_changed(other) for other in before], axis=0)
+    return float(np.mean(others[rows])) > _LIMITS.together_share if rows.any() else True

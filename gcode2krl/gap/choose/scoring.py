@@ -1,53 +1,28 @@
-"""Grouped forward selection: how surprising a block of signatures is."""
+"""How surprising the gain of a candidate is, and whether its size is plausible."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
-from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.fit.gram import Ledger
+from gcode2krl.arrays import Floats
+from gcode2krl.gap.fit.design import Column
+from gcode2krl.gap.fit.gram import Gram
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-FALSE_ALARMS = 1e-3
-"""Of each link; five links together stay below the one in a hundred runs of design/gap.md."""
-LEAST_RATIO = 0.08
-"""An effect whose trace, nuisance taken out, is below this share of the noise is not reported: models of
-sound machines differ by so much."""
-
-_REACH, _BENT_REACH = 0.02, 1.0
-"""Of their range, by how much coefficients may be beyond it: they are the first order of an effect."""
+_LIMITS = THRESHOLDS.choose
+_ASYMPTOTIC = 100.0
+"""From this chi2/2 on the tail probability underflows, and its asymptotic series is exact to a per cent."""
 
 
-@dataclass(frozen=True)
-class Column:
-    """Where a block's columns stand among the signatures, and the range of its coefficients."""
-
-    block: int
-    first: int
-    width: int
-    low: Floats
-    high: Floats
-    bent: bool = False
-    """The signals are not proportional to the size: coefficients tell little of it."""
-
-    @property
-    def index(self) -> Ints:
-        """Return the numbers of its columns."""
-        return np.arange(self.first, self.first + self.width)
-
-    def moved(self, by: int) -> "Column":
-        """Return the column behind ``by`` more."""
-        return replace(self, first=self.first + by)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Score:
-    """One block's statistic."""
+    """One candidate's statistic."""
 
     column: Column
     gain: float
-    """Fall of chi2."""
+    """Fall of chi2: the likelihood ratio."""
     coefficients: Floats
     surprise: float
     """-log of the probability of that gain without the effect."""
@@ -58,32 +33,37 @@ class Score:
 def surprise(gain: float, width: int) -> float:
     """Return -log P(chi2 with ``width`` degrees > gain); large values by the asymptotic series."""
     x, half = max(gain, 0.0) / 2.0, width / 2.0
-    if x < 100.0:
+    if x < _ASYMPTOTIC:
         return float(-np.log(max(special.gammaincc(half, x), 1e-300)))
     return float(x - (half - 1.0) * np.log(x) + special.gammaln(half))
 
 
-def scores(ledger: Ledger, columns: Sequence[Column]) -> list[Score]:
-    """Return the statistic of every block beside what is given in the ledger's last evidence."""
-    found = []
-    for column in columns:
-        if column.width == 0:
-            continue
-        gain, coefficients = ledger.bounded_gain(column.index)
-        span = np.abs(column.high - column.low)
-        reach = 1e-9 + (_BENT_REACH if column.bent else _REACH) * span
-        within = bool(np.all((coefficients >= column.low - reach) & (coefficients <= column.high + reach)))
-        if column.width == 1 and column.low[0] == 0.0 and coefficients[0] < 0.0:
-            within = False
-        plausible = np.clip(coefficients, column.low, column.high)
-        if column.bent and column.width > 1:  # of several, those that say nothing begin at nominal
-            within = True
-            plausible = np.where(plausible == coefficients, coefficients, 0.0)
-        found.append(Score(column, gain, plausible, surprise(gain, column.width), within))
-    return found
+def scores(gram: Gram, columns: Sequence[Column]) -> list[Score]:
+    """Return the statistic of every candidate beside the accepted effects."""
+    return [_score(gram, column) for column in columns if column.width]
 
 
-def threshold(blocks: int) -> float:
-    """Return the surprise that the largest of so many blocks stays below in all but one in a thousand
-    effect-free data sets (Bonferroni; conservative, as blocks are alike)."""
-    return float(np.log(max(blocks, 1) / FALSE_ALARMS))
+def _score(gram: Gram, column: Column) -> Score:
+    gain, coefficients = gram.gain(column.index)
+    plausible = np.clip(coefficients, column.low, column.high)
+    if column.bent and column.width > 1:  # those of several that say nothing begin at nominal
+        within = True
+        plausible = np.where(plausible == coefficients, coefficients, 0.0)
+    else:
+        within = _within(column, coefficients)
+    return Score(column, gain, plausible, surprise(gain, column.width), within)
+
+
+def _within(column: Column, coefficients: Floats) -> bool:
+    """Tell whether coefficients (c,) are in their range, or little beyond: they are a first order."""
+    if column.width == 1 and column.low[0] == 0.0 and coefficients[0] < 0.0:
+        return False
+    share = _LIMITS.bent_reach if column.bent else _LIMITS.reach
+    reach = 1e-9 + share * np.abs(column.high - column.low)
+    return bool(np.all((coefficients >= column.low - reach) & (coefficients <= column.high + reach)))
+
+
+def threshold(candidates: int) -> float:
+    """Return the surprise that the largest of so many stays below, but for one effect-free data set in a
+    thousand (Bonferroni; conservative, as candidates are alike)."""
+    return float(np.log(max(candidates, 1) / _LIMITS.false_alarms))

@@ -12,12 +12,16 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.mismatch import sigma
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.selection import Question, nuisance_for
+from gcode2krl.gap.fit.design import Question, nuisance_for
+from gcode2krl.gap.fit.nuisance import CLOCK, Nuisance
 from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.thresholds import THRESHOLDS
 
+_MOST_S = THRESHOLDS.choose.clock_most_s
 _ROUNDS = 2
-_MOST_S = 0.02
+"""The second takes off what the first leaves of its own linearisation."""
 _RIDGE = 1e-6
+"""Keeps columns apart that are equal to rounding; of unit length each."""
 
 
 def with_set_clocks(traces: Sequence[Trace], question: Question, known: Signatures) -> list[Trace]:
@@ -29,25 +33,29 @@ def with_set_clocks(traces: Sequence[Trace], question: Question, known: Signatur
     if not traces or not traces[0].link.sets_clocks:
         return traces
     nuisance = nuisance_for(traces, question, known)
-    total = np.zeros(len(traces))
+    limit_s = question.mismatch.clock_s * question.clocks
+    unit_s = sigma(question.mismatch.clock_s) * question.clocks**0.5
+    offsets_s = np.zeros(len(traces))
     current = traces
     for _ in range(_ROUNDS):
-        for number, trace in enumerate(current):
-            others = [each.columns for each in nuisance[number] if each.name != "clock"]
-            clock = [each.columns for each in nuisance[number] if each.name == "clock"]
-            if clock:
-                share = _coefficient(trace, clock[0], others)
-                total[number] += share * sigma(question.mismatch.clock_s) * question.clocks**0.5
-        limit = question.mismatch.clock_s * question.clocks
-        common = float(np.median(np.clip(total, -_MOST_S, _MOST_S)))
-        kept = common if abs(common) > limit else 0.0
-        total = kept + np.clip(total - kept, -limit, limit)
-        current = [_later(trace, offset - kept) for trace, offset in zip(traces, total.tolist(), strict=True)]
-        if kept:
+        offsets_s += [unit_s * _clock_of(trace, own) for trace, own in zip(current, nuisance, strict=True)]
+        common_s = float(np.median(np.clip(offsets_s, -_MOST_S, _MOST_S)))
+        kept_s = common_s if abs(common_s) > limit_s else 0.0
+        offsets_s = kept_s + np.clip(offsets_s - kept_s, -limit_s, limit_s)
+        moves_s = (offsets_s - kept_s).tolist()
+        current = [_later(trace, move_s) for trace, move_s in zip(traces, moves_s, strict=True)]
+        if kept_s:
             break
     for before, after in zip(traces, current, strict=True):
         known.same(before, after)
     return current
+
+
+def _clock_of(trace: Trace, nuisance: Sequence[Nuisance]) -> float:
+    """Return the coefficient of a trace's clock beside its other nuisance; 0 where it has none."""
+    others = [each.columns for each in nuisance if each.name != CLOCK]
+    clock = [each.columns for each in nuisance if each.name == CLOCK]
+    return _coefficient(trace, clock[0], others) if clock else 0.0
 
 
 def _later(trace: Trace, offset_s: float) -> Trace:
@@ -68,5 +76,5 @@ def _coefficient(trace: Trace, clock: Floats, others: Sequence[Floats]) -> float
     flat = flat[:, good] / scale[good]
     gram = flat.T @ flat
     gram[np.diag_indices_from(gram)] += _RIDGE
-    found = np.linalg.solve(gram, flat.T @ trace.residual.T.reshape(k * n))
-    return float(found[0] / scale[0])
+    coefficients = np.linalg.solve(gram, flat.T @ trace.residual.T.reshape(k * n))
+    return float(coefficients[0] / scale[0])

@@ -11,6 +11,7 @@ from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links.surface import SurfaceLink, SurfacePoints
 from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.fit.clusters import cluster_scores, clustered_covariance
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 LIMITS = THRESHOLDS.beside
@@ -83,7 +84,7 @@ def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) 
     per_size = _radius_per_size(effect, inputs)
     offset = Interval(*(float((b[0] + k * deviation) / per_size) for k in (0.0, -1.645, 1.645)))
     applied = Applied(effect, None, {effect.names[0]: offset.value})
-    usual = context.mismatch.limits(applied, 1.0)[effect.names[0]]
+    usual = effect.usual(context.mismatch, 1.0)[effect.names[0]]
     is_gap = abs(b[0] / per_size) > usual + LIMITS.scan_certain * deviation
     return SurfaceFinding(
         effect=effect,
@@ -158,12 +159,8 @@ def _fit(x: Floats, y: Floats, prior: Floats, block: Ints) -> tuple[Floats, Floa
     b = _solved(x, y, prior)
     rest = y - x @ b
     spread2 = float(np.mean(rest**2))
-    inverse = np.linalg.inv(x.T @ x / spread2 + np.diag(prior))
-    scores = np.zeros((int(block.max()) + 1, x.shape[1]))
-    np.add.at(scores, block, x * (rest / spread2)[:, None])
-    robust = inverse @ (scores.T @ scores) @ inverse
-    wide = np.sqrt(np.maximum(np.diag(robust) / np.diag(inverse), 1.0))
-    return b, inverse * np.outer(wide, wide)
+    inverse = np.asarray(np.linalg.inv(x.T @ x / spread2 + np.diag(prior)), dtype=np.float64)
+    return b, clustered_covariance(inverse, cluster_scores(x, rest / spread2, block))
 
 
 def _held_out(x: Floats, y: Floats, prior: Floats, chosen: Bools, test: Bools) -> tuple[float, float]:

@@ -1,1 +1,53 @@
-"""The statistical model of a link and its fit."""
+"""The statistical model of a link, and its fit.
+
+**Model.** A link has measured values y (v,), those of all its runs and components, one after the other:
+
+    y = f(θ) + N·b + e,    e ~ N(0, L·Lᵀ),    b ~ N(0, I) within |b_i| <= sqrt(3)
+
+- θ (p,): the free numbers of the effects that are in the model (`fitted.Numbers`), f their simulation
+  (`beside.trace.Trace.sample`), never a curve fit. Each number stays in its plausible range.
+- N (v, m), b (m,): normal mismatch (`nuisance`, `design`). A column of N is what one deviation does to the
+  signals, to first order, times the standard deviation of a uniform draw within its bound; so b has unit
+  variance, and its bound is sqrt(3) whatever the unit. b is shared by all runs for what belongs to the
+  machine, and each run's own for clocks, frames and zeros.
+- e: coloured noise, of each component by itself: x_t = Σ_i a_i·x_{t-1-i} + s·w_t of order 3 with w white
+  (`noise`). L⁻¹ is the filter (x_t - Σ_i a_i·x_{t-1-i})/s. It starts anew at each gap of the data: the first
+  three rows of a segment are divided by the rms of x alone. (That leaves them correlated among themselves,
+  and is wrong by three rows in thousands.)
+
+**Likelihood** (`likelihood.Likelihood`). With r = L⁻¹·(y - f(θ)) and whitened columns N for short,
+
+    chi2(θ) = min over |b_i| <= sqrt(3) of |r - N·b|² + |b|²
+
+The marginal residual is the vector (r - N·b, b), whose squared length is chi2. While no b_i is at its bound,
+chi2 = rᵀ·(I + N·Nᵀ)⁻¹·r: the same as generalised least squares with the covariance L·Lᵀ + N·Nᵀ of the raw
+data, nuisance integrated out. b at a bound is held there, and what is beyond is a gap.
+
+**Refit** (`refitting`, `least_squares`). θ of least chi2 by Gauss-Newton; J = ∂(marginal residual)/∂θ by
+differences of the simulation, H = Jᵀ·J the information, all numbers in units of their typical size. Numbers
+of a prior have standard deviation `prior_sizes`; the cost of numbers is log det(I + prior_sizes²·H),
+Laplace's approximation of the evidence (MacKay 1992).
+
+**Fast view** (`gram.Gram`). To first order r(θ + δ, c) = r - T·δ - S·c - N·b, T the tangents of the effects
+in the model and S the signatures of a candidate, both whitened. Inner products under the inverse covariance
+are
+
+    <a, b> = aᵀ·(I + N·Nᵀ)⁻¹·b = aᵀ·b - aᵀ·N·(NᵀN + I)⁻¹·Nᵀ·b        (Woodbury)
+
+so one Gram matrix of [r, T, S, N] holds every candidate's
+
+- gain: the likelihood ratio 2·log Λ = chi2 without S - chi2 with the best c, b refitted within its bounds;
+- observable share: <S, S> / SᵀS, the power of a signature that nuisance leaves;
+- inflation: see below.
+
+**Clusters** (`clusters`). No model is exact, so what is left of r is neither white nor independent. Rows of
+one stretch of time (`beside.stretches`, one second, all components) are a cluster g with the score u_g =
+Σ_{i in g} J_i·r_i. The sandwich H⁻¹·(Σ_g u_g·u_gᵀ)·H⁻¹ (White 1980) is the covariance of θ without the
+assumption of independent rows; trace(H⁻¹·Σ_g u_g·u_gᵀ)/p, never below 1, is the inflation of a gain: 2·log Λ
+over it is compared with chi2 of p degrees. Stretches must be longer than the memory of e and many more than
+p.
+
+**Assumptions and their range.** Mismatch is linear in b over its bounds (clocks are set first where it is
+not); effects are linear over a fiftieth of their typical size (differences) and, for the fast view, over
+their whole size: a large or bent effect is judged after its refit. Noise is stationary within a run.
+"""

@@ -1,106 +1,226 @@
-"""What the data say of every block at once: Gram matrices of whitened data, signatures and nuisance.
+"""The fast view of the likelihood: inner products of data, tangents, signatures and nuisance.
 
-With y the whitened residual, S the signatures and N the nuisance columns (each times its standard deviation)
-the covariance of y is I + N·Nᵀ, and inner products under its inverse are
-<a, b> = aᵀb - aᵀN·(NᵀN + I)⁻¹·Nᵀb (Woodbury). Everything the selection needs is such products, so the rows of
-the data are touched once.
+The symbols are those of `gcode2krl.gap.fit`. Gains, observable shares and inflations of hundreds of
+candidates need only aᵀ·b of whitened columns, summed over stretches of time; so the rows of the data are
+touched once. A candidate's gain is the likelihood ratio of its linear model, r - T·δ - S·c - N·b, with T the
+tangents of the accepted effects.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.beside.holdout import STRETCH_S
-from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.box import MOST, boxed
-from gcode2krl.gap.fit.noise import Noise
-from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.fit.clusters import gain_inflation
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-PRIOR = 3.0
-"""A size is expected within so many typical ones."""
+_PRIOR = THRESHOLDS.fit.prior_sizes
+_RANK = 1e-9
+"""Eigenvalues below this share of the largest hold rounding errors only."""
+
+
+class SignatureGram:
+    """Gram matrices of whitened signatures and nuisance, a stretch of time at a time."""
+
+    def __init__(
+        self, columns: Sequence[Floats], signatures: int, places: Sequence[Ints], stretches: Sequence[Ints]
+    ) -> None:
+        """Take the whitened columns (k·n, s + w) of each trace.
+
+        The first ``signatures`` are signatures, the others nuisance that stands in b at ``places`` (w,);
+        ``stretches`` (k·n,) number each row's stretch of time.
+        """
+        self.columns, self.signatures, self.places = columns, signatures, places
+        self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
+        self._fixed = [
+            [wide[rows].T @ wide[rows] for rows in members]
+            for wide, members in zip(columns, self._rows, strict=True)
+        ]
+
+    def beside(self, data: Sequence[Floats]) -> "Gram":
+        """Return the view with whitened data (k·n, 1 + t) of each trace: residual r and tangents T."""
+        traces = []
+        for number, (new, wide, rows) in enumerate(zip(data, self.columns, self._rows, strict=True)):
+            grams = [
+                _joined(new[at], wide[at], fixed) for at, fixed in zip(rows, self._fixed[number], strict=True)
+            ]
+            traces.append(TraceGram(np.stack(grams), np.sum(grams, axis=0), self.places[number]))
+        values = sum(len(new) for new in data)
+        return Gram(tuple(traces), data[0].shape[1] - 1, self.signatures, values)
+
+
+def _joined(new: Floats, fixed: Floats, fixed_gram: Floats) -> Floats:
+    """Return the Gram matrix of columns [new, fixed], that of the latter being known."""
+    cross = new.T @ fixed
+    return np.block([[new.T @ new, cross], [cross.T, fixed_gram]])
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """One part's signatures and nuisance, whitened, component after component."""
+class TraceGram:
+    """Gram matrices of one trace, columns [r, T, S, N]."""
 
-    trace: Trace
-    whitened: Floats
-    """(k·n, s + shared + own)"""
-    stretch: Ints
-    """(k·n,) number of the stretch of time each row belongs to."""
-    noise: tuple[Noise, ...]
+    stretches: Floats
+    """(g, c, c)"""
+    total: Floats
+    """(c, c)"""
+    places: Ints
+    """(w,) of its nuisance in b"""
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Inner products of all data; columns are numbered as those of the signatures."""
+
+    traces: tuple[TraceGram, ...]
+    tangents: int
     signatures: int
-    shared: int
+    values: int
+    """Number of data."""
 
-    def white(self, columns: Floats) -> Floats:
-        """Return columns (k, n, c) through the trace's filters, (k·n, c)."""
-        return whitened(columns, self.trace, self.noise)
+    @property
+    def _kept(self) -> int:
+        return 1 + self.tangents + self.signatures
 
+    def _at(self, columns: Ints) -> Ints:
+        """Return where signatures stand."""
+        return 1 + self.tangents + np.asarray(columns, dtype=int)
 
-def whitened(columns: Floats, trace: Trace, noise: Sequence[Noise]) -> Floats:
-    """Return columns (k, n, c) through one filter a component, one component after the other: (k·n, c)."""
-    return np.concatenate([noise[j].whiten(columns[j], trace.segments) for j in range(len(columns))])
+    @cached_property
+    def total(self) -> Floats:
+        """(1 + t + s + m) squared: the Gram matrix of [r, T, S, N] over all traces."""
+        return self._summed(np.arange(self._kept))
 
+    def _summed(self, kept: Ints) -> Floats:
+        """Return the Gram matrix over all traces of some columns and of all nuisance, in the order of b."""
+        size = len(kept) + 1 + max(int(each.places.max(initial=-1)) for each in self.traces)
+        summed = np.zeros((size, size))
+        for each in self.traces:
+            at = np.r_[kept, np.arange(self._kept, len(each.total))]
+            into = np.r_[np.arange(len(kept)), len(kept) + each.places]
+            summed[np.ix_(into, into)] += each.total[np.ix_(at, at)]
+        return summed
 
-def stretches_of(trace: Trace) -> Ints:
-    """Return the number (n,) of the stretch of time each row of a trace belongs to."""
-    number: Ints = ((trace.time_s - trace.inputs.time_s[0]) / STRETCH_S).astype(np.int64)
-    return number
-
-
-def stretches_of_all(traces: Sequence[Trace]) -> Ints:
-    """Return the number of the stretch of time of each value of all traces, in the order of `whiten`.
-
-    No two runs have a number in common, however long they are.
-    """
-    numbers, first = [], 0
-    for trace in traces:
-        own = stretches_of(trace)
-        own -= own.min(initial=0)  # a table may begin before its model
-        numbers.append(np.tile(first + own, trace.shape[1]))
-        first += int(own.max(initial=-1)) + 1
-    return np.concatenate(numbers)
-
-
-def rows_of(trace: Trace, signatures: Floats, nuisance: Sequence[Nuisance], noise: Sequence[Noise]) -> Rows:
-    """Return signatures (k, n, s) and nuisance of a trace through its filters."""
-    shared = [each.columns for each in nuisance if each.shared]
-    own = [each.columns for each in nuisance if not each.shared]
-    stacked = np.concatenate([signatures, *shared, *own], axis=2)
-    return Rows(
-        trace,
-        whitened(stacked, trace, noise),
-        np.tile(stretches_of(trace), len(stacked)),
-        tuple(noise),
-        signatures.shape[2],
-        sum(each.shape[2] for each in shared),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Gram matrix (1 + s, 1 + s) of data and signatures, nuisance taken out; and the number of rows."""
-
-    gram: Floats
-    rows: int
+    @cached_property
+    def _free_fit(self) -> tuple[Floats, Floats, float]:
+        """Tangents' coefficients, b and chi2 without any signature."""
+        return self._fit(np.arange(1, 1 + self.tangents), np.zeros(self.tangents))
 
     @property
     def chi2(self) -> float:
-        """Return the squared length of the whitened data after nuisance."""
-        return float(self.gram[0, 0])
+        """Return chi2 with the best tangents and nuisance within its bounds."""
+        return self._free_fit[2]
+
+    @cached_property
+    def _held(self) -> Floats:
+        """Nuisance (m,) that stands at its bounds without any signature; 0 for the rest of it."""
+        b = self._free_fit[1]
+        return np.where(np.abs(b) >= MOST, b, 0.0)
+
+    def _fit(self, free: Ints, precision: Floats) -> tuple[Floats, Floats, float]:
+        """Return the coefficients of free columns, b within its bounds, and chi2.
+
+        The free ones have a normal prior about 0 of this precision, whose cost is part of chi2.
+        """
+        total, kept = self.total, self._kept
+        here = np.r_[0, np.arange(kept, len(total))]
+        gram, cross = total[np.ix_(here, here)], total[np.ix_(free, here)]
+        half = solve(total[np.ix_(free, free)] + np.diag(precision), cross)
+        gram = gram - cross.T @ half
+        cost = gram[1:, 1:] + np.eye(len(here) - 1)
+        b = boxed(cost, gram[1:, 0])
+        chi2 = float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)
+        return half[:, 0] - half[:, 1:] @ b, b, chi2
+
+    def gain(self, columns: Ints) -> tuple[float, Floats]:
+        """Return the likelihood ratio of signatures as a fall of chi2, and their coefficients.
+
+        Tangents and nuisance, within its bounds, are fitted anew. The prior of `prior_sizes` keeps small what
+        the data hardly see.
+        """
+        free = np.r_[np.arange(1, 1 + self.tangents), self._at(columns)]
+        precision = np.r_[np.zeros(self.tangents), np.full(len(columns), _PRIOR**-2)]
+        coefficients, _, chi2 = self._fit(free, precision)
+        return self.chi2 - chi2, coefficients[self.tangents :]
+
+    @cached_property
+    def marginal(self) -> Floats:
+        """(1 + t + s) squared: inner products under the inverse of I + N·Nᵀ, by Woodbury.
+
+        Nuisance at its bounds is taken off the data at its value, and is not free to explain more.
+        """
+        total, kept = self.total.copy(), self._kept
+        at = kept + np.flatnonzero(self._held)
+        if len(at):
+            held = self._held[at - kept]
+            off = total[:, at] @ held
+            inner = held @ total[np.ix_(at, at)] @ held
+            total[0] -= off
+            total[:, 0] -= off
+            total[0, 0] += inner
+            total[at], total[:, at] = 0.0, 0.0
+        return marginal(total, kept)
+
+    def observable(self, columns: Ints) -> tuple[float, float]:
+        """Return the least share of signatures' power that nuisance leaves, and the least power left."""
+        at = self._at(columns)
+        left, whole = np.diag(self.marginal)[at], np.diag(self.total)[at]
+        return float(np.min(left / np.maximum(whole, 1e-300))), float(np.min(left))
+
+    def inflation(self, columns: Ints) -> float:
+        """Return by how much the gain of signatures varies more than white noise lets it, at least 1.
+
+        White's estimator over stretches of time, at the best fit of these signatures, the tangents and
+        nuisance; b stays at the bounds where it is held.
+        """
+        chosen = np.r_[0, self._at(columns)]
+        given = np.arange(1, 1 + self.tangents)
+        coefficients, inverse, explained = self._linear_fit(chosen, given)
+        rest = np.r_[1.0, -coefficients]
+        scores = []
+        for each in self.traces:
+            nuisance = np.arange(self._kept, len(each.total))
+            rows = np.r_[chosen, given, nuisance]
+            # columns of the projected residual and signatures, in those of the Gram matrix
+            into = np.r_[np.arange(len(given)), len(given) + each.places]
+            basis = np.vstack([np.eye(len(chosen)), -explained[into]])
+            for gram in each.stretches:
+                scores.append(basis[:, 1:].T @ gram[np.ix_(rows, rows)] @ (basis @ rest))
+        return gain_inflation(inverse, np.array(scores), fitted=len(chosen))
+
+    def _linear_fit(self, chosen: Ints, given: Ints) -> tuple[Floats, Floats, Floats]:
+        """Return coefficients (c,) of signatures, their inverse information, and what explains [r, S].
+
+        ``chosen`` are the columns [r, S]; the last result (t + m, 1 + c) are the tangents' and the nuisance's
+        coefficients for each of them.
+        """
+        t, c = len(given), len(chosen)
+        summed = self._summed(np.r_[chosen, given])
+        normal, right = summed[c:, c:].copy(), summed[c:, :c].copy()
+        normal[range(t, len(normal)), range(t, len(normal))] += 1.0
+        at_bound = np.r_[np.zeros(t), self._held]
+        free = at_bound == 0.0
+        score = summed[1:c, 0] - right[:, 1:].T @ at_bound
+        right[:, 0] -= normal @ at_bound
+        explained = np.zeros_like(right)
+        explained[free] = solve(normal[np.ix_(free, free)], right[free])
+        information = summed[1:c, 1:c] - right[:, 1:].T @ explained[:, 1:]
+        inverse = solve(information, np.eye(c - 1))
+        coefficients = inverse @ (score - right[free, 1:].T @ explained[free, 0])
+        explained[:, 0] += at_bound
+        return coefficients, inverse, explained
 
 
 def solve(a: Floats, b: Floats) -> Floats:
     """Return a⁻¹·b for a positive semidefinite a; directions that hold nothing stay zero."""
     scale = np.sqrt(np.maximum(np.diag(a), 1e-300))
     values, vectors = np.linalg.eigh(a / np.outer(scale, scale))
-    good = values > 1e-9 * max(float(values[-1]), 1e-30) if len(values) else values > 0
+    good = values > _RANK * max(float(values[-1]), 1e-30) if len(values) else values > 0
     inverse = vectors[:, good] / values[good] @ vectors[:, good].T
-    found: Floats = (inverse @ (b / scale[:, None])) / scale[:, None]
-    return found
+    solved: Floats = (inverse @ (b / scale[:, None])) / scale[:, None]
+    return solved
 
 
 def marginal(gram: Floats, keep: int) -> Floats:
@@ -109,154 +229,3 @@ def marginal(gram: Floats, keep: int) -> Floats:
     cross = gram[:keep, keep:]
     result: Floats = gram[:keep, :keep] - cross @ np.linalg.solve(rest, cross.T)
     return result
-
-
-def _bounded(total: Floats, kept: int, free: Ints, pull: Floats) -> tuple[Floats, Floats, float]:
-    """Return signatures' coefficients, pulled to zero by ``pull``, nuisance within its bounds (m,), and chi2.
-
-    chi2 is that of both; what the pull costs is in it.
-    """
-    here = np.r_[0, np.arange(kept, len(total))]
-    gram, cross = total[np.ix_(here, here)], total[np.ix_(free, here)]
-    half = solve(total[np.ix_(free, free)] + np.diag(pull), cross)
-    gram = gram - cross.T @ half
-    cost = gram[1:, 1:] + np.eye(len(here) - 1)
-    b = boxed(cost, gram[1:, 0])
-    coefficients = half[:, 0] - half[:, 1:] @ b
-    return coefficients, b, float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)
-
-
-def _less(total: Floats, held: Floats) -> Floats:
-    """Return the Gram matrix with held columns, at their values, taken off the data and out of the rest."""
-    found = total.copy()
-    at = np.flatnonzero(held)
-    if len(at):
-        off = total[:, at] @ held[at]
-        found[0] -= off
-        found[:, 0] -= off
-        found[0, 0] += held[at] @ total[np.ix_(at, at)] @ held[at]
-        found[at], found[:, at] = 0.0, 0.0
-    return found
-
-
-class Ledger:
-    """Gram matrices by run and stretch of time; any choice of them is evidence."""
-
-    def __init__(self, rows: Sequence[Rows]) -> None:
-        self.rows = list(rows)
-        self._members = [
-            {int(number): np.flatnonzero(each.stretch == number) for number in np.unique(each.stretch)}
-            for each in rows
-        ]
-        self._fixed = [
-            {number: each.whitened[at].T @ each.whitened[at] for number, at in members.items()}
-            for each, members in zip(self.rows, self._members, strict=True)
-        ]
-        self._grams: list[dict[int, tuple[Floats, int]]] = []
-        self._held, self._chi2, self._total = np.zeros(0), 0.0, np.zeros((0, 0))
-        self.given = 0
-
-    def set_data(self, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> None:
-        """Take residuals (n, k) of all traces and tangents (k, n, t) of the accepted effects."""
-        self._grams = []
-        for number, each in enumerate(self.rows):
-            new = each.white(np.concatenate([residuals[number].T[:, :, None], tangents[number]], axis=2))
-            self.given = new.shape[1] - 1
-            found = {}
-            for stretch, at in self._members[number].items():
-                mine, fixed = new[at], each.whitened[at]
-                cross = mine.T @ fixed
-                found[stretch] = (
-                    np.block([[mine.T @ mine, cross], [cross.T, self._fixed[number][stretch]]]), len(at)
-                )  # fmt: skip
-            self._grams.append(found)
-
-    def evidence(self) -> Evidence:
-        """Return what all data together say; tangents come first.
-
-        Nuisance that the data drive to its bounds, with the tangents alone, is held there and taken off.
-        """
-        kept = 1 + self.given + self.rows[0].signatures
-        places = self._places(np.arange(kept))
-        size = 1 + max(int(into.max(initial=-1)) for _, into in places)
-        total, count = np.zeros((size, size)), 0
-        for grams, (at, into) in zip(self._grams, places, strict=True):
-            whole = np.sum([gram for gram, _ in grams.values()], axis=0)
-            total[np.ix_(into, into)] += whole[np.ix_(at, at)]
-            count += sum(rows for _, rows in grams.values())
-        free = np.arange(1, 1 + self.given)
-        _, b, self._chi2 = _bounded(total, kept, free, np.zeros(len(free)))
-        self._held = np.zeros(len(total))
-        self._held[kept:] = np.where(np.abs(b) >= MOST, b, 0.0)
-        self._total = total
-        return Evidence(marginal(_less(total, self._held), kept), count)
-
-    def bounded_gain(self, columns: Ints) -> tuple[float, Floats]:
-        """Return by how much chi2 of the last evidence falls with some signatures, and their coefficients.
-
-        Nuisance is fitted anew within its bounds. A combination that the data hardly see stays small.
-        """
-        kept = 1 + self.given + self.rows[0].signatures
-        free = np.r_[np.arange(1, 1 + self.given), np.asarray(columns, dtype=int) + 1]
-        pull = np.r_[np.zeros(self.given), np.full(len(columns), PRIOR**-2)]
-        coefficients, _, chi2 = _bounded(self._total, kept, free, pull)
-        return self._chi2 - chi2, coefficients[self.given :]
-
-    def seen(self, evidence: Evidence, columns: Ints) -> tuple[float, float]:
-        """Return the least share of signatures' power that nuisance leaves, and the least power left."""
-        at = np.asarray(columns, dtype=int) + 1
-        left, whole = np.diag(evidence.gram)[at], np.diag(self._total)[at]
-        return float(np.min(left / np.maximum(whole, 1e-300))), float(np.min(left))
-
-    def inflation(self, columns: Ints) -> float:
-        """Return by how much the gain of signatures varies more than white noise lets it, at least 1.
-
-        From the scores of each stretch of time beside the best fit of these signatures, the given ones and
-        nuisance (White 1980, by clusters): what a model is off by here and there, of either sign, makes the
-        noise of a gain larger than the noise of a sample says.
-        """
-        chosen = np.r_[0, np.asarray(columns, dtype=int) + 1]
-        given = np.arange(1, 1 + self.given)
-        places = self._places(given)
-        held = self._held[1 + self.given + self.rows[0].signatures :]
-        size = 1 + max(int(into.max(initial=-1)) for _, into in places)
-        normal, right = np.zeros((size, size)), np.zeros((size, len(chosen)))
-        total = np.zeros((len(chosen), len(chosen)))
-        for grams, (at, into) in zip(self._grams, places, strict=True):
-            whole = np.sum([gram for gram, _ in grams.values()], axis=0)
-            normal[np.ix_(into, into)] += whole[np.ix_(at, at)]
-            right[into] += whole[np.ix_(at, chosen)]
-            total += whole[np.ix_(chosen, chosen)]
-        normal[range(len(given), size), range(len(given), size)] += 1.0
-        at_bound = np.r_[np.zeros(len(given)), held]
-        free = at_bound == 0.0
-        score = total[1:, 0] - right[:, 1:].T @ at_bound
-        right[:, 0] -= normal @ at_bound
-        taken = np.zeros_like(right)
-        taken[free] = solve(normal[np.ix_(free, free)], right[free])
-        info = total[1:, 1:] - right[:, 1:].T @ taken[:, 1:]
-        fitted = solve(info, (score - right[free, 1:].T @ taken[free, 0])[:, None])[:, 0]
-        taken[:, 0] += at_bound
-        rest = np.r_[1.0, -fitted]
-        scores = []
-        for grams, (at, into) in zip(self._grams, places, strict=True):
-            rows = np.r_[chosen, at]
-            basis = np.vstack([np.eye(len(chosen)), -taken[into]])
-            for gram, _ in grams.values():
-                scores.append(basis[:, 1:].T @ gram[np.ix_(rows, rows)] @ (basis @ rest))
-        u = np.array(scores)
-        grown = np.trace(solve(info, u.T @ u)) / (len(chosen) - 1)
-        return float(max(1.0, grown * len(u) / max(len(u) - len(chosen), 1)))
-
-    def _places(self, given: Ints) -> list[tuple[Ints, Ints]]:
-        """Return for each trace where given signatures and nuisance stand in its Gram, and in that of all."""
-        found, own = [], 0
-        first = 1 + self.given + self.rows[0].signatures
-        for rows in self.rows:
-            width = rows.whitened.shape[1] - rows.signatures
-            common = len(given) + rows.shared
-            start = common + own
-            into = np.r_[np.arange(common), np.arange(start, start + width - rows.shared)]
-            found.append((np.r_[given, np.arange(first, first + width)], into))
-            own += width - rows.shared
-        return found

@@ -1,94 +1,158 @@
-"""What simulations are compared with: whitened data of all traces, normal mismatch fitted along."""
+"""The likelihood of a link's data; the model and its symbols are in `gcode2krl.gap.fit`."""
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
+from gcode2krl.gap.beside.stretches import stretches_of, stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.box import boxed
+from gcode2krl.gap.fit.clusters import cluster_scores
+from gcode2krl.gap.fit.design import NuisanceDesign
+from gcode2krl.gap.fit.fitted import Numbers
+from gcode2krl.gap.fit.gram import SignatureGram
+from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
 
+STEP_SHARE = 0.02
+"""Differences are over this share of a typical size: within the linear range of effects, above rounding."""
+
 
 class Likelihood:
-    """Whitened data of all traces with their nuisance, to be compared with simulations."""
+    """Whitened data of all traces, with b at its best within its bounds.
+
+    Vectors (v,) hold the values of all traces, component after component; marginal residuals (v + m,) hold
+    L⁻¹·(r - N·b) and behind it b, so that their squared length is chi2.
+    """
 
     def __init__(
         self, traces: Sequence[Trace], nuisance: Sequence[Sequence[Nuisance]], noise: Sequence[Noise]
     ) -> None:
-        self.traces, self.noise = list(traces), list(noise)
-        self.shared_width = sum(
-            {each.name: each.columns.shape[2] for own in nuisance for each in own if each.shared}.values()
+        self.traces, self.noise = tuple(traces), tuple(noise)
+        self.design = NuisanceDesign.of(nuisance)
+        self._columns = [
+            self._whitened(trace, self.design.columns(number, trace))
+            for number, trace in enumerate(self.traces)
+        ]
+        self._normal = np.eye(self.design.width)
+        for columns, at in zip(self._columns, self.design.places, strict=True):
+            self._normal[np.ix_(at, at)] += columns.T @ columns
+
+    # Data and models as vectors
+
+    def _whitened(self, trace: Trace, columns: Floats) -> Floats:
+        """Return L⁻¹ times columns (k, n, c) of a trace, (k·n, c)."""
+        return np.concatenate(
+            [noise.whiten(own, trace.segments) for noise, own in zip(self.noise, columns, strict=True)]
         )
-        self.columns = self._wide(nuisance, whitened=True)
-        self._decompose()
-
-    def raw(self, nuisance: Sequence[Sequence[Nuisance]]) -> list[Floats]:
-        """Return the nuisance columns (k·n, w) of each trace as they are, not whitened."""
-        return self._wide(nuisance, whitened=False)
-
-    def _wide(self, nuisance: Sequence[Sequence[Nuisance]], whitened: bool) -> list[Floats]:
-        """Return the columns (k·n, w) of each trace: shared ones in common places, own ones side by side."""
-        widths = {each.name: each.columns.shape[2] for own in nuisance for each in own if each.shared}
-        starts = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
-        at = sum(widths.values())
-        width = at + sum(each.columns.shape[2] for own in nuisance for each in own if not each.shared)
-        found: list[Floats] = []
-        for trace, own in zip(self.traces, nuisance, strict=True):
-            n, k = trace.shape
-            wide = np.zeros((k * n, width))
-            for each in own:
-                flat = self._white(trace, each.columns) if whitened else each.columns.reshape(k * n, -1)
-                place = starts[each.name] if each.shared else at
-                wide[:, place : place + flat.shape[1]] = flat
-                at += 0 if each.shared else flat.shape[1]
-            found.append(wide)
-        return found
-
-    def _decompose(self) -> None:
-        """Prepare y -> y - N·b, whose squared length with that of b is chi2 after nuisance."""
-        width = self.columns[0].shape[1] if self.columns else 0
-        self.gram = sum((c.T @ c for c in self.columns), np.zeros((width, width))) + np.eye(width)
-
-    def _white(self, trace: Trace, columns: Floats) -> Floats:
-        return np.concatenate([
-            self.noise[j].whiten(columns[j], trace.segments) for j in range(columns.shape[0])
-        ])  # fmt: skip
 
     def whiten(self, values: Sequence[Floats]) -> Floats:
-        """Return residuals (n, k) of all traces as one whitened vector."""
-        return np.concatenate([
-            self._white(trace, value.T[:, :, None])[:, 0]
-            for trace, value in zip(self.traces, values, strict=True)
-        ])  # fmt: skip
+        """Return L⁻¹ times values (n, k) of all traces, (v,)."""
+        columns = [value.T[:, :, None] for value in values]
+        return np.concatenate(
+            [self._whitened(trace, own)[:, 0] for trace, own in zip(self.traces, columns, strict=True)]
+        )
 
-    def without_nuisance(self, y: Floats) -> Floats:
-        """Return the vector whose squared length is chi2 after nuisance within its bounds."""
-        b = self.nuisance_of(y)
-        fitted = np.concatenate([columns @ b for columns in self.columns]) if self.columns else 0.0 * y
-        return np.concatenate([y - fitted, b])
+    @cached_property
+    def clusters(self) -> Ints:
+        """(v,) the stretch of time of each value."""
+        return stretches_of_all(self.traces)
 
-    def nuisance_of(self, y: Floats) -> Floats:
-        """Return the nuisance coefficients, within their bounds, that fit a whitened vector best."""
-        at, sums = 0, np.zeros(len(self.gram))
-        for columns in self.columns:
-            sums += columns.T @ y[at : at + len(columns)]
-            at += len(columns)
-        return boxed(self.gram, sums)
+    def _split(self, vectors: Floats) -> list[Floats]:
+        """Return the rows of vectors (v, …) that belong to each trace."""
+        ends = np.cumsum([len(columns) for columns in self._columns])
+        return np.split(vectors, ends[:-1])
 
-    def projected(self, y: Floats) -> Floats:
-        """Return vectors (k·n, c) with unbounded nuisance taken out, its coefficients behind them."""
-        at, sums = 0, np.zeros((len(self.gram), y.shape[1]))
-        for columns in self.columns:
-            sums += columns.T @ y[at : at + len(columns)]
-            at += len(columns)
-        b = np.linalg.solve(self.gram, sums)
-        return np.concatenate([y - np.concatenate([columns @ b for columns in self.columns]), b])
+    # Nuisance
+
+    def _projections(self, whitened: Floats) -> Floats:
+        """Return Nᵀ·y (m, …) of whitened vectors (v, …)."""
+        sums = np.zeros((self.design.width, *whitened.shape[1:]))
+        for own, columns, at in zip(self._split(whitened), self._columns, self.design.places, strict=True):
+            sums[at] += columns.T @ own
+        return sums
+
+    def _explained(self, b: Floats) -> Floats:
+        """Return L⁻¹·N·b (v, …)."""
+        return np.concatenate(
+            [columns @ b[at] for columns, at in zip(self._columns, self.design.places, strict=True)]
+        )
+
+    def nuisance_of(self, whitened: Floats) -> Floats:
+        """Return b (m,), within its bounds, that fits a whitened vector (v,) best."""
+        return boxed(self._normal, self._projections(whitened))
+
+    def marginal(self, whitened: Floats) -> Floats:
+        """Return the marginal residual (v + m,) of a whitened vector."""
+        b = self.nuisance_of(whitened)
+        return np.concatenate([whitened - self._explained(b), b])
+
+    def projected(self, whitened: Floats) -> Floats:
+        """Return the marginal residuals (v + m, c) of vectors (v, c) for unbounded nuisance."""
+        b = np.asarray(np.linalg.solve(self._normal, self._projections(whitened)), dtype=np.float64)
+        return np.concatenate([whitened - self._explained(b), b])
+
+    # Effects
 
     def residual(self, applied: Sequence[Applied]) -> Floats:
-        """Return the marginal residual vector with some effects."""
-        return self.without_nuisance(
-            self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
-        )
+        """Return the marginal residual (v + m,) with some effects."""
+        return self.marginal(self.whiten([trace.measured - trace.sample(applied) for trace in self.traces]))
+
+    def chi2(self, applied: Sequence[Applied]) -> float:
+        """Return chi2 with some effects."""
+        r = self.residual(applied)
+        return float(r @ r)
+
+    def tangents(self, numbers: Numbers, x: Floats, without: int | None = None) -> list[Floats]:
+        """Return ∂f/∂θ (k, n, p) of each trace, in typical sizes, of all effects but one."""
+        moving = numbers.without(without)
+        shapes = [trace.shape for trace in self.traces]
+
+        def model(at: Floats) -> Floats:
+            applied = numbers.applied(at)
+            return np.concatenate([trace.sample(applied).T.ravel() for trace in self.traces])
+
+        slopes = derivative(model, x, model(x), numbers.box.steps(x, STEP_SHARE), moving)
+        slopes = slopes * numbers.box.scale[moving]
+        return [own.reshape(k, n, -1) for own, (n, k) in zip(self._split(slopes), shapes, strict=True)]
+
+    def jacobian(self, numbers: Numbers, x: Floats, bounded: bool = True) -> Floats:
+        """Return the derivative (v + m, p) of the marginal residual, in typical sizes.
+
+        ``bounded``: nuisance at its bounds stays there. If not, its uncertainty is part of that of θ.
+        """
+        if bounded:
+
+            def residual(at: Floats) -> Floats:
+                return self.residual(numbers.applied(at))
+
+            steps = numbers.box.steps(x, STEP_SHARE)
+            return derivative(residual, x, residual(x), steps) * numbers.box.scale
+        slopes = [self._whitened(*pair) for pair in zip(self.traces, self.tangents(numbers, x), strict=True)]
+        return self.projected(-np.concatenate(slopes))
+
+    def scores(self, jacobian: Floats, residual: Floats) -> Floats:
+        """Return White's scores (g, p) by stretches of time; rows of b belong to none."""
+        rows = len(self.clusters)
+        return cluster_scores(jacobian[:rows], residual[:rows], self.clusters)
+
+    def gram(self, signatures: Sequence[Floats]) -> "SignatureGram":
+        """Return the fast view of signatures (k, n, s) of each trace."""
+        columns = [
+            np.concatenate([self._whitened(trace, own), nuisance], axis=1)
+            for trace, own, nuisance in zip(self.traces, signatures, self._columns, strict=True)
+        ]
+        stretches = [np.tile(stretches_of(trace), trace.shape[1]) for trace in self.traces]
+        return SignatureGram(columns, signatures[0].shape[2], self.design.places, stretches)
+
+    def data(self, applied: Sequence[Applied], tangents: Sequence[Floats]) -> list[Floats]:
+        """Return whitened [r, T] (k·n, 1 + t) of each trace with some effects, for `SignatureGram.beside`."""
+        residuals = [(trace.measured - trace.sample(applied)).T[:, :, None] for trace in self.traces]
+        return [
+            self._whitened(trace, np.concatenate([r, t], axis=2))
+            for trace, r, t in zip(self.traces, residuals, tangents, strict=True)
+        ]

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-ORDER = 3
-_LEAST_ROWS = 60
+_LIMITS = THRESHOLDS.fit
 _SETTLED = 500
+"""Rows after which nothing is left of a start, with the largest pole allowed."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def white(sigma: float) -> Noise:
     return Noise(np.zeros(0), sigma, sigma)
 
 
-def fit(residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = ORDER) -> Noise:
+def fit(residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = _LIMITS.noise_order) -> Noise:
     """Return the model of some residuals (n,) with their segments, by least squares over all of them.
 
     ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less.
@@ -58,12 +59,13 @@ def fit(residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = ORD
                 now.append(x[order:])
     everything = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
     rms = max(float(np.sqrt(np.mean(everything**2))), floor)
-    if sum(len(each) for each in now) < _LEAST_ROWS:
+    if sum(len(each) for each in now) < _LIMITS.noise_least_rows:
         return white(rms)
     x, y = np.concatenate(past), np.concatenate(now)
+    # a tenth of the floor's power: colour is not learnt from the rounding of decimals
     ridge = 1e-6 * float(np.sum(x**2)) + len(y) * floor**2 * 0.1 + 1e-30
     a = _stable(np.asarray(np.linalg.solve(x.T @ x + ridge * np.eye(order), x.T @ y), dtype=np.float64))
-    scale = max(float(np.sqrt(np.mean((y - x @ a) ** 2))), 0.3 * floor)
+    scale = max(float(np.sqrt(np.mean((y - x @ a) ** 2))), _LIMITS.noise_least_scale * floor)
     return Noise(a, scale, max(rms, scale))
 
 
@@ -76,19 +78,19 @@ def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Flo
     return drawn
 
 
-def at_most(found: Noise, sigma: float) -> Noise:
-    """Return a model of no more than this rms, white where it was larger: the rest is no noise."""
-    return found if found.sigma <= sigma else white(sigma)
+def at_most(noise: Noise, sigma: float) -> Noise:
+    """Return a model of no more than this rms, white where it was larger: the rest is structure."""
+    return noise if noise.sigma <= sigma else white(sigma)
 
 
-def unbiased(found: Noise, again: Noise, floor: float) -> Noise:
-    """Return a model, corrected by what a model of noise drawn from it came out as."""
-    if len(found.a) != len(again.a) or len(found.a) == 0:
-        return found
-    a = _stable(2.0 * found.a - again.a)
-    scale = max(found.scale**2 / again.scale, 0.3 * floor)
-    steady = _gain(found.a) * found.scale
-    sigma = max(found.sigma * steady / again.sigma, floor, scale)
+def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
+    """Return a model, corrected by the model that noise drawn from it came out as."""
+    if len(noise.a) != len(of_drawn.a) or len(noise.a) == 0:
+        return noise
+    a = _stable(2.0 * noise.a - of_drawn.a)
+    scale = max(noise.scale**2 / of_drawn.scale, _LIMITS.noise_least_scale * floor)
+    steady = _gain(noise.a) * noise.scale
+    sigma = max(noise.sigma * steady / of_drawn.sigma, floor, scale)
     return Noise(a, scale, sigma)
 
 
@@ -102,12 +104,13 @@ def _gain(a: Floats) -> float:
 
 
 def _stable(a: Floats) -> Floats:
-    """Return the coefficients with all poles within 0.98."""
+    """Return the coefficients with all poles within the largest that is allowed."""
     companion = np.zeros((len(a), len(a)))
     companion[0] = a
     companion[1:, :-1] = np.eye(len(a) - 1)
     largest = float(np.abs(np.linalg.eigvals(companion)).max())
-    if largest <= 0.98:
+    most = _LIMITS.noise_largest_pole
+    if largest <= most:
         return a
-    shrink: Floats = a * (0.98 / largest) ** np.arange(1, len(a) + 1)
-    return shrink
+    shrunk: Floats = a * (most / largest) ** np.arange(1, len(a) + 1)
+    return shrunk

@@ -1,6 +1,7 @@
 """Where a link's noise is learnt: repeats of one program, or what is left of a run beside everything slow."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,19 +12,25 @@ from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_SLOW_S = 0.5
-_RIDGE = 1e-6
-_TRUST = 0.9
-"""Noise is never taken below this share of what run.toml states."""
-_MOST_STATED = 1.4
-"""Nor above this: what is more than that is structure."""
+_LIMITS = THRESHOLDS.fit
+_RIDGE, _HATS_RIDGE = 1e-6, 1e-9
+"""Keep columns apart that are equal to rounding; of unit length each, or per row."""
+_LEAST_RMS = 1e-9
+"""So that exact data have a model at all."""
+_EXACT = 1e-12
+"""The floor of drawn noise: it has no decimals."""
+_SAME_MM = 1e-3
+"""Repeats of a program have the same path."""
 
 
 def noise_of(
-    traces: Sequence[Trace], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]],
+    traces: Sequence[Trace],
+    signatures: Sequence[Floats],
+    nuisance: Sequence[Sequence[Nuisance]],
     applied: Sequence[Applied] = (),
-) -> list[Noise]:  # fmt: skip
+) -> list[Noise]:
     """Return the noise of each component, beside effects that are known.
 
     From every run is taken what any effect or nuisance could explain of that run alone. If the runs repeat
@@ -31,47 +38,34 @@ def noise_of(
     second is taken out too, since it may be structure. What this takes of the noise itself is found by doing
     the same to drawn noise of the model (Efron's bootstrap bias).
     """
-    taken = [
-        _Taken(trace, columns, own) for trace, columns, own in zip(traces, signatures, nuisance, strict=True)
-    ]
-    repeats = _repeats(traces)
-
-    def fits(values: Sequence[Floats], floors: Floats) -> list[Noise]:
-        rests = [each.off(value) for each, value in zip(taken, values, strict=True)]
-        if repeats is None:
-            rests = [each.fast(rest) for each, rest in zip(taken, rests, strict=True)]
-        found = []
-        for j in range(traces[0].shape[1]):
-            mine = [(rest[:, j], trace.segments) for rest, trace in zip(rests, traces, strict=True)]
-            found.append(fit(mine if repeats is None else _apart(mine, traces, repeats), float(floors[j])))
-        return found
-
-    floors = np.array([_floor(traces, j) for j in range(traces[0].shape[1])])
-    first = fits([trace.measured - trace.sample(applied) for trace in traces], floors)
+    source = _Source(
+        tuple(traces),
+        tuple(_Explained(*each) for each in zip(traces, signatures, nuisance, strict=True)),
+        _repeats(traces),
+    )
+    stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
+    floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
+    first = source.noise([trace.measured - trace.sample(applied) for trace in traces], floors)
     generator = np.random.default_rng(0)
     drawn = [
         np.stack([drawn_noise(noise, len(trace.time_s), generator) for noise in first], axis=1)
         for trace in traces
     ]
-    again = fits(drawn, np.full(len(first), 1e-12))
-    most = _MOST_STATED * min(_stated(traces), default=np.inf)
+    again = source.noise(drawn, [_EXACT] * len(first))
+    most = _LIMITS.noise_most_stated * min(stated, default=np.inf)
     return [
-        at_most(unbiased(one, other, float(floor)), most)
-        for one, other, floor in zip(first, again, floors, strict=True)
+        at_most(unbiased(noise, of_drawn, floor), most)
+        for noise, of_drawn, floor in zip(first, again, floors, strict=True)
     ]
 
 
-def _stated(traces: Sequence[Trace]) -> list[float]:
-    return [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
-
-
-def _floor(traces: Sequence[Trace], component: int) -> float:
+def _floor(traces: Sequence[Trace], stated: Sequence[float], component: int) -> float:
     """Return the least rms: the last decimal's, and what run.toml states."""
-    floor = max(resolution(trace.measured[:, component]) for trace in traces)
-    return max(floor, _TRUST * max(_stated(traces), default=0.0), 1e-9)
+    decimals = max(resolution(trace.measured[:, component]) for trace in traces)
+    return max(decimals, _LIMITS.noise_least_stated * max(stated, default=0.0), _LEAST_RMS)
 
 
-class _Taken:
+class _Explained:
     """What is taken out of one trace before its noise is looked at."""
 
     def __init__(self, trace: Trace, signatures: Floats, nuisance: Sequence[Nuisance]) -> None:
@@ -80,14 +74,13 @@ class _Taken:
         flat = columns.reshape(k * n, c)
         scale = np.sqrt(np.sum(flat**2, axis=0))
         self.flat = flat[:, scale > 0.0] / scale[scale > 0.0]
-        gram = self.flat.T @ self.flat
-        gram[np.diag_indices_from(gram)] += _RIDGE
-        self.gram = gram
+        self.gram = self.flat.T @ self.flat
+        self.gram[np.diag_indices_from(self.gram)] += _RIDGE
         t = trace.time_s
-        count = max(2, round((t[-1] - t[0]) / _SLOW_S) + 1)
+        count = max(2, round((t[-1] - t[0]) / _LIMITS.noise_slow_s) + 1)
         knots = np.linspace(t[0], t[-1], count)
         self.hats = np.maximum(0.0, 1.0 - np.abs(t[:, None] - knots) / (knots[1] - knots[0]))
-        self.hats_gram = self.hats.T @ self.hats + 1e-9 * len(t) * np.eye(count)
+        self.hats_gram = self.hats.T @ self.hats + _HATS_RIDGE * len(t) * np.eye(count)
 
     def off(self, values: Floats) -> Floats:
         """Return values (n, k) without what effects and nuisance explain."""
@@ -95,33 +88,55 @@ class _Taken:
             return values
         y = values.T.reshape(-1)
         rest = y - self.flat @ np.linalg.solve(self.gram, self.flat.T @ y)
-        found: Floats = rest.reshape(values.shape[1], -1).T
-        return found
+        unexplained: Floats = rest.reshape(values.shape[1], -1).T
+        return unexplained
 
     def fast(self, values: Floats) -> Floats:
         """Return values (n, k) without what is slower than half a second."""
-        found: Floats = values - self.hats @ np.linalg.solve(self.hats_gram, self.hats.T @ values)
-        return found
+        quick: Floats = values - self.hats @ np.linalg.solve(self.hats_gram, self.hats.T @ values)
+        return quick
+
+
+@dataclass(frozen=True, eq=False)
+class _Source:
+    """Traces, what is taken out of each, and the rows of their repeats."""
+
+    traces: tuple[Trace, ...]
+    explained: tuple[_Explained, ...]
+    repeats: list[Ints] | None
+
+    def noise(self, values: Sequence[Floats], floors: Sequence[float]) -> list[Noise]:
+        """Return the model of each component of values (n, k) of all traces."""
+        rests = [each.off(value) for each, value in zip(self.explained, values, strict=True)]
+        if self.repeats is None:
+            rests = [each.fast(rest) for each, rest in zip(self.explained, rests, strict=True)]
+        return [fit(self._component(rests, j), floor) for j, floor in enumerate(floors)]
+
+    def _component(self, rests: Sequence[Floats], j: int) -> list[tuple[Floats, Ints]]:
+        """Return one component (n,) of each trace with its segments, that of repeats less their mean."""
+        values = [rest[:, j] for rest in rests]
+        if self.repeats is None:
+            return [(value, trace.segments) for value, trace in zip(values, self.traces, strict=True)]
+        return [(value, self.traces[0].segments) for value in _differences(values, self.repeats)]
 
 
 def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
     """Return for each trace the rows that belong to the first one's; None where they are no repeats."""
     first = traces[0]
-    if len(traces) < 2:
+    if len(traces) < 2 or not all(_is_repeat(trace, first) for trace in traces[1:]):
         return None
-    for trace in traces[1:]:
-        same = len(trace.inputs) == len(first.inputs) and np.allclose(
-            trace.inputs.position_mm, first.inputs.position_mm, atol=1e-3
-        )
-        if not same or trace.shape[1] != first.shape[1]:
-            return None
     return [nearest_rows(trace.time_s, first.time_s) for trace in traces]
 
 
-def _apart(
-    mine: list[tuple[Floats, Ints]], traces: Sequence[Trace], rows: list[Ints]
-) -> list[tuple[Floats, Ints]]:
-    """Return by how much runs differ from their mean, with the variance that one of them has."""
-    values = np.stack([rest[row] for (rest, _), row in zip(mine, rows, strict=True)])
-    apart = (values - values.mean(axis=0)) * np.sqrt(len(traces) / (len(traces) - 1.0))
-    return [(each, traces[0].segments) for each in apart]
+def _is_repeat(trace: Trace, first: Trace) -> bool:
+    same = len(trace.inputs) == len(first.inputs) and np.allclose(
+        trace.inputs.position_mm, first.inputs.position_mm, atol=_SAME_MM
+    )
+    return same and trace.shape[1] == first.shape[1]
+
+
+def _differences(values: Sequence[Floats], rows: Sequence[Ints]) -> Floats:
+    """Return by how much runs (r, n) differ from their mean, with the variance that one of them has."""
+    runs = np.stack([value[row] for value, row in zip(values, rows, strict=True)])
+    differences: Floats = (runs - runs.mean(axis=0)) * np.sqrt(len(runs) / (len(runs) - 1.0))
+    return differences

@@ -1,20 +1,24 @@
 """Nuisance: what normal mismatch does to a signal, as columns with the standard deviation of each."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect
+from gcode2krl.effects.effect import LINKS, NO_TARGET
 from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.signatures import Block, Signatures
-from gcode2krl.units import DEG_PER_RAD
+from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of
 
+CLOCK, ENCODER_ZERO = "table clock", "encoder zero"
+"""Nuisance of instruments: two words, so that no effect can have such a name."""
 _JITTER_KNOTS_S = 1.0
 _ROUGH = 1e3
-"""Standard deviation of what is no finding whatever its size, in units of its bound."""
+"""Standard deviation of a quantity that is never reported, however large, in units of its bound."""
 
 
 class Nuisance(NamedTuple):
@@ -27,70 +31,107 @@ class Nuisance(NamedTuple):
 
 
 def nuisance_of(
-    trace: Trace, library: Mapping[str, Effect], mismatch: Mismatch, known: Signatures,
-    upstream: frozenset[str], clock: float = 1.0,
-) -> list[Nuisance]:  # fmt: skip
+    trace: Trace,
+    library: Mapping[str, Effect],
+    mismatch: Mismatch,
+    known: Signatures,
+    upstream: frozenset[str],
+    clock: float = 1.0,
+) -> list[Nuisance]:
     """Return what normal mismatch may do to a trace.
 
     ``upstream``: links that are not measured before it; ``clock``: mismatch of its clock over that of one.
     """
-    found = _all(trace, library, mismatch, known, upstream, clock)
-    return [each for each in found if np.any(each.columns)]
+    every = [
+        *_of_effects(trace, library, mismatch, known, upstream),
+        *_of_instruments(trace, mismatch, upstream, clock),
+    ]
+    return [nuisance for nuisance in every if np.any(nuisance.columns)]
 
 
-def _all(
-    trace: Trace, library: Mapping[str, Effect], m: Mismatch, known: Signatures, upstream: frozenset[str],
-    clock: float,
-) -> Iterator[Nuisance]:  # fmt: skip
-    def effect(
-        name: str, target: str | None, parameter: str, bound: float, **shape: float
-    ) -> Nuisance | None:
-        if name not in library or target not in library[name].targets(trace.inputs.cell):
-            return None
-        one = library[name]
-        apart = one.start(trace.inputs, target)[parameter] - one.nominal(trace.inputs, target)[parameter]
+# Effects at their usual size, one value for all runs
+
+
+def _of_effects(
+    trace: Trace,
+    library: Mapping[str, Effect],
+    mismatch: Mismatch,
+    known: Signatures,
+    upstream: frozenset[str],
+) -> Iterator[Nuisance]:
+    cell = trace.inputs.cell
+    for effect in _in_order(library, cell):
+        for target in effect.targets(cell):
+            if trace.link.name in effect.disturbed(target, upstream):
+                for block in blocks_of(effect, target):
+                    yield from _of_block(block, trace, mismatch, known)
+
+
+def _in_order(library: Mapping[str, Effect], cell: Cell) -> list[Effect]:
+    """Return the effects that are nuisances: along the chain of links, in a link those with targets first.
+
+    The order moves sums in their last digits only.
+    """
+
+    def place(effect: Effect) -> tuple[int, bool]:
+        return min(LINKS.index(link) for link in effect.links), effect.targets(cell) == NO_TARGET
+
+    return sorted((effect for effect in library.values() if effect.is_nuisance), key=place)
+
+
+def _of_block(block: Block, trace: Trace, mismatch: Mismatch, known: Signatures) -> Iterator[Nuisance]:
+    """Yield the columns of each size of a block that has a usual bound."""
+    effect, target = block.effect, block.target
+    usual = effect.usual(mismatch, float(trace.time_s[-1] - trace.time_s[0]))
+    start, nominal = effect.start(trace.inputs, target), effect.nominal(trace.inputs, target)
+    sizes = effect.sizes
+    for number, p in enumerate(sizes):
+        bound, typical = usual.get(p.name, 0.0), start[p.name] - nominal[p.name]
+        if bound == 0.0 or typical == 0.0:
+            continue
         # at the size that it may have: a lag of 15 ms has another shape than one of half a millisecond
-        size = abs(bound / apart)
-        columns = known.columns(Block(one, target, shape), trace, size)
-        if columns.shape[2] == 0:
-            return None
-        words = " ".join([name, target or "", *(f"{value:g}" for value in shape.values())])
-        return Nuisance(words, True, columns * (sigma(bound) / (size * apart)))
+        size = abs(bound / typical)
+        columns = known.columns(block, trace, size)
+        width = columns.shape[2] // len(sizes)
+        own = columns[:, :, number * width : (number + 1) * width]
+        words = (effect.name, target, *(f"{value:g}" for value in block.shape.values()))
+        if len(sizes) > 1:
+            words = (*words, p.name)
+        yield Nuisance(" ".join(filter(None, words)), True, own * (sigma(bound) / (size * typical)))
 
-    def present(items: Sequence[Nuisance | None]) -> Iterator[Nuisance]:
-        return (each for each in items if each is not None)
 
-    joints = [f"A{number}" for number in range(1, 7)]
-    behind_gear = trace.link.name == "gear" or (trace.link.name == "mechanics" and "gear" in upstream)
-    if trace.link.name == "servo" or (trace.link.name == "mechanics" and "servo" in upstream):
-        yield from present([effect("servo_lag", a, "tau_s", m.lag_s) for a in joints])
-    if behind_gear:
-        play_deg = m.play_rad * DEG_PER_RAD
-        yield from present([effect("backlash", a, "gap_deg", play_deg) for a in joints])
-        yield from present([
-            effect("transmission", a, "amplitude_deg", play_deg, harmonic=h)
-            for a in joints
-            for h in (1.0, 2.0)
-        ])  # fmt: skip
+# Instruments, each run its own value
+
+
+def _of_instruments(
+    trace: Trace, mismatch: Mismatch, upstream: frozenset[str], clock: float
+) -> Iterator[Nuisance]:
+    yield from _of_encoders(trace, mismatch)
+    yield from _of_force_sensor(trace, mismatch)
+    yield from _of_tracker(trace, mismatch)
+    yield Nuisance(CLOCK, False, -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s) * clock)
+    yield from _of_time_law(trace, mismatch, upstream)
+
+
+def _of_encoders(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
     if trace.link.name == "gear":
-        yield Nuisance("encoder zero", False, _constants(trace) * m.joint_zero_rad * _ROUGH)
-    if trace.link.name in ("force", "mechanics"):
-        yield from present([
-            effect("force_scale", way, "scale", m.coefficients) for way in ("tangential", "radial", "axial")
-        ])  # fmt: skip
-        yield from present([effect("edge_force", None, "scale", m.coefficients)])
+        yield Nuisance(ENCODER_ZERO, False, _constants(trace) * mismatch.joint_zero_rad * _ROUGH)
+
+
+def _of_force_sensor(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
     if trace.link.name == "force":
-        yield Nuisance("force zero", False, _force_zero(trace) * sigma(m.force_zero_N))
-        yield Nuisance("sensor gain", False, _diagonal(trace.nominal) * sigma(m.sensor_gain))
+        yield Nuisance("force zero", False, _force_zero(trace) * sigma(mismatch.force_zero_N))
+        yield Nuisance("sensor gain", False, _diagonal(trace.nominal) * sigma(mismatch.sensor_gain))
+
+
+def _of_tracker(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
     if trace.link.name == "mechanics":
-        yield from present([
-            effect("stiffness", str(name), "scale", m.stiffness)
-            for name in trace.inputs.cell.compliance.virtual_joints
-        ])  # fmt: skip
-        yield Nuisance("frame", False, _frame(trace, m))
-    yield Nuisance("clock", False, -_stacked(trace.clock_rate)[:, :, None] * sigma(m.clock_s) * clock)
+        yield Nuisance("tracker frame", False, _frame(trace, mismatch))
+
+
+def _of_time_law(trace: Trace, mismatch: Mismatch, upstream: frozenset[str]) -> Iterator[Nuisance]:
     if trace.link.name == "path" or (trace.link.name == "mechanics" and "path" in upstream):
-        yield Nuisance("time law", False, _jitter(trace, _JITTER_KNOTS_S) * sigma(m.clock_s))
+        yield Nuisance("time law", False, _jitter(trace, _JITTER_KNOTS_S) * sigma(mismatch.clock_s))
 
 
 def _stacked(values: Floats) -> Floats:
@@ -119,16 +160,16 @@ def _force_zero(trace: Trace) -> Floats:
     return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
 
 
-def _frame(trace: Trace, m: Mismatch) -> Floats:
+def _frame(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
     position = trace.nominal
     turned = np.zeros((3, len(position), 6))
     for axis in range(3):
-        turned[axis, :, axis] = sigma(m.frame_mm)
+        turned[axis, :, axis] = sigma(mismatch.frame_mm)
     arm = position - position.mean(axis=0)
     for axis in range(3):
         turn = np.cross(np.eye(3)[axis], arm)
-        turned[:, :, 3 + axis] = turn.T * sigma(m.frame_rad)
+        turned[:, :, 3 + axis] = turn.T * sigma(mismatch.frame_rad)
     return turned
 
 
@@ -142,6 +183,4 @@ def _jitter(trace: Trace, knots_s: float) -> Floats:
 
 
 def _rows(trace: Trace, rotations: Floats) -> Floats:
-    from gcode2krl.gap.beside.interpolation import nearest_rows
-
     return rotations[nearest_rows(trace.inputs.time_s, trace.time_s)]

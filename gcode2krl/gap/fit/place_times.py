@@ -1,7 +1,7 @@
-"""When a run has gone how far: what the numbers of a time law are found from.
+"""The times at which a run reaches each place of its path: data from which a time law is fitted.
 
-Late by a second, a signal tells nothing of the law that made it late: least squares on it have a minimum at
-each stop. The time at which a place is reached is nearly proportional to the law's numbers instead.
+Least squares on a signal that is late by a second have a minimum at each stop. The time at which a place is
+reached is nearly proportional to the numbers of the law instead.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,20 @@ from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.interpolation import values_of
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.numbers import Free
+from gcode2krl.gap.fit.fitted import Numbers
+from gcode2krl.gap.fit.least_squares import Shortened, gauss_newton
 
 _PLACES = 400
+"""Of a run, at equal ways."""
 _STEPS = 8
 _STEP_SHARE = 0.1
+"""Of a typical size: a controller's times are whole cycles, and smaller differences are none."""
+_SETTLED_SHARE = 0.98
+"""A step that leaves more of the rms ends the fit: a refit on the signals follows."""
 
 
 class PlaceTimes:
-    """The measured times at which runs have gone so far, to be compared with those of plans."""
+    """The measured times at which runs reach places, to be compared with those of plans."""
 
     def __init__(self, traces: Sequence[Trace]) -> None:
         self.traces = list(traces)
@@ -33,12 +38,12 @@ class PlaceTimes:
         Of each run its mean, which is its clock's, is taken off.
         """
         late = []
-        for trace, (own_s, own_way) in zip(self.traces, self.measured, strict=True):
+        for trace, (measured_s, measured_way) in zip(self.traces, self.measured, strict=True):
             signals = trace.signals(applied)
             values = values_of(signals, trace.plus)
             time_s, way = gone(signals.time_s, values[:, list(trace.columns)], 0.0)
-            at = own_way[-1] * (np.arange(_PLACES) + 0.5) / _PLACES
-            behind = np.interp(at, own_way, own_s) - np.interp(at, way, time_s)
+            at = measured_way[-1] * (np.arange(_PLACES) + 0.5) / _PLACES
+            behind = np.interp(at, measured_way, measured_s) - np.interp(at, way, time_s)
             late.append(behind - behind.mean())
         return np.concatenate(late)
 
@@ -49,33 +54,26 @@ class PlaceTimes:
         except Gcode2KrlError:
             return np.inf
 
-    def fitted(self, others: Sequence[Applied], free: Free, start: Applied) -> Applied:
-        """Return the effect whose numbers meet the measured times best, by Gauss-Newton from a start."""
-        x = free.start(start)
-        best = self.size((*others, free.applied(x)))
-        for _ in range(_STEPS):
-            late = self.late((*others, free.applied(x)))
-            columns = []
-            for i in range(len(x)):
-                moved = x.copy()
-                step = _STEP_SHARE * free.scale[i]
-                moved[i] += step if x[i] + step <= free.high[i] else -step
-                change = self.late((*others, free.applied(moved))) - late
-                columns.append(change / (moved[i] - x[i]))
-            jacobian = np.stack(columns, axis=1) * free.scale
-            move = -np.linalg.lstsq(jacobian, late, rcond=1e-6)[0] * free.scale
-            for shrink in (1.0, 0.5, 0.2):
-                trial = np.clip(x + shrink * move, free.low, free.high)
-                size = self.size((*others, free.applied(trial)))
-                if size < best:
-                    break
-            if size >= best:
-                break
-            settled = size > 0.98 * best
-            x, best = trial, size
-            if settled:
-                break
-        return free.applied(x)
+    def fitted(self, others: Sequence[Applied], start: Applied) -> Applied:
+        """Return the effect whose numbers meet the measured times best, from a start."""
+        numbers = Numbers.of([start], self.traces[0])
+
+        def late(x: Floats) -> Floats:
+            return self.late((*others, *numbers.applied(x)))
+
+        try:
+            control = Shortened(numbers.box)
+            x = numbers.start([start])
+            least = gauss_newton(
+                late, x, numbers.box, control, _settled, most_steps=_STEPS, step_share=_STEP_SHARE
+            )
+        except Gcode2KrlError:
+            return start
+        return numbers.applied(least.x)[0]
+
+
+def _settled(before: float, after: float) -> bool:
+    return after > _SETTLED_SHARE**2 * before
 
 
 def gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:
@@ -89,8 +87,8 @@ def _anchors(values: Floats, least: float) -> Ints:
     """Return the rows that are at least so far from the kept row before them."""
     kept, last = [0], values[0]
     for row in range(1, len(values)):
-        apart = values[row] - last
-        if float(apart @ apart) >= least * least:
+        way = values[row] - last
+        if float(way @ way) >= least * least:
             kept.append(row)
             last = values[row]
     return np.array(kept)

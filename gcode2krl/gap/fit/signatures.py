@@ -5,8 +5,9 @@ around the nominal model, one for each of the settings that span the effect.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from gcode2krl.effects import Applied, Effect, Parameter
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.trace import Trace
 
-PHASE = "phase"
-HZ = "hz"
+_Key = tuple[float, str, str | None, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True)
@@ -29,14 +29,14 @@ class Block:
 
     @property
     def key(self) -> tuple[str, str | None]:
-        """Return what the block is an instance of: effect and target."""
+        """Return the names of effect and target."""
         return self.effect.name, self.target
 
     def settings(self, trace: Trace, size: float = 1.0) -> list[Applied]:
         """Return the effects whose signals, less the nominal ones, span the block; ``size`` 1 is typical."""
-        shapes = [dict(self.shape)]
-        if PHASE in self.effect.names:
-            shapes = [dict(self.shape) | {PHASE: turn} for turn in (0.0, math.pi / 2.0)]
+        phase, shapes = self.effect.phase, [dict(self.shape)]
+        if phase is not None:
+            shapes = [dict(self.shape) | {phase.name: turn} for turn in (0.0, math.pi / 2.0)]
         return [
             Applied(self.effect, self.target, values)
             for shape in shapes
@@ -47,38 +47,28 @@ class Block:
         self, coefficients: Floats, trace: Trace, shape: Mapping[str, float] | None = None
     ) -> Applied:
         """Return the effect that a combination of the block's columns is."""
-        form = dict(self.shape) | dict(shape or {})
-        if PHASE in self.effect.names:
-            form[PHASE] = math.atan2(coefficients[1], coefficients[0])
+        phase, form = self.effect.phase, dict(self.shape) | dict(shape or {})
+        if phase is not None:
+            form[phase.name] = math.atan2(coefficients[1], coefficients[0])
             coefficients = np.array([math.hypot(coefficients[0], coefficients[1])])
         values = self.effect.combined(coefficients, trace.inputs, self.target, form)
         return Applied(self.effect, self.target, values)
 
     def bounds(self, trace: Trace) -> tuple[Floats, Floats]:
         """Return the plausible range (c,), (c,) of the coefficients; symmetric where they are a vector."""
-        effect = self.effect
-        sizes = [p for p in effect.parameters if not p.is_shape and p.name not in (effect.direction or ())]
-        if PHASE in effect.names or effect.direction is not None:
-            width = 2 if PHASE in effect.names else 3 * len(sizes)
+        effect, sizes = self.effect, self.effect.sizes
+        if effect.phase is not None or effect.direction is not None:
+            width = 2 if effect.phase is not None else 3 * len(sizes)
             most = max(_share(p.high, p, effect, trace, self.target) for p in sizes)
             return np.full(width, -most), np.full(width, most)
-        ends = np.array([
-            sorted(_share(end, p, effect, trace, self.target) for end in (p.low, p.high)) for p in sizes
-        ])  # fmt: skip
-        return ends[:, 0], ends[:, 1]
-
-    def free_shapes(self) -> tuple[str, ...]:
-        """Return the shapes that a refit may move: those whose grid is a mere start, not a count."""
-        return tuple(
-            p.name
-            for p in self.effect.parameters
-            if p.is_shape
-            and p.name not in (self.effect.direction or ())
-            and p.name not in (PHASE, "harmonic")
+        ends = np.array(
+            [sorted(_share(end, p, effect, trace, self.target) for end in (p.low, p.high)) for p in sizes]
         )
+        return ends[:, 0], ends[:, 1]
 
 
 def _share(value: float, p: Parameter, effect: Effect, trace: Trace, target: str | None) -> float:
+    """Return the coefficient of the block's column at which the parameter has a value."""
     name = p.name
     nominal = effect.nominal(trace.inputs, target)[name]
     start = effect.start(trace.inputs, target)[name]
@@ -86,25 +76,29 @@ def _share(value: float, p: Parameter, effect: Effect, trace: Trace, target: str
 
 
 def blocks_of(effect: Effect, target: str | None) -> Iterator[Block]:
-    """Yield the blocks of an effect at a target, one a combination of shapes."""
+    """Yield the blocks of an effect at a target, one a combination of shapes; a phase is in the columns."""
+    phase = effect.phase
     seen = []
     for shape in effect.shapes():
-        form = {name: value for name, value in shape.items() if name != PHASE}
+        form = {name: value for name, value in shape.items() if phase is None or name != phase.name}
         if form not in seen:
             seen.append(form)
             yield Block(effect, target, form)
 
 
-def blocks_at(effect: Effect, target: str | None, hz: tuple[float, ...]) -> Iterator[Block]:
+def blocks_at(effect: Effect, target: str | None, frequencies_hz: Sequence[float]) -> Iterator[Block]:
     """Yield the blocks of an effect with a frequency, at these frequencies in place of its grid's."""
+    frequency = effect.frequency
+    if frequency is None:
+        return
     seen = set()
     for block in blocks_of(effect, target):
-        rest = {name: value for name, value in block.shape.items() if name != HZ}
-        for value in hz:
+        rest = {name: value for name, value in block.shape.items() if name != frequency.name}
+        for value in frequencies_hz:
             key = (value, *sorted(rest.items()))
             if key not in seen:
                 seen.add(key)
-                yield Block(effect, target, rest | {HZ: value})
+                yield Block(effect, target, rest | {frequency.name: value})
 
 
 def strongest_hz(
@@ -114,52 +108,49 @@ def strongest_hz(
 
     Neighbours within 15 % of a higher peak are not taken.
     """
-    length = min(len(each) for each in residuals)
+    length = min(len(residual) for residual in residuals)
     mean = sum(
-        np.abs(np.fft.rfft(each[:length] - each[:length].mean(axis=0), axis=0)) ** 2 for each in residuals
+        np.abs(np.fft.rfft(rows[:length] - rows[:length].mean(axis=0), axis=0)) ** 2 for rows in residuals
     )
     power, hz = np.sum(mean, axis=1), np.fft.rfftfreq(length, step_s)
     wide = max(1, round(0.3 * length * step_s))
     power = np.convolve(power, np.ones(wide) / wide, mode="same")
-    found: list[float] = []
+    peaks: list[float] = []
     for i in np.argsort(-power):
-        if low <= hz[i] <= high and all(abs(hz[i] / other - 1.0) > 0.15 for other in found):
-            found.append(float(hz[i]))
-            if len(found) == most:
+        if low <= hz[i] <= high and all(abs(hz[i] / peak - 1.0) > 0.15 for peak in peaks):
+            peaks.append(float(hz[i]))
+            if len(peaks) == most:
                 break
-    return tuple(found)
+    return tuple(peaks)
 
 
 class Signatures:
-    """Columns by part, each computed once."""
+    """Columns of blocks on traces, each computed once and kept as long as its trace is in use."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[int, float, str, str | None, tuple[tuple[str, float], ...]], Floats] = {}
-        self._kept: list[Trace] = []
-        self._names: dict[int, int] = {}
+        self._by_trace: WeakKeyDictionary[Trace, dict[_Key, Floats]] = WeakKeyDictionary()
 
     def same(self, known: Trace, other: Trace) -> None:
         """Let a trace whose stamps are moved by a few ms have the columns of the other one."""
-        self._kept += [known, other]
-        self._names[id(other)] = self._names.get(id(known), id(known))
+        self._by_trace[other] = self._by_trace.setdefault(known, {})
 
     def columns(self, block: Block, trace: Trace, size: float = 1.0) -> Floats:
         """Return the block's columns (k, n, c) on a trace, none where the effect is not possible there."""
-        key = (self._names.get(id(trace), id(trace)), size, *block.key, tuple(sorted(block.shape.items())))
-        if key not in self._known:
-            self._kept.append(trace)
-            self._known[key] = _columns(block, trace, size)
-        return self._known[key]
+        known = self._by_trace.setdefault(trace, {})
+        key = (size, *block.key, tuple(sorted(block.shape.items())))
+        if key not in known:
+            known[key] = _columns(block, trace, size)
+        return known[key]
 
 
 def _columns(block: Block, trace: Trace, size: float) -> Floats:
     n, k = trace.shape
     try:
         settings = block.settings(trace, size)
-        found = np.empty((k, n, len(settings)))
+        columns = np.empty((k, n, len(settings)))
         for number, applied in enumerate(settings):
-            found[:, :, number] = (trace.sample([applied]) - trace.nominal).T
+            columns[:, :, number] = (trace.sample([applied]) - trace.nominal).T
     except Gcode2KrlError:
         return np.zeros((k, n, 0))
-    found[~np.isfinite(found)] = 0.0
-    return found
+    columns[~np.isfinite(columns)] = 0.0
+    return columns

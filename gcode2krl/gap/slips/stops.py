@@ -35,18 +35,18 @@ def unplanned_stops(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> tup
     before = _rms(traces)
     if before < traces[0].link.least_off:
         return [], unchanged
-    found = _explaining_stops(pairs, before)
-    if found is None:
+    stops = _explaining_stops(pairs, before)
+    if stops is None:
         return [], unchanged
-    count = max(len(rows) for rows in found.rows)
-    applied = Applied(effect, None, {"count": float(count), "hold_s": found.hold_s})
+    count = max(len(rows) for rows in stops.rows)
+    applied = Applied(effect, None, {"count": float(count), "hold_s": stops.hold_s})
     lines = sorted(
-        {int(line) for pair, rows in zip(pairs, found.rows, strict=True) for line in _lines(pair, rows)}
+        {int(line) for pair, rows in zip(pairs, stops.rows, strict=True) for line in _lines(pair, rows)}
     )
     words = f"the robot stopped exactly at {count} corners that are blended in the plan, lines {lines}"
     factor, unit = traces[0].factor, traces[0].unit
-    slip = Slip(applied, traces[0].link, before * factor, found.rms_left * factor, unit, words)
-    return [slip], found.pairs
+    slip = Slip(applied, traces[0].link, before * factor, stops.rms_left * factor, unit, words)
+    return [slip], stops.pairs
 
 
 class _Stops(NamedTuple):
@@ -79,19 +79,18 @@ def _explaining_stops(pairs: Sequence[Pair], before: float) -> _Stops | None:
 
 
 def _held(pairs: Sequence[Pair], stops: Sequence[Ints]) -> tuple[float, list[Pair]]:
-    """Return for how long the robot stands at each stop, in s, and the pairs with the stops planned."""
+    """Return how long (s) the robot stands at each stop, and the pairs with the stops planned."""
     hold_s, stopped = 0.0, list(pairs)
     for _ in range(_LIMITS.stop_hold_steps):
         stopped = [_stopped(pair, rows, hold_s) for pair, rows in zip(pairs, stops, strict=True)]
-        left = [
-            late[np.isin(_corners(pair), rows)]
-            for pair, one, rows in zip(pairs, stopped, stops, strict=True)
-            for late in [_lateness(one, _corners(pair))]
+        left_s = [
+            _lateness(planned, corners := _corners(pair))[np.isin(corners, rows)]
+            for pair, planned, rows in zip(pairs, stopped, stops, strict=True)
         ]
-        change = float(np.median(np.concatenate(left)))
-        if abs(change) < _LIMITS.stop_hold_settled_s:
+        change_s = float(np.median(np.concatenate(left_s)))
+        if abs(change_s) < _LIMITS.stop_hold_settled_s:
             break
-        hold_s = max(hold_s + change, 0.0)
+        hold_s = max(hold_s + change_s, 0.0)
     return hold_s, stopped
 
 

@@ -2,70 +2,62 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import GEAR, JOINTS, LINKS, MECHANICS, PATH, TIMING
+from gcode2krl.gap.beside.links import GEAR, JOINTS, LINKS, MECHANICS, PATH, TIMING, Link
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judgement import Cause, Judgement
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.result import Gap
+from gcode2krl.gap.tell.causes import cause_of, slip_cause
+from gcode2krl.gap.tell.result import (
+    CauseResult,
+    Detectable,
+    Gap,
+    GapSize,
+    LinkResult,
+    NotExamined,
+    SignalResult,
+    Unexplained,
+    Where,
+)
 from gcode2krl.gap.tell.where import place
-
-_MOST_ALIKE = 5
-_SURE = 0.95
-"""A slip was re-simulated and took nine tenths of a gap that machines do not have by themselves."""
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 
 def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> Gap:
     """Return the diagnosis of all links together."""
     pairs = context.pairs
     judgements = [each for each in context.judgements if isinstance(each, Judgement)]
-    main = max(judgements, key=_weight, default=None)
-    gapped = [each for each in judgements if each.verdict != "no_gap"]
-    causes = [_slip_cause(slip) for slip in slips]
-    causes += [_cause(cause, each) for each in gapped for cause in each.causes]
-    causes.sort(key=lambda cause: -cause["probability"])
-    verdict = _verdict(gapped, slips)
-    named = [slip.applied for slip in slips if not slip.final]
-    named += [one for each in gapped for one in each.applied]
-    every = [
-        replace(issue, message=f"{pair.name}: {issue.message}") for pair in pairs for issue in pair.run.issues
-    ]
+    largest = max(judgements, key=_weight, default=None)
     return Gap(
-        verdict=verdict,
-        gap=_gap(main, slips),
-        links=_links(judgements, slips),
-        where=_where(main, judgements),
-        causes=causes,
-        unexplained=_rest(main),
-        not_examined=_not_examined(judgements, slips),
-        observable=[entry for each in judgements for entry in observable(each.examination)],
-        named=tuple(named),
-        issues=(*issues, *every),
+        verdict=_verdict(judgements, slips),
+        gap=_size(largest, slips),
+        links=tuple(_links(judgements, slips)),
+        where=_where(largest, judgements),
+        causes=_causes(judgements, slips),
+        unexplained=_unexplained(largest),
+        not_examined=tuple(_not_examined(judgements, slips)),
+        observable=tuple(
+            Detectable(**entry) for judgement in judgements for entry in observable(judgement.examination)
+        ),
+        named=(
+            *(slip.applied for slip in slips if not slip.final),
+            *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
+        ),
+        issues=(*issues, *_issues_of_runs(pairs)),
         runs=tuple(pair.name for pair in pairs),
         notes=tuple(_notes(pairs, judgements)),
     )
 
 
-def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[str]:
-    """Yield what a reader should know of what was left out."""
-    if any(pair.run.head.angles == "relative" for pair in pairs):
-        yield "angles are relative: no kinematics, no limits, no gravity"
-    for each in judgements:
-        left = [joint for joint in JOINTS if joint not in each.traces[0].components]
-        if each.link.of_joints and left:
-            yield f"{each.link.name}: {', '.join(left)} left out: not recorded, or never moving"
-    for each in judgements:
-        if each.usual:
-            names = ", ".join(one.label for one in each.usual)
-            yield f"{each.link.name}: {names} within normal mismatch"
+def _gapped(judgements: Sequence[Judgement]) -> list[Judgement]:
+    """Return the judgements of links with a gap."""
+    return [judgement for judgement in judgements if judgement.verdict != "no_gap"]
 
 
 def _weight(judgement: Judgement) -> tuple[bool, float]:
@@ -74,10 +66,11 @@ def _weight(judgement: Judgement) -> tuple[bool, float]:
     return judgement.verdict != "no_gap", size.excess_before / max(size.noise, 1e-30)
 
 
-def _verdict(gapped: Sequence[Judgement], slips: Sequence[Slip]) -> str:
-    if not gapped:
+def _verdict(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> str:
+    """Return the verdict of all links with a gap together."""
+    verdicts = {judgement.verdict for judgement in _gapped(judgements)}
+    if not verdicts:
         return "explained" if slips else "no_gap"
-    verdicts = {each.verdict for each in gapped}
     if verdicts == {"explained"}:
         return "explained"
     if verdicts == {"unexplained"} and not slips:
@@ -85,151 +78,154 @@ def _verdict(gapped: Sequence[Judgement], slips: Sequence[Slip]) -> str:
     return "partly_explained"
 
 
-def _gap(main: Judgement | None, slips: Sequence[Slip]) -> dict[str, Any]:
-    if main is None or (slips and main.verdict == "no_gap"):
-        slip = slips[0] if slips else None
-        link = slip.link if slip else MECHANICS
-        return {
-            "signal": link.signal, "unit": link.unit,
-            "rms_before": slip.rms_before if slip else None, "rms_after": slip.rms_after if slip else None,
-            "noise_floor": None, "max_before": None, "max_after": None, "shrink": None, "held_out": False,
-        }  # fmt: skip
-    size, factor = main.size, main.traces[0].factor
-    explained = bool(main.causes)
-    return {
-        "signal": TIMING.signal if _is_timing(main) else main.traces[0].signal,
-        "unit": main.traces[0].unit,
-        "rms_before": factor * size.before**0.5,
-        "rms_after": factor * size.after**0.5,
-        "noise_floor": factor * size.floor**0.5,
-        "max_before": factor * size.largest_before,
-        "max_after": factor * size.largest_after,
-        "shrink": size.shrink if explained and main.held_out else None,
-        "held_out": main.held_out,
-    }
-
-
-def _is_timing(judgement: Judgement) -> bool:
-    return (
-        judgement.link.tells_time and judgement.verdict != "no_gap" and timing_share(judgement.traces) > 0.5
+def _size(largest: Judgement | None, slips: Sequence[Slip]) -> GapSize:
+    """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
+    if largest is None or (slips and largest.verdict == "no_gap"):
+        return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
+    size, trace = largest.size, largest.traces[0]
+    return GapSize(
+        signal=TIMING.signal if _is_timing(largest) else trace.signal,
+        unit=trace.unit,
+        rms_before=trace.factor * size.before**0.5,
+        rms_after=trace.factor * size.after**0.5,
+        noise_floor=trace.factor * size.floor**0.5,
+        max_before=trace.factor * size.largest_before,
+        max_after=trace.factor * size.largest_after,
+        shrink=size.shrink if largest.causes and largest.held_out else None,
+        held_out=largest.held_out,
     )
 
 
-def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = []
-    by_link = {each.link: each for each in judgements}
+def _size_of_slip(slip: Slip) -> GapSize:
+    link = slip.link
+    return GapSize(signal=link.signal, unit=link.unit, rms_before=slip.rms_before, rms_after=slip.rms_after)
+
+
+def _is_timing(judgement: Judgement) -> bool:
+    """Tell whether the gap of a path is one of timing: most of it lies along the motion."""
+    if not judgement.link.tells_time or judgement.verdict == "no_gap":
+        return False
+    return timing_share(judgement.traces) > THRESHOLDS.tell.timing_share
+
+
+def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> Iterator[LinkResult]:
+    """Yield the examined links in the chain's order."""
+    judged = {judgement.link: judgement for judgement in judgements}
     slipped = {slip.link for slip in slips}
     for link in LINKS:
-        if link is TIMING and PATH in by_link:
-            path = by_link[PATH]
-            before, after = timing_sizes(path.traces, path.examination.applied)
-            verdict = path.verdict if _is_timing(path) else "no_gap"
-            entry = {"link": link.name, "rms_before": before, "rms_after": after, "noise": None, "unit": "s"}
-            found.append(entry | {"verdict": verdict})
-        if link in by_link:
-            each = by_link[link]
-            factor = each.traces[0].factor
-            verdict = "no_gap" if _is_timing(each) else each.verdict
-            found.append({
-                "link": link.name,
-                "rms_before": factor * each.size.before**0.5,
-                "rms_after": factor * each.size.after**0.5,
-                "noise": factor * each.size.floor**0.5,
-                "unit": each.traces[0].unit,
-                "verdict": "explained" if link in slipped and verdict == "no_gap" else verdict,
-            })  # fmt: skip
-        if link is GEAR and link in by_link:
-            found[-1]["offset_deg"] = _zeros(by_link[link])
-    return found
+        if link is TIMING and PATH in judged:
+            yield _timing(judged[PATH])
+        if link in judged:
+            yield _link(judged[link], link in slipped)
 
 
-def _zeros(judgement: Judgement) -> dict[str, float]:
-    """Return the constant difference of the encoders of each joint, which is a zero and no finding."""
-    values = np.mean([trace.measured.mean(axis=0) for trace in judgement.traces], axis=0)
-    factor = judgement.traces[0].factor
-    return {
-        name: factor * float(value)
-        for name, value in zip(judgement.traces[0].components, values, strict=True)
-    }
+def _timing(path: Judgement) -> LinkResult:
+    """Return by how much runs are late along their path."""
+    before_s, after_s = timing_sizes(path.traces, path.examination.applied)
+    return LinkResult(
+        link=TIMING.name,
+        rms_before=before_s,
+        rms_after=after_s,
+        noise=None,
+        unit=TIMING.unit,
+        verdict=path.verdict if _is_timing(path) else "no_gap",
+    )
 
 
-def _where(main: Judgement | None, judgements: Sequence[Judgement]) -> dict[str, Any]:
-    signals = [
-        {
-            "signal": each.traces[0].signal,
-            "rms": each.traces[0].factor * each.size.before**0.5,
-            "noise": each.traces[0].factor * each.size.floor**0.5,
-            "significant": each.verdict != "no_gap",
-        }
-        for each in judgements
-    ]
-    empty: dict[str, Any] = {
-        "intervals": [], "direction_base": None, "phases": [], "joints": [], "frequency_hz": None
-    }  # fmt: skip
-    if main is None or main.verdict == "no_gap":
-        return {"signals": signals, **empty}
-    named = list(main.applied)
-    return {"signals": signals, **place(main.traces, main.examination.noise, named)}
+def _link(judgement: Judgement, slipped: bool) -> LinkResult:
+    """Return a judged link; ``slipped``: a slip showed in it."""
+    factor, size = judgement.traces[0].factor, judgement.size
+    verdict = "no_gap" if _is_timing(judgement) else judgement.verdict
+    return LinkResult(
+        link=judgement.link.name,
+        rms_before=factor * size.before**0.5,
+        rms_after=factor * size.after**0.5,
+        noise=factor * size.floor**0.5,
+        unit=judgement.traces[0].unit,
+        verdict="explained" if slipped and verdict == "no_gap" else verdict,
+        offset_deg=_zeros_deg(judgement) if judgement.link is GEAR else None,
+    )
 
 
-def _cause(cause: Cause, judgement: Judgement) -> dict[str, Any]:
-    factor = judgement.traces[0].factor
-    shows_in_time = _is_timing(judgement) and TIMING.name in cause.applied.effect.links
-    link = TIMING if shows_in_time else judgement.link
-    return {
-        "effect": cause.applied.effect.name,
-        "target": cause.applied.target,
-        "link": link.name,
-        "probability": cause.probability,
-        "parameters": {name: each._asdict() for name, each in cause.parameters.items()},
-        "shrink": cause.shrink,
-        "rms_after": None if cause.rms_after is None else factor * cause.rms_after,
-        "indistinguishable_from": [
-            {"effect": rival.applied.effect.name, "target": rival.applied.target}
-            for rival, _ in cause.rivals
-            if rival.alike
-        ][:_MOST_ALIKE],
-        "rivals": [
-            {"effect": rival.applied.effect.name, "target": rival.applied.target, "probability": share}
-            for rival, share in cause.rivals
-            if not rival.alike
-        ],
-    }
+def _zeros_deg(judgement: Judgement) -> dict[str, float]:
+    """Return the mean difference of each joint's two encoders: zeros are set by hand and never a finding."""
+    trace = judgement.traces[0]
+    zeros = trace.factor * np.mean([each.measured.mean(axis=0) for each in judgement.traces], axis=0)
+    return dict(zip(trace.components, zeros.tolist(), strict=True))
 
 
-def _slip_cause(slip: Slip) -> dict[str, Any]:
-    # what it leaves of the gap says how well its numbers are met
-    share = (slip.rms_after or 0.0) / slip.rms_before if slip.rms_before > 0.0 else 0.0
-    values = {}
-    for name, v in slip.applied.values.items():
-        wide = share * abs(v) + (Mismatch.clock_s if name.endswith("_s") else 0.0)
-        values[name] = {"value": v, "low": v - wide, "high": v + wide}
-    return {
-        "effect": slip.applied.effect.name, "target": slip.applied.target, "link": slip.link.name,
-        "probability": _SURE, "parameters": {} if slip.final else values, "shrink": None,
-        "rms_after": slip.rms_after, "words": slip.words,
-        "indistinguishable_from": [{"effect": name, "target": target} for name, target in slip.alike],
-    }  # fmt: skip
+def _where(largest: Judgement | None, judgements: Sequence[Judgement]) -> Where:
+    """Return which signals have a gap, and the place of the largest."""
+    signals = tuple(
+        SignalResult(
+            signal=judgement.traces[0].signal,
+            rms=judgement.traces[0].factor * judgement.size.before**0.5,
+            noise=judgement.traces[0].factor * judgement.size.floor**0.5,
+            significant=judgement.verdict != "no_gap",
+        )
+        for judgement in judgements
+    )
+    if largest is None or largest.verdict == "no_gap":
+        return Where(signals=signals)
+    return replace(place(largest.traces, largest.examination.noise, largest.applied), signals=signals)
 
 
-def _rest(main: Judgement | None) -> dict[str, Any]:
-    if main is None:
-        return {"rms": None, "significant": False, "structure": "unknown"}
-    size, factor = main.size, main.traces[0].factor
-    return {
-        "rms": factor * max(size.after, 0.0) ** 0.5,
-        "significant": bool(size.significant),
-        "structure": "structured" if size.significant else "white",
-    }
+def _causes(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
+    """Return the causes of all links, the most probable first."""
+    causes = [slip_cause(slip) for slip in slips]
+    for judgement in _gapped(judgements):
+        causes += [
+            cause_of(cause, judgement, _reported_in(cause, judgement).name) for cause in judgement.causes
+        ]
+    return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
 
-def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> list[dict[str, Any]]:
-    done = {each.link for each in judgements}
-    if PATH in done:
-        done.add(TIMING)
+def _reported_in(cause: Cause, judgement: Judgement) -> Link:
+    """Return the link that a cause is reported in: timing for a gap of the path that is one."""
+    shows_in_time = TIMING.name in cause.applied.effect.links
+    return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
+
+
+def _unexplained(largest: Judgement | None) -> Unexplained:
+    """Return what is left of the largest gap."""
+    if largest is None:
+        return Unexplained(rms=None, significant=False, structure="unknown")
+    size, significant = largest.size, bool(largest.size.significant)
+    return Unexplained(
+        rms=largest.traces[0].factor * max(size.after, 0.0) ** 0.5,
+        significant=significant,
+        structure="structured" if significant else "white",
+    )
+
+
+def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> Iterator[NotExamined]:
+    """Yield the links without a judgement, and what they need."""
+    examined = {judgement.link for judgement in judgements}
+    if PATH in examined:
+        examined.add(TIMING)
     final = any(slip.final for slip in slips)
-    return [
-        {"link": link.name, "needs": "a run that belongs to the prediction" if final else link.needs}
-        for link in LINKS
-        if link not in done
-    ]
+    for link in LINKS:
+        if link not in examined:
+            needs = "a run that belongs to the prediction" if final else link.needs
+            yield NotExamined(link=link.name, needs=needs)
+
+
+def _issues_of_runs(pairs: Sequence[Pair]) -> Iterator[Issue]:
+    """Yield the findings of the runs' files, each with its run's name."""
+    for pair in pairs:
+        for issue in pair.run.issues:
+            yield replace(issue, message=f"{pair.name}: {issue.message}")
+
+
+def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[str]:
+    """Yield what a reader should know of what was left out."""
+    if any(pair.run.head.angles == "relative" for pair in pairs):
+        yield "angles are relative: no kinematics, no limits, no gravity"
+    for judgement in judgements:
+        missing = [joint for joint in JOINTS if joint not in judgement.traces[0].components]
+        if judgement.link.of_joints and missing:
+            yield f"{judgement.link.name}: {', '.join(missing)} left out: not recorded, or never moving"
+    for judgement in judgements:
+        if judgement.usual:
+            labels = ", ".join(applied.label for applied in judgement.usual)
+            yield f"{judgement.link.name}: {labels} within normal mismatch"

@@ -1,4 +1,4 @@
-"""Named causes into a cell file, so that the next prediction has them."""
+"""Named causes, written into a cell file so that the next prediction has them."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,13 +11,13 @@ from gcode2krl.gap.tell.result import Gap
 
 
 def apply_to_cell(gap: Gap, file: Path, base: Path | None, sources: Sequence[str]) -> int:
-    """Write a cell file with the named causes as ``[[effects]]``, return how many were added.
+    """Write the named causes into a cell file as ``[[effects]]`` and return how many there are.
 
     Parameters
     ----------
-    file : is written; where it exists its keys are kept and comments are lost.
-    base : cell file to begin from where ``file`` does not exist.
-    sources : the runs that the causes come from.
+    file : the cell file that is written; if it exists, its other keys are kept and its comments are lost.
+    base : the cell file to begin from where ``file`` does not exist.
+    sources : names of the runs that the causes come from.
 
     Raises
     ------
@@ -31,18 +31,18 @@ def apply_to_cell(gap: Gap, file: Path, base: Path | None, sources: Sequence[str
     before = data.get("effects", [])
     if not isinstance(before, list):
         raise input_error("cell-key", "effects: found no list", "write [[effects]]", source=str(file))
-    causes = [cause for cause in gap.named if cause.effect.kind == "cause"]
+    causes = [applied for applied in gap.named if applied.effect.kind == "cause"]
     entries = [
         {
-            "name": one.effect.name,
-            **({"target": one.target} if one.target is not None else {}),
-            "parameters": {name: float(f"{value:.6g}") for name, value in one.values.items()},
+            "name": cause.effect.name,
+            **({"target": cause.target} if cause.target is not None else {}),
+            "parameters": {name: float(f"{value:.6g}") for name, value in cause.values.items()},
             "source": f"diagnosed from {', '.join(sources)}",
         }
-        for one in causes
+        for cause in causes
     ]
-    same = {(entry["name"], entry.get("target")) for entry in entries}
-    kept = [entry for entry in before if (entry.get("name"), entry.get("target")) not in same]
+    replaced = {(entry["name"], entry.get("target")) for entry in entries}
+    kept = [entry for entry in before if (entry.get("name"), entry.get("target")) not in replaced]
     data["effects"] = [*kept, *entries]
     resolve_cell(data, beside=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})

@@ -1,82 +1,206 @@
-"""What a diagnosis says, as an object and as the JSON of the contract."""
+"""What a diagnosis says. Its JSON object (docs/diagnose.md) is made of these by `as_json`, field by field."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Issue
+from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judgement import NAMED
 
-SCHEMA = "gcode2krl/gap/1"
+
+@dataclass(frozen=True, kw_only=True)
+class GapSize:
+    """The signal with the largest gap over its noise, in its unit; None where nothing was compared."""
+
+    signal: str
+    unit: str
+    rms_before: float | None = None
+    rms_after: float | None = None
+    noise_floor: float | None = None
+    """Noise, and the normal mismatch of machine and tool."""
+    max_before: float | None = None
+    max_after: float | None = None
+    shrink: float | None = None
+    """Share of the explainable gap that is gone on held-out data."""
+    held_out: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkResult:
+    """One examined link."""
+
+    link: str
+    rms_before: float
+    rms_after: float
+    noise: float | None
+    unit: str
+    verdict: str
+    """no_gap, explained, partly_explained or unexplained."""
+    offset_deg: Mapping[str, float] | None = None
+    """Joint -> zero between its two encoders, where the link has two."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalResult:
+    """The size of a signal's gap beside its noise."""
+
+    signal: str
+    rms: float
+    noise: float
+    significant: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalResult:
+    """A stretch of time in which the gap is large."""
+
+    run: str
+    signal: str
+    t_start_s: float
+    t_end_s: float
+    lines: tuple[int, ...]
+    """First and last G-code line; none where no move of the program is in it."""
+    rms: float
+    what: str
+    """What goes on there: a phase, or the reversal of a joint."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseResult:
+    """The gap in a phase of the work, and its share of the gap's power."""
+
+    phase: str
+    rms: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointResult:
+    """The share of a joint in the gap's power."""
+
+    joint: str
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Where:
+    """The place of a gap: in which signals and, of the largest, when, along what and at which joints."""
+
+    signals: tuple[SignalResult, ...] = ()
+    intervals: tuple[IntervalResult, ...] = ()
+    """The largest first."""
+    direction_base: tuple[float, ...] | None = None
+    """Unit vector in ``$BASE``, where the signal is one."""
+    phases: tuple[PhaseResult, ...] = ()
+    joints: tuple[JointResult, ...] = ()
+    frequency_hz: tuple[float, ...] | None = None
+    """The band that holds the power between its 10 % and 90 % points."""
 
 
 @dataclass(frozen=True)
+class EffectAt:
+    """An effect and where it is."""
+
+    effect: str
+    target: str | None
+
+
+@dataclass(frozen=True)
+class RivalResult:
+    """An effect in place of a cause, and its probability."""
+
+    effect: str
+    target: str | None
+    probability: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CauseResult:
+    """One effect at one target, a set-up slip included."""
+
+    effect: str
+    target: str | None
+    link: str
+    probability: float
+    parameters: Mapping[str, Interval]
+    """Name -> value and 90 % interval."""
+    shrink: float | None
+    """Share of the explainable gap that it takes on held-out data, on top of the causes above it."""
+    rms_after: float | None
+    words: str | None = None
+    """Of a set-up slip, what shows it; None for other causes."""
+    indistinguishable_from: tuple[EffectAt, ...] = ()
+    """Others that these data cannot tell from it: they share the probability."""
+    rivals: tuple[RivalResult, ...] | None = None
+    """None where no other effect was compared with it."""
+
+    @property
+    def is_named(self) -> bool:
+        """Tell whether its probability is at least 0.5."""
+        return self.probability >= NAMED
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unexplained:
+    """What is left of the gap with the causes in the model."""
+
+    rms: float | None
+    significant: bool
+    structure: str
+    """structured, white or unknown."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotExamined:
+    """A link without data, and what a run must hold for it."""
+
+    link: str
+    needs: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detectable:
+    """The smallest size of an effect that would have been a finding in a link."""
+
+    link: str
+    effect: str
+    target: str | None
+    parameter: str
+    smallest: float
+    seen: bool
+    """False where normal mismatch could do nearly all that the effect does."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Gap:
     """Where reality differs from the prediction, why, and how much is gone with the causes in the model."""
 
     verdict: str
     """no_gap, explained, partly_explained or unexplained."""
-    gap: Mapping[str, Any]
-    links: Sequence[Mapping[str, Any]]
-    where: Mapping[str, Any]
-    causes: Sequence[Mapping[str, Any]]
-    unexplained: Mapping[str, Any]
-    not_examined: Sequence[Mapping[str, Any]]
-    observable: Sequence[Mapping[str, Any]] = ()
-    """The smallest size of each effect that these data could have shown."""
+    gap: GapSize
+    links: tuple[LinkResult, ...]
+    where: Where
+    causes: tuple[CauseResult, ...]
+    """The most probable first."""
+    unexplained: Unexplained
+    not_examined: tuple[NotExamined, ...]
+    observable: tuple[Detectable, ...] = ()
     next_run: str | None = None
     named: tuple[Applied, ...] = ()
     """The causes with a probability of at least 0.5, as effects that `predict` takes."""
-    issues: tuple[Issue, ...] = field(default=())
+    issues: tuple[Issue, ...] = ()
     runs: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
+    @property
+    def named_causes(self) -> tuple[CauseResult, ...]:
+        """Return the causes with a probability of at least 0.5."""
+        return tuple(cause for cause in self.causes if cause.is_named)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the object of the JSON contract, plain numbers only."""
-        return {
-            "schema": SCHEMA,
-            "verdict": self.verdict,
-            "gap": plain(self.gap),
-            "links": plain(self.links),
-            "where": plain(self.where),
-            "causes": plain(self.causes),
-            "unexplained": plain(self.unexplained),
-            "not_examined": plain(self.not_examined),
-            "observable": plain(self.observable),
-            "next_run": self.next_run,
-            "runs": list(self.runs),
-            "notes": list(self.notes),
-            "issues": [
-                {
-                    "severity": i.severity,
-                    "code": i.code,
-                    "line": i.line,
-                    "message": i.message,
-                    "remedy": i.remedy,
-                }
-                for i in self.issues
-            ],
-        }
+        from gcode2krl.gap.tell.as_json import gap_object
 
-    @property
-    def named_causes(self) -> list[Mapping[str, Any]]:
-        """Return the causes with a probability of at least 0.5."""
-        return [cause for cause in self.causes if cause["probability"] >= NAMED]
-
-
-def plain(value: Any) -> Any:
-    """Return numbers, lists and dicts without numpy types; what is not finite becomes None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(each) for each in value]
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
+        return gap_object(self)

@@ -1,7 +1,6 @@
 """Where a gap is: in time, on which lines, in which phase, along which direction, at which joint."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,43 +8,40 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs
 from gcode2krl.effects.operators import since_reversal
 from gcode2krl.gap.beside.interpolation import nearest_rows
-from gcode2krl.gap.beside.links import JOINTS
+from gcode2krl.gap.beside.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.noise import Noise
+from gcode2krl.gap.tell.result import IntervalResult, JointResult, PhaseResult, Where
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")
-_NEAR_S = 0.3
-"""What happens so soon after a reversal, an entry or an exit belongs to it."""
-_JOIN_S = 0.2
-_SMOOTH_S = 0.1
-_MOVES_RAD = 1e-4
+_LIMITS = THRESHOLDS.tell
 
 
-def place(traces: Sequence[Trace], noise: Sequence[Noise], applied: Sequence[Applied]) -> dict[str, Any]:
+def place(traces: Sequence[Trace], noise: Sequence[Noise], applied: Sequence[Applied]) -> Where:
     """Return intervals, direction, phases, joints and band of the gap of one link.
 
-    Intervals are where the gap, as the rms over 0.1 s, is larger than its rms over all runs.
-    Of a gap that effects explain, the place is that of the effects; else that of the smoothed residual.
+    Intervals are where the gap, as the rms over 0.1 s, is larger than its rms over all runs. The place of a
+    gap that effects explain is that of the effects, else that of the smoothed residual.
     """
     shapes = [structure(trace, applied) for trace in traces]
     sigma = float(np.sqrt(sum(each.sigma**2 for each in noise)))
-    sizes = [_size(trace, shape) for trace, shape in zip(traces, shapes, strict=True)]
-    level = float(np.sqrt(np.mean(np.concatenate([np.sum(s**2, axis=1) for s in shapes]))))
-    intervals = []
-    for trace, size in zip(traces, sizes, strict=True):
-        least = max(level, 0.0 if applied else sigma)
-        intervals += _intervals(
-            trace, size, least, [JOINTS.index(a.target) for a in applied if a.target in JOINTS]
-        )
-    intervals.sort(key=lambda each: -each["rms"])
-    vector = traces[0].signal in ("tcp", "force") and not traces[0].in_sensor_frame
-    return {
-        "intervals": intervals,
-        "direction_base": _direction(shapes) if vector else None,
-        "phases": _phases(traces, shapes),
-        "joints": _joints(traces, shapes, applied),
-        "frequency_hz": _band(traces, shapes),
-    }
+    rms = float(np.sqrt(np.mean(np.concatenate([np.sum(shape**2, axis=1) for shape in shapes]))))
+    level = max(rms, 0.0 if applied else sigma)
+    joints = [str(one.target) for one in applied if one.target in JOINTS]
+    intervals = [
+        interval
+        for trace, shape in zip(traces, shapes, strict=True)
+        for interval in _intervals(trace, _size(trace, shape), level, joints)
+    ]
+    is_vector = traces[0].link in (FORCE, MECHANICS) and not traces[0].in_sensor_frame
+    return Where(
+        intervals=tuple(sorted(intervals, key=lambda interval: -interval.rms)),
+        direction_base=_direction(shapes) if is_vector else None,
+        phases=_phases(traces, shapes),
+        joints=_joints(traces, shapes, applied),
+        frequency_hz=_band(traces[0], shapes[0]),
+    )
 
 
 def structure(trace: Trace, applied: Sequence[Applied]) -> Floats:
@@ -63,26 +59,26 @@ def _size(trace: Trace, shape: Floats) -> Floats:
 
 def _smooth(trace: Trace, values: Floats) -> Floats:
     """Return the mean of (n,) over 0.1 s."""
-    kernel = np.ones(max(1, round(_SMOOTH_S / float(np.median(np.diff(trace.time_s))))))
-    found: Floats = np.convolve(values, kernel, mode="same")
-    return found / np.convolve(np.ones(len(values)), kernel, mode="same")
+    kernel = np.ones(max(1, round(_LIMITS.smooth_s / float(np.median(np.diff(trace.time_s))))))
+    sums: Floats = np.convolve(values, kernel, mode="same")
+    return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
 
 
 def phase_of(inputs: Inputs) -> tuple[Ints, Ints]:
-    """Return the phase (m,) of each sample, a number in `PHASES`, and which joint reversed last, or -1."""
+    """Return the phase (m,) of each sample, an index of `PHASES`, and which joint reversed last, or -1."""
     time_s, m = inputs.time_s, len(inputs)
     cuts = np.any(inputs.force_base_N != 0.0, axis=1)
     phase = np.where(cuts, PHASES.index("cruise"), PHASES.index("air"))
     edges = np.flatnonzero(np.diff(cuts.astype(int)))
     for edge in edges:
         entry = bool(cuts[edge + 1])
-        first = time_s[edge + 1] - (0.0 if entry else _NEAR_S)
-        last = time_s[edge + 1] + (_NEAR_S if entry else 0.0)
+        first = time_s[edge + 1] - (0.0 if entry else _LIMITS.after_event_s)
+        last = time_s[edge + 1] + (_LIMITS.after_event_s if entry else 0.0)
         phase[(time_s >= first) & (time_s <= last)] = PHASES.index("entry" if entry else "exit")
     joint = np.full(m, -1)
-    latest = np.full(m, _NEAR_S)
+    latest = np.full(m, _LIMITS.after_event_s)
     for axis in range(6):
-        if np.ptp(inputs.q_cmd_rad[:, axis]) < _MOVES_RAD:
+        if np.ptp(inputs.q_cmd_rad[:, axis]) < _LIMITS.joint_moves_rad:
             continue
         _, since = since_reversal(inputs.q_cmd_rad[:, axis], time_s)
         newer = since < latest
@@ -93,117 +89,122 @@ def phase_of(inputs: Inputs) -> tuple[Ints, Ints]:
     return phase, joint
 
 
-def _intervals(trace: Trace, size: Floats, level: float, suspects: Sequence[int]) -> list[dict[str, Any]]:
+def _intervals(trace: Trace, size: Floats, level: float, joints: Sequence[str]) -> Iterator[IntervalResult]:
+    """Yield where the size (n,) of a gap exceeds a level; ``joints``: those of the effects in it."""
     inside = np.flatnonzero(size > level)
     if len(inside) == 0:
-        return []
+        return
     phase, joint = phase_of(trace.inputs)
-    breaks = np.flatnonzero(np.diff(trace.time_s[inside]) > _JOIN_S) + 1
-    found = []
+    breaks = np.flatnonzero(np.diff(trace.time_s[inside]) > _LIMITS.same_interval_s) + 1
     for rows in np.split(inside, breaks):
-        start, end = float(trace.time_s[rows[0]]), float(trace.time_s[rows[-1]])
-        own = nearest_rows(trace.inputs.time_s, trace.time_s[rows])
-        lines = trace.inputs.source_line[own]
+        samples = nearest_rows(trace.inputs.time_s, trace.time_s[rows])
+        lines = trace.inputs.source_line[samples]
         lines = lines[lines > 0]
-        found.append({
-            "run": trace.run,
-            "signal": trace.signal,
-            "t_start_s": round(start, 4),
-            "t_end_s": round(end, 4),
-            "lines": [int(lines.min()), int(lines.max())] if len(lines) else [],
-            "rms": float(np.sqrt(np.mean(size[rows] ** 2))) * trace.factor,
-            "what": _what(phase[own], joint[own], size[rows], suspects),
-        })  # fmt: skip
-    return found
+        yield IntervalResult(
+            run=trace.run,
+            signal=trace.signal,
+            t_start_s=round(float(trace.time_s[rows[0]]), 4),
+            t_end_s=round(float(trace.time_s[rows[-1]]), 4),
+            lines=(int(lines.min()), int(lines.max())) if len(lines) else (),
+            rms=float(np.sqrt(np.mean(size[rows] ** 2))) * trace.factor,
+            what=_what(phase[samples], joint[samples], size[rows], joints),
+        )
 
 
-def _what(phase: Ints, joint: Ints, size: Floats, suspects: Sequence[int]) -> str:
-    energy = np.bincount(phase, weights=size**2, minlength=len(PHASES))
-    name = PHASES[int(np.argmax(energy))]
+def _what(phase: Ints, joint: Ints, size: Floats, joints: Sequence[str]) -> str:
+    """Return the phase that has most of the power of some rows, with the joint of a reversal."""
+    power = np.bincount(phase, weights=size**2, minlength=len(PHASES))
+    name = PHASES[int(np.argmax(power))]
     if name != "reversal":
         return name
-    at = joint[joint >= 0]
-    if len(suspects) == 1:
-        return f"reversal of {JOINTS[suspects[0]]}"
-    return f"reversal of {JOINTS[int(np.bincount(at).argmax())]}" if len(at) else name
+    if len(joints) == 1:
+        return f"reversal of {joints[0]}"
+    reversed_last = joint[joint >= 0]
+    if len(reversed_last) == 0:
+        return name
+    return f"reversal of {JOINTS[int(np.bincount(reversed_last).argmax())]}"
 
 
-def _direction(shapes: Sequence[Floats]) -> list[float]:
+def _direction(shapes: Sequence[Floats]) -> tuple[float, ...]:
     """Return the share of each axis as the components of a unit vector."""
-    rms = np.sqrt(np.mean(np.concatenate([s**2 for s in shapes]), axis=0))
+    rms = np.sqrt(np.mean(np.concatenate([shape**2 for shape in shapes]), axis=0))
     length = float(np.linalg.norm(rms))
-    return [float(value) for value in rms / length] if length > 0.0 else [0.0, 0.0, 0.0]
+    return tuple((rms / length).tolist()) if length > 0.0 else (0.0, 0.0, 0.0)
 
 
-def _phases(traces: Sequence[Trace], shapes: Sequence[Floats]) -> list[dict[str, Any]]:
-    energy, count = np.zeros(len(PHASES)), np.zeros(len(PHASES))
+def _phases(traces: Sequence[Trace], shapes: Sequence[Floats]) -> tuple[PhaseResult, ...]:
+    """Return the phases that occur, that with most of the gap's power first."""
+    power, count = np.zeros(len(PHASES)), np.zeros(len(PHASES))
     for trace, shape in zip(traces, shapes, strict=True):
         phase, _ = phase_of(trace.inputs)
-        own = phase[nearest_rows(trace.inputs.time_s, trace.time_s)]
-        energy += np.bincount(own, weights=np.sum(shape**2, axis=1), minlength=len(PHASES))
-        count += np.bincount(own, minlength=len(PHASES))
-    factor, total = traces[0].factor, max(float(energy.sum()), 1e-300)
-    return [
-        {
-            "phase": PHASES[i],
-            "rms": float(np.sqrt(energy[i] / count[i])) * factor,
-            "share": float(energy[i] / total),
-        }
-        for i in np.argsort(-energy)
+        of_rows = phase[nearest_rows(trace.inputs.time_s, trace.time_s)]
+        power += np.bincount(of_rows, weights=np.sum(shape**2, axis=1), minlength=len(PHASES))
+        count += np.bincount(of_rows, minlength=len(PHASES))
+    factor, total = traces[0].factor, max(float(power.sum()), 1e-300)
+    return tuple(
+        PhaseResult(
+            phase=PHASES[i], rms=float(np.sqrt(power[i] / count[i])) * factor, share=float(power[i] / total)
+        )
+        for i in np.argsort(-power)
         if count[i] > 0
-    ]
+    )
 
 
 def _joints(
     traces: Sequence[Trace], shapes: Sequence[Floats], applied: Sequence[Applied]
-) -> list[dict[str, Any]]:
+) -> tuple[JointResult, ...]:
     """Return each joint's share of the gap's power.
 
     By its own column where angles were measured; by the effects' targets where effects explain it; else by
     how much of a gap at the tip lies along what the joint alone can move it.
     """
-    if traces[0].signal.startswith("joint"):
+    at_joints = [one for one in applied if one.target in JOINTS]
+    if traces[0].link.of_joints:
         names = traces[0].components
-        energy = sum(np.sum(s**2, axis=0) for s in shapes if s.shape[1] == len(names))
-    elif any(one.target in JOINTS for one in applied):
-        names = tuple(str(one.target) for one in applied if one.target in JOINTS)
-        energy = np.array([
-            sum(float(np.sum(structure(trace, [one]) ** 2)) for trace in traces)
-            for one in applied if one.target in JOINTS
-        ])  # fmt: skip
-    elif traces[0].signal == "tcp" and not applied:
-        names, energy = JOINTS, _along_joints(traces, shapes)
+        power = sum(np.sum(shape**2, axis=0) for shape in shapes if shape.shape[1] == len(names))
+    elif at_joints:
+        names = tuple(str(one.target) for one in at_joints)
+        power = np.array([_power(traces, one) for one in at_joints])
+    elif traces[0].link is MECHANICS and not applied:
+        names, power = JOINTS, _along_joints(traces, shapes)
     else:
-        return []
-    total = float(np.sum(energy))
+        return ()
+    total = float(np.sum(power))
     if total <= 0.0:
-        return []
-    return [
-        {"joint": names[i], "share": float(energy[i] / total)}
-        for i in np.argsort(-np.asarray(energy))
-        if energy[i] > 0.01 * total
-    ]
+        return ()
+    return tuple(
+        JointResult(joint=names[i], share=float(power[i] / total))
+        for i in np.argsort(-np.asarray(power))
+        if power[i] > _LIMITS.joint_least_share * total
+    )
+
+
+def _power(traces: Sequence[Trace], applied: Applied) -> float:
+    """Return the power of what one effect does to some traces."""
+    return sum(float(np.sum(structure(trace, [applied]) ** 2)) for trace in traces)
 
 
 def _along_joints(traces: Sequence[Trace], shapes: Sequence[Floats]) -> Floats:
-    energy = np.zeros(6)
+    """Return the power (6,) of the gap along the directions in which each joint moves the tip."""
+    power = np.zeros(6)
     for trace, shape in zip(traces, shapes, strict=True):
-        own = nearest_rows(trace.inputs.time_s, trace.time_s)
-        columns = trace.inputs.jacobian[own][:, :3, :]
+        samples = nearest_rows(trace.inputs.time_s, trace.time_s)
+        columns = trace.inputs.jacobian[samples][:, :3, :]
         length = np.maximum(np.linalg.norm(columns, axis=1), 1e-9)
         along = np.einsum("ni,nij->nj", shape, columns) / length
-        energy += np.sum(along**2, axis=0)
-    return energy
+        power += np.sum(along**2, axis=0)
+    return power
 
 
-def _band(traces: Sequence[Trace], shapes: Sequence[Floats]) -> list[float]:
+def _band(trace: Trace, shape: Floats) -> tuple[float, ...]:
     """Return the band (Hz) between the 10 % and 90 % points of the power of what is not constant."""
-    trace, shape = traces[0], shapes[0]
-    step = float(np.median(np.diff(trace.time_s)))
+    step_s = float(np.median(np.diff(trace.time_s)))
     power = np.sum(np.abs(np.fft.rfft(shape - shape.mean(axis=0), axis=0)) ** 2, axis=1)
     total = float(power.sum())
     if total <= 0.0:
-        return [0.0, 0.0]
+        return 0.0, 0.0
     share = np.cumsum(power) / total
-    hz = np.fft.rfftfreq(len(shape), step)
-    return [float(hz[int(np.searchsorted(share, level))]) for level in (0.1, 0.9)]
+    hz = np.fft.rfftfreq(len(shape), step_s)
+    return tuple(
+        float(hz[int(np.searchsorted(share, level))]) for level in (_LIMITS.band_low, _LIMITS.band_high)
+    )

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 
 from gcode2krl.gap.thresholds.beside import BesideThresholds
+from gcode2krl.gap.thresholds.choose import ChooseThresholds
+from gcode2krl.gap.thresholds.fit import FitThresholds
 from gcode2krl.gap.thresholds.slips import SlipThresholds
 from gcode2krl.gap.thresholds.tell import TellThresholds
 
@@ -14,6 +16,8 @@ class Thresholds:
     """Every number that decides an answer, by the room that uses it."""
 
     beside: BesideThresholds = field(default_factory=BesideThresholds)
+    fit: FitThresholds = field(default_factory=FitThresholds)
+    choose: ChooseThresholds = field(default_factory=ChooseThresholds)
     slips: SlipThresholds = field(default_factory=SlipThresholds)
     tell: TellThresholds = field(default_factory=TellThresholds)
 

@@ -132,7 +132,7 @@ class GearLink(_DriveLink):
     needs = "controller.csv with q1_load_deg … (encoders behind the gear)"
     own_clock = True
     sets_clocks = True
-    instrument = ("clock", "encoder zero")
+    instrument = ("table clock", "encoder zero")
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return q_load - q_act."""

@@ -1,0 +1,45 @@
+"""What an effect can depend on: where it shows and the inputs of its link, which together are its family.
+
+A gap without a name is described by them too, so that it can be compared with effects.
+"""
+
+from enum import Enum
+
+
+class Where(Enum):
+    """Of what the signal of a link is a deviation."""
+
+    TIP = "tip"
+    JOINT = "joint"
+    FORCE_AXIS = "force axis"
+
+
+class Dependence(Enum):
+    """An input that a deviation can be a function of."""
+
+    CONSTANT = "constant"
+    """None of the others: a zero, an offset."""
+    RUN_TIME = "run time"
+    """Time in the run, smoothly."""
+    RUN_TIME_STEP = "step in run time"
+    RUN_START = "run start"
+    """Time since the start of each run: what settles."""
+    RUN_TO_RUN = "run to run"
+    WALL_CLOCK = "wall clock"
+    OWN_ANGLE = "own angle"
+    MOTOR_ANGLE = "motor angle"
+    REVERSALS = "reversals"
+    """Direction of motion, with memory."""
+    OWN_TORQUE = "own torque"
+    VELOCITY = "velocity"
+    FORCE = "force"
+    FORCE_BY_PLACE = "force by place"
+    METRES_CUT = "metres cut"
+    TRAVEL = "travel"
+    """Length of the path so far."""
+    PLACE = "place"
+    """Pose of the tool."""
+    SPINDLE_SPEED = "spindle speed"
+    TEMPERATURE = "temperature"
+    TONE = "tone"
+    """One frequency, whatever the motion."""

@@ -1,0 +1,31 @@
+"""Stretches of time: rows of one stretch share the errors of a model and stay together in every split."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gcode2krl.arrays import Ints
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+STRETCH_S = THRESHOLDS.beside.stretch_s
+
+
+def stretches_of(trace: Trace) -> Ints:
+    """Return the number (n,) of the stretch of time each row of a trace belongs to."""
+    number: Ints = ((trace.time_s - trace.inputs.time_s[0]) / STRETCH_S).astype(np.int64)
+    return number
+
+
+def stretches_of_all(traces: Sequence[Trace]) -> Ints:
+    """Return the number of the stretch of each value of all traces, component after component.
+
+    No two runs have a number in common, however long they are.
+    """
+    numbers, first = [], 0
+    for trace in traces:
+        number = stretches_of(trace)
+        number -= number.min(initial=0)  # a table may begin before its model
+        numbers.append(np.tile(first + number, trace.shape[1]))
+        first += int(number.max(initial=-1)) + 1
+    return np.concatenate(numbers)

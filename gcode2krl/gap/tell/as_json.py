@@ -1,0 +1,71 @@
+"""The JSON object of a diagnosis (docs/diagnose.md): the typed result, field by field."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from gcode2krl.errors import Issue
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.tell.result import Gap
+
+SCHEMA = "gcode2krl/gap/1"
+_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals"})
+"""Keys that only some links and causes have; others are null where nothing is known."""
+
+
+def gap_object(gap: Gap) -> dict[str, Any]:
+    """Return the object, its keys in the order of the contract; what is not finite is None."""
+    return {
+        "schema": SCHEMA,
+        "verdict": gap.verdict,
+        "gap": plain(gap.gap),
+        "links": plain(gap.links),
+        "where": plain(gap.where),
+        "causes": plain(gap.causes),
+        "unexplained": plain(gap.unexplained),
+        "not_examined": plain(gap.not_examined),
+        "observable": plain(gap.observable),
+        "next_run": gap.next_run,
+        "runs": list(gap.runs),
+        "notes": list(gap.notes),
+        "issues": [_issue(issue) for issue in gap.issues],
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return a result without dataclasses and numpy types: dicts, lists, numbers, texts, None."""
+    if isinstance(value, Interval):
+        value = value._asdict()
+    if is_dataclass(value):
+        value = {name: each for name, each in _items(value) if not _is_left_out(name, each)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(each) for each in value]
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def _items(result: Any) -> list[tuple[str, Any]]:
+    return [(entry.name, getattr(result, entry.name)) for entry in fields(result)]
+
+
+def _is_left_out(name: str, value: Any) -> bool:
+    return value is None and name in _LEFT_OUT_WHERE_NONE
+
+
+def _issue(issue: Issue) -> dict[str, Any]:
+    return {
+        "severity": issue.severity,
+        "code": issue.code,
+        "line": issue.line,
+        "message": issue.message,
+        "remedy": issue.remedy,
+    }

@@ -1,0 +1,55 @@
+"""Causes as the answer states them: effects that a link was explained by, and set-up slips."""
+
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.choose.judgement import Cause, Judgement
+from gcode2krl.gap.slips.slip import Slip
+from gcode2krl.gap.tell.result import CauseResult, EffectAt, RivalResult
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+
+def cause_of(cause: Cause, judgement: Judgement, link: str) -> CauseResult:
+    """Return a cause of a judged link; ``link`` is the name of that which it is reported in."""
+    factor = judgement.traces[0].factor
+    alike = [rival.applied for rival, _ in cause.rivals if rival.alike]
+    others = [(rival.applied, probability) for rival, probability in cause.rivals if not rival.alike]
+    return CauseResult(
+        effect=cause.applied.effect.name,
+        target=cause.applied.target,
+        link=link,
+        probability=cause.probability,
+        parameters=cause.parameters,
+        shrink=cause.shrink,
+        rms_after=None if cause.rms_after is None else factor * cause.rms_after,
+        indistinguishable_from=tuple(
+            EffectAt(applied.effect.name, applied.target) for applied in alike[: THRESHOLDS.tell.most_alike]
+        ),
+        rivals=tuple(
+            RivalResult(applied.effect.name, applied.target, probability) for applied, probability in others
+        ),
+    )
+
+
+def slip_cause(slip: Slip) -> CauseResult:
+    """Return a set-up slip as a cause; one that ends the comparison has no parameters."""
+    return CauseResult(
+        effect=slip.applied.effect.name,
+        target=slip.applied.target,
+        link=slip.link.name,
+        probability=THRESHOLDS.slips.probability,
+        parameters={} if slip.final else _slip_intervals(slip),
+        shrink=None,
+        rms_after=slip.rms_after,
+        words=slip.words,
+        indistinguishable_from=tuple(EffectAt(name, target) for name, target in slip.alike),
+    )
+
+
+def _slip_intervals(slip: Slip) -> dict[str, Interval]:
+    """Return the values of a slip; what it leaves of the gap says how well they are met."""
+    share = (slip.rms_after or 0.0) / slip.rms_before if slip.rms_before > 0.0 else 0.0
+    intervals = {}
+    for name, value in slip.applied.values.items():
+        width = share * abs(value) + (Mismatch.clock_s if name.endswith("_s") else 0.0)
+        intervals[name] = Interval(value, value - width, value + width)
+    return intervals

@@ -1,0 +1,123 @@
+"""Thresholds of choose/: when an effect is accepted and named, and how sure its numbers are."""
+
+from dataclasses import dataclass
+
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
+
+
+@dataclass(frozen=True)
+class ChooseThresholds:
+    """When an effect is accepted and named, and how sure its numbers are."""
+
+    # Candidates
+    false_alarms: float = convention(
+        1e-3, "of each link; five links together stay below one run in a hundred without an effect"
+    )
+    least_ratio: float = calibrated(
+        0.08,
+        DEVELOPMENT,
+        "share of the noise, nuisance taken out; models of sound machines differ by less",
+    )
+    reach: float = convention(
+        0.02, "share of its range by which a coefficient may be beyond it: it is the first order of an effect"
+    )
+    bent_reach: float = convention(1.0, "the same of an effect that is not proportional to its size")
+    most_causes: int = convention(4, "effects that are accepted in one link")
+    most_effects: int = convention(8, "those and effects within normal mismatch")
+    most_tried: int = convention(12, "candidates whose gain is judged by its scatter over stretches of time")
+    shortlist: int = convention(5, "effects that are refitted in one round, beside those that plan anew")
+    close_share: float = calibrated(
+        0.15, DEVELOPMENT, "rivals within this share of the best linear gain are refitted too"
+    )
+    close_gain: float = calibrated(12.0, DEVELOPMENT, "rivals within this gain of the best are refitted too")
+    bent_share: float = calibrated(
+        0.4,
+        DEVELOPMENT,
+        "an effect not proportional to its size is refitted from this share of the best linear gain on",
+    )
+    hopeless: float = calibrated(
+        3.0, DEVELOPMENT, "an effect that plans anew and leaves more times the best chi2 is not searched for"
+    )
+    behind_share: float = calibrated(
+        0.2, DEVELOPMENT, "a refit behind the best by this share of its gain after three steps is given up"
+    )
+
+    # Acceptance
+    left_out_groups: int = convention(
+        4, "groups of stretches that are left out in turn when an effect is tested"
+    )
+    prune_share: float = convention(
+        0.05, "an effect that brings less of the whole gain where it acts is dropped"
+    )
+    quieter_noise: float = calibrated(
+        0.7, DEVELOPMENT, "noise with less of its power beside the causes is learnt anew"
+    )
+    mismatch_slack: float = convention(1.15, "bounds of normal mismatch are round numbers")
+    mismatch_deviations: float = convention(
+        1.0, "standard deviations by which an effect's number may be beyond normal mismatch"
+    )
+
+    # Size of the gap
+    significant_sigma: float = convention(
+        4.0, "excess power over its own standard deviation; one in 30,000 by chance"
+    )
+    significant_share: float = calibrated(
+        0.1, DEVELOPMENT, "excess power below this share of the noise's is within what its model is sure of"
+    )
+    least_spread: float = convention(
+        0.1, "of the mean over the root of the count: the least standard deviation of a mean square"
+    )
+    observable_share: float = convention(
+        0.02, "an effect whose power nuisance leaves less of is not observable in that link"
+    )
+
+    # Rivals and probability
+    temperature: float = calibrated(
+        3.0, DEVELOPMENT, "divides differences of chi2: neither noise nor effects are exactly as modelled"
+    )
+    alike_chi2: float = convention(
+        9.2, "twice log 100: data that favour one of two effects by less do not tell them apart"
+    )
+    most_rivals: int = convention(8, "effects that are refitted in place of a cause")
+    rival_share: float = calibrated(
+        0.25, DEVELOPMENT, "a rival whose linear gain is lower by more of the cause's is not refitted"
+    )
+    bent_rival_share: float = calibrated(
+        0.7, DEVELOPMENT, "the same of a rival that is not proportional to its size"
+    )
+    rival_gain: float = calibrated(15.0, DEVELOPMENT, "a rival within this gain of the cause is refitted")
+    unknown_share: float = calibrated(
+        0.15, DEVELOPMENT, "of the structured gap: a larger rest is more than the form of an effect is off by"
+    )
+    unknown_width: float = calibrated(
+        0.03, DEVELOPMENT, "of the step from certainly known to unknown at `unknown_share`"
+    )
+    least_unknown: float = convention(0.02, "probability that is always left to what the library lacks")
+
+    # Naming
+    named: float = convention(0.5, "probability from which on a cause is named")
+    most_together: int = calibrated(
+        2, DEVELOPMENT, "more effects in one link at once imitate something that the library lacks"
+    )
+    least_share_of_rest: float = calibrated(
+        0.4, DEVELOPMENT, "of what the causes above it leave on held-out data: less does not name a cause"
+    )
+    together_share: float = convention(
+        0.5, "of an effect's data: from here on it acts where the effects before it do"
+    )
+    unsupported: float = calibrated(
+        0.4, DEVELOPMENT, "multiplies the probability of a cause that held-out data do not support"
+    )
+
+    # Intervals, as half-widths of 90 %
+    model_error: float = calibrated(
+        0.03, DEVELOPMENT, "share of a number that the models of effects are off by, whatever the noise"
+    )
+    law_error: float = calibrated(0.1, DEVELOPMENT, "the same of effects that plan anew")
+    inside_bound: float = physics(0.9, "nine in ten of a uniform draw are within this share of its bound")
+    least_stretches: int = convention(
+        8, "fewer stretches of time cannot tell how scores scatter between them"
+    )
+
+    # Clocks that are set before the effects are looked at
+    clock_most_s: float = convention(0.02, "larger clock errors of single runs are found by other means")

@@ -1,0 +1,34 @@
+"""Thresholds of fit/: what is known of an effect's numbers and of the noise before the data are looked at."""
+
+from dataclasses import dataclass
+
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention
+
+
+@dataclass(frozen=True)
+class FitThresholds:
+    """What is known of an effect's numbers and of the noise before the data are looked at."""
+
+    # Noise
+    noise_order: int = convention(3, "of the autoregressive model: a drift and an oscillation")
+    noise_least_rows: int = convention(60, "fewer rows give no colour: the noise is then taken as white")
+    noise_largest_pole: float = convention(0.98, "a model of longer memory than 50 rows is drift, not noise")
+    noise_least_scale: float = convention(
+        0.3, "of the least rms: what the model leaves unpredicted is never less"
+    )
+    noise_slow_s: float = calibrated(
+        0.5, DEVELOPMENT, "without repeats everything slower may be structure and is no noise"
+    )
+    noise_least_stated: float = convention(0.9, "of what run.toml states: noise is never taken to be less")
+    noise_most_stated: float = calibrated(
+        1.4, DEVELOPMENT, "of what run.toml states: what is above it is structure"
+    )
+
+    # Numbers of effects
+    prior_sizes: float = convention(3.0, "the standard deviation of a size's prior, in typical sizes")
+    number_cost: float = convention(
+        0.5, "of two effects that are one to the data the one with fewer numbers is named; as chi2"
+    )
+    slip_odds: float = convention(
+        9.2, "twice log 100, prior odds: slips are gross, and what is slight is another effect; as chi2"
+    )

@@ -1,0 +1,60 @@
+"""Names of effects and parameters stay in their own files: a diagnosis asks what an effect states."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from gcode2krl.effects import library
+from tests.conftest import ROOT
+
+PACKAGE = ROOT / "gcode2krl"
+KNOWN = library()
+NAMES = {
+    *KNOWN,
+    *(name for effect in KNOWN.values() for name in (*effect.names, *effect.vectors)),
+}
+FILES = [
+    *(file for room in ("beside", "fit", "choose") for file in sorted((PACKAGE / "gap" / room).glob("*.py"))),
+    PACKAGE / "gap" / "diagnosis.py",
+    *sorted((PACKAGE / "effects").glob("*.py")),
+]
+ALLOWED = {
+    # words that mean something else there
+    "gap/beside/links.py": {"mm"},  # a unit
+    "gap/fit/refitting.py": {"scale"},  # the field of `Free`
+    "gap/fit/sensitivity.py": {"scale"},
+    "effects/coefficients.py": {"diameter_mm"},  # of a cell's tool
+    # names that several effects share, and words of roles
+    "effects/parameter.py": {"direction_x", "direction_y", "direction_z", "direction", "phase", "count"},
+    "effects/frame_effect.py": {"x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "mm"},
+    # to go with links as objects
+    "gap/diagnosis.py": {"offset_s"},
+    "gap/beside/scan.py": {"tool_diameter", "offset_mm", "diameter_mm"},  # the last one of a cell's tool
+}
+
+
+def literals(text):
+    """Return the string literals of a source that are no docstrings."""
+    tree = ast.parse(text)
+    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    return {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said
+    }
+
+
+def of(file: Path) -> str:
+    return file.relative_to(PACKAGE).as_posix()
+
+
+@pytest.mark.parametrize("file", FILES, ids=of)
+def test_no_effect_and_no_parameter_is_known_by_name(file):
+    found = literals(file.read_text(encoding="utf-8")) & NAMES
+    assert found <= ALLOWED.get(of(file), set())
+
+
+def test_a_name_in_a_source_is_found():
+    assert literals('"""Of `backlash`."""\nif name == "backlash":\n    """phase"""\n') == {"backlash"}
+    assert {"backlash", "gap_deg", "phase", "direction"} <= NAMES

@@ -1,0 +1,119 @@
+"""The JSON object: keys in the order of the contract, plain values, what is left out."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from gcode2krl.errors import Issue
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.tell.as_json import SCHEMA, gap_object, plain
+from gcode2krl.gap.tell.result import (
+    CauseResult,
+    EffectAt,
+    Gap,
+    GapSize,
+    LinkResult,
+    NotExamined,
+    RivalResult,
+    Unexplained,
+    Where,
+)
+
+
+def _cause(**more):
+    return CauseResult(
+        effect="backlash", target="A2", link="gear", probability=0.9,
+        parameters={"gap_deg": Interval(np.float64(0.02), 0.01, 0.03)}, shrink=None, rms_after=0.1, **more,
+    )  # fmt: skip
+
+
+def _link(**more):
+    return LinkResult(
+        link="gear", rms_before=1.0, rms_after=0.5, noise=0.4, unit="deg", verdict="explained", **more
+    )
+
+
+def _gap(**more):
+    given = {
+        "verdict": "explained",
+        "gap": GapSize(signal="joint_load", unit="deg"),
+        "links": (_link(),),
+        "where": Where(),
+        "causes": (_cause(),),
+        "unexplained": Unexplained(rms=float("nan"), significant=False, structure="white"),
+        "not_examined": (NotExamined(link="force", needs="force.csv"),),
+    }
+    return Gap(**(given | more))
+
+
+def test_the_keys_are_those_of_the_contract_in_their_order():
+    found = gap_object(_gap())
+    assert list(found) == [
+        "schema", "verdict", "gap", "links", "where", "causes", "unexplained", "not_examined", "observable",
+        "next_run", "runs", "notes", "issues",
+    ]  # fmt: skip
+    assert found["schema"] == SCHEMA
+    assert list(found["gap"]) == [
+        "signal", "unit", "rms_before", "rms_after", "noise_floor", "max_before", "max_after", "shrink",
+        "held_out",
+    ]  # fmt: skip
+    assert list(found["where"]) == [
+        "signals", "intervals", "direction_base", "phases", "joints", "frequency_hz",
+    ]  # fmt: skip
+    assert found == _gap().as_dict()
+
+
+def test_keys_of_some_causes_and_links_are_left_out_and_others_are_null():
+    plain_keys = ["effect", "target", "link", "probability", "parameters", "shrink", "rms_after"]
+    assert list(plain(_cause())) == [*plain_keys, "indistinguishable_from"]
+    slip = plain(_cause(words="the run was at 50 % override"))
+    assert list(slip) == [*plain_keys, "words", "indistinguishable_from"]
+    compared = plain(_cause(rivals=(), indistinguishable_from=(EffectAt("mastering", None),)))
+    assert list(compared) == [*plain_keys, "indistinguishable_from", "rivals"]
+    assert compared["indistinguishable_from"] == [{"effect": "mastering", "target": None}]
+    assert (compared["rivals"], compared["shrink"]) == ([], None)
+    assert "offset_deg" not in plain(_link())
+    assert plain(_link(offset_deg={"A1": 0.5}))["offset_deg"] == {"A1": 0.5}
+
+
+def test_numbers_are_plain_and_what_is_not_finite_is_null():
+    found = gap_object(_gap(causes=(_cause(rivals=(RivalResult("clock", "q_load", np.float64(0.1)),)),)))
+    text = json.dumps(found, allow_nan=False)
+    assert found["unexplained"]["rms"] is None
+    assert json.loads(text) == found
+    assert type(found["causes"][0]["rivals"][0]["probability"]) is float
+    assert found["causes"][0]["parameters"] == {"gap_deg": {"value": 0.02, "low": 0.01, "high": 0.03}}
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted"),
+    [
+        (np.int64(3), 3),
+        (np.bool_(True), True),
+        (np.array([1.0, np.inf]), [1.0, None]),
+        ({1: (np.float64(2.0), "a", None)}, {"1": [2.0, "a", None]}),
+    ],
+)
+def test_numpy_types_become_those_of_json(value, wanted):
+    found = plain(value)
+    assert found == wanted
+    assert type(found) is type(wanted)
+
+
+def test_any_dataclass_becomes_its_fields():
+    @dataclass(frozen=True)
+    class Place:
+        at_s: float
+        words: str | None = None
+
+    assert plain([Place(1.0)]) == [{"at_s": 1.0}]
+
+
+def test_findings_have_five_keys():
+    issue = Issue("warning", "run-clock", 3, "late", "set it", "t_s")
+    (found,) = gap_object(_gap(issues=(issue,)))["issues"]
+    assert found == {
+        "severity": "warning", "code": "run-clock", "line": 3, "message": "late", "remedy": "set it"
+    }  # fmt: skip

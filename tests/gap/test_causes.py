@@ -1,0 +1,68 @@
+"""Causes as the answer states them: units, rivals, the intervals of slips."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.gap.beside.links import GEAR, PATH
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.choose.judgement import Cause
+from gcode2krl.gap.slips.slip import Slip
+from gcode2krl.gap.tell.causes import cause_of, slip_cause
+from gcode2krl.gap.tell.result import EffectAt, RivalResult
+from gcode2krl.gap.thresholds import THRESHOLDS
+from tests.gap.synthetic import applied
+
+JUDGEMENT = SimpleNamespace(link=GEAR, traces=(SimpleNamespace(factor=10.0),))
+
+
+def _rival(text, alike):
+    return SimpleNamespace(applied=applied(text)[0], alike=alike)
+
+
+def _cause(rivals=(), rms_after=0.5):
+    (backlash,) = applied("backlash:target=A2,gap_deg=0.02")
+    parameters = {"gap_deg": Interval(0.02, 0.01, 0.03)}
+    return Cause(backlash, GEAR.name, 0.8, parameters, 0.9, rms_after, tuple(rivals))
+
+
+def test_a_cause_has_the_unit_of_the_report_and_the_link_it_is_reported_in():
+    found = cause_of(_cause(), JUDGEMENT, "timing")
+    assert (found.effect, found.target, found.link) == ("backlash", "A2", "timing")
+    assert (found.probability, found.shrink, found.rms_after) == (0.8, 0.9, 5.0)
+    assert found.parameters == {"gap_deg": Interval(0.02, 0.01, 0.03)}
+    assert (found.words, found.rivals) == (None, ())
+    assert cause_of(_cause(rms_after=None), JUDGEMENT, "gear").rms_after is None
+
+
+def test_rivals_are_alike_or_have_a_probability():
+    alike = [(_rival(f"mastering:target=A{n},offset_deg=1", True), 0.1) for n in range(1, 7)]
+    found = cause_of(_cause([*alike, (_rival("base_frame:x_mm=1", False), 0.2)]), JUDGEMENT, "gear")
+    assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}") for n in range(1, 6))
+    assert len(found.indistinguishable_from) == THRESHOLDS.tell.most_alike
+    assert found.rivals == (RivalResult("base_frame", None, 0.2),)
+
+
+def _slip(text, before=1.0, after=0.1, **more):
+    return Slip(applied(text)[0], PATH, before, after, "deg", "what shows it", **more)
+
+
+def test_a_slip_is_as_sure_of_its_numbers_as_it_explains_the_gap():
+    found = slip_cause(_slip("override:percent=50", 2.0, 0.1, alike=(("clock", None),)))
+    assert found.parameters["percent"] == pytest.approx((50.0, 47.5, 52.5))
+    assert (found.link, found.words, found.shrink, found.rivals) == ("path", "what shows it", None, None)
+    assert found.indistinguishable_from == (EffectAt("clock", None),)
+    assert found.is_named
+
+
+def test_times_are_known_to_the_mismatch_of_clocks_at_best():
+    found = slip_cause(_slip("clock:target=controller,offset_s=2", 1.0, 0.0))
+    offset = found.parameters["offset_s"]
+    assert offset.high - offset.value == pytest.approx(Mismatch.clock_s)
+
+
+def test_a_slip_that_ends_the_comparison_has_no_numbers():
+    found = slip_cause(_slip("other_program:", 0.0, None, final=True))
+    assert (found.parameters, found.rms_after) == ({}, None)
+    assert slip_cause(_slip("override:percent=50", 0.0, 0.0)).parameters["percent"] == (50.0, 50.0, 50.0)

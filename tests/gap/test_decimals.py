@@ -1,0 +1,18 @@
+"""The rms of rounding, told from the values themselves."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.gap.beside.decimals import resolution
+
+
+@pytest.mark.parametrize("step", [0.5, 0.01, 1e-5])
+def test_rounding_has_the_rms_of_a_uniform_draw(step):
+    exact = np.random.default_rng(8).uniform(-200.0 * step, 200.0 * step, 20_000)
+    rounded = np.round(exact / step) * step
+    assert resolution(rounded) == pytest.approx(step / np.sqrt(12.0), rel=1e-6)
+    assert resolution(rounded) == pytest.approx(float(np.std(rounded - exact)), rel=0.02)
+
+
+def test_a_constant_has_no_last_decimal():
+    assert resolution(np.full(50, 3.0)) == 0.0

@@ -1,0 +1,68 @@
+"""Signals between samples: against SciPy's Hermite cubics, NumPy's lines and a loop."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from gcode2krl.effects import simulate
+from gcode2krl.gap.beside.interpolation import cubic, interpolate, linear, nearest_rows, values_of
+from tests.gap.constructed import applied, joints, motion, wave
+
+GENERATOR = np.random.default_rng(1)
+OWN_S = np.cumsum(GENERATOR.uniform(0.005, 0.02, 60))
+VALUES = GENERATOR.standard_normal((60, 3))
+INSIDE_S = GENERATOR.uniform(OWN_S[0], OWN_S[-1], 400)
+
+
+def test_cubics_are_hermite_with_central_slopes():
+    expected = CubicHermiteSpline(OWN_S, VALUES, np.gradient(VALUES, OWN_S, axis=0))(INSIDE_S)
+    np.testing.assert_allclose(cubic(INSIDE_S, OWN_S, VALUES), expected, atol=1e-12)
+
+
+def test_lines_are_lines():
+    expected = np.stack([np.interp(INSIDE_S, OWN_S, column) for column in VALUES.T], axis=1)
+    np.testing.assert_allclose(linear(INSIDE_S, OWN_S, VALUES), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("between", [cubic, linear])
+def test_samples_are_met_and_ends_held(between):
+    np.testing.assert_allclose(between(OWN_S, OWN_S, VALUES), VALUES, atol=1e-12)
+    beyond = between(np.array([OWN_S[0] - 5.0, OWN_S[-1] + 5.0]), OWN_S, VALUES)
+    np.testing.assert_allclose(beyond, VALUES[[0, -1]], atol=1e-12)
+
+
+def test_a_cubic_is_right_between_samples_of_a_smooth_path_where_a_line_is_not():
+    inputs = motion()
+    times_s = inputs.time_s[1:-2] + 0.01
+    exact = joints(times_s)
+    assert np.abs(cubic(times_s, inputs.time_s, inputs.q_cmd_rad) - exact)[5:-5].max() < 1e-6
+    assert np.abs(linear(times_s, inputs.time_s, inputs.q_cmd_rad) - exact).max() > 2e-5
+
+
+def test_the_nearest_row_is_that_of_a_loop():
+    times_s = np.concatenate([INSIDE_S, [OWN_S[0] - 1.0, OWN_S[-1] + 1.0], OWN_S])
+    expected = [int(np.argmin(np.abs(OWN_S - time_s))) for time_s in times_s]
+    np.testing.assert_array_equal(nearest_rows(OWN_S, times_s), expected)
+
+
+def test_the_path_in_a_signal_goes_by_cubics_and_what_deviates_by_lines():
+    inputs = motion()
+    jagged = wave(12.0)
+    signals = simulate(inputs, [applied(jagged, 0.01)])
+    times_s = inputs.time_s[5:-5] + 0.007
+    added = np.interp(times_s, inputs.time_s, 0.01 * jagged.form(inputs.time_s))
+    expected = joints(times_s)
+    expected[:, 0] += added
+    np.testing.assert_allclose(interpolate(signals, "q_act_rad", times_s), expected, atol=1e-6)
+    force = interpolate(signals, "force_meas_base_N", times_s)
+    assert force.shape == (len(times_s), 3)
+
+
+def test_measured_joints_stand_for_those_of_the_model():
+    from dataclasses import replace
+
+    inputs = motion()
+    measured = inputs.q_cmd_rad + 0.5
+    signals = simulate(replace(inputs, q_act_rad=measured))
+    assert values_of(signals, "q_act_rad") is measured
+    assert values_of(signals, "q_cmd_rad") is inputs.q_cmd_rad

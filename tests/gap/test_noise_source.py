@@ -1,0 +1,95 @@
+"""Where noise is learnt: what repeats is none, nor what effects explain, nor what is slow; bounds hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.gap.fit.noise import Noise, drawn_noise
+from gcode2krl.gap.fit.noise_source import noise_of
+from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
+
+COUNT, SIGMA = 2000, 2e-4
+TIME_S = 0.02 * np.arange(COUNT)
+COLOURED = Noise(np.array([0.6, 0.0, 0.0]), SIGMA, SIGMA / 0.8)
+"""Its rms is scale/sqrt(1 - 0.6²)."""
+
+
+def no_signatures(count: int = COUNT) -> np.ndarray:
+    return np.zeros((1, count, 0))
+
+
+def learnt(residuals: list[np.ndarray], signatures: np.ndarray | None = None, nuisance=(), **more) -> Noise:
+    """Return the noise of the one component of some runs."""
+    traces = [trace(r.reshape(-1, 1), number=i, **more) for i, r in enumerate(residuals)]
+    columns = no_signatures(len(residuals[0])) if signatures is None else signatures
+    return noise_of(traces, [columns] * len(traces), [list(nuisance)] * len(traces))[0]
+
+
+def coloured(seed: int) -> np.ndarray:
+    return drawn_noise(COLOURED, COUNT, np.random.default_rng(seed))
+
+
+def test_between_repeats_the_noise_comes_out_whatever_they_share():
+    shared = 30.0 * SIGMA * (np.sin(2.0 * np.pi * 8.0 * TIME_S) + np.sign(np.sin(TIME_S)))
+    found = learnt([shared + coloured(seed) for seed in (1, 2, 3)])
+    assert found.sigma == pytest.approx(SIGMA / 0.8, rel=0.05)
+    assert found.scale == pytest.approx(SIGMA, rel=0.05)
+    np.testing.assert_allclose(found.a, [0.6, 0.0, 0.0], atol=0.06)
+
+
+def test_of_two_repeats_half_the_difference_is_that_of_each():
+    found = learnt([noise(COUNT, seed, SIGMA)[:, 0] for seed in (4, 5)])
+    assert found.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_a_single_runs_slow_structure_is_no_noise():
+    slow = 20.0 * SIGMA * np.sin(2.0 * np.pi * 0.15 * TIME_S)
+    found = learnt([slow + noise(COUNT, 6, SIGMA)[:, 0]])
+    assert found.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_a_tone_that_an_effect_could_be_is_no_noise():
+    tone = np.stack([np.sin(2.0 * np.pi * 9.0 * TIME_S), np.cos(2.0 * np.pi * 9.0 * TIME_S)], axis=1)
+    data = 5.0 * SIGMA * tone[:, 0] + noise(COUNT, 7, SIGMA)[:, 0]
+    assert learnt([data], tone[None]).sigma == pytest.approx(SIGMA, rel=0.05)
+    # where nothing could be it, it counts: the rms of 5·sin is 5/sqrt(2)
+    assert learnt([data]).sigma == pytest.approx(SIGMA * np.sqrt(1.0 + 12.5), rel=0.05)
+
+
+def test_what_nuisance_could_be_is_no_noise():
+    comb = np.sign(np.sin(2.0 * np.pi * 7.0 * TIME_S))
+    data = 4.0 * SIGMA * comb + noise(COUNT, 8, SIGMA)[:, 0]
+    assert learnt([data], None, [columns_nuisance("comb", comb)]).sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_known_effects_are_taken_off_before():
+    effect = wave(9.0)
+    one = trace(5.0 * SIGMA * effect.form(motion(40.0).time_s)[:, None] + noise(COUNT, 9, SIGMA))
+    (found,) = noise_of([one], [no_signatures()], [[]], [applied(effect, 5.0 * SIGMA)])
+    assert found.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_of_a_stated_sigma_nine_tenths_are_the_least(runs):
+    quiet = [noise(COUNT, 10 + i, SIGMA)[:, 0] for i in range(runs)]
+    least = 0.9 * 4.0 * SIGMA
+    assert least <= learnt(quiet, declared_sigma=4.0 * SIGMA).sigma < 1.05 * least
+    assert learnt(quiet, declared_sigma=0.9 * SIGMA).sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_more_than_the_stated_sigma_by_far_is_structure():
+    loud = [noise(COUNT, 12, 3.0 * SIGMA)[:, 0]]
+    found = learnt(loud, declared_sigma=SIGMA)
+    assert found.sigma == pytest.approx(1.4 * SIGMA, rel=1e-9)
+    assert not found.a.any()
+
+
+def test_runs_of_different_paths_are_no_repeats():
+    """Else a difference of their structure would be noise."""
+    slow = 20.0 * SIGMA * np.sin(2.0 * np.pi * 0.2 * TIME_S)
+    one = trace(noise(COUNT, 13, SIGMA) + slow[:, None])
+    elsewhere = replace(motion(40.0), position_mm=motion(40.0).position_mm + 5.0)
+    other = trace(noise(COUNT, 14, SIGMA), number=1, inputs=elsewhere)
+    (found,) = noise_of([one, other], [no_signatures()] * 2, [[]] * 2)
+    assert found.sigma == pytest.approx(SIGMA, rel=0.05)

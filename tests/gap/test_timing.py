@@ -1,0 +1,56 @@
+"""How late a run is: along its motion, against known delays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects import Applied, library
+from gcode2krl.gap.beside.timing import late_s, timing_share, timing_sizes
+from tests.gap.constructed import joint_rates, trace
+
+NOMINAL = trace(np.zeros((500, 6)), "path")
+RATE = joint_rates(NOMINAL.time_s)
+INSIDE = slice(10, -10)
+
+
+def with_residual(residual):
+    return replace(NOMINAL, measured=NOMINAL.nominal + residual)
+
+
+def test_late_by_a_time_is_behind_by_the_way_gone_in_it():
+    delay = 3e-3 * np.sin(NOMINAL.time_s)
+    one = with_residual(-delay[:, None] * RATE)
+    late, moves = late_s(one, one.residual)
+    assert moves.all()
+    np.testing.assert_allclose(late[INSIDE], delay[INSIDE], atol=2e-5)
+
+
+def test_what_stands_tells_no_time():
+    planned = NOMINAL.inputs.q_cmd_rad
+    halfway = np.where(NOMINAL.time_s[:, None] < 5.0, planned, planned[250])
+    stopped = replace(NOMINAL.inputs, q_cmd_rad=halfway)
+    late, moves = late_s(trace(np.ones((500, 6)), "path", inputs=stopped), np.ones((500, 6)))
+    assert moves[10:240].all()
+    assert not moves[260:].any()
+    assert not late[260:].any()
+
+
+def test_a_residual_along_the_motion_is_timing_and_one_across_is_none():
+    assert timing_share([with_residual(2e-3 * RATE)]) == pytest.approx(1.0, abs=1e-3)
+    across = np.stack([RATE[:, 1], -RATE[:, 0], *np.zeros((4, 500))], axis=1)
+    assert timing_share([with_residual(2e-3 * across)]) == pytest.approx(0.0, abs=1e-3)
+    along, beside = 2e-3 * RATE, 2e-3 * across
+    expected = np.sum(along**2) / (np.sum(along**2) + np.sum(beside**2))
+    assert timing_share([with_residual(along + beside)]) == pytest.approx(expected, abs=2e-3)
+    assert timing_share([NOMINAL]) == 0.0
+
+
+def test_sizes_are_rms_delays_before_and_after():
+    one = replace(NOMINAL, measured=replace(NOMINAL, time_s=NOMINAL.time_s - 0.01).nominal)
+    other = replace(NOMINAL, measured=replace(NOMINAL, time_s=NOMINAL.time_s - 0.03).nominal)
+    late = Applied(library()["clock"], "controller", {"offset_s": 0.01, "skew": 0.0})
+    before, after = timing_sizes([one, other], [late])
+    assert before == pytest.approx(np.sqrt((0.01**2 + 0.03**2) / 2.0), rel=0.01)
+    assert after == pytest.approx(np.sqrt(0.02**2 / 2.0), rel=0.01)
+    assert timing_sizes([one], []) == (pytest.approx(0.01, rel=0.01),) * 2
