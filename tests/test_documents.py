@@ -14,7 +14,7 @@ from gcode2krl import Prediction, load_cell, predict
 from tests.conftest import ROOT
 from tests.identify.test_controller import Controller, trace_of, write_csv
 
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 CELL = """based_on = "demonstration"
 
 [stock]
@@ -96,11 +96,13 @@ def names_of(prediction):
     load_N = np.zeros_like(prediction.motion.position_mm)
     load_N[:, 0] = 100.0
     return {
+        "prediction": prediction,
         "cell": prediction.cell,
         "toolpath": prediction.toolpath,
         "targets": prediction.targets,
         "motion": prediction.motion,
         "forces": prediction.forces,
+        "joints": prediction.joints,
         "q_rad": prediction.joints.q_rad,
         "force_root_N": load_N,
         "moment_root_Nmm": 50.0 * load_N,
