@@ -13,6 +13,8 @@ from gcode2krl.robot.kinematics import flange_pose
 from gcode2krl.units import MM_PER_M
 
 Rows = slice | Ints
+Load = tuple[Floats, Floats]
+"""Force (m, 3) in N on the tool and moment (m, 3) in N·mm about its tip, along ``$BASE``."""
 
 
 def tool_rows(tool: Ints32) -> Iterator[tuple[int, Rows]]:

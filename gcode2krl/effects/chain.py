@@ -14,7 +14,8 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.arm import Load
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.signals import Signals
 

@@ -11,25 +11,22 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.effects.parameter import DIRECTION, Parameter, Role
-
-if TYPE_CHECKING:
-    from gcode2krl.effects.inputs import Inputs
-    from gcode2krl.effects.signals import Signals
+from gcode2krl.effects.signals import Signals
 
 Values = Mapping[str, float]
 Target = str | None
-Load = tuple[Floats, Floats]
-"""Force (m, 3) in N on the tool and moment (m, 3) in N·mm about its tip, along ``$BASE``."""
 
 LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
 JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
@@ -217,14 +214,14 @@ class Effect:
     def _with_role(self, role: Role) -> Parameter | None:
         return next((p for p in self.parameters if p.role is role), None)
 
-    def nominal(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
+    def nominal(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return the values at which the effect is not there, the model's own where they depend on the cell.
 
         Shapes have their typical value.
         """
         return {p.name: p.unset for p in self.parameters}
 
-    def start(self, inputs: "Inputs", target: Target = None) -> dict[str, float]:
+    def start(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return typical values with the effect."""
         return {p.name: p.start for p in self.parameters}
 
@@ -235,7 +232,7 @@ class Effect:
         return tuple(dict(combination) for combination in itertools.product(*grids))
 
     def settings(
-        self, inputs: "Inputs", target: Target = None, shape: Values | None = None, size: float = 1.0
+        self, inputs: Inputs, target: Target = None, shape: Values | None = None, size: float = 1.0
     ) -> tuple[dict[str, float], ...]:
         """Return settings of all parameters whose signals, minus the nominal ones, span the effect.
 
@@ -251,7 +248,7 @@ class Effect:
         return tuple(base | {name: value} | axis for name, value in values.items() for axis in axes)
 
     def combined(
-        self, coefficients: Floats, inputs: "Inputs", target: Target = None, shape: Values | None = None
+        self, coefficients: Floats, inputs: Inputs, target: Target = None, shape: Values | None = None
     ) -> dict[str, float]:
         """Return the values of a combination of `settings` (at size 1) with these coefficients."""
         base = self.nominal(inputs, target) | dict(shape or {})
@@ -280,55 +277,55 @@ class Effect:
 
     # What it does: the hooks, in the order in which `simulate` calls them
 
-    def replan(self, inputs: "Inputs", applied: Applied) -> "Inputs":
+    def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs of the motion that is really planned: timing, path, commanded joints."""
         return inputs
 
-    def servo(self, q_act_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side joints (m, 6); ``q_act_rad`` comes in as what is commanded."""
         return q_act_rad
 
-    def gear(self, q_load_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the joints behind the gears (m, 6); ``q_load_rad`` comes in as the motor side."""
         return q_load_rad
 
-    def joints(self, q_true_rad: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def joints(self, q_true_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the joints as they truly are (m, 6); comes in as what encoders behind the gear would say."""
         return q_true_rad
 
-    def cut(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+    def cut(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the true cutting force and moment on the tool."""
         return load
 
-    def load(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+    def load(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return the load that bends the arm; comes in as the true cutting load, or the measured one."""
         return load
 
-    def softness(self, softness: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def softness(self, softness: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return 1/k_C, 1/k_B, 1/k_A (10, 3) in rad/(N·mm) of the virtual joints."""
         return softness
 
-    def elastic(self, angle_rad: Floats, torque_Nm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def elastic(self, angle_rad: Floats, torque_Nm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what the axes turn by beyond the linear model (m, 6), under joint torques (m, 6) in N·m."""
         return angle_rad
 
-    def geometry(self, lengths_mm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def geometry(self, lengths_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return a1, a2, c1, c2, c3, c4 (6,) of the arm in mm."""
         return lengths_mm
 
-    def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the tool tip (m, 3) in mm in ``$BASE``, deflection included."""
         return tcp_mm
 
-    def orientation(self, rotation: Floats, inputs: "Inputs", applied: Applied) -> Floats:
+    def orientation(self, rotation: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the rotations (m, 3, 3) of the tool frame in ``$BASE``; called where they are asked for."""
         return rotation
 
-    def sensor(self, load: Load, inputs: "Inputs", applied: Applied) -> Load:
+    def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return force and moment as the sensor states them, turned to the axes of ``$BASE``."""
         return load
 
-    def instruments(self, signals: "Signals", applied: Applied) -> "Signals":
+    def instruments(self, signals: Signals, applied: Applied) -> Signals:
         """Return the signals with what belongs to the instruments: clocks, units, the finished part."""
         return signals
 

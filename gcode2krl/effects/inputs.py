@@ -11,14 +11,13 @@ from gcode2krl import robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.effects import arm
-from gcode2krl.effects.effect import Load
+from gcode2krl.effects.arm import Load
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.tables import Forces, Motion, Targets, Toolpath
-from gcode2krl.units import S_PER_MIN
+from gcode2krl.units import S_PER_H
 
 Cut = Callable[[Motion, Cell], Forces]
 Plan = Callable[[Targets, Cell], Motion]
-_S_PER_H = 60.0 * S_PER_MIN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +110,7 @@ class Inputs:
     @cached_property
     def run_hours(self) -> Floats:
         """(m,) hours since the earliest of the runs started."""
-        return self.hours + self.time_s / _S_PER_H
+        return self.hours + self.time_s / S_PER_H
 
     @cached_property
     def _rigid_tip_mm(self) -> Floats:

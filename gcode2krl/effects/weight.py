@@ -3,11 +3,9 @@
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects.effect import Load
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.inputs import Inputs
-
-GRAVITY_M_S2 = 9.80665
-"""Standard gravity (CGPM 1901)."""
+from gcode2krl.units import GRAVITY_M_S2
 
 
 def with_weight(load: Load, inputs: Inputs, mass_kg: float, lever_mm: Floats) -> Load:

@@ -20,7 +20,6 @@ from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.result import Gap
-from gcode2krl.gap.tell.scan_answer import with_scan
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run
 
@@ -97,7 +96,10 @@ def _diagnosed(context: Context) -> Gap:
             explain, held = split(traces, context.explaining)
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
-    return with_scan(answer(context, slips, issues), judge_surface(PART, context))
+    surface = judge_surface(PART, context)
+    if surface is not None:
+        context = context.with_judgement(surface)
+    return answer(context, slips, issues)
 
 
 def _with_data(context: Context) -> Context:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Ints
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
@@ -51,7 +52,7 @@ def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
 
 
 def found_issues(
-    found: NDArray[np.void], counts: NDArray[np.int64], state: Record, texts: Mapping[int, bytes]
+    found: NDArray[np.void], counts: Ints, state: Record, texts: Mapping[int, bytes]
 ) -> list[Issue]:
     """Return the findings in the order of the file, then how many more there are.
 

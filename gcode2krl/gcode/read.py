@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
@@ -171,7 +172,7 @@ def _size_of(stream: BinaryIO) -> int:
         return 0
 
 
-def _work_offsets(cell: "Cell | None") -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
     offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
         if frame.a_deg or frame.b_deg or frame.c_deg:
@@ -249,10 +250,10 @@ class _Interpreter:
     def __init__(
         self,
         name: str,
-        options: NDArray[np.float64],
-        offsets: NDArray[np.float64],
-        offset_known: NDArray[np.bool_],
-        tool_length: NDArray[np.float64],
+        options: Floats,
+        offsets: Floats,
+        offset_known: Bools,
+        tool_length: Floats,
     ) -> None:
         self.name = name
         self.state = initial_state()

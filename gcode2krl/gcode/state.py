@@ -11,6 +11,7 @@ reported. What is stated anew is out of doubt. Doubt begins only with an error, 
 import numpy as np
 from numpy.typing import NDArray
 
+from gcode2krl.arrays import Ints32
 from gcode2krl.gcode import vocabulary as v
 
 STATE = np.dtype(
@@ -141,7 +142,7 @@ _DOUBTS: dict[int, tuple[float, ...]] = {
 """What is in doubt: after which G-codes that are not read."""
 
 
-def _doubt_table() -> NDArray[np.int32]:
+def _doubt_table() -> Ints32:
     of_unknown = DOUBT_MOTION | DOUBT_POSITION
     table = np.full(v.LARGEST_G + 1, of_unknown, dtype=np.int32)
     for doubt, codes in _DOUBTS.items():

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gcode2krl.arrays import Floats
 from gcode2krl.errors import input_error
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
@@ -16,7 +16,7 @@ _WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)", re.IGNORECASE)
 _LARGEST_TOOL = 99999
 
 
-def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
+def lengths_from_table(path: str | Path) -> Floats:
     """Return length by tool number (t,) in mm from a ``tool.tbl``; NaN where a tool is not declared."""
     try:
         text = Path(path).read_text(encoding="utf-8", errors="replace")
@@ -36,7 +36,7 @@ def lengths_from_table(path: str | Path) -> NDArray[np.float64]:
     return _by_number(lengths)
 
 
-def lengths_from_cell(cell: "Cell | None") -> NDArray[np.float64]:
+def lengths_from_cell(cell: "Cell | None") -> Floats:
     """Return length by tool number (t,) in mm from a cell; NaN where a tool is not declared."""
     tools = cell.tool if cell is not None else {}
     return _by_number(
@@ -44,7 +44,7 @@ def lengths_from_cell(cell: "Cell | None") -> NDArray[np.float64]:
     )
 
 
-def _by_number(lengths: dict[int, float]) -> NDArray[np.float64]:
+def _by_number(lengths: dict[int, float]) -> Floats:
     table = np.full(max(lengths, default=0) + 1, np.nan)
     for number, length in lengths.items():
         table[number] = length

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gcode2krl import ascii_codes as ch
+from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.gcode import findings as f
 
 LINE_LIMIT = 4096
@@ -35,10 +36,10 @@ class Words(NamedTuple):
     """Columns of the words of a piece of text, and the spans of its message comments."""
 
     letter: NDArray[np.uint8]
-    value: NDArray[np.float64]
-    extra: NDArray[np.float64]
-    line: NDArray[np.int32]
-    message_span: NDArray[np.int64]
+    value: Floats
+    extra: Floats
+    line: Ints32
+    message_span: Ints
     """(k, 2) start and end byte of each message comment."""
     most_decimals: int
     """Largest number of decimals behind X, Y or Z."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
@@ -182,7 +182,7 @@ class _Composer:
             self._triggers_before(start, end),
         )
 
-    def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], Ints]:
         """Return the text of the triggers of rows start..end, and where that of each row begins."""
         if self.pilot is None:
             return NOTHING_BEFORE

@@ -7,9 +7,8 @@ much as the look-ahead needs to see in order not to brake.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from gcode2krl.arrays import Floats, Rows
+from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import view
@@ -171,7 +170,7 @@ def _zones(windows: Windows, chain: Chain, cell: Cell) -> tuple[Floats, Floats, 
     return windows.begin_mm + head, windows.end_mm - tail, least
 
 
-def _largest_before(values: Floats, stop: NDArray[np.bool_], count: int) -> Floats:
+def _largest_before(values: Floats, stop: Bools, count: int) -> Floats:
     """Return the largest value (n,) of each motion and so many before it, back to the last stop."""
     largest = values.copy()
     for _ in range(count):

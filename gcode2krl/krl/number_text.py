@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import ascii_codes as ch
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints, Ints32
 
 BYTES_PER_TARGET = 240
 NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
@@ -21,10 +21,10 @@ def motion_lines(
     abc_deg: Floats,
     speed_m_s: Floats,
     cdis_mm: Floats,
-    source_line: NDArray[np.int32],
+    source_line: Ints32,
     state: Floats,
     comment_every: int,
-    before: tuple[NDArray[np.uint8], NDArray[np.int64]] = NOTHING_BEFORE,
+    before: tuple[NDArray[np.uint8], Ints] = NOTHING_BEFORE,
 ) -> bytes:
     """Return the KRL text (CRLF) of a run of LIN motions.
 
@@ -48,7 +48,7 @@ def fixed(value: float, decimals: int) -> str:
     return buffer[:size].tobytes().decode("ascii")
 
 
-def in_decimals(values: Floats, decimals: int) -> NDArray[np.int64]:
+def in_decimals(values: Floats, decimals: int) -> Ints:
     """Return numbers (n,) as whole numbers of their last decimal, by the same rule; NaN is 0."""
     whole = np.empty(len(values), dtype=np.int64)
     _in_decimals(np.ascontiguousarray(values), decimals, whole)

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
-from gcode2krl.arrays import Floats, Rows
+from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import motion_starts
 from gcode2krl.tables import Joints, Table, Targets
@@ -61,7 +60,7 @@ def _taken(table: Table, rows: Rows) -> dict[str, Any]:
 
 def pieces_in(
     position_mm: Floats,
-    ptp: NDArray[np.bool_],
+    ptp: Bools,
     cdis_mm: Floats,
     targets: Targets,
     cell: Cell,
@@ -79,10 +78,10 @@ def pieces_in(
 @njit(cache=True, nogil=True)
 def _align(
     position: Floats,
-    ptp: NDArray[np.bool_],
+    ptp: Bools,
     cdis: Floats,
     target: Floats,
-    target_ptp: NDArray[np.bool_],
+    target_ptp: Bools,
     start: Floats,
     limit: float,
     row: Rows,

@@ -5,11 +5,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import krc4
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
@@ -121,7 +120,7 @@ def _known(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def _halts(program: KrlProgram) -> NDArray[np.int64]:
+def _halts(program: KrlProgram) -> Ints:
     """Return the motions behind which a wait or a halt holds the advance run."""
     texts: dict[int, list[str]] = {}
     for statement in program.statements:

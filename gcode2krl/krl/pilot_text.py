@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.krl.number_text import in_decimals
 from gcode2krl.krl.triggers import Triggers
 from gcode2krl.pilot import Knots, PilotHeader, knot_rows, sidecar_head
@@ -40,7 +40,7 @@ class PilotText:
     """G-code line from which on the program has no pilot force any more; None = it has one throughout.
     The triggers are one more than the knots then: the last says that there is no knot."""
 
-    def before(self, motions: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    def before(self, motions: int) -> tuple[NDArray[np.uint8], Ints]:
         """Return the text of all triggers, and where in it that of each motion (p + 1,) begins."""
         triggers = self.triggers
         if triggers is None:
@@ -106,7 +106,7 @@ def checksum(
     position_mm: Floats,
     abc_deg: Floats,
     q_deg: Floats,
-    ptp: NDArray[np.bool_],
+    ptp: Bools,
     speed_mm_s: Floats,
     cdis_mm: Floats,
     rows: bytes,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.units import MM_PER_M
@@ -43,12 +43,12 @@ class ReadTriggers(NamedTuple):
     delay_ms: Floats
     written: Floats
     """(k, 4) what it writes, NaN behind the first where that is one number."""
-    calls: NDArray[np.bool_]
+    calls: Bools
     """(k,) True where it calls a subprogram with four numbers, False where it assigns one."""
     names: tuple[str, ...]
     """What is written or called, each name once."""
-    line: NDArray[np.int32]
-    file_of: NDArray[np.int32]
+    line: Ints32
+    file_of: Ints32
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class KrlProgram:
     """(p, 2) S and T, NaN where absent."""
     q_deg: Floats
     """(p, 6) joint targets, NaN on Cartesian motions."""
-    ptp: NDArray[np.bool_]
+    ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
     wait_s: Floats
-    line: NDArray[np.int32]
+    line: Ints32
     file: tuple[str, ...]
     """Names of the files; ``file_of`` (p,) points into it."""
-    file_of: NDArray[np.int32]
+    file_of: Ints32
     statements: tuple[Statement, ...]
     triggers: ReadTriggers
     uncalled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -212,8 +212,8 @@ class _Reader:
         value: Floats,
         blend: NDArray[np.int8],
         before: Ints,
-        line: NDArray[np.int32],
-        file_of: NDArray[np.int32],
+        line: Ints32,
+        file_of: Ints32,
     ) -> ReadTriggers:
         rows = np.flatnonzero(kind == w.KIND_TRIGGER)
         values = value[rows]
@@ -228,7 +228,7 @@ class _Reader:
             file_of=file_of[rows],
         )
 
-    def _names_written(self, place: Ints, file_of: NDArray[np.int32]) -> tuple[str, ...]:
+    def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
         found: set[str] = set()
         for file in np.unique(file_of).tolist():
@@ -347,9 +347,7 @@ def _in_force(values: Floats) -> Floats:
     return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
-def _dwells(
-    marked: NDArray[np.bool_], seconds: Floats, motions_before: NDArray[np.int64], count: int
-) -> Floats:
+def _dwells(marked: Bools, seconds: Floats, motions_before: Ints, count: int) -> Floats:
     """Return the dwell (p,) behind each motion: the waits that are marked as such."""
     dwell = np.zeros(count)
     rows = np.flatnonzero(marked & (motions_before > 0))

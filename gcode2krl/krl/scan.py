@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import ascii_codes as ch
 from gcode2krl import krl_words as w
+from gcode2krl.arrays import Floats, Ints, Ints32
 
 DISTANCE, DELAY, WRITTEN, NAME = 0, 1, 2, 6
 """Columns of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
@@ -27,10 +28,10 @@ class Scanned(NamedTuple):
     """A row per statement."""
 
     kind: NDArray[np.int8]
-    line: NDArray[np.int32]
-    span: NDArray[np.int64]
+    line: Ints32
+    span: Ints
     """(k, 2) first and last byte of the statement."""
-    value: NDArray[np.float64]
+    value: Floats
     """(k, 8) components X, Y, Z, A, B, C, S, T, or A1 to A6, NaN where absent; a lone number stands in
     column 0. The columns of a trigger are named above; any other trigger is `KIND_OTHER`."""
     blend: NDArray[np.int8]

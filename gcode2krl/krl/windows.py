@@ -7,9 +7,8 @@ of that motion. Instants within the approximation of a corner belong to neither 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gcode2krl.arrays import Floats, Rows
+from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
@@ -166,14 +165,14 @@ class _Clock:
         k_s = cell.controller.k_s
         self.jerk = cell.controller.acc_cp_m_s2 * MM_PER_M / k_s if k_s > 0 else np.inf
 
-    def arrival(self, path_mm: Floats, at_rest: NDArray[np.bool_]) -> Floats:
+    def arrival(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is reached; at rest it is where the motion ends."""
         after = np.searchsorted(self.path_mm, path_mm - _AT_REST_MM, side="left")
         after = np.clip(after, 1, len(self.time_s) - 1)
         stopping = self.time_s[after - 1] + self._from_rest(after - 1)
         return np.where(at_rest, np.minimum(stopping, self.time_s[after]), self._between(path_mm, after))
 
-    def departure(self, path_mm: Floats, at_rest: NDArray[np.bool_]) -> Floats:
+    def departure(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is left; at rest it is where the motion begins."""
         after = np.searchsorted(self.path_mm, path_mm + _AT_REST_MM, side="right")
         after = np.clip(after, 1, len(self.time_s) - 1)

@@ -15,22 +15,24 @@ NAMES = {
     *(name for effect in KNOWN.values() for name in (*effect.names, *effect.vectors)),
 }
 FILES = [
-    *(file for room in ("beside", "fit", "choose") for file in sorted((PACKAGE / "gap" / room).glob("*.py"))),
+    *(
+        file
+        for room in ("beside", "fit", "choose")
+        for file in sorted((PACKAGE / "gap" / room).rglob("*.py"))
+    ),
     PACKAGE / "gap" / "diagnosis.py",
     *sorted((PACKAGE / "effects").glob("*.py")),
 ]
 ALLOWED = {
     # words that mean something else there
-    "gap/beside/links.py": {"mm"},  # a unit
+    "gap/beside/links/surface.py": {"mm", "diameter_mm"},  # a unit, and a key of a tool
+    "gap/beside/links/vectors.py": {"mm"},
     "gap/fit/refitting.py": {"scale"},  # the field of `Free`
     "gap/fit/sensitivity.py": {"scale"},
     "effects/coefficients.py": {"diameter_mm"},  # of a cell's tool
     # names that several effects share, and words of roles
     "effects/parameter.py": {"direction_x", "direction_y", "direction_z", "direction", "phase", "count"},
     "effects/frame_effect.py": {"x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "mm"},
-    # to go with links as objects
-    "gap/diagnosis.py": {"offset_s"},
-    "gap/beside/scan.py": {"tool_diameter", "offset_mm", "diameter_mm"},  # the last one of a cell's tool
 }
 
 

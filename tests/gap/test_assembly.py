@@ -12,7 +12,7 @@ from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PATH, SERVO
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.judgement import Judgement
+from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell import assembly
 from gcode2krl.runs import Run, RunHead
@@ -38,7 +38,17 @@ def _trace(link, factor=10.0, components=JOINTS, zero=0.0):
 def _judgement(link, verdict="no_gap", size=None, usual=(), **trace):
     size = size or _size()
     traces = (_trace(link, **trace),)
-    return Judgement(link, traces, verdict, (), size, True, SimpleNamespace(), tuple(usual))
+    return Judgement(
+        link=link,
+        verdict=verdict,
+        causes=(),
+        size=size,
+        held_out=True,
+        factor=traces[0].factor,
+        traces=traces,
+        examination=SimpleNamespace(),
+        usual=tuple(usual),
+    )
 
 
 def _slip(link=PATH, final=False):

@@ -7,14 +7,14 @@ import pytest
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.links import GEAR, PATH
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.judgement import Cause
+from gcode2krl.gap.choose.judged import Cause
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.result import EffectAt, RivalResult
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import applied
 
-JUDGEMENT = SimpleNamespace(link=GEAR, traces=(SimpleNamespace(factor=10.0),))
+JUDGEMENT = SimpleNamespace(link=GEAR, factor=10.0)
 
 
 def _rival(text, alike):

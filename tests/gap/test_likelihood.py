@@ -15,17 +15,17 @@ from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gap.fit.box import MOST
 from gcode2krl.gap.fit.clusters import cluster_scores, clustered_covariance, gain_inflation
 from gcode2krl.gap.fit.fitted import Numbers
+from gcode2krl.gap.fit.hooke_jeeves import pattern_search
 from gcode2krl.gap.fit.least_squares import Box, Damped, Shortened, derivative, gauss_newton
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
-from gcode2krl.gap.fit.pattern_search import pattern_search
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 COVERS = (
     "gcode2krl.gap.fit.clusters",
     "gcode2krl.gap.fit.least_squares",
-    "gcode2krl.gap.fit.pattern_search",
+    "gcode2krl.gap.fit.hooke_jeeves",
 )
 
 PRIOR = THRESHOLDS.fit.prior_sizes

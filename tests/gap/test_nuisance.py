@@ -9,9 +9,12 @@ from scipy.spatial.transform import Rotation
 from gcode2krl import robot
 from gcode2krl.effects import library
 from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.gap.beside.instruments import CLOCK
 from gcode2krl.gap.fit.nuisance import nuisance_of
 from gcode2krl.gap.fit.signatures import Signatures
 from tests.gap.constructed import joint_rates, motion, trace
+
+COVERS = ("gcode2krl.gap.beside.instruments",)
 
 BOUNDS = Mismatch()
 LIBRARY = library()
@@ -53,7 +56,7 @@ def test_a_frame_is_a_small_shift_and_turn_of_the_points(tip):
 def test_each_run_has_a_frame_a_clock_and_a_zero_of_its_own(tip, force):
     by_name = {**nuisance(tip), **nuisance(force)}
     own = {name for name, each in by_name.items() if not each.shared}
-    assert own == {"tracker frame", "table clock", "force zero", "sensor gain"}
+    assert own == {"tracker frame", CLOCK, "force zero", "sensor gain"}
 
 
 def test_a_force_zero_is_along_the_sensors_axes_whatever_the_frame(force):
@@ -82,14 +85,14 @@ def test_a_sensors_gain_is_a_share_of_each_component(force):
 
 def test_a_clock_goes_with_the_rate():
     path = trace(np.zeros((500, 6)), "path")
-    columns = nuisance(path, {}, clock=1.5)["table clock"].columns[:, :, 0].T
+    columns = nuisance(path, {}, clock=1.5)[CLOCK].columns[:, :, 0].T
     inside = slice(5, -5)
     expected = -joint_rates(path.time_s) * 2e-3 / ROOT3 * 1.5
     np.testing.assert_allclose(columns[inside], expected[inside], rtol=0.01, atol=2e-6)
 
 
 def test_a_clock_of_the_tip_is_the_tip_a_moment_later(tip):
-    columns = nuisance(tip, {})["table clock"].columns[:, :, 0].T
+    columns = nuisance(tip, {})[CLOCK].columns[:, :, 0].T
     late = replace(tip, time_s=tip.time_s - 1e-4).nominal - tip.nominal
     np.testing.assert_allclose(columns[5:-5], late[5:-5] / 1e-4 * 2e-3 / ROOT3, rtol=0.02, atol=2e-3)
 
@@ -99,7 +102,7 @@ def test_the_hats_of_the_time_law_add_up_to_the_clock():
     found = nuisance(path, {})
     assert found["time law"].columns.shape[2] == 11  # a knot each second
     np.testing.assert_allclose(
-        found["time law"].columns.sum(axis=2), found["table clock"].columns[:, :, 0], atol=1e-15
+        found["time law"].columns.sum(axis=2), found[CLOCK].columns[:, :, 0], atol=1e-15
     )
 
 

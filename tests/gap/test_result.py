@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError, fields, is_dataclass
 
 import pytest
 
-from gcode2krl.gap.choose.judgement import NAMED
+from gcode2krl.gap.choose.judged import NAMED
 from gcode2krl.gap.tell import result
 
 

@@ -10,7 +10,9 @@ import pytest
 
 from gcode2krl.effects import Effect, Mismatch, Parameter, Role
 from gcode2krl.effects.mismatch import sigma
-from gcode2krl.gap.fit.nuisance import CLOCK, nuisance_of
+from gcode2krl.gap.beside.instruments import CLOCK
+from gcode2krl.gap.beside.links import SERVO
+from gcode2krl.gap.fit.nuisance import nuisance_of
 from gcode2krl.gap.fit.numbers import free_of
 from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_at, blocks_of
 
@@ -20,7 +22,7 @@ TIME_S = np.linspace(0.0, 2.0, 201)
 class Signal:
     """As much of a trace as signatures and nuisance need: effects add up in one component."""
 
-    link = SimpleNamespace(name="servo")
+    link = SERVO
     shape = (len(TIME_S), 1)
     time_s = TIME_S
     inputs = SimpleNamespace(cell=None, time_s=TIME_S)

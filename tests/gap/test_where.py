@@ -153,3 +153,10 @@ def test_after_the_reversals_of_the_joint_that_an_effect_is_in():
     assert {interval.what for interval in where.intervals} == {"reversal of A2"}
     assert where.joints[0].joint == "A2"
     assert where.phases[0].phase == "reversal"
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0 / 3.0, 7.3e-5])
+def test_a_constant_gap_has_no_interval_whatever_its_rounding(size):
+    sizes = size * (1.0 + 1e-14 * np.random.default_rng(1).standard_normal(500))
+    constant = found(np.stack([sizes, 2.0 * sizes, 2.0 * sizes], axis=1), link="mechanics")
+    assert constant.intervals == ()

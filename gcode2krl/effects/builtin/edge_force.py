@@ -1,9 +1,10 @@
 """The edge forces are larger than the coefficients say."""
 
 from gcode2krl.cell import Cell
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.coefficients import with_scaled_edge
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Target
+from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 

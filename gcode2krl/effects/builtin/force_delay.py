@@ -1,7 +1,8 @@
 """The force signal comes late."""
 
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs, resampled
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.effects.parameter import Parameter, Role

@@ -2,8 +2,9 @@
 
 from types import MappingProxyType
 
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.weight import with_weight

@@ -9,9 +9,10 @@ from gcode2krl.cell import Cell
 from gcode2krl.cutting import cutting_load
 from gcode2krl.cutting.law import feed_per_tooth, law_array
 from gcode2krl.effects import arm
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.coefficients import edge_only
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Load, Target
+from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV

@@ -3,8 +3,9 @@
 import numpy as np
 
 from gcode2krl.cell import Cell
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, Load, Target
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.coefficients import with_larger_tools
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 from gcode2krl.effects.signals import Signals

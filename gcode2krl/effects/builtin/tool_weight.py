@@ -1,7 +1,8 @@
 """Weight of the end effector in the reading of the force sensor."""
 
+from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, Load
+from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 

@@ -2,14 +2,11 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.pair import Pair
-
-if TYPE_CHECKING:
-    from gcode2krl.gap.beside.links.base import Verdict
+from gcode2krl.gap.beside.verdict import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +28,14 @@ class Context:
     """Set-up slips that every link's model has."""
     learned: tuple[Applied, ...] = ()
     """Causes that bend the arm, so that the mechanics' model has them."""
-    judgements: "tuple[Verdict, ...]" = ()
+    judgements: tuple[Verdict, ...] = ()
     clocks_set: bool = False
     """The controllers' clocks were set by the commanded joints."""
     stopped: bool = False
     """Stops that nobody planned are in the plan."""
 
     @property
-    def timing(self) -> "Verdict | None":
+    def timing(self) -> Verdict | None:
         """Return the judgement of the link that tells when the robot is where."""
         return next((each for each in self.judgements if each.link.tells_time), None)
 
@@ -80,11 +77,11 @@ class Context:
         """Return the context with more causes that bend the arm."""
         return replace(self, learned=(*self.learned, *learned))
 
-    def with_judgement(self, judged: "Verdict") -> "Context":
+    def with_judgement(self, judged: Verdict) -> "Context":
         """Return the context with one more judgement."""
         return replace(self, judgements=(*self.judgements, judged))
 
-    def without_cause(self, judged: "Verdict", applied: Applied) -> "Context":
+    def without_cause(self, judged: Verdict, applied: Applied) -> "Context":
         """Return the context whose judgement of a link lacks a cause."""
         judgements = tuple(each.without(applied) if each is judged else each for each in self.judgements)
         return replace(self, judgements=judgements)

@@ -11,8 +11,7 @@ from gcode2krl.gap.beside.planning import remembered_plan
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run
-
-_S_PER_H = 3600.0
+from gcode2krl.units import S_PER_H
 
 
 def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
@@ -51,4 +50,4 @@ def hours_since(first: datetime | None, run: Run) -> float:
     """Return the hours from the first start to that of a run; 0 where one is not known."""
     if first is None or run.head.started is None:
         return 0.0
-    return (run.head.started - first).total_seconds() / _S_PER_H
+    return (run.head.started - first).total_seconds() / S_PER_H

@@ -1,29 +1,75 @@
 """One measured signal of one run beside the model of it: what a link of the chain is judged by."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.effects import Applied, Inputs, Signals
+from gcode2krl.effects import Applied, Inputs, Signals, simulate
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.interpolation import interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-if TYPE_CHECKING:
-    from gcode2krl.gap.beside.links.base import Link
-
 LIMITS = THRESHOLDS.beside
+
+
+class Signal:
+    """What a link compares: names and units, clocks, and how its model is simulated."""
+
+    name: str
+    signal: str
+    """Name of its signal in the report."""
+    unit: str
+    """Unit of the report."""
+    needs: str
+    """What a run must hold for the link to be examined."""
+    table: str = "controller"
+    """The table of a run whose clock stamps it."""
+    of_joints: bool = False
+    """Its components are joints."""
+    tells_time: bool = False
+    """It shows when the robot is where: timing is the part of it along the motion."""
+    model_rms: float = 0.0
+    """Accuracy of its model in the inner unit where that, not noise, is the limit."""
+    least_off: float = 0.0
+    """RMS in the inner unit below which the run keeps to the planned times."""
+    least_step: float = 0.0
+    """Shorter ways along the signal, in the inner unit, are noise of the instrument, not motion."""
+    own_clock: bool = False
+    """The signal has a clock of its own besides that of its table."""
+    sets_clocks: bool = False
+    """Clocks are set run by run first, since the signal changes fast all the time."""
+    instrument: tuple[str, ...] = ()
+    """Names of the nuisance that belongs to the instrument alone: the joints do nothing of it."""
+
+    def __repr__(self) -> str:
+        return f"<link {self.name}>"
+
+    def simulated(self, trace: "Trace", applied: Sequence[Applied]) -> Signals:
+        """Return the signals of its model with some effects at work."""
+        return simulate(trace.inputs, applied)
+
+    def planned(self, inputs: Inputs) -> Floats:
+        """Return the planned signal (m, k) that shows how far a run has come."""
+        raise NotImplementedError(f"{self.name} does not show how far a run has come")
+
+    def mismatch(self, trace: "Trace", mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
+        """Yield what its instrument may be off by: names, and columns (k, n, c) for one deviation."""
+        return iter(())
+
+    def has_time_law(self, unmeasured: frozenset[str]) -> bool:
+        """Tell whether the time law may be slightly off in it, given the links without data."""
+        return self.tells_time
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
     """A measured signal (n, k), the inputs of its model, and which signals of the model it is."""
 
-    link: "Link"
+    link: Signal
     run: str
     run_number: int
     simulator: Simulator

@@ -44,6 +44,11 @@ class Size:
     largest_after: float
 
     @property
+    def power(self) -> float:
+        """Return the power of the gap before the effects over that of the noise."""
+        return self.excess_before / max(self.noise, 1e-30)
+
+    @property
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
         least = max(_LIMITS.significant_sigma * self.deviation, _LIMITS.significant_share * self.noise)

@@ -1,20 +1,19 @@
 """One link, from its traces to a judgement: causes, their probability, and what held-out data say of them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination
-from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
-from gcode2krl.gap.choose.intervals import Interval, intervals_of
-from gcode2krl.gap.choose.rivals import Rival, probabilities, rivals_of, unknown_probability
+from gcode2krl.gap.choose.intervals import intervals_of
+from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
+from gcode2krl.gap.choose.rivals import probabilities, rivals_of, unknown_probability
 from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
 from gcode2krl.gap.fit.design import Question, nuisance_for
@@ -22,52 +21,6 @@ from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
-NAMED = _LIMITS.named
-"""A cause counts as named from this probability on."""
-
-
-@dataclass(frozen=True)
-class Cause:
-    """One effect at one target."""
-
-    applied: Applied
-    link: str
-    probability: float
-    parameters: dict[str, Interval]
-    shrink: float | None
-    """Share of the explainable gap that it takes on held-out data, on top of those above it."""
-    rms_after: float | None
-    rivals: tuple[tuple[Rival, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What is known of one link."""
-
-    link: Link
-    traces: tuple[Trace, ...]
-    verdict: str
-    causes: tuple[Cause, ...]
-    size: Size
-    held_out: bool
-    examination: Examination
-    usual: tuple[Applied, ...] = field(default=())
-    """Accepted effects that are within normal mismatch."""
-    every: tuple[Trace, ...] = field(default=())
-    """The traces with the held-out ones."""
-
-    @property
-    def applied(self) -> tuple[Applied, ...]:
-        """Return the named causes."""
-        return tuple(cause.applied for cause in self.causes if cause.probability >= NAMED)
-
-    def fitted(self, trace: Trace) -> Floats:
-        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
-        return fitted_signal(trace, self.examination)
-
-    def without(self, applied: Applied) -> "Judgement":
-        """Return the judgement without a cause that a later link has shown to be elsewhere."""
-        return replace(self, causes=tuple(cause for cause in self.causes if cause.applied != applied))
 
 
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
@@ -97,7 +50,23 @@ def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]
 def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
     size = _size(found, every, ())
     verdict = "unexplained" if size.significant else "no_gap"
-    return Judgement(found.link, found.traces, verdict, (), size, True, found, found.mismatch, every)
+    return replace(_of(found, verdict, (), size, held_out=True), every=every)
+
+
+def _of(
+    found: Examination, verdict: str, causes: tuple[Cause, ...], size: Size, *, held_out: bool
+) -> Judgement:
+    return Judgement(
+        link=found.link,
+        verdict=verdict,
+        causes=causes,
+        size=size,
+        held_out=held_out,
+        factor=found.traces[0].factor,
+        traces=found.traces,
+        examination=found,
+        usual=found.mismatch,
+    )
 
 
 # Held-out data
@@ -150,7 +119,7 @@ def _judgement(found: Examination, sizes: Sequence[Size], whole: Size, held_out:
     causes = sorted(_causes(found, sizes, unknown, held_out), key=lambda cause: -cause.probability)
     rest = left and last.share_left > _LIMITS.unknown_share
     verdict = _verdict(any(cause.probability >= NAMED for cause in causes), rest, sizes[0].significant)
-    return Judgement(found.link, found.traces, verdict, tuple(causes), last, held_out, found, found.mismatch)
+    return _of(found, verdict, tuple(causes), last, held_out=held_out)
 
 
 def _verdict(named: bool, rest: bool, gap: bool) -> str:

@@ -14,7 +14,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
 _STEPS = 6
-"""A rival begins at its best linear fit: half the steps of a whole refit settle its chi2."""
+"""Half of a whole refit: a rival begins at its best linear fit."""
 _MOST_WORSE = -30.0
 """A rival that is better than its cause by more than this has all the weight anyway."""
 

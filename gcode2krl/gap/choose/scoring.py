@@ -13,7 +13,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
 _ASYMPTOTIC = 100.0
-"""From this chi2/2 on the tail probability underflows, and its asymptotic series is exact to a per cent."""
+"""From this chi2/2 on the first term of the asymptotic series is taken: off by (width - 2)/gain at most."""
 
 
 @dataclass(frozen=True, eq=False)

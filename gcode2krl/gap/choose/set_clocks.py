@@ -11,9 +11,10 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.mismatch import sigma
+from gcode2krl.gap.beside.instruments import CLOCK
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.design import Question, nuisance_for
-from gcode2krl.gap.fit.nuisance import CLOCK, Nuisance
+from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 

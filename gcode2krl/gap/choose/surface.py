@@ -1,5 +1,6 @@
 """What the scans of the part say of the cutter: its radius, fitted beside what frames and the arm may do."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,38 +11,42 @@ from gcode2krl.effects import Applied, Effect, Inputs, commanded
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links.surface import SurfaceLink, SurfacePoints
+from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.choose.judged import Cause, Judged
 from gcode2krl.gap.fit.clusters import cluster_scores, clustered_covariance
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 LIMITS = THRESHOLDS.beside
 
 
-@dataclass(frozen=True)
-class SurfaceFinding:
-    """What the scans say; lengths in mm."""
+@dataclass(frozen=True, kw_only=True)
+class SurfaceJudgement(Judged):
+    """The judgement of the part's surface, whose signal is a place; lengths in mm."""
 
-    effect: Effect
     points: int
-    rms_before: float
-    rms_after: float
-    noise: float
-    offset: Interval
-    """The size of the effect."""
-    shrink: float
-    """On points that the offset was not fitted to."""
-    applied: Applied | None
-    """The cause, where the offset is more than normal mismatch."""
+    held_out_shrink: float
+    """On points that the cutter's radius was not fitted to."""
+
+    @property
+    def shrink(self) -> float:
+        """Return the share of the gap that is gone on held-out points."""
+        return self.held_out_shrink
+
+    @property
+    def reported(self) -> tuple[Cause, ...]:
+        """Return the causes that the answer lists: also one that is not sure enough to be named."""
+        return self.causes
 
 
-def judge_surface(link: SurfaceLink, context: Context) -> SurfaceFinding | None:
+def judge_surface(link: SurfaceLink, context: Context) -> SurfaceJudgement | None:
     """Return what scans say of the cutter; None without a scan, or where no wall was scanned."""
     base = link.base(context)
     clouds = [cloud for pair in context.pairs if (cloud := link.points(pair, base)) is not None]
     effect = _of_radius(link, context)
     if not clouds or effect is None or sum(cloud.wall.sum() for cloud in clouds) < LIMITS.scan_least_points:
         return None
-    return _finding(clouds, effect, context)
+    return _judgement(link, _finding(clouds, effect, context), context)
 
 
 def _of_radius(link: SurfaceLink, context: Context) -> Effect | None:
@@ -60,8 +65,64 @@ def _radius_per_size(effect: Effect, inputs: Inputs) -> float:
     return larger / (start[name] - nominal[name])
 
 
-def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) -> SurfaceFinding:
-    """Return the size of an effect of the radius, and the gap with and without it."""
+@dataclass(frozen=True)
+class _Finding:
+    """The size of an effect of the radius, and the gap with and without it: mean squares in mm²."""
+
+    applied: Applied
+    interval: Interval
+    is_gap: bool
+    """The size is more than normal mismatch."""
+    points: int
+    before: float
+    after: float
+    shrink: float
+
+
+def _judgement(link: SurfaceLink, found: _Finding, context: Context) -> SurfaceJudgement:
+    """Return the judgement; a cause that an earlier link has named is not repeated."""
+    effect = found.applied.effect
+    sure = found.is_gap and found.shrink >= LIMITS.scan_least_shrink
+    named = {applied.effect.name for judged in context.judgements for applied in judged.applied}
+    cause = Cause(
+        applied=found.applied,
+        link=link.name,
+        probability=LIMITS.scan_probability if sure else LIMITS.scan_probability_unsure,
+        parameters={effect.names[0]: found.interval},
+        shrink=found.shrink,
+        rms_after=found.after**0.5,
+        rivals=None,
+    )
+    return SurfaceJudgement(
+        link=link,
+        verdict="explained" if sure else "no_gap",
+        causes=(cause,) if found.is_gap and effect.name not in named else (),
+        size=_size(found),
+        held_out=True,
+        factor=1.0,
+        points=found.points,
+        held_out_shrink=found.shrink,
+    )
+
+
+def _size(found: _Finding) -> Size:
+    """Return the size of the gap; the scatter about the fitted surface counts as noise."""
+    return Size(
+        rows=found.points,
+        before=found.before,
+        after=found.after,
+        floor=found.after,
+        noise=found.after,
+        excess=0.0,
+        excess_before=0.0,
+        deviation=0.0,
+        largest_before=math.nan,
+        largest_after=math.nan,
+    )
+
+
+def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) -> _Finding:
+    """Return what the points say of an effect of the radius."""
     y = np.concatenate([cloud.deviation for cloud in clouds])
     x, prior = _columns(clouds, context.mismatch)
     block = _blocks(clouds)
@@ -83,18 +144,16 @@ def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) 
     inputs = context.pairs[0].inputs
     per_size = _radius_per_size(effect, inputs)
     offset = Interval(*(float((b[0] + k * deviation) / per_size) for k in (0.0, -1.645, 1.645)))
-    applied = Applied(effect, None, {effect.names[0]: offset.value})
     usual = effect.usual(context.mismatch, 1.0)[effect.names[0]]
     is_gap = abs(b[0] / per_size) > usual + LIMITS.scan_certain * deviation
-    return SurfaceFinding(
-        effect=effect,
+    return _Finding(
+        applied=Applied(effect, None, {effect.names[0]: offset.value}),
+        interval=offset,
+        is_gap=is_gap,
         points=len(y),
-        rms_before=float(np.sqrt(np.mean(before**2))),
-        rms_after=float(np.sqrt(noise2)),
-        noise=float(np.sqrt(noise2)),
-        offset=offset,
+        before=float(np.mean(before**2)),
+        after=noise2,
         shrink=shrink,
-        applied=applied if is_gap else None,
     )
 
 

@@ -10,15 +10,9 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect
 from gcode2krl.effects.effect import LINKS, NO_TARGET
 from gcode2krl.effects.mismatch import Mismatch, sigma
-from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.instruments import CLOCK, clock_columns, time_law_columns
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of
-
-CLOCK, ENCODER_ZERO = "table clock", "encoder zero"
-"""Nuisance of instruments: two words, so that no effect can have such a name."""
-_JITTER_KNOTS_S = 1.0
-_ROUGH = 1e3
-"""Standard deviation of a quantity that is never reported, however large, in units of its bound."""
 
 
 class Nuisance(NamedTuple):
@@ -106,81 +100,8 @@ def _of_block(block: Block, trace: Trace, mismatch: Mismatch, known: Signatures)
 def _of_instruments(
     trace: Trace, mismatch: Mismatch, upstream: frozenset[str], clock: float
 ) -> Iterator[Nuisance]:
-    yield from _of_encoders(trace, mismatch)
-    yield from _of_force_sensor(trace, mismatch)
-    yield from _of_tracker(trace, mismatch)
-    yield Nuisance(CLOCK, False, -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s) * clock)
-    yield from _of_time_law(trace, mismatch, upstream)
-
-
-def _of_encoders(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
-    if trace.link.name == "gear":
-        yield Nuisance(ENCODER_ZERO, False, _constants(trace) * mismatch.joint_zero_rad * _ROUGH)
-
-
-def _of_force_sensor(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
-    if trace.link.name == "force":
-        yield Nuisance("force zero", False, _force_zero(trace) * sigma(mismatch.force_zero_N))
-        yield Nuisance("sensor gain", False, _diagonal(trace.nominal) * sigma(mismatch.sensor_gain))
-
-
-def _of_tracker(trace: Trace, mismatch: Mismatch) -> Iterator[Nuisance]:
-    if trace.link.name == "mechanics":
-        yield Nuisance("tracker frame", False, _frame(trace, mismatch))
-
-
-def _of_time_law(trace: Trace, mismatch: Mismatch, upstream: frozenset[str]) -> Iterator[Nuisance]:
-    if trace.link.name == "path" or (trace.link.name == "mechanics" and "path" in upstream):
-        yield Nuisance("time law", False, _jitter(trace, _JITTER_KNOTS_S) * sigma(mismatch.clock_s))
-
-
-def _stacked(values: Floats) -> Floats:
-    return np.ascontiguousarray(values.T)
-
-
-def _constants(trace: Trace) -> Floats:
-    n, k = trace.shape
-    return np.repeat(np.eye(k)[:, None, :], n, axis=1)
-
-
-def _diagonal(values: Floats) -> Floats:
-    """Return (k, n, k): column j is component j alone."""
-    n, k = values.shape
-    columns = np.zeros((k, n, k))
-    for j in range(k):
-        columns[j, :, j] = values[:, j]
-    return columns
-
-
-def _force_zero(trace: Trace) -> Floats:
-    """Return a unit force along each axis of the sensor, in the frame of the measured values."""
-    if trace.in_sensor_frame or trace.in_tool_frame:
-        return _constants(trace)
-    turned = _rows(trace, trace.inputs.sensor_rotation)
-    return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
-
-
-def _frame(trace: Trace, mismatch: Mismatch) -> Floats:
-    """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
-    position = trace.nominal
-    turned = np.zeros((3, len(position), 6))
-    for axis in range(3):
-        turned[axis, :, axis] = sigma(mismatch.frame_mm)
-    arm = position - position.mean(axis=0)
-    for axis in range(3):
-        turn = np.cross(np.eye(3)[axis], arm)
-        turned[:, :, 3 + axis] = turn.T * sigma(mismatch.frame_rad)
-    return turned
-
-
-def _jitter(trace: Trace, knots_s: float) -> Floats:
-    """Return the signal's rate times hats over time: a time law that is off by a little, here and there."""
-    start, end = trace.time_s[0], trace.time_s[-1]
-    knots = np.linspace(start, end, max(2, round((end - start) / knots_s) + 1))
-    hats = np.maximum(0.0, 1.0 - np.abs(trace.time_s[:, None] - knots) / (knots[1] - knots[0]))
-    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats[None]
-    return columns
-
-
-def _rows(trace: Trace, rotations: Floats) -> Floats:
-    return rotations[nearest_rows(trace.inputs.time_s, trace.time_s)]
+    for name, columns in trace.link.mismatch(trace, mismatch):
+        yield Nuisance(name, False, columns)
+    yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock)
+    if trace.link.has_time_law(upstream):
+        yield Nuisance("time law", False, time_law_columns(trace, mismatch))

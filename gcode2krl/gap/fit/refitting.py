@@ -8,13 +8,16 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.fit.fitted import Fitted, Numbers
+from gcode2krl.gap.fit.hooke_jeeves import pattern_search
 from gcode2krl.gap.fit.least_squares import Damped, attempted, gauss_newton
 from gcode2krl.gap.fit.likelihood import STEP_SHARE, Likelihood
-from gcode2krl.gap.fit.pattern_search import pattern_search
 
 _MOST_STEPS = 12
+"""Bounds the time; a fit ends earlier where chi2 settles."""
 _MULTIPLES = (1.0, 0.5, 0.75, 1.25, 1.5, 2.0, 3.0)
+"""Of the first order's size, which is small for an effect that saturates; the first order itself first."""
 _FIRST_SEARCH_STEP = 0.3
+"""In typical sizes."""
 _SETTLED, _SETTLED_SHARE = 0.02, 1e-6
 """Falls of chi2, and shares of it, that move a number by far less than its deviation."""
 

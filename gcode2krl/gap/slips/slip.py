@@ -9,9 +9,9 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gap.beside.links import MECHANICS, PATH, Link
+from gcode2krl.gap.beside.links import MECHANICS, PATH
 from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.trace import Signal, Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 Alike = tuple[tuple[str, str | None], ...]
@@ -22,7 +22,7 @@ class Slip:
     """A slip, where it showed, and whether anything can be said beyond it."""
 
     applied: Applied
-    link: Link
+    link: Signal
     rms_before: float
     """In the unit of the report, as ``rms_after``, which is None where the slip cannot be simulated."""
     rms_after: float | None

@@ -15,6 +15,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Effect, Inputs
 from gcode2krl.effects.builtin.advance_stop import with_stops
 from gcode2krl.gap.beside.clocks import with_table_clock
+from gcode2krl.gap.beside.links import MECHANICS, PATH
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.place_times import gone
@@ -156,8 +157,7 @@ def _stopped(pair: Pair, rows: Ints, hold_s: float) -> Pair:
 
 def _on_time(pair: Pair) -> Pair:
     """Return the pair with the clock of its table as it fits best."""
-    traces = motion_traces([pair])
-    return with_table_clock(pair, traces[0].link) if traces else pair
+    return with_table_clock(pair, PATH if PATH.traces([pair]) else MECHANICS)
 
 
 def _lines(pair: Pair, rows: Ints) -> Ints:

@@ -8,15 +8,14 @@ import numpy as np
 
 from gcode2krl.errors import Issue
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import Gap
 
 SCHEMA = "gcode2krl/gap/1"
 _LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 
-def gap_object(gap: Gap) -> dict[str, Any]:
-    """Return the object, its keys in the order of the contract; what is not finite is None."""
+def gap_object(gap: Any) -> dict[str, Any]:
+    """Return the object of a `Gap`, its keys in the order of the contract; what is not finite is None."""
     return {
         "schema": SCHEMA,
         "verdict": gap.verdict,

@@ -11,7 +11,7 @@ from gcode2krl.gap.beside.links import GEAR, JOINTS, LINKS, MECHANICS, PATH, TIM
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
-from gcode2krl.gap.choose.judgement import Cause, Judgement
+from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.result import (
@@ -31,42 +31,48 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> Gap:
     """Return the diagnosis of all links together."""
-    pairs = context.pairs
-    judgements = [each for each in context.judgements if isinstance(each, Judgement)]
-    largest = max(judgements, key=_weight, default=None)
+    judgements = [judged for judged in context.judgements if isinstance(judged, Judged)]
+    signals = [judged for judged in judgements if isinstance(judged, Judgement)]
+    largest = max(signals, key=_weight, default=None)
     return Gap(
         verdict=_verdict(judgements, slips),
-        gap=_size(largest, slips),
+        gap=_size(_with_largest_gap(judgements, largest), slips),
         links=tuple(_links(judgements, slips)),
         where=_where(largest, judgements),
         causes=_causes(judgements, slips),
         unexplained=_unexplained(largest),
         not_examined=tuple(_not_examined(judgements, slips)),
         observable=tuple(
-            Detectable(**entry) for judgement in judgements for entry in observable(judgement.examination)
+            Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
         ),
-        issues=(*issues, *_issues_of_runs(pairs)),
-        runs=tuple(pair.name for pair in pairs),
-        notes=tuple(_notes(pairs, judgements)),
+        issues=(*issues, *_issues_of_runs(context.pairs)),
+        runs=tuple(pair.name for pair in context.pairs),
+        notes=tuple(_notes(context.pairs, signals)),
     )
 
 
-def _gapped(judgements: Sequence[Judgement]) -> list[Judgement]:
+def _gapped(judgements: Sequence[Judged]) -> list[Judged]:
     """Return the judgements of links with a gap."""
     return [judgement for judgement in judgements if judgement.verdict != "no_gap"]
 
 
+def _with_largest_gap(judgements: Sequence[Judged], largest: Judgement | None) -> Judged | None:
+    """Return the judgement of the largest gap: that of the part where no signal has one."""
+    if largest is not None and largest.verdict != "no_gap":
+        return largest
+    return next(iter(_gapped(judgements)), largest)
+
+
 def _weight(judgement: Judgement) -> tuple[bool, float]:
     """Order links by whether there is a gap, then by its power over the noise's."""
-    size = judgement.size
-    return judgement.verdict != "no_gap", size.excess_before / max(size.noise, 1e-30)
+    return judgement.verdict != "no_gap", judgement.size.power
 
 
-def _verdict(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> str:
+def _verdict(judgements: Sequence[Judged], slips: Sequence[Slip]) -> str:
     """Return the verdict of all links with a gap together."""
     verdicts = {judgement.verdict for judgement in _gapped(judgements)}
     if not verdicts:
@@ -78,20 +84,20 @@ def _verdict(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> str:
     return "partly_explained"
 
 
-def _size(largest: Judgement | None, slips: Sequence[Slip]) -> GapSize:
+def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
         return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
-    size, trace = largest.size, largest.traces[0]
+    size, link, factor = largest.size, largest.link, largest.factor
     return GapSize(
-        signal=TIMING.signal if _is_timing(largest) else trace.signal,
-        unit=trace.unit,
-        rms_before=trace.factor * size.before**0.5,
-        rms_after=trace.factor * size.after**0.5,
-        noise_floor=trace.factor * size.floor**0.5,
-        max_before=trace.factor * size.largest_before,
-        max_after=trace.factor * size.largest_after,
-        shrink=size.shrink if largest.causes and largest.held_out else None,
+        signal=TIMING.signal if _is_timing(largest) else link.signal,
+        unit=link.unit,
+        rms_before=factor * size.before**0.5,
+        rms_after=factor * size.after**0.5,
+        noise_floor=factor * size.floor**0.5,
+        max_before=factor * size.largest_before,
+        max_after=factor * size.largest_after,
+        shrink=largest.shrink,
         held_out=largest.held_out,
     )
 
@@ -101,20 +107,21 @@ def _size_of_slip(slip: Slip) -> GapSize:
     return GapSize(signal=link.signal, unit=link.unit, rms_before=slip.rms_before, rms_after=slip.rms_after)
 
 
-def _is_timing(judgement: Judgement) -> bool:
+def _is_timing(judgement: Judged) -> bool:
     """Tell whether the gap of a path is one of timing: most of it lies along the motion."""
-    if not judgement.link.tells_time or judgement.verdict == "no_gap":
+    if not isinstance(judgement, Judgement) or not judgement.link.tells_time:
         return False
-    return timing_share(judgement.traces) > THRESHOLDS.tell.timing_share
+    return judgement.verdict != "no_gap" and timing_share(judgement.traces) > THRESHOLDS.tell.timing_share
 
 
-def _links(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> Iterator[LinkResult]:
+def _links(judgements: Sequence[Judged], slips: Sequence[Slip]) -> Iterator[LinkResult]:
     """Yield the examined links in the chain's order."""
     judged = {judgement.link: judgement for judgement in judgements}
     slipped = {slip.link for slip in slips}
     for link in LINKS:
-        if link is TIMING and PATH in judged:
-            yield _timing(judged[PATH])
+        path = judged.get(PATH)
+        if link is TIMING and isinstance(path, Judgement):
+            yield _timing(path)
         if link in judged:
             yield _link(judged[link], link in slipped)
 
@@ -132,35 +139,37 @@ def _timing(path: Judgement) -> LinkResult:
     )
 
 
-def _link(judgement: Judgement, slipped: bool) -> LinkResult:
+def _link(judgement: Judged, slipped: bool) -> LinkResult:
     """Return a judged link; ``slipped``: a slip showed in it."""
-    factor, size = judgement.traces[0].factor, judgement.size
+    factor, size = judgement.factor, judgement.size
     verdict = "no_gap" if _is_timing(judgement) else judgement.verdict
     return LinkResult(
         link=judgement.link.name,
         rms_before=factor * size.before**0.5,
         rms_after=factor * size.after**0.5,
         noise=factor * size.floor**0.5,
-        unit=judgement.traces[0].unit,
+        unit=judgement.link.unit,
         verdict="explained" if slipped and verdict == "no_gap" else verdict,
-        offset_deg=_zeros_deg(judgement) if judgement.link is GEAR else None,
+        offset_deg=_zeros_deg(judgement) if isinstance(judgement, Judgement) else None,
     )
 
 
-def _zeros_deg(judgement: Judgement) -> dict[str, float]:
+def _zeros_deg(judgement: Judgement) -> dict[str, float] | None:
     """Return the mean difference of each joint's two encoders: zeros are set by hand and never a finding."""
+    if judgement.link is not GEAR:
+        return None
     trace = judgement.traces[0]
     zeros = trace.factor * np.mean([each.measured.mean(axis=0) for each in judgement.traces], axis=0)
     return dict(zip(trace.components, zeros.tolist(), strict=True))
 
 
-def _where(largest: Judgement | None, judgements: Sequence[Judgement]) -> Where:
+def _where(largest: Judgement | None, judgements: Sequence[Judged]) -> Where:
     """Return which signals have a gap, and the place of the largest."""
     signals = tuple(
         SignalResult(
-            signal=judgement.traces[0].signal,
-            rms=judgement.traces[0].factor * judgement.size.before**0.5,
-            noise=judgement.traces[0].factor * judgement.size.floor**0.5,
+            signal=judgement.link.signal,
+            rms=judgement.factor * judgement.size.before**0.5,
+            noise=judgement.factor * judgement.size.floor**0.5,
             significant=judgement.verdict != "no_gap",
         )
         for judgement in judgements
@@ -170,17 +179,17 @@ def _where(largest: Judgement | None, judgements: Sequence[Judgement]) -> Where:
     return replace(place(largest.traces, largest.examination.noise, largest.applied), signals=signals)
 
 
-def _causes(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
+def _causes(judgements: Sequence[Judged], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
     """Return the causes of all links, the most probable first."""
     causes = [slip_cause(slip) for slip in slips]
-    for judgement in _gapped(judgements):
+    for judgement in judgements:
         causes += [
-            cause_of(cause, judgement, _reported_in(cause, judgement).name) for cause in judgement.causes
+            cause_of(cause, judgement, _reported_in(cause, judgement).name) for cause in judgement.reported
         ]
     return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
 
-def _reported_in(cause: Cause, judgement: Judgement) -> Link:
+def _reported_in(cause: Cause, judgement: Judged) -> Link:
     """Return the link that a cause is reported in: timing for a gap of the path that is one."""
     shows_in_time = TIMING.name in cause.applied.effect.links
     return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
@@ -192,13 +201,13 @@ def _unexplained(largest: Judgement | None) -> Unexplained:
         return Unexplained(rms=None, significant=False, structure="unknown")
     size, significant = largest.size, bool(largest.size.significant)
     return Unexplained(
-        rms=largest.traces[0].factor * max(size.after, 0.0) ** 0.5,
+        rms=largest.factor * max(size.after, 0.0) ** 0.5,
         significant=significant,
         structure="structured" if significant else "white",
     )
 
 
-def _not_examined(judgements: Sequence[Judgement], slips: Sequence[Slip]) -> Iterator[NotExamined]:
+def _not_examined(judgements: Sequence[Judged], slips: Sequence[Slip]) -> Iterator[NotExamined]:
     """Yield the links without a judgement, and what they need."""
     examined = {judgement.link for judgement in judgements}
     if PATH in examined:

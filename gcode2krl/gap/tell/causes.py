@@ -2,17 +2,17 @@
 
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.judgement import Cause, Judgement
+from gcode2krl.gap.choose.judged import Cause, Judged
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.result import CauseResult, EffectAt, RivalResult
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
-def cause_of(cause: Cause, judgement: Judgement, link: str) -> CauseResult:
+def cause_of(cause: Cause, judgement: Judged, link: str) -> CauseResult:
     """Return a cause of a judged link; ``link`` is the name of that which it is reported in."""
-    factor = judgement.traces[0].factor
-    alike = [rival.applied for rival, _ in cause.rivals if rival.alike]
-    others = [(rival.applied, probability) for rival, probability in cause.rivals if not rival.alike]
+    compared = cause.rivals or ()
+    alike = [rival.applied for rival, _ in compared if rival.alike]
+    others = [(rival.applied, probability) for rival, probability in compared if not rival.alike]
     return CauseResult(
         effect=cause.applied.effect.name,
         target=cause.applied.target,
@@ -20,11 +20,13 @@ def cause_of(cause: Cause, judgement: Judgement, link: str) -> CauseResult:
         probability=cause.probability,
         parameters=cause.parameters,
         shrink=cause.shrink,
-        rms_after=None if cause.rms_after is None else factor * cause.rms_after,
+        rms_after=None if cause.rms_after is None else judgement.factor * cause.rms_after,
         indistinguishable_from=tuple(
             EffectAt(applied.effect.name, applied.target) for applied in alike[: THRESHOLDS.tell.most_alike]
         ),
-        rivals=tuple(
+        rivals=None
+        if cause.rivals is None
+        else tuple(
             RivalResult(applied.effect.name, applied.target, probability) for applied, probability in others
         ),
     )

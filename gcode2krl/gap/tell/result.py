@@ -7,7 +7,8 @@ from typing import Any
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Issue
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.judgement import NAMED
+from gcode2krl.gap.choose.judged import NAMED
+from gcode2krl.gap.tell.as_json import gap_object
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,6 +202,4 @@ class Gap:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of the JSON contract, plain numbers only."""
-        from gcode2krl.gap.tell.as_json import gap_object
-
         return gap_object(self)

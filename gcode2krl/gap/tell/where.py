@@ -27,7 +27,8 @@ def place(traces: Sequence[Trace], noise: Sequence[Noise], applied: Sequence[App
     shapes = [structure(trace, applied) for trace in traces]
     sigma = float(np.sqrt(sum(each.sigma**2 for each in noise)))
     rms = float(np.sqrt(np.mean(np.concatenate([np.sum(shape**2, axis=1) for shape in shapes]))))
-    level = max(rms, 0.0 if applied else sigma)
+    # a constant gap is nowhere larger than its rms, whatever the rounding
+    level = max(rms, 0.0 if applied else sigma) * (1.0 + _LIMITS.rounding)
     joints = [str(one.target) for one in applied if one.target in JOINTS]
     intervals = [
         interval

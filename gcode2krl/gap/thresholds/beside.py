@@ -140,3 +140,10 @@ class BesideThresholds:
     scan_certain: float = convention(4.0, "deviations beyond normal mismatch that make a gap")
     scan_rough_mm: float = convention(1.0, "what is known of a radius or a floor beforehand")
     scan_tip_mm: float = physics(0.003, "the swept surface is known to some micrometres")
+    scan_probability: float = convention(
+        0.95, "of a diameter that takes `scan_least_shrink` of the scan's gap, or more"
+    )
+    scan_probability_unsure: float = convention(0.4, "of one that takes less: it is not named")
+    scan_least_shrink: float = calibrated(
+        0.4, DEVELOPMENT, "share of the scan's gap on points not fitted to, from which a diameter is named"
+    )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
+from gcode2krl.gap.thresholds.stated import convention, physics
 
 
 @dataclass(frozen=True)
@@ -12,13 +12,6 @@ class TellThresholds:
     most_alike: int = convention(5, "effects that a cause lists as indistinguishable from it")
     timing_share: float = convention(
         0.5, "a gap of the path with more of its power along the motion is one of timing"
-    )
-    scan_probability: float = convention(
-        0.95, "of a diameter that takes `scan_least_shrink` of the scan's gap, or more"
-    )
-    scan_probability_unsure: float = convention(0.4, "of one that takes less: it is not named")
-    scan_least_shrink: float = calibrated(
-        0.4, DEVELOPMENT, "share of the scan's gap on points not fitted to, from which a diameter is named"
     )
     after_event_s: float = physics(
         0.3,
@@ -37,3 +30,4 @@ class TellThresholds:
     )
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
     headline_causes: int = convention(3, "causes in the first sentence")
+    rounding: float = convention(1e-9, "a size that exceeds the level of an interval by less is equal to it")

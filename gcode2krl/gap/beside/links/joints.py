@@ -1,21 +1,24 @@
 """The links of the joints: path, servo and gear."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Inputs, Signals
+from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.clocks import with_table_clock
 from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.instruments import CLOCK, ENCODER_ZERO, ROUGH, constants
 from gcode2krl.gap.beside.interpolation import nearest_rows
-from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
+from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.traces import joint_trace
 from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.retiming import refined, retimed
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.verdict import FittedVerdict, Verdict, is_lost
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller
 from gcode2krl.units import RAD_PER_DEG
@@ -63,7 +66,7 @@ class PathLink(Link):
         """Return a tenth where the clock was set by the commanded joints already."""
         return LIMITS.clock_set_share if context.clocks_set else 1.0
 
-    def learn(self, context: Context, judged: Verdict) -> Context:
+    def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Plan named time laws into the inputs, then take over the run's own timing.
 
         Where the controller moves by a model of the robot of its own, its joints are brought back to those of
@@ -92,7 +95,7 @@ class _DriveLink(Link):
     unit = "deg"
     of_joints = True
 
-    def learn(self, context: Context, judged: Verdict) -> Context:
+    def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Let later links start from the fitted model, where it holds: encoders' noise stays out of them."""
         if is_lost(judged):
             return context
@@ -119,7 +122,7 @@ class ServoLink(_DriveLink):
             self, pair, table, difference, "q_act_rad", "q_cmd_rad", base=base, sigma_rad=sigma_rad
         )
 
-    def learn(self, context: Context, judged: Verdict) -> Context:
+    def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Take the clock off the controller's table too, where only its commanded columns have it."""
         return super().learn(_with_free_controller(context, judged), judged)
 
@@ -132,7 +135,7 @@ class GearLink(_DriveLink):
     needs = "controller.csv with q1_load_deg … (encoders behind the gear)"
     own_clock = True
     sets_clocks = True
-    instrument = ("table clock", "encoder zero")
+    instrument = (CLOCK, ENCODER_ZERO)
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return q_load - q_act."""
@@ -148,8 +151,12 @@ class GearLink(_DriveLink):
             self, pair, table, difference, "q_load_rad", "q_act_rad", base=base, sigma_rad=sigma_rad
         )
 
+    def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
+        """Yield the zeros of the encoders, which are set by hand."""
+        yield ENCODER_ZERO, constants(trace) * mismatch.joint_zero_rad * ROUGH
 
-def _with_fitted(pair: Pair, judged: Verdict) -> Pair:
+
+def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
     """Return the pair with what the judged link really does to the joints, by its fitted model."""
     table = pair.run.controller
     trace = next((trace for trace in judged.every if trace.run_number == pair.number), None)
@@ -171,9 +178,10 @@ def _with_free_controller(context: Context, servo: Verdict) -> Context:
     of_table, of_columns = _clock(path, "controller"), _clock(servo, "q_cmd")
     if path is None or of_table is None or of_columns is None:
         return context
-    if abs(of_table["offset_s"] - of_columns["offset_s"]) > LIMITS.clocks_of_two * context.mismatch.clock_s:
+    offset_s = _offset_s(of_table)
+    if abs(offset_s - _offset_s(of_columns)) > LIMITS.clocks_of_two * context.mismatch.clock_s:
         return context
-    freed = (pair.later("controller", -of_table["offset_s"]) for pair in context.pairs)
+    freed = (pair.later("controller", -offset_s) for pair in context.pairs)
     return context.without_cause(path, of_table).with_pairs(freed)
 
 
@@ -181,6 +189,11 @@ def _clock(judged: Verdict | None, target: str) -> Applied | None:
     """Return the named clock of a table or of columns."""
     named = judged.applied if judged is not None else ()
     return next((one for one in named if one.effect.is_clock and one.target == target), None)
+
+
+def _offset_s(clock: Applied) -> float:
+    """Return the offset of a clock, its first size."""
+    return clock[clock.effect.sizes[0].name]
 
 
 def logged_correction(pair: Pair, table: Controller) -> Floats:

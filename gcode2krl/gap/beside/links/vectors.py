@@ -1,15 +1,18 @@
 """The links of the instruments at the tool: force and mechanics."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Inputs
+from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links.base import Link, Verdict, is_lost
+from gcode2krl.gap.beside.instruments import component_columns, force_zero_columns, frame_columns
+from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.joints import PathLink, ServoLink
 from gcode2krl.gap.beside.links.traces import vector_trace
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.verdict import FittedVerdict, is_lost
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
@@ -32,7 +35,12 @@ class ForceLink(Link):
             base=base, frame=head.frames.force, sigma=head.noise.force_N,
         )  # fmt: skip
 
-    def learn(self, context: Context, judged: Verdict) -> Context:
+    def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
+        """Yield the zero and the gain of the force sensor."""
+        yield "force zero", force_zero_columns(trace) * sigma(mismatch.force_zero_N)
+        yield "sensor gain", component_columns(trace.nominal) * sigma(mismatch.sensor_gain)
+
+    def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Let the named causes bend the arm; where the model does not hold, let the measured force do so."""
         learned = (applied.effect.learned(applied, self.name) for applied in judged.applied)
         context = context.with_learned(applied for applied in learned if applied is not None)
@@ -76,3 +84,11 @@ class MechanicsLink(Link):
         """Return two where the joints are on the controller's clock, which no path has set."""
         on_two = not context.has_data(PathLink.name) and context.has_data(ServoLink.name)
         return max(super().clocks(context), 2 if on_two else 1)
+
+    def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
+        """Yield the frame in which the tracker states the tip."""
+        yield "tracker frame", frame_columns(trace, mismatch)
+
+    def has_time_law(self, unmeasured: frozenset[str]) -> bool:
+        """Tell whether the commanded path is not measured, so that the tip shows its time law."""
+        return PathLink.name in unmeasured

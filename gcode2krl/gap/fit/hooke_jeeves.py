@@ -9,7 +9,7 @@ from gcode2krl.gap.fit.least_squares import Box
 
 _ROUNDS = 30
 _FINEST = 0.005
-"""In typical sizes: a tenth of what intervals of such effects have for the error of the model."""
+"""In typical sizes: far below the share that the models of such effects are off by, `law_error`."""
 
 
 def pattern_search(chi2: Callable[[Floats], float], x: Floats, box: Box, first_step: float) -> Floats:

@@ -1,0 +1,74 @@
+"""What instruments within normal mismatch do to a signal, as columns (k, n, c) for one standard deviation."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.gap.beside.interpolation import nearest_rows
+
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.trace import Trace
+
+CLOCK, ENCODER_ZERO = "table clock", "encoder zero"
+"""Names of two words, so that no effect can have such a name."""
+ROUGH = 1e3
+"""Standard deviation of a quantity that is never reported, however large, in units of its bound."""
+_KNOTS_S = 1.0
+
+
+def _stacked(values: Floats) -> Floats:
+    return np.ascontiguousarray(values.T)
+
+
+def constants(trace: "Trace") -> Floats:
+    """Return (k, n, k): column j is one in component j."""
+    n, k = trace.shape
+    return np.repeat(np.eye(k)[:, None, :], n, axis=1)
+
+
+def component_columns(values: Floats) -> Floats:
+    """Return (k, n, k): column j is component j alone."""
+    n, k = values.shape
+    columns = np.zeros((k, n, k))
+    for j in range(k):
+        columns[j, :, j] = values[:, j]
+    return columns
+
+
+def force_zero_columns(trace: "Trace") -> Floats:
+    """Return a unit force along each axis of the sensor, in the frame of the measured values."""
+    if trace.in_sensor_frame or trace.in_tool_frame:
+        return constants(trace)
+    rows = nearest_rows(trace.inputs.time_s, trace.time_s)
+    turned = trace.inputs.sensor_rotation[rows]
+    return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
+
+
+def frame_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+    """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
+    position = trace.nominal
+    turned = np.zeros((3, len(position), 6))
+    for axis in range(3):
+        turned[axis, :, axis] = sigma(mismatch.frame_mm)
+    arm = position - position.mean(axis=0)
+    for axis in range(3):
+        turn = np.cross(np.eye(3)[axis], arm)
+        turned[:, :, 3 + axis] = turn.T * sigma(mismatch.frame_rad)
+    return turned
+
+
+def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+    """Return (k, n, 1): what the clock of the table does to the signal, to first order."""
+    columns: Floats = -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
+    return columns
+
+
+def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+    """Return (k, n, c): the signal's rate times hats over time, for a time law that is slightly off."""
+    start, end = trace.time_s[0], trace.time_s[-1]
+    knots = np.linspace(start, end, max(2, round((end - start) / _KNOTS_S) + 1))
+    hats = np.maximum(0.0, 1.0 - np.abs(trace.time_s[:, None] - knots) / (knots[1] - knots[0]))
+    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats[None]
+    return columns * sigma(mismatch.clock_s)

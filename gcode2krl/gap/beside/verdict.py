@@ -1,0 +1,49 @@
+"""What the judgement of a link says to the links after it."""
+
+from typing import Protocol
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied
+from gcode2krl.gap.beside.trace import Trace
+
+
+class JudgedLink(Protocol):
+    """What is asked of a link that was judged."""
+
+    name: str
+    tells_time: bool
+
+
+class Verdict(Protocol):
+    """What the judgement of a link says to all that comes later."""
+
+    @property
+    def link(self) -> "JudgedLink":
+        """Return the judged link."""
+
+    @property
+    def verdict(self) -> str:
+        """Return no_gap, explained, partly_explained or unexplained."""
+
+    @property
+    def applied(self) -> tuple[Applied, ...]:
+        """Return the named causes."""
+
+    def without(self, applied: Applied) -> "Verdict":
+        """Return the judgement without a cause."""
+
+
+class FittedVerdict(Verdict, Protocol):
+    """What later links may learn from the judgement of a signal."""
+
+    @property
+    def every(self) -> tuple[Trace, ...]:
+        """Return all traces of the link, held-out ones included."""
+
+    def fitted(self, trace: Trace) -> Floats:
+        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
+
+
+def is_lost(judged: Verdict | None) -> bool:
+    """Tell whether the model of a link does not hold, not even with the causes that were named."""
+    return judged is not None and judged.verdict in ("unexplained", "partly_explained")

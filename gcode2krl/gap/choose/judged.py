@@ -1,0 +1,81 @@
+"""What is known of a link after it was judged: its verdict, its causes and the size of its gap."""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied
+from gcode2krl.gap.beside.links.base import Link
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.choose.fitted_joints import fitted_signal
+from gcode2krl.gap.choose.gap_size import Size
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.choose.rivals import Rival
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+NAMED = THRESHOLDS.choose.named
+"""A cause counts as named from this probability on."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect at one target."""
+
+    applied: Applied
+    link: str
+    probability: float
+    parameters: dict[str, Interval]
+    shrink: float | None
+    """Share of the explainable gap that it takes on held-out data, on top of those above it."""
+    rms_after: float | None
+    rivals: tuple[tuple[Rival, float], ...] | None = ()
+    """None where no other effect was compared with it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """What every judgement of a link says; sizes are in the link's inner unit."""
+
+    link: Link
+    verdict: str
+    causes: tuple[Cause, ...]
+    size: Size
+    held_out: bool
+    factor: float
+    """From the inner unit to that of the report."""
+
+    @property
+    def applied(self) -> tuple[Applied, ...]:
+        """Return the named causes."""
+        return tuple(cause.applied for cause in self.causes if cause.probability >= NAMED)
+
+    @property
+    def shrink(self) -> float | None:
+        """Return the share of the explainable gap that is gone on held-out data; None without a cause."""
+        return self.size.shrink if self.causes and self.held_out else None
+
+    @property
+    def reported(self) -> tuple[Cause, ...]:
+        """Return the causes that the answer lists: those of a gap."""
+        return self.causes if self.verdict != "no_gap" else ()
+
+    def without(self, applied: Applied) -> Self:
+        """Return the judgement without a cause that a later link has shown to be elsewhere."""
+        return replace(self, causes=tuple(cause for cause in self.causes if cause.applied != applied))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement(Judged):
+    """The judgement of a link whose signal is one in time."""
+
+    traces: tuple[Trace, ...]
+    examination: Examination
+    usual: tuple[Applied, ...] = field(default=())
+    """Accepted effects that are within normal mismatch."""
+    every: tuple[Trace, ...] = field(default=())
+    """The traces with the held-out ones."""
+
+    def fitted(self, trace: Trace) -> Floats:
+        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
+        return fitted_signal(trace, self.examination)
