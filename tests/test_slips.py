@@ -136,7 +136,7 @@ def test_a_spin_in_radians_is_refused():
 
 @pytest.mark.parametrize("day", ["2026-13-45", "2026-02-30", "2026-00-01"])
 def test_a_confirmation_on_no_day_is_refused(day):
-    assert f"{day} is no day" in refusal(verified={"by": "somebody", "date": day})
+    assert f"{day} is not a date" in refusal(verified={"by": "somebody", "date": day})
 
 
 def test_a_confirmation_in_the_future_is_a_warning_from_the_second_day_on():

@@ -106,7 +106,7 @@ def test_plain_statements_pass(text):
 def test_no_subprogram_of_the_controller_is_declared(name, tmp_path):
     path = tmp_path / "cell.toml"
     path.write_text(f'{BASED}[program]\nexternals = ["{name}(INT :IN)"]\n')
-    with pytest.raises(NotUnderstoodError, match="no subprogram that a template may call"):
+    with pytest.raises(NotUnderstoodError, match="a template may not call it"):
         load_cell(path)
 
 

@@ -102,7 +102,7 @@ FRAME = {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 0.0, "b_deg": 0.0,
 )
 def test_what_cannot_be_is_an_error_that_names_the_key(data, key):
     with pytest.raises(NotUnderstoodError) as error:
-        resolve_cell({"based_on": "demonstration", **data})
+        resolve_cell(data)
     assert {issue.code for issue in error.value.issues} == {"cell-impossible"}
     assert all(key in issue.message and key in issue.remedy for issue in error.value.issues[:1])
 
@@ -133,7 +133,7 @@ def test_a_warning_reaches_the_program(tmp_path):
 @pytest.mark.parametrize("axis", ["a_deg", "b_deg", "c_deg"])
 @pytest.mark.parametrize("angle", [0.0, 90.0, -45.0, 180.0, 30.0, 1.5, 3.5e-15])
 def test_angles_in_degrees_pass(axis, angle):
-    resolve_cell({"based_on": "demonstration", "frames": {"base": {**FRAME, axis: angle}}})
+    resolve_cell({"frames": {"base": {**FRAME, axis: angle}}})
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_angles_in_degrees_pass(axis, angle):
 @pytest.mark.parametrize("base", [{}, {"based_on": "demonstration"}])
 def test_types_are_strict_and_a_wrong_one_names_its_key(data, key, base):
     with pytest.raises(NotUnderstoodError) as error:
-        resolve_cell({"based_on": "demonstration", **base, **data})
+        resolve_cell({**base, **data})
     assert any(key in issue.message for issue in error.value.issues)
 
 

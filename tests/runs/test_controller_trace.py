@@ -164,7 +164,7 @@ def test_sections_before_the_program_are_left_out():
     assert (len(rests), others) == (2, 1)
     with pytest.raises(NotUnderstoodError, match=r"2 sections between standstills, the program 3; it ends"):
         program_rests(trace, np.array([here, there, here, there]), np.array([4, 5, 6, 6]), 0.1)
-    with pytest.raises(NotUnderstoodError, match=r"part at standstill 3 \(G-code line 6\)"):
+    with pytest.raises(NotUnderstoodError, match=r"differ at standstill 3 \(G-code line 6\)"):
         program_rests(trace, np.array([here, there, [9.0, 0.0, 7.0]]), np.array([4, 5, 6]), 0.1)
     with pytest.raises(NotUnderstoodError, match=r"shifted .* \(-?0.00\d, -3.000, 0.000\)"):
         program_rests(trace, np.add([here, there, here], [0, 3, 0]), np.array([4, 5, 6]), 0.1)

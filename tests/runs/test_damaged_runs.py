@@ -63,7 +63,7 @@ def test_a_value_that_nothing_measures(folder, capfd, column, value):
     columns[column] = columns[column].copy()
     columns[column][7] = value
     maker.write(folder, "force.csv", columns)
-    refused(folder, "row 9", column, "no measured value")
+    refused(folder, "row 9", column, "not a measured value")
     assert capfd.readouterr().err == ""
 
 

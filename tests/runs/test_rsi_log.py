@@ -111,7 +111,7 @@ def test_broken_telegrams_are_dropped_and_counted(tmp_path):
     file.write_text("\n".join(lines), encoding="utf-8")
     sheet = read_rsi_log(file)
     assert sheet.rows() == len(lines) - 5
-    assert "4 telegrams malformed, 1 there twice" in sheet.issues[0].message
+    assert "4 telegrams malformed, 1 duplicated" in sheet.issues[0].message
     folder = maker.run_folder(tmp_path / "run-1")
     (folder / "rsi.log").write_text("\n".join(lines), encoding="utf-8")
     assert load_run(folder).controller.segments[:, 0].tolist() == [0, 10, 19, 28, 37, 46]
