@@ -83,6 +83,7 @@ if TYPE_CHECKING:
 @click.option(
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
+# each branch is one of the options, in the order in which they are refused or done
 def command(
     part: str,
     output: str | None,

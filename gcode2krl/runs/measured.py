@@ -11,7 +11,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.inputs import locked
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.runs.tables import Sheet, missing_column
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
@@ -180,15 +180,8 @@ def build(
     Raises `NotUnderstoodError` for a missing column, and for fewer than 10 rows.
     """
     present = {name for name, values in sheet.columns.items() if np.isfinite(values).any()}
-    if TIME not in sheet.columns:
-        raise missing_column(sheet, [TIME], f"time in seconds in a column {TIME}")
-    _refuse_few(sheet.rows(), sheet.rows(), sheet)
-    used = [signal for signal in SIGNALS[kind] if _is_there(signal, present, sheet, partial)]
-    if not used:
-        wanted = ", ".join(SIGNALS[kind][0].columns)
-        raise missing_column(sheet, [wanted], f"a table of measured values has {TIME} and, say, {wanted}")
+    used = _used_signals(kind, sheet, present, partial)
     strict = [c for signal in used if not signal.gaps for c in signal.columns if c in present]
-    _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in present)))
     needed = (TIME, *strict)
     finite = np.stack([np.isfinite(sheet.columns[name]) for name in needed], axis=1)
     kept = np.flatnonzero(finite.all(axis=1))
@@ -209,6 +202,19 @@ def build(
     )
     first_lost = int(np.argmin(finite.all(axis=1))) + sheet.first_row
     return replace(table, issues=(*sheet.issues, *_findings(table, first_lost)))
+
+
+def _used_signals(kind: type[Measured], sheet: Sheet, present: set[str], partial: bool) -> list[Signal]:
+    """Return the signals that a file has; raises where it is no table of this kind."""
+    if TIME not in sheet.columns:
+        raise missing_column(sheet, [TIME], f"time in seconds in a column {TIME}")
+    _refuse_few(sheet.rows(), sheet.rows(), sheet)
+    used = [signal for signal in SIGNALS[kind] if _is_there(signal, present, sheet, partial)]
+    if not used:
+        wanted = ", ".join(SIGNALS[kind][0].columns)
+        raise missing_column(sheet, [wanted], f"a table of measured values has {TIME} and, say, {wanted}")
+    _refuse_absurd(sheet, (TIME, *(c for signal in used for c in signal.columns if c in present)))
+    return used
 
 
 def _lost(names: Sequence[str], finite: Bools) -> dict[str, int]:
@@ -239,9 +245,14 @@ def _is_there(signal: Signal, there: set[str], sheet: Sheet, partial: bool) -> b
         return False
     if loose and len(absent) < len(signal.columns):
         return True
+    raise _incomplete(signal, absent, there, sheet)
+
+
+def _incomplete(signal: Signal, absent: Sequence[str], there: set[str], sheet: Sheet) -> NotUnderstoodError:
+    """Return the error of a signal some of whose columns are missing or empty."""
     empty = [column for column in absent if column in sheet.columns]
     if empty:
-        raise input_error(
+        return input_error(
             "trace-column",
             f"column {', '.join(empty)}: has no value in any row",
             "record it, or leave the column out",
@@ -250,8 +261,8 @@ def _is_there(signal: Signal, there: set[str], sheet: Sheet, partial: bool) -> b
         )
     if len(absent) < len(signal.columns):
         rest = ", ".join(column for column in signal.columns if column in there)
-        raise missing_column(sheet, absent, f"it belongs with {rest}: give all or none")
-    raise missing_column(sheet, absent, f"name the columns {', '.join(signal.columns)}")
+        return missing_column(sheet, absent, f"it belongs with {rest}: give all or none")
+    return missing_column(sheet, absent, f"name the columns {', '.join(signal.columns)}")
 
 
 def _signal(signal: Signal, sheet: Sheet, there: set[str], kept: Ints) -> Floats:

@@ -8,11 +8,12 @@ here: they are those of frames, which the tip shows better.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.effects import Applied, simulate
+from gcode2krl.effects import Applied, Inputs, simulate
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.links.base import Link
@@ -60,40 +61,52 @@ def _assigned(pair: Pair, base: Sequence[Applied]) -> SurfacePoints | None:
     """Return the points of a run's scan beside the surface that its tip has swept."""
     scan, inputs = pair.run.scan, pair.inputs
     axis = inputs.tool_rotation[:, :, 2]
-    cuts = inputs.force_base_N.any(axis=1)
+    cuts: Bools = np.any(inputs.force_base_N, axis=1)
     if scan is None or not cuts.any() or np.ptp(axis, axis=0).max() > LIMITS.scan_straight:
         return None
-    tip, bent = _tips(pair, base)
-    tool = inputs.cell.tool
-    radius = np.array([tool[int(number)].diameter_mm / 2.0 for number in inputs.tool])[cuts]
-    corner = np.array([_corner(tool[int(number)]) for number in inputs.tool])[cuts]
-    up = -axis[0] if axis[0, 2] < 0.0 else axis[0]
-    turn = _upright(up)
-    path, bend = tip[cuts] @ turn.T, bent[cuts] @ turn.T
+    turn = _upright(-axis[0] if axis[0, 2] < 0.0 else axis[0])
+    tip, bent = (values[cuts] @ turn.T for values in _tips(pair, base))
+    radius, corner = _cutters(inputs, cuts)
     points = scan.position_mm @ turn.T
-    assigned = [_surface(point, path, radius, corner) for point in points]
-    kept = np.array([row is not None for row in assigned])
-    if kept.sum() < LIMITS.scan_least_points:
+    feet = [_foot(point, tip, radius, corner) for point in points]
+    kept = [foot for foot in feet if foot is not None]
+    if len(kept) < LIMITS.scan_least_points:
         return None
-    rows = [row for row in assigned if row is not None]
-    deviation = np.array([row[0] for row in rows])
-    wall = np.array([row[1] for row in rows])
-    normal = np.array([row[2] for row in rows])
-    nearest = np.array([row[3] for row in rows])
-    return SurfacePoints(deviation, wall, normal, np.sum(bend[nearest] * normal, axis=1), points[kept])
+    normal = np.array([foot.normal for foot in kept])
+    return SurfacePoints(
+        deviation=np.array([foot.deviation for foot in kept]),
+        wall=np.array([foot.is_wall for foot in kept]),
+        normal=normal,
+        deflection=np.sum(bent[[foot.row for foot in kept]] * normal, axis=1),
+        place=points[[foot is not None for foot in feet]],
+    )
 
 
-def _surface(
-    point: Floats, path: Floats, radius: Floats, corner: Floats
-) -> tuple[float, bool, Floats, int] | None:
-    """Return deviation, whether it is a wall, the normal and the row of the tip; None for neither."""
+def _cutters(inputs: Inputs, cuts: Bools) -> tuple[Floats, Floats]:
+    """Return the radius and the height of the corner of the cutter at each cutting sample."""
+    tools = [inputs.cell.tool[int(number)] for number in inputs.tool[cuts]]
+    return np.array([tool.diameter_mm / 2.0 for tool in tools]), np.array([_corner(tool) for tool in tools])
+
+
+class _Foot(NamedTuple):
+    """The point of the swept surface below or beside a scanned one."""
+
+    deviation: float
+    is_wall: bool
+    normal: Floats
+    row: int
+    """Of the tip that has cut it."""
+
+
+def _foot(point: Floats, path: Floats, radius: Floats, corner: Floats) -> _Foot | None:
+    """Return the foot of a point on a floor or a wall; None where it belongs to neither."""
     offset = path[:, :2] - point[:2]
     away = np.hypot(offset[:, 0], offset[:, 1])
     over = np.flatnonzero(away < radius - corner - LIMITS.scan_inside_mm)
     if len(over):
         row = int(over[np.argmin(path[over, 2])])
         low = float(path[row, 2] - point[2])
-        return (low, False, np.array([0.0, 0.0, 1.0]), row) if abs(low) < LIMITS.scan_reach_mm else None
+        return _Foot(low, False, np.array([0.0, 0.0, 1.0]), row) if abs(low) < LIMITS.scan_reach_mm else None
     beside = np.flatnonzero(path[:, 2] + corner < point[2] - LIMITS.scan_above_mm)
     if not len(beside):
         return None
@@ -101,7 +114,7 @@ def _surface(
     far = float(away[row] - radius[row])
     if abs(far) > LIMITS.scan_reach_mm:
         return None
-    return far, True, np.array([*(offset[row] / away[row]), 0.0]), row
+    return _Foot(far, True, np.array([*(offset[row] / away[row]), 0.0]), row)
 
 
 def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
