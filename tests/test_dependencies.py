@@ -33,7 +33,8 @@ def imported():
 def test_a_dependency_is_imported_or_has_a_reason():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     stated = [re.split(r"[><=!~\[; ]", each)[0] for each in tomllib.loads(text)["project"]["dependencies"]]
-    unused = [name for name in stated if IMPORTED_AS.get(name, name) not in imported()]
+    used = imported()
+    unused = [name for name in stated if IMPORTED_AS.get(name, name) not in used]
     with_reason = [name for name in stated if re.search(rf'"{name}[^"]*", # not imported here: \w', text)]
     assert unused == with_reason
 

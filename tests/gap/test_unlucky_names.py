@@ -110,28 +110,28 @@ def _gap(folder, name, target, values, **signals) -> Gap:
 def test_sizes_called_phase_hz_and_harmonic_are_fitted_as_sizes(folder):
     gap = _gap(folder, "clock_works", "controller", SIZES, tracker=False, force=False)
     cause = gap.causes[0]
-    assert (gap.verdict, cause["effect"], cause["target"]) == ("explained", "clock_works", "controller")
+    assert (gap.verdict, cause.effect, cause.target) == ("explained", "clock_works", "controller")
     assert len(gap.named_causes) == 1
-    assert gap.gap["shrink"] > 0.95
+    assert gap.gap.shrink > 0.95
     for name, truth in SIZES.items():
-        value = cause["parameters"][name]
-        assert value["value"] == pytest.approx(truth, rel=0.05), name
+        value = cause.parameters[name]
+        assert value.value == pytest.approx(truth, rel=0.05), name
         # 90 % intervals of six numbers: each holds the truth once it is widened by half of itself
-        around = 0.25 * (value["high"] - value["low"])
-        assert value["low"] - around <= truth <= value["high"] + around, name
-        assert value["high"] - value["low"] < 0.3 * abs(truth), name
+        around = 0.25 * (value.high - value.low)
+        assert value.low - around <= truth <= value.high + around, name
+        assert value.high - value.low < 0.3 * abs(truth), name
 
 
 def test_a_phase_and_a_frequency_are_found_by_their_roles(folder):
     gap = _gap(folder, "mechanics", None, TONE, force=False)
     cause = gap.causes[0]
-    assert (gap.verdict, cause["effect"], cause["link"]) == ("explained", "mechanics", "mechanics")
-    found = {name: each["value"] for name, each in cause["parameters"].items()}
+    assert (gap.verdict, cause.effect, cause.link) == ("explained", "mechanics", "mechanics")
+    found = {name: each.value for name, each in cause.parameters.items()}
     assert found["mm"] == pytest.approx(TONE["mm"], rel=0.1)
     assert found["beat"] == pytest.approx(TONE["beat"], abs=0.01)
     assert np.cos(found["turn"] - TONE["turn"]) > 0.97
-    turn = cause["parameters"]["turn"]
-    assert 0.0 < turn["high"] - turn["low"] < 1.5  # of an angle, about its value
+    turn = cause.parameters["turn"]
+    assert 0.0 < turn.high - turn.low < 1.5  # of an angle, about its value
 
 
 @functools.cache
@@ -145,14 +145,14 @@ def test_a_folder_of_effects_changes_no_answer_that_they_have_no_part_in(folder)
     assert _names(without) == _names(beside) == [("servo_lag", "A3")]
     assert (without.verdict, _verdicts(without)) == (beside.verdict, _verdicts(beside))
     # noise is what no candidate explains: with more candidates its last digits move, and the fit's with them
-    one, other = (gap.causes[0]["parameters"]["tau_s"] for gap in (without, beside))
+    one, other = (gap.causes[0].parameters["tau_s"] for gap in (without, beside))
     assert one == pytest.approx(other, rel=1e-3)
-    assert without.gap["shrink"] == pytest.approx(beside.gap["shrink"], abs=1e-4)
+    assert without.gap.shrink == pytest.approx(beside.gap.shrink, abs=1e-4)
 
 
 def _names(gap: Gap):
-    return [(each["effect"], each["target"]) for each in gap.named_causes]
+    return [(each.effect, each.target) for each in gap.named_causes]
 
 
 def _verdicts(gap: Gap):
-    return [(each["link"], each["verdict"]) for each in gap.links]
+    return [(each.link, each.verdict) for each in gap.links]

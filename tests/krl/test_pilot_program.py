@@ -92,7 +92,17 @@ def check(made, in_view=IN_VIEW):
 # --- the examples ---------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda part: part.stem)
+LONG = "raster_finish"
+"""An example of thousands of lines: some ten seconds a test."""
+
+
+def _marks(part: Path):
+    return [pytest.mark.slow] if part.stem == LONG else []
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(part, marks=_marks(part), id=part.stem) for part in EXAMPLES]
+)
 def example(request):
     prediction = moved(read_gcode(request.param, load_cell()), load_cell())
     return SimpleNamespace(prediction=prediction, name=request.param.stem)
@@ -383,6 +393,7 @@ def random_forces(prediction, chance):
     return force
 
 
+@pytest.mark.slow
 def test_a_thousand_programs(tmp_path, monkeypatch):
     """Some are carried out by the replay; few are refused, for knots that are too close."""
     monkeypatch.setattr("os.fsync", lambda descriptor: None)
