@@ -138,8 +138,13 @@ def test_every_effect_and_slip_is_among_sixty_cases() -> None:
     assert {each.effect for each in whole} >= {*cases.LIBRARY, *cases.SLIPS}
     kinds = [each.kind for each in whole]
     assert {kind: kinds.count(kind) for kind in ("null", "open", "pair", "deleted", "log", "blind")} == {
-        "null": 5, "open": 3, "pair": 3, "deleted": 3, "log": 4, "blind": 3,
-    }  # fmt: skip
+        "null": 5,
+        "open": 3,
+        "pair": 3,
+        "deleted": 3,
+        "log": 4,
+        "blind": 3,
+    }
     assert sum(each.holdout for each in whole) >= 10
     assert sum(each.apply for each in whole) >= 4
     assert len({each.kind for each in whole[::5]}) >= 5  # a part has some of each

@@ -14,15 +14,30 @@ PACKAGE = Path(gcode2krl.__file__).parent
 
 PUBLIC = {
     "gcode2krl": [
-        "Cell", "Gcode2KrlError", "Issue", "Prediction", "Run", "__version__", "cut", "deflect", "diagnose",
-        "load_cell", "load_run", "plan_motion", "predict", "read_gcode", "set_targets", "solve_joints",
-        "verify_krl", "write_krl",
+        "Cell",
+        "Gcode2KrlError",
+        "Issue",
+        "Prediction",
+        "Run",
+        "__version__",
+        "cut",
+        "deflect",
+        "diagnose",
+        "load_cell",
+        "load_run",
+        "plan_motion",
+        "predict",
+        "read_gcode",
+        "set_targets",
+        "solve_joints",
+        "verify_krl",
+        "write_krl",
     ],
     "gcode2krl.krc4": ["corner", "effective_acceleration", "jerk", "speed_step"],
     "gcode2krl.robot": ["forward", "inverse", "jacobian"],
     "gcode2krl.cutting": ["mean_force"],
     "gcode2krl.compliance": ["displace", "project_normal"],
-}  # fmt: skip
+}
 """Module to names: the published interface."""
 
 STILL_SHARED = (

@@ -447,18 +447,22 @@ def _issues(
     if result.rms_mm > limit_mm:
         worst = max((section for section in sections if section.fitted), key=lambda section: section.rms_mm)
         yield Issue(
-            "warning", "law-misfit", worst.first_line,
+            "warning",
+            "law-misfit",
+            worst.first_line,
             f"the law leaves {result.rms_mm:.4f} mm rms, the noise is {result.noise_mm:.4f} mm; worst at "
             "this line; the intervals do not cover that",
             "was the override 100 %, and $ACC.CP that of the cell?",
-        )  # fmt: skip
+        )
     yield from _turning_issues(result, limit_mm)
     for section in sections:
         if not section.fitted and not section.turns and section.rms_mm > limit_mm:
             yield Issue(
-                "note", "unequal-speeds", section.first_line,
+                "note",
+                "unequal-speeds",
+                section.first_line,
                 f"the model for unequal speeds (an assumption) is {section.rms_mm:.4f} mm rms off here",
-            )  # fmt: skip
+            )
 
 
 def _cdis_issues(result: Identification, levels: Floats) -> Iterator[Issue]:

@@ -37,9 +37,12 @@ AMPLITUDE_RAD = np.radians([6.0, 4.0, 5.0, 8.0, 7.0, 9.0])
 HZ = np.array([0.31, 0.23, 0.37, 0.29, 0.41, 0.19])
 LINK = {link.name: link for link in LINKS}
 PLANNED = {
-    "path": ("q_cmd_rad", None), "servo": ("q_act_rad", "q_cmd_rad"), "gear": ("q_load_rad", "q_act_rad"),
-    "force": ("force_meas_base_N", None), "mechanics": ("tcp_base_mm", None),
-}  # fmt: skip
+    "path": ("q_cmd_rad", None),
+    "servo": ("q_act_rad", "q_cmd_rad"),
+    "gear": ("q_load_rad", "q_act_rad"),
+    "force": ("force_meas_base_N", None),
+    "mechanics": ("tcp_base_mm", None),
+}
 """Which signals of the model a link compares."""
 
 
@@ -68,11 +71,19 @@ def motion(seconds: float = SECONDS, step_s: float = STEP_S) -> Inputs:
     position, rotation = robot.forward(q_rad, cell(), 1)
     nothing = np.zeros((count, 3))
     return Inputs(
-        cell=cell(), time_s=time_s, move=np.zeros(count, dtype=np.int32),
-        source_line=np.arange(1, count + 1, dtype=np.int32), path_mm=np.zeros(count),
-        tool=np.ones(count, dtype=np.int32), spindle_rad_s=np.zeros(count), q_cmd_rad=q_rad,
-        position_mm=position, rotation=rotation, force_base_N=nothing, moment_base_Nmm=nothing,
-    )  # fmt: skip
+        cell=cell(),
+        time_s=time_s,
+        move=np.zeros(count, dtype=np.int32),
+        source_line=np.arange(1, count + 1, dtype=np.int32),
+        path_mm=np.zeros(count),
+        tool=np.ones(count, dtype=np.int32),
+        spindle_rad_s=np.zeros(count),
+        q_cmd_rad=q_rad,
+        position_mm=position,
+        rotation=rotation,
+        force_base_N=nothing,
+        moment_base_Nmm=nothing,
+    )
 
 
 class Added(Effect):
@@ -118,11 +129,20 @@ def trace(residual: np.ndarray, link: str = "servo", number: int = 0, inputs: In
     plus, minus = PLANNED[link]
     columns = tuple(range(residual.shape[1]))
     made = Trace(
-        link=LINK[link], run=f"run-{number + 1}", run_number=number, simulator=Simulator(), factor=1.0,
+        link=LINK[link],
+        run=f"run-{number + 1}",
+        run_number=number,
+        simulator=Simulator(),
+        factor=1.0,
         components=tuple(f"A{i + 1}" if LINK[link].of_joints else "xyz"[i] for i in columns),
-        columns=columns, plus=plus, minus=minus, inputs=inputs, time_s=inputs.time_s, measured=residual,
+        columns=columns,
+        plus=plus,
+        minus=minus,
+        inputs=inputs,
+        time_s=inputs.time_s,
+        measured=residual,
         segments=np.array([[0, len(residual)]], dtype=np.int64),
-    )  # fmt: skip
+    )
     made = replace(made, **more)
     return replace(made, measured=residual + made.nominal)
 

@@ -103,27 +103,66 @@ def mismatch(generator: np.random.Generator, cell: Any) -> list[Applied]:
 
 
 def runs(
-    effects: list[Applied], count: int = 3, seed: int = 0, *, sigma_mm: float = 0.02, sigma_N: float = 3.0,
-    sigma_deg: float = 3e-4, load_encoders: bool = False, controller: bool = True, tracker: bool = True,
-    force: bool = True, memory: float = 0.5, base: Prediction | None = None, extra: Any = None,
-    normal: bool = True, tracker_hz: float = 100.0,
-) -> list[Run]:  # fmt: skip
+    effects: list[Applied],
+    count: int = 3,
+    seed: int = 0,
+    *,
+    sigma_mm: float = 0.02,
+    sigma_N: float = 3.0,
+    sigma_deg: float = 3e-4,
+    load_encoders: bool = False,
+    controller: bool = True,
+    tracker: bool = True,
+    force: bool = True,
+    memory: float = 0.5,
+    base: Prediction | None = None,
+    extra: Any = None,
+    normal: bool = True,
+    tracker_hz: float = 100.0,
+) -> list[Run]:
     """Return runs of one program with some effects at work."""
     generator = np.random.default_rng(seed)
     nominal = base or prediction(dt_s=TRUE_STEP_S)  # a robot is finer than any prediction of it
     usual = mismatch(generator, nominal.cell) if normal else []
     return [
-        _run(number, inputs_of(nominal, hours=0.5 * number), [*effects, *usual], generator, sigma_mm, sigma_N,
-             sigma_deg, load_encoders, controller, tracker, force, memory, extra, normal, tracker_hz)
+        _run(
+            number,
+            inputs_of(nominal, hours=0.5 * number),
+            [*effects, *usual],
+            generator,
+            sigma_mm,
+            sigma_N,
+            sigma_deg,
+            load_encoders,
+            controller,
+            tracker,
+            force,
+            memory,
+            extra,
+            normal,
+            tracker_hz,
+        )
         for number in range(count)
-    ]  # fmt: skip
+    ]
 
 
 def _run(
-    number: int, inputs: Inputs, effects: list[Applied], generator: np.random.Generator, sigma_mm: float,
-    sigma_N: float, sigma_deg: float, load_encoders: bool, controller: bool, tracker: bool, force: bool,
-    memory: float, extra: Any, normal: bool, tracker_hz: float,
-) -> Run:  # fmt: skip
+    number: int,
+    inputs: Inputs,
+    effects: list[Applied],
+    generator: np.random.Generator,
+    sigma_mm: float,
+    sigma_N: float,
+    sigma_deg: float,
+    load_encoders: bool,
+    controller: bool,
+    tracker: bool,
+    force: bool,
+    memory: float,
+    extra: Any,
+    normal: bool,
+    tracker_hz: float,
+) -> Run:
     from gcode2krl.gap.beside.interpolation import interpolate
 
     signals = simulate(inputs, effects)

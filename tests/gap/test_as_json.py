@@ -24,9 +24,15 @@ from gcode2krl.gap.tell.result import (
 
 def _cause(**more):
     return CauseResult(
-        effect="backlash", target="A2", link="gear", probability=0.9,
-        parameters={"gap_deg": Interval(np.float64(0.02), 0.01, 0.03)}, shrink=None, rms_after=0.1, **more,
-    )  # fmt: skip
+        effect="backlash",
+        target="A2",
+        link="gear",
+        probability=0.9,
+        parameters={"gap_deg": Interval(np.float64(0.02), 0.01, 0.03)},
+        shrink=None,
+        rms_after=0.1,
+        **more,
+    )
 
 
 def _link(**more):
@@ -51,17 +57,40 @@ def _gap(**more):
 def test_the_keys_are_those_of_the_contract_in_their_order():
     found = gap_object(_gap())
     assert list(found) == [
-        "schema", "verdict", "gap", "links", "where", "causes", "unexplained", "not_examined", "observable",
-        "next_run", "runs", "notes", "issues",
-    ]  # fmt: skip
+        "schema",
+        "verdict",
+        "gap",
+        "links",
+        "where",
+        "causes",
+        "unexplained",
+        "not_examined",
+        "observable",
+        "next_run",
+        "runs",
+        "notes",
+        "issues",
+    ]
     assert found["schema"] == SCHEMA
     assert list(found["gap"]) == [
-        "signal", "unit", "rms_before", "rms_after", "noise_floor", "max_before", "max_after", "shrink",
+        "signal",
+        "unit",
+        "rms_before",
+        "rms_after",
+        "noise_floor",
+        "max_before",
+        "max_after",
+        "shrink",
         "held_out",
-    ]  # fmt: skip
+    ]
     assert list(found["where"]) == [
-        "signals", "intervals", "direction_base", "phases", "joints", "frequency_hz",
-    ]  # fmt: skip
+        "signals",
+        "intervals",
+        "direction_base",
+        "phases",
+        "joints",
+        "frequency_hz",
+    ]
     assert found == _gap().as_dict()
 
 
@@ -115,5 +144,9 @@ def test_findings_have_five_keys():
     issue = Issue("warning", "run-clock", 3, "late", "set it", "t_s")
     (found,) = gap_object(_gap(issues=(issue,)))["issues"]
     assert found == {
-        "severity": "warning", "code": "run-clock", "line": 3, "message": "late", "remedy": "set it"
-    }  # fmt: skip
+        "severity": "warning",
+        "code": "run-clock",
+        "line": 3,
+        "message": "late",
+        "remedy": "set it",
+    }

@@ -23,16 +23,28 @@ JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 
 def _size(before=4.0, after=1.0, excess_before=3.0):
     return Size(
-        rows=100, before=before, after=after, floor=0.25, noise=0.25, excess=0.0, excess_before=excess_before,
-        deviation=1.0, largest_before=5.0, largest_after=2.0,
-    )  # fmt: skip
+        rows=100,
+        before=before,
+        after=after,
+        floor=0.25,
+        noise=0.25,
+        excess=0.0,
+        excess_before=excess_before,
+        deviation=1.0,
+        largest_before=5.0,
+        largest_after=2.0,
+    )
 
 
 def _trace(link, factor=10.0, components=JOINTS, zero=0.0):
     return SimpleNamespace(
-        link=link, signal=link.signal, unit=link.unit, factor=factor, components=components,
+        link=link,
+        signal=link.signal,
+        unit=link.unit,
+        factor=factor,
+        components=components,
         measured=np.full((4, len(components)), zero) + np.array([[0.1], [-0.1], [0.1], [-0.1]]),
-    )  # fmt: skip
+    )
 
 
 def _judgement(link, verdict="no_gap", size=None, usual=(), **trace):
@@ -103,8 +115,10 @@ def test_links_come_in_the_order_of_the_chain_with_zeros_of_encoders():
     judgements = [_judgement(FORCE, "explained"), _judgement(GEAR, zero=0.5), _judgement(SERVO, "explained")]
     links = list(assembly._links(judgements, [_slip(GEAR)]))
     assert [(link.link, link.verdict) for link in links] == [
-        ("servo", "explained"), ("gear", "explained"), ("force", "explained"),
-    ]  # fmt: skip
+        ("servo", "explained"),
+        ("gear", "explained"),
+        ("force", "explained"),
+    ]
     assert links[1].offset_deg == pytest.approx(dict.fromkeys(JOINTS, 5.0))
     assert links[0].offset_deg is None
     assert [link.verdict for link in assembly._links([_judgement(GEAR)], [])] == ["no_gap"]

@@ -21,25 +21,35 @@ GAP = {"signal": "tcp", "rms_before": 0.5, "rms_after": 0.3, "shrink": 0.9, "hel
 
 def effect(name="backlash", target="A2", form="same", ratio=2.0, **more):
     return {
-        "effect": name, "target": target, "family": "joint", "form": form, "ratio": ratio,
-        "parameters": {"gap_deg": 0.02}, "main_signal": "tcp",
+        "effect": name,
+        "target": target,
+        "family": "joint",
+        "form": form,
+        "ratio": ratio,
+        "parameters": {"gap_deg": 0.02},
+        "main_signal": "tcp",
         "where": [{"run": "run-1", "t_start_s": 1.0, "t_end_s": 3.0}],
-    } | more  # fmt: skip
+    } | more
 
 
 def cause(name="backlash", target="A2", probability=0.9, alike=(), **parameters):
     return {
-        "effect": name, "target": target, "probability": probability, "parameters": parameters,
+        "effect": name,
+        "target": target,
+        "probability": probability,
+        "parameters": parameters,
         "indistinguishable_from": [{"effect": n, "target": t} for n, t in alike],
-    }  # fmt: skip
+    }
 
 
 def record(effects=(), causes=(), verdict=None, kind="single", intervals=(), **more):
     verdict = verdict or ("explained" if causes else "no_gap")
     result = {
-        "verdict": verdict, "causes": list(causes), "gap": GAP,
+        "verdict": verdict,
+        "causes": list(causes),
+        "gap": GAP,
         "where": {"intervals": list(intervals)},
-    }  # fmt: skip
+    }
     made = {
         "case": {"seed": 1, "kind": kind},
         "label": {"effects": list(effects)},

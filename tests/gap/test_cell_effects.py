@@ -14,9 +14,10 @@ from tests.gap.test_report import GAP
 LIBRARY = library()
 BACKLASH = Applied(LIBRARY["backlash"], "A2", {"gap_deg": 0.0212345678})
 FRAME = Applied(
-    LIBRARY["base_frame"], None,
+    LIBRARY["base_frame"],
+    None,
     {"x_mm": 0.5, "y_mm": 0.0, "z_mm": -0.25, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.01},
-)  # fmt: skip
+)
 SLIP = Applied(LIBRARY["override"], None, {"percent": 50.0})
 
 
@@ -33,9 +34,11 @@ def test_a_new_file_holds_the_causes_with_their_source(tmp_path):
     assert apply_to_cell(with_causes(BACKLASH, FRAME), file, None, ["run-1", "run-2"]) == 2
     first, second = effects(file)
     assert first == {
-        "name": "backlash", "target": "A2", "parameters": {"gap_deg": 0.0212346},
+        "name": "backlash",
+        "target": "A2",
+        "parameters": {"gap_deg": 0.0212346},
         "source": "diagnosed from run-1, run-2",
-    }  # fmt: skip
+    }
     assert "target" not in second
     assert second["parameters"] == FRAME.values
 
@@ -63,8 +66,9 @@ def test_what_stood_there_stays_and_the_same_cause_is_replaced(tmp_path):
     )
     apply_to_cell(with_causes(BACKLASH), file, None, ["run-1"])
     assert [(one["target"], one["parameters"]["gap_deg"]) for one in effects(file)] == [
-        ("A3", 0.01), ("A2", 0.0212346),
-    ]  # fmt: skip
+        ("A3", 0.01),
+        ("A2", 0.0212346),
+    ]
     assert tomllib.loads(file.read_text(encoding="utf-8"))["name"] == "my cell"
 
 

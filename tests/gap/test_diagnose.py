@@ -154,15 +154,34 @@ def test_the_json_has_every_key_and_plain_values():
     )
     assert found["schema"] == SCHEMA
     assert set(found) >= {
-        "verdict", "gap", "links", "where", "causes", "unexplained", "not_examined", "next_run",
-    }  # fmt: skip
+        "verdict",
+        "gap",
+        "links",
+        "where",
+        "causes",
+        "unexplained",
+        "not_examined",
+        "next_run",
+    }
     assert set(found["gap"]) == {
-        "signal", "unit", "rms_before", "rms_after", "noise_floor", "max_before", "max_after", "shrink",
+        "signal",
+        "unit",
+        "rms_before",
+        "rms_after",
+        "noise_floor",
+        "max_before",
+        "max_after",
+        "shrink",
         "held_out",
-    }  # fmt: skip
+    }
     assert set(found["where"]) == {
-        "signals", "intervals", "direction_base", "phases", "joints", "frequency_hz",
-    }  # fmt: skip
+        "signals",
+        "intervals",
+        "direction_base",
+        "phases",
+        "joints",
+        "frequency_hz",
+    }
     assert {each["link"] for each in found["not_examined"]} == {"gear", "force", "mechanics", "part"}
 
 

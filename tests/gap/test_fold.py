@@ -15,10 +15,19 @@ COUNT, STEP_S = 2000, 0.01
 def _part(number: int) -> Trace:
     time_s = STEP_S * np.arange(COUNT)
     return Trace(
-        link=SERVO, run=f"run-{number}", run_number=number, simulator=Simulator(), factor=1.0,
-        components=("A1",), columns=(0,), plus="q_act_rad", inputs=SimpleNamespace(time_s=time_s),
-        time_s=time_s, measured=np.zeros((COUNT, 1)), segments=np.array([[0, COUNT]], dtype=np.int64),
-    )  # fmt: skip
+        link=SERVO,
+        run=f"run-{number}",
+        run_number=number,
+        simulator=Simulator(),
+        factor=1.0,
+        components=("A1",),
+        columns=(0,),
+        plus="q_act_rad",
+        inputs=SimpleNamespace(time_s=time_s),
+        time_s=time_s,
+        measured=np.zeros((COUNT, 1)),
+        segments=np.array([[0, COUNT]], dtype=np.int64),
+    )
 
 
 def test_whole_runs_are_held_out_by_turns():

@@ -92,7 +92,8 @@ def test_the_deviation_is_that_of_means_over_seconds():
     [
         (60.0, 100),
         pytest.param(
-            10.0, 400,
+            10.0,
+            400,
             marks=pytest.mark.xfail(
                 strict=True,
                 reason="four deviations, said to be one in 30,000, are one in 200 by ten stretches: "
@@ -100,7 +101,7 @@ def test_the_deviation_is_that_of_means_over_seconds():
             ),
         ),
     ],
-)  # fmt: skip
+)
 def test_white_noise_is_hardly_ever_significant(seconds, count):
     rows = round(seconds / 0.02)
     alarms = sum(size(noise(rows, 100 + seed, SIGMA)[:, 0]).significant for seed in range(count))
@@ -108,9 +109,17 @@ def test_white_noise_is_hardly_ever_significant(seconds, count):
 
 
 PLAIN = Size(
-    rows=100, before=10.0, after=3.0, floor=2.0, noise=1.0, excess=1.0, excess_before=8.0, deviation=0.1,
-    largest_before=9.0, largest_after=4.0,
-)  # fmt: skip
+    rows=100,
+    before=10.0,
+    after=3.0,
+    floor=2.0,
+    noise=1.0,
+    excess=1.0,
+    excess_before=8.0,
+    deviation=0.1,
+    largest_before=9.0,
+    largest_after=4.0,
+)
 
 
 def test_shares_by_hand():

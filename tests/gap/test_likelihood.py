@@ -478,9 +478,14 @@ def test_gauss_newton_stays_in_its_box():
     target = np.array([3.0, -0.5])
     narrow = Box(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), np.ones(2))
     least = gauss_newton(
-        lambda x: x - target, np.zeros(2), narrow, Damped(narrow), lambda a, b: a - b < 1e-12,
-        most_steps=50, step_share=1e-4,
-    )  # fmt: skip
+        lambda x: x - target,
+        np.zeros(2),
+        narrow,
+        Damped(narrow),
+        lambda a, b: a - b < 1e-12,
+        most_steps=50,
+        step_share=1e-4,
+    )
     assert least.x == pytest.approx([1.0, -0.5], abs=1e-6)
 
 

@@ -35,9 +35,13 @@ def test_another_path_is_no_override():
     table = pair.run.controller
     rows = slice(0, int(0.8 * len(table.time_s)))
     shorter = replace(
-        table, time_s=table.time_s[rows], row=table.row[rows], q_cmd_rad=table.q_cmd_rad[rows],
-        q_act_rad=table.q_act_rad[rows], segments=np.array([[0, rows.stop]]),
-    )  # fmt: skip
+        table,
+        time_s=table.time_s[rows],
+        row=table.row[rows],
+        q_cmd_rad=table.q_cmd_rad[rows],
+        q_act_rad=table.q_act_rad[rows],
+        segments=np.array([[0, rows.stop]]),
+    )
     assert OverrideTest().find([replace(pair, run=replace(pair.run, controller=shorter))], LIBRARY) == []
 
 

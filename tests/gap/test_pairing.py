@@ -99,9 +99,11 @@ def test_without_a_robot_or_with_relative_angles_there_is_no_tip():
 
 def test_a_measured_force_is_the_load_turned_into_the_base():
     force = Force(
-        time_s=STAMPS_S, row=np.arange(len(STAMPS_S)), segments=np.array([[0, len(STAMPS_S)]]),
+        time_s=STAMPS_S,
+        row=np.arange(len(STAMPS_S)),
+        segments=np.array([[0, len(STAMPS_S)]]),
         force_N=np.tile([10.0, -20.0, 5.0], (len(STAMPS_S), 1)),
-    )  # fmt: skip
+    )
     turns = {"base": Rotation.identity(len(STAMPS_S))}
     turns["tcp"] = Rotation.from_quat(robot.forward(OWN, cell(), 1)[1])
     push = np.array(force.force_N)

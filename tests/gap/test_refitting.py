@@ -60,9 +60,7 @@ def test_beside_nuisance_they_are_generalised_least_squares():
     traces = [trace(each[:, None], number=i) for i, each in enumerate(y)]
     found = refit(likelihood(traces, nuisance, SIGMA), [applied(ONE, 0.3), applied(TWO, 0.3)])
     nothing = np.zeros(COUNT)
-    columns = np.column_stack([
-        np.r_[shared, shared], np.r_[own_1, nothing], np.r_[nothing, own_2]
-    ])  # fmt: skip
+    columns = np.column_stack([np.r_[shared, shared], np.r_[own_1, nothing], np.r_[nothing, own_2]])
     inverse = np.linalg.inv(SIGMA**2 * np.eye(2 * COUNT) + columns @ columns.T)
     x, both = np.vstack([FORMS, FORMS]), np.concatenate(y)
     normal = x.T @ inverse @ x

@@ -20,9 +20,14 @@ from gcode2krl.gap.tell.result import (
 )
 
 BACKLASH = CauseResult(
-    effect="backlash", target="A2", link="mechanics", probability=0.94,
-    parameters={"gap_deg": Interval(0.0212, 0.0192, 0.0232)}, shrink=0.976, rms_after=0.06,
-)  # fmt: skip
+    effect="backlash",
+    target="A2",
+    link="mechanics",
+    probability=0.94,
+    parameters={"gap_deg": Interval(0.0212, 0.0192, 0.0232)},
+    shrink=0.976,
+    rms_after=0.06,
+)
 LAG = replace(BACKLASH, effect="servo_lag", target="A4", parameters={}, probability=0.8, shrink=None)
 UNSURE = replace(BACKLASH, effect="thermal", target=None, parameters={}, probability=0.31)
 GAP = Gap(
@@ -31,7 +36,11 @@ GAP = Gap(
     links=(
         LinkResult(link="servo", rms_before=1e-3, rms_after=1e-3, noise=None, unit="deg", verdict="no_gap"),
         LinkResult(
-            link="mechanics", rms_before=0.4123, rms_after=0.0611, noise=0.0304, unit="mm",
+            link="mechanics",
+            rms_before=0.4123,
+            rms_after=0.0611,
+            noise=0.0304,
+            unit="mm",
             verdict="explained",
         ),
     ),
@@ -39,7 +48,7 @@ GAP = Gap(
     causes=(BACKLASH,),
     unexplained=Unexplained(rms=0.06, significant=False, structure="white"),
     not_examined=(NotExamined(link="force", needs="force.csv"),),
-)  # fmt: skip
+)
 
 
 def where(share, phase="reversal", joints=("A2",)):
@@ -103,10 +112,13 @@ def test_the_phase_with_most_of_the_gap_is_in_the_sentence(share, words):
 @pytest.mark.parametrize(
     ("phase", "words"),
     [
-        ("corner", "at corners"), ("entry", "where the cutter enters"), ("exit", "where it leaves"),
-        ("cruise", "while cutting"), ("air", "in air"),
+        ("corner", "at corners"),
+        ("entry", "where the cutter enters"),
+        ("exit", "where it leaves"),
+        ("cruise", "while cutting"),
+        ("air", "in air"),
     ],
-)  # fmt: skip
+)
 def test_phases_have_words_of_their_own(phase, words):
     assert f", nearly all of it {words}: " in headline(replace(GAP, where=where(0.95, phase)))
 
@@ -114,10 +126,14 @@ def test_phases_have_words_of_their_own(phase, words):
 @pytest.mark.parametrize(
     ("signal", "words"),
     [
-        ("force", "of force"), ("joint_actual", "of servo error"), ("joint_load", "behind the gears"),
-        ("joint_commanded", "off the commanded path"), ("timing", "off in time"), ("scan", "on the part"),
+        ("force", "of force"),
+        ("joint_actual", "of servo error"),
+        ("joint_load", "behind the gears"),
+        ("joint_commanded", "off the commanded path"),
+        ("timing", "off in time"),
+        ("scan", "on the part"),
     ],
-)  # fmt: skip
+)
 def test_signals_have_words_of_their_own(signal, words):
     assert f"RMS {words}: " in headline(replace(GAP, gap=replace(GAP.gap, signal=signal)))
 
@@ -141,9 +157,14 @@ def test_numbers_have_three_digits(value, text):
 
 def test_the_whole_report_line_by_line():
     interval = IntervalResult(
-        run="run-1", signal="tcp", t_start_s=3.1, t_end_s=3.9, lines=(120, 131), rms=0.8,
+        run="run-1",
+        signal="tcp",
+        t_start_s=3.1,
+        t_end_s=3.9,
+        lines=(120, 131),
+        rms=0.8,
         what="reversal of A2",
-    )  # fmt: skip
+    )
     some = replace(
         GAP,
         causes=(BACKLASH, UNSURE),

@@ -10,9 +10,14 @@ from gcode2krl.gap.tell import result
 
 def _cause(probability):
     return result.CauseResult(
-        effect="backlash", target="A2", link="gear", probability=probability, parameters={}, shrink=None,
+        effect="backlash",
+        target="A2",
+        link="gear",
+        probability=probability,
+        parameters={},
+        shrink=None,
         rms_after=None,
-    )  # fmt: skip
+    )
 
 
 def _gap(*probabilities):

@@ -70,10 +70,13 @@ def test_the_way_to_the_start_and_from_the_end_is_no_program():
     table = pair.run.controller
     away = table.q_cmd_rad[[0, -1]] + [[0.2, 0, 0, 0, 0, 0]]
     share = np.linspace(1.0, 0.0, 100, endpoint=False)[:, None]
-    q = np.concatenate([
-        table.q_cmd_rad[0] + share * (away[0] - table.q_cmd_rad[0]), table.q_cmd_rad,
-        table.q_cmd_rad[-1] + share[::-1] * (away[1] - table.q_cmd_rad[-1]),
-    ])  # fmt: skip
+    q = np.concatenate(
+        [
+            table.q_cmd_rad[0] + share * (away[0] - table.q_cmd_rad[0]),
+            table.q_cmd_rad,
+            table.q_cmd_rad[-1] + share[::-1] * (away[1] - table.q_cmd_rad[-1]),
+        ]
+    )
     time_s = 0.012 * np.arange(len(q))
     longer = Controller(
         time_s=time_s, row=np.arange(len(q)) + 2, segments=np.array([[0, len(q)]]), q_cmd_rad=q
@@ -105,9 +108,11 @@ def test_slower_rapid_moves_alone_are_no_other_program():
     assert slow.time_s[-1] > inputs.time_s[-1] + 0.2
     time_s = np.arange(0.0, slow.time_s[-1], 0.012)
     table = Controller(
-        time_s=time_s, row=np.arange(len(time_s)) + 2, segments=np.array([[0, len(time_s)]]),
+        time_s=time_s,
+        row=np.arange(len(time_s)) + 2,
+        segments=np.array([[0, len(time_s)]]),
         q_cmd_rad=cubic(time_s, slow.time_s, slow.q_cmd_rad),
-    )  # fmt: skip
+    )
     run = Run(pair.run.name, pair.run.folder, pair.run.head, controller=table)
     assert other_program([replace(pair, run=run)]) is None
 

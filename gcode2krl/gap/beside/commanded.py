@@ -76,9 +76,14 @@ def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:
     if len(rows) < 2:
         return None
     return CommandedPath(
-        pair.name, inputs, pair.stamps(table)[rows], tip_mm[rows], way_mm[rows], apart_mm[rows],
+        pair.name,
+        inputs,
+        pair.stamps(table)[rows],
+        tip_mm[rows],
+        way_mm[rows],
+        apart_mm[rows],
         resolution_mm,
-    )  # fmt: skip
+    )
 
 
 def _nearest_tool(q_rad: Floats, inputs: Inputs, tool: int | None) -> tuple[Floats, Floats]:

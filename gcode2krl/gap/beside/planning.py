@@ -30,9 +30,12 @@ def remembered_plan(prediction: Prediction) -> Plan | None:
 
     def once(targets: Targets, cell: Cell) -> Motion:
         key = (
-            targets.cdis_mm.tobytes(), targets.speed_mm_s.tobytes(), targets.wait_s.tobytes(),
-            targets.position_mm.tobytes(), cell.controller.model_dump_json(),
-        )  # fmt: skip
+            targets.cdis_mm.tobytes(),
+            targets.speed_mm_s.tobytes(),
+            targets.wait_s.tobytes(),
+            targets.position_mm.tobytes(),
+            cell.controller.model_dump_json(),
+        )
         if key not in known:
             known[key] = plan(targets, cell)
             if len(known) > LIMITS.remembered_plans:

@@ -31,9 +31,15 @@ class ForceLink(Link):
         if table is None or pair.from_log:
             return None
         return vector_trace(
-            self, pair, table, table.force_N, "force_meas_base_N",
-            base=base, frame=head.frames.force, sigma=head.noise.force_N,
-        )  # fmt: skip
+            self,
+            pair,
+            table,
+            table.force_N,
+            "force_meas_base_N",
+            base=base,
+            frame=head.frames.force,
+            sigma=head.noise.force_N,
+        )
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
         """Yield the zero and the gain of the force sensor."""
@@ -68,9 +74,15 @@ class MechanicsLink(Link):
             return None
         pair = pair.with_measured_joints("q_load")
         return vector_trace(
-            self, pair, table, table.position_mm, "tcp_base_mm",
-            base=base, frame=head.frames.tracker, sigma=head.noise.tcp_mm,
-        )  # fmt: skip
+            self,
+            pair,
+            table,
+            table.position_mm,
+            "tcp_base_mm",
+            base=base,
+            frame=head.frames.tracker,
+            sigma=head.noise.tcp_mm,
+        )
 
     def planned(self, inputs: Inputs) -> Floats:
         """Return the commanded tip (m, 3)."""
