@@ -26,10 +26,22 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "unexplained": plain(gap.unexplained),
         "not_examined": plain(gap.not_examined),
         "observable": plain(gap.observable),
-        "next_run": gap.next_run,
+        "next_run": _next_run(gap.next_run),
         "runs": list(gap.runs),
         "notes": list(gap.notes),
         "issues": [_issue(issue) for issue in gap.issues],
+    }
+
+
+def _next_run(run: Any) -> dict[str, Any] | None:
+    """Return the next run with its pairs of answers as lists; None where nothing is left to part."""
+    if run is None:
+        return None
+    return {
+        "program": run.program,
+        "minutes": plain(run.minutes),
+        "separates": [[each.first, each.second, plain(each.odds)] for each in run.separates],
+        "expect": [{"if": each.answer, "then": each.shows} for each in run.expect],
     }
 
 

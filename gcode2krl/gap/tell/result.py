@@ -66,6 +66,8 @@ class IntervalResult:
     rms: float
     what: str
     """What goes on there: a phase, or the reversal of a joint."""
+    share: float | None = None
+    """Of the gap's power over all runs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,6 +120,68 @@ class RivalResult:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Constancy:
+    """Whether a cause's numbers are the same in all runs, halves of them and joints."""
+
+    inconstancy: float
+    """Spread of the size over parts of the data beyond what noise lets it vary, over the size."""
+    p: float
+    """Probability of at least that spread where the size is one number."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DependsOnResult:
+    """On what a gap without a name depends: where, on which input, in which form."""
+
+    link: str
+    at: str
+    """``tip``, a joint ``A1`` … ``A6``, or an axis of the force ``fx`` ``fy`` ``fz``."""
+    on: str
+    """An input: the value of an `effects.dependence.Dependence`, "time in the run" for a step too."""
+    form: str
+    """step, drift, periodic, loop or smooth."""
+    probability: float
+    share: float
+    """Of the gap's power beyond noise that it takes."""
+    at_time_s: float | None = None
+    """Of a step, its moment in `run`."""
+    run: str | None = None
+    size: float | None = None
+    """Of a step its height, else the largest deviation, in ``unit``."""
+    unit: str | None = None
+    direction: tuple[float, ...] | None = None
+    """Unit vector in ``$BASE`` of what moves the tip or is a force."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Separates:
+    """Two answers that the data leave open, and the odds expected between them after a run."""
+
+    first: str
+    second: str
+    odds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expectation:
+    """What a run will show if an answer is right."""
+
+    answer: str
+    shows: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextRun:
+    """The canned program that parts best what the data leave open."""
+
+    program: str
+    """A name that ``gcode2krl make-test`` takes."""
+    minutes: float
+    separates: tuple[Separates, ...]
+    expect: tuple[Expectation, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class CauseResult:
     """One effect at one target, a set-up slip included."""
 
@@ -136,6 +200,11 @@ class CauseResult:
     """Others that these data cannot tell from it: they share the probability."""
     rivals: tuple[RivalResult, ...] | None = None
     """None where no other effect was compared with it."""
+    family: str | None = None
+    """Where and on what it depends, ``A2, reversals``."""
+    form_fits: float | None = None
+    """The gain of its form over that of the best function of what it depends on."""
+    constant: Constancy | None = None
 
     @property
     def is_named(self) -> bool:
@@ -151,6 +220,8 @@ class Unexplained:
     significant: bool
     structure: str
     """structured, white or unknown."""
+    depends_on: tuple[DependsOnResult, ...] = ()
+    """The most probable first; empty where nothing significant is left."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +259,8 @@ class Gap:
     unexplained: Unexplained
     not_examined: tuple[NotExamined, ...]
     observable: tuple[Detectable, ...] = ()
-    next_run: str | None = None
+    next_run: NextRun | None = None
+    """None only where nothing is left to part."""
     named: tuple[Applied, ...] = ()
     """The causes with a probability of at least 0.5, as effects that `predict` takes."""
     issues: tuple[Issue, ...] = ()
