@@ -44,6 +44,26 @@ def tool_rotation(q_rad: Floats, cell: Cell, tool: Ints32) -> Floats:
     return turned
 
 
+def axes_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell) -> Floats:
+    """Return a point (m, 6, 3) in mm of each axis in ``$BASE``: of A1 at the foot, of A4 to A6 the wrist.
+
+    Eq. 1 of `gcode2krl.robot.kinematics`, link by link.
+    """
+    a1, a2, c1, c2, c3, _ = lengths_mm
+    cos_1, sin_1 = np.cos(q_rad[:, 0]), np.sin(q_rad[:, 0])
+    upper, fore = q_rad[:, 1], q_rad[:, 1] + q_rad[:, 2]
+    radius = np.stack([0.0 * upper, 0.0 * upper + a1, a1 + c2 * np.cos(upper)], axis=1)
+    height = np.stack([0.0 * upper, 0.0 * upper + c1, c1 - c2 * np.sin(upper)], axis=1)
+    wrist_out = radius[:, 2] + c3 * np.cos(fore) - a2 * np.sin(fore)
+    wrist_up = height[:, 2] - c3 * np.sin(fore) - a2 * np.cos(fore)
+    radius = np.column_stack([radius, wrist_out, wrist_out, wrist_out])
+    height = np.column_stack([height, wrist_up, wrist_up, wrist_up])
+    root = np.stack([cos_1[:, None] * radius, -sin_1[:, None] * radius, height], axis=2)
+    to_base = invert(cell.base_matrix())
+    points: Floats = root @ to_base[:3, :3].T + to_base[:3, 3]
+    return points
+
+
 def jacobian_base(q_rad: Floats, cell: Cell, tool: Ints32) -> Floats:
     """Return the Jacobian (m, 6, 6) of the tip along ``$BASE``: mm/rad over rad/rad."""
     found = np.empty((len(q_rad), 6, 6))

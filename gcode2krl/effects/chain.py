@@ -41,11 +41,12 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
     for one in applied:
         cut = one.effect.cut(cut, inputs, one)
-    bending = cut if inputs.load_base_N is None else (inputs.load_base_N, inputs.moment_base_Nmm)
+    cutting = cut if inputs.load_base_N is None else (inputs.load_base_N, inputs.moment_base_Nmm)
+    bending = cutting
     for one in applied:
         bending = one.effect.load(bending, inputs, one)
 
-    pose = _pose(inputs, applied, q_true, bending, rotation)
+    pose = _pose(inputs, applied, q_true, cutting, bending, rotation)
     sensed = cut
     for one in applied:
         sensed = one.effect.sensor(sensed, inputs, one)
@@ -93,9 +94,12 @@ def _planned(inputs: Inputs, applied: Sequence[Applied]) -> Inputs:
 
 
 def _pose(
-    inputs: Inputs, applied: Sequence[Applied], q_true: Floats, load: Load, rotation: bool
+    inputs: Inputs, applied: Sequence[Applied], q_true: Floats, cutting: Load, load: Load, rotation: bool
 ) -> dict[str, Any]:
-    """Return true joints, tip and, where asked for, orientation of the loaded arm."""
+    """Return true joints, tip and, where asked for, orientation of the loaded arm.
+
+    ``load`` bends the arm, ``cutting`` is the part of it that acts between cutter and part.
+    """
     softness, lengths_mm = inputs.softness, inputs.lengths_mm
     for one in applied:
         softness = softness if softness is None else one.effect.softness(softness, inputs, one)
@@ -115,6 +119,8 @@ def _pose(
     if q_true is not inputs.q_cmd_rad or lengths_mm is not inputs.lengths_mm:
         tip = tip + (arm.tip_mm(q_true, lengths_mm, inputs.cell, inputs.tool) - inputs._rigid_tip_mm)
     tcp = tip + deflection
+    for one in applied:
+        tcp = one.effect.yielding(tcp, cutting, inputs, one)
     for one in applied:
         tcp = one.effect.tcp(tcp, deflection, inputs, one)
     found: dict[str, Any] = {"q_true_rad": q_true, "tcp_base_mm": tcp}

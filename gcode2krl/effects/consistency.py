@@ -8,7 +8,8 @@ from gcode2krl.effects.effect import LINKS, Effect
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.effects.parameter import Parameter, Role
 
-_UNITS = {Role.PHASE: "rad", Role.FREQUENCY: "Hz"}
+_UNITS = {Role.PHASE: "rad", Role.FREQUENCY: "Hz", Role.MOMENT: "s"}
+_AT_MOST_ONE = (Role.PHASE, Role.FREQUENCY, Role.MOMENT)
 
 
 def what_is_wrong(effect: Effect) -> str:
@@ -53,9 +54,11 @@ def _of_parameter(p: Parameter) -> Iterator[str]:
 def _of_roles(effect: Effect) -> Iterator[str]:
     """Find roles that do not go together: a sine has one amplitude, a vector one length."""
     count = Counter(p.role for p in effect.parameters)
-    for role in (Role.PHASE, Role.FREQUENCY):
+    for role in _AT_MOST_ONE:
         if count[role] > 1:
             yield f"found {count[role]} parameters with Role.{role.name}, allowed: one"
+    if count[Role.FREQUENCY] and count[Role.MOMENT]:
+        yield "a frequency and a moment cannot be searched together"
     if count[Role.PHASE] and count[Role.SIZE] != 1:
         yield f"a phase needs exactly one size, its amplitude; found {count[Role.SIZE]}"
     direction = effect.direction or ()

@@ -132,11 +132,22 @@ class Effect:
         """Return the links in which the effect shows at this target."""
         return self.links
 
+    def at(self, target: Target) -> "Effect":
+        """Return the effect with the parameters that it has at a target, of the same name.
+
+        Another one than itself only where a target has a number in another unit: mm of a tip, degrees of a
+        joint.
+        """
+        return self
+
     def visible_links(self, examined: frozenset[str], target: Target = None) -> frozenset[str]:
         """Return the examined links in which it shows; what is not measured adds to the next link downstream.
 
-        Without a load encoder, say, a backlash shows in the mechanics.
+        Without a load encoder, say, a backlash shows in the mechanics. An error of an instrument shows in
+        what that instrument measures and nowhere else.
         """
+        if self.family == "sensor":
+            return self.links_at(target) & examined
         visible = set()
         for link in self.links_at(target):
             here: str | None = link
@@ -205,6 +216,11 @@ class Effect:
     def phase(self) -> Parameter | None:
         """Return the parameter that is the phase of a sine; None where it is no sine."""
         return self._with_role(Role.PHASE)
+
+    @property
+    def moment(self) -> Parameter | None:
+        """Return the parameter that is a moment in s; None where it does not begin at one."""
+        return self._with_role(Role.MOMENT)
 
     @property
     def frequency(self) -> Parameter | None:
@@ -312,6 +328,13 @@ class Effect:
     def geometry(self, lengths_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return a1, a2, c1, c2, c3, c4 (6,) of the arm in mm."""
         return lengths_mm
+
+    def yielding(self, tcp_mm: Floats, load: Load, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the tip (m, 3) with what gives way under the cutting load besides the arm.
+
+        ``load`` is the true one, or the measured one where the arm is bent by that.
+        """
+        return tcp_mm
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the tool tip (m, 3) in mm in ``$BASE``, deflection included."""

@@ -10,11 +10,11 @@ from gcode2krl import frames as fr
 from gcode2krl import robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.effects import arm
+from gcode2krl.effects import arm, masses
 from gcode2krl.effects.arm import Load
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.tables import Forces, Motion, Targets, Toolpath
-from gcode2krl.units import S_PER_H
+from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, S_PER_H
 
 Cut = Callable[[Motion, Cell], Forces]
 Plan = Callable[[Targets, Cell], Motion]
@@ -85,6 +85,35 @@ class Inputs:
     def jacobian(self) -> Floats:
         """(m, 6, 6) of the tip at the commanded joints, along ``$BASE``."""
         return arm.jacobian_base(self.q_cmd_rad, self.cell, self.tool)
+
+    @cached_property
+    def own_torque_Nm(self) -> Floats:
+        """(m, 6) torque of the nominal loads about each axis, positive with the angle: what its gear carries.
+
+        Cutting load (the measured force where there is one), and weight and inertia of links and payload as
+        far as the cell states their masses.
+        """
+        force_N = self.force_base_N if self.load_base_N is None else self.load_base_N
+        torque = arm.torque_Nm(self.jacobian, force_N, self.moment_base_Nmm)
+        return torque + masses.torque_Nm(self.bodies, self.bodies_push_N, self.axes_mm, self.jacobian)
+
+    @cached_property
+    def axes_mm(self) -> Floats:
+        """(m, 6, 3) a point of each joint's axis in ``$BASE``: where the links meet."""
+        return arm.axes_mm(self.q_cmd_rad, self.lengths_mm, self.cell)
+
+    @cached_property
+    def bodies(self) -> masses.Bodies:
+        """Links and payload as points with a mass."""
+        return masses.bodies_of(self.cell, self.axes_mm, self.position_mm, self.tool_rotation, self.tool)
+
+    @cached_property
+    def bodies_push_N(self) -> Floats:
+        """(m, b, 3) weight and inertia of links and payload along ``$BASE``."""
+        speed = [gradient(at, self.time_s) for at in np.moveaxis(self.bodies.centre_mm, 1, 0)]
+        acceleration = np.stack([gradient(each, self.time_s) for each in speed], axis=1) / MM_PER_M
+        push_N: Floats = self.bodies.mass_kg[:, None] * (GRAVITY_M_S2 * self.gravity - acceleration)
+        return push_N
 
     @cached_property
     def lengths_mm(self) -> Floats:

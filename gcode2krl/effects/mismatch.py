@@ -35,6 +35,9 @@ class Mismatch:
     joint_zero_rad: float = math.radians(1.0)
     """Between two encoders of one joint: their zeros are set by hand, so it is never reported."""
 
+    air_K_m: float = 1.0
+    """Of the air between tracker and tip, warmer further up: 5 m away 12 µm, within that of the frame."""
+
     @property
     def play_deg(self) -> float:
         """Return the play in degrees."""

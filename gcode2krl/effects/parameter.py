@@ -24,6 +24,9 @@ class Role(Enum):
     """A form that a fit keeps at the values of the grid: an order, a number of teeth."""
     FREQUENCY = "frequency"
     """A form in Hz that a search tries at the peaks of the spectrum and a fit then changes."""
+    MOMENT = "moment"
+    """A time in s since the earliest run started, at which something changes for good; a search tries the
+    change points of the residual, and a fit then changes it."""
     DIRECTION = "direction"
     """A component of `Effect.direction`. Fitted with the one size as a vector."""
 

@@ -91,6 +91,7 @@ def build(
     if effect is None:
         raise _wrong(where, f"found effect {name!r}, allowed: {', '.join(sorted(known))}", _near(name, known))
     _check_target(where, effect, target, cell)
+    effect = effect.at(target)
     values = {p.name: p.unset for p in effect.parameters}
     for key, value in given.items():
         for parameter, number in _components(where, effect, key, value):

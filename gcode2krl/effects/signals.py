@@ -59,6 +59,15 @@ class Signals:
     radius_offset_mm: float = 0.0
     """What the cutter's radius is larger by than the model's; the finished part shows it."""
 
+    part_shift_mm: Floats | None = None
+    """(m, 3) by how much the part has given way under the cutter; the finished part shows it, a tracker of
+    the tip does not."""
+
+    @property
+    def tip_on_part_mm(self) -> Floats:
+        """Return where the tip is (m, 3) on the part: in ``$BASE``, less what the part has given way."""
+        return self.tcp_base_mm if self.part_shift_mm is None else self.tcp_base_mm - self.part_shift_mm
+
     @property
     def time_s(self) -> Floats:
         """(m,) true time of the rows."""

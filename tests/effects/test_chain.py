@@ -45,7 +45,7 @@ def _effects(known, cell, skip=()):
     for name, effect in sorted(known.items()):
         for target in effect.targets(cell):
             if name not in skip:
-                yield effect, target
+                yield effect.at(target), target
 
 
 def test_nominal_values_change_nothing(milling, known):
@@ -70,6 +70,7 @@ def test_typical_values_change_something(milling, swinging, known):
                 continue
             after = simulate(run, [Applied(effect, target, effect.start(run, target))], rotation=True)
             changed |= len(after.time_s) != len(run) or after.radius_offset_mm != 0.0
+            changed |= after.part_shift_mm is not None
             changed |= any(
                 not np.array_equal(getattr(after, name), getattr(before[id(run)], name)) for name in SIGNALS
             )

@@ -47,6 +47,18 @@ TABLE = {
     "hose_pack": ("h0_N", "H_N_rad"),
     "force_delay": ("delay_s",),
     "tool_diameter": ("offset_mm",),
+    "step": ("at_s", "size_mm", "direction"),
+    "gear_twist": ("deg_per_kNm",),
+    "encoder_interpolation": ("amplitude_deg", "periods", "phase"),
+    "joint_eccentricity": ("amplitude_deg", "phase"),
+    "axis_parallelism": ("mrad",),
+    "spindle_growth": ("um_per_krpm", "time_constant_s"),
+    "cutter_bending": ("um_per_N",),
+    "pedestal_compliance": ("mrad_per_kNm",),
+    "cable_pull": ("N_per_deg", "direction"),
+    "tracker_drift": ("mm_per_h", "direction"),
+    "tracker_refraction": ("K_per_m", "tracker_x_m", "tracker_y_m"),
+    "fixture_compliance": ("x_um_per_N", "y_um_per_N", "z_um_per_N", "um_per_N"),
 }
 SLIPS = (
     "tool_number",

@@ -38,11 +38,16 @@ def test_a_role_that_is_not_stated_follows_from_the_nominal_value():
 def test_roles_of_the_library_are_stated_once():
     found = {
         role: {(e.name, p.name) for e in KNOWN.values() for p in e.parameters if p.role is role}
-        for role in (Role.PHASE, Role.COUNT, Role.FREQUENCY)
+        for role in (Role.PHASE, Role.COUNT, Role.FREQUENCY, Role.MOMENT)
     }
     assert found == {
-        Role.PHASE: {("transmission", "phase")},
-        Role.COUNT: {("transmission", "harmonic")},
+        Role.PHASE: {
+            ("transmission", "phase"),
+            ("encoder_interpolation", "phase"),
+            ("joint_eccentricity", "phase"),
+        },
+        Role.COUNT: {("transmission", "harmonic"), ("encoder_interpolation", "periods")},
+        Role.MOMENT: {("step", "at_s")},
         Role.FREQUENCY: {("vibration", "hz")},
     }
     for effect in KNOWN.values():
@@ -74,6 +79,12 @@ WAYS = tuple(form(name, Role.DIRECTION) for name in "xyz")
         ),
         (effect_of(size(), form("turn", Role.PHASE, "deg")), "turn: a phase is in rad, found 'deg'"),
         (effect_of(size(), form("beat", Role.FREQUENCY, "rad/s")), "beat: a frequency is in Hz"),
+        (effect_of(size(), form("at", Role.MOMENT, "h")), "at: a moment is in s, found 'h'"),
+        (
+            effect_of(size(), form("at", Role.MOMENT, "s"), form("off", Role.MOMENT, "s")),
+            "2 parameters with Role.MOMENT, allowed: one",
+        ),
+        (effect_of(size(), BEAT, form("at", Role.MOMENT, "s")), "a frequency and a moment"),
         (effect_of(form("much", Role.SIZE)), "much: a size needs a nominal value"),
         (effect_of(size(role=Role.SHAPE)), "much: a shape has no nominal value"),
         (effect_of(size(role="size")), "much: role: found 'size', allowed: Role.SIZE, Role.SHAPE"),
@@ -162,8 +173,11 @@ def test_every_effect_of_the_library_says_what_it_depends_on():
 
 def words(effect):
     """Return place and inputs in the order of their lists, as the documentation has them."""
-    where = ", ".join(each.value for each in Where if each in effect.where)
-    return f"{where}: {', '.join(each.value for each in Dependence if each in effect.depends_on)}"
+    forms = [effect.at(target) for target in effect.targets(CELL)]
+    places = {each for form in forms for each in form.where}
+    inputs = {each for form in forms for each in form.depends_on}
+    where = ", ".join(each.value for each in Where if each in places)
+    return f"{where}: {', '.join(each.value for each in Dependence if each in inputs)}"
 
 
 def test_the_documentation_says_what_each_depends_on():

@@ -14,7 +14,7 @@ class BaseFrame(Effect):
     family = "geometry"
     links = frozenset({"mechanics"})
     where = frozenset({Where.TIP})
-    depends_on = frozenset({Dependence.PLACE})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
     parameters = frame_parameters(
         most_mm=20.0,
         most_deg=2.0,

@@ -18,7 +18,7 @@ class ForceDelay(Effect):
     family = "sensor"
     links = frozenset({"force"})
     where = frozenset({Where.FORCE_AXIS})
-    depends_on = frozenset({Dependence.FORCE})
+    depends_on = frozenset({Dependence.VELOCITY, Dependence.FORCE})
     parameters = (
         Parameter(
             name="delay_s",

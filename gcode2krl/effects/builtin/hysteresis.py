@@ -24,7 +24,7 @@ class Hysteresis(Effect):
     family = "compliance"
     links = frozenset({"mechanics"})
     where = frozenset({Where.JOINT})
-    depends_on = frozenset({Dependence.OWN_TORQUE, Dependence.REVERSALS})
+    depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(

@@ -27,7 +27,7 @@ class ToolNumber(Effect):
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
     where = frozenset({Where.JOINT, Where.TIP})
-    depends_on = frozenset({Dependence.PLACE})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
     kind = "slip"
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
@@ -55,7 +55,7 @@ class BaseNumber(Effect):
     family = "set-up slips"
     links = frozenset({"path", "mechanics"})
     where = frozenset({Where.JOINT, Where.TIP})
-    depends_on = frozenset({Dependence.PLACE})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
     kind = "slip"
     parameters = frame_parameters(2000.0, 180.0, 10.0, 1.0, source="another base of the cell: anything")
 

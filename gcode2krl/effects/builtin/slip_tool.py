@@ -26,7 +26,7 @@ class SwappedTool(Effect):
     family = "set-up slips"
     links = frozenset({"mechanics", "force", "part"})
     where = frozenset({Where.TIP, Where.FORCE_AXIS})
-    depends_on = frozenset({Dependence.PLACE, Dependence.FORCE})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE, Dependence.FORCE})
     kind = "slip"
     searched_in = frozenset({"force", "mechanics"})
     parameters = (

@@ -22,7 +22,7 @@ class StockOffset(Effect):
     family = "force"
     links = frozenset({"force"})
     where = frozenset({Where.FORCE_AXIS})
-    depends_on = frozenset({Dependence.FORCE_BY_PLACE})
+    depends_on = frozenset({Dependence.FORCE_BY_PLACE, Dependence.PLACE})
     needs = frozenset({"cut"})
     parameters = (
         Parameter(

@@ -17,7 +17,7 @@ class ToolWeight(Effect):
     family = "sensor"
     links = frozenset({"force"})
     where = frozenset({Where.FORCE_AXIS})
-    depends_on = frozenset({Dependence.PLACE})
+    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
     parameters = (
         Parameter(
             name="weight_N",

@@ -28,7 +28,7 @@ class Vibration(Effect):
     family = "compliance"
     links = frozenset({"mechanics"})
     where = frozenset({Where.TIP})
-    depends_on = frozenset({Dependence.TONE, Dependence.FORCE})
+    depends_on = frozenset({Dependence.ACCELERATION, Dependence.FORCE, Dependence.TONE})
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (

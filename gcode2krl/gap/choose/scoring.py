@@ -63,7 +63,12 @@ def _within(column: Column, coefficients: Floats) -> bool:
     return bool(np.all((coefficients >= column.low - reach) & (coefficients <= column.high + reach)))
 
 
-def threshold(candidates: int) -> float:
+def tried(columns: Sequence[Column]) -> float:
+    """Return how many candidates were looked at to get these."""
+    return sum(column.tried for column in columns)
+
+
+def threshold(candidates: float) -> float:
     """Return the surprise that the largest of so many stays below, but for one effect-free data set in a
     thousand (Bonferroni; conservative, as candidates are alike)."""
-    return float(np.log(max(candidates, 1) / _LIMITS.false_alarms))
+    return float(np.log(max(candidates, 1.0) / _LIMITS.false_alarms))

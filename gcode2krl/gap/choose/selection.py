@@ -12,7 +12,7 @@ from gcode2krl.gap.choose.examination import Examination, LinkData
 from gcode2krl.gap.choose.mismatch import within_mismatch
 from gcode2krl.gap.choose.ranking import ranked, shortlist
 from gcode2krl.gap.choose.replanning import replanned
-from gcode2krl.gap.choose.scoring import Score, surprise, threshold
+from gcode2krl.gap.choose.scoring import Score, surprise, threshold, tried
 from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.noise import Noise
@@ -77,11 +77,11 @@ def _grown(found: Examination) -> tuple[Examination, bool]:
         found = replace(
             found,
             observable=tuple(gram.observable(column.index) for column in candidates.columns),
-            first_level=threshold(len(candidates.columns)),
+            first_level=threshold(tried(candidates.columns)),
         )
     taken = found.accepted_keys | found.rejected
     allowed = [column for column in candidates.columns if candidates.block(column).key not in taken]
-    found = replace(found, level=threshold(len(allowed)))
+    found = replace(found, level=threshold(tried(allowed)))
     return _accepted(found, ranked(found, gram, allowed), gram.values)
 
 

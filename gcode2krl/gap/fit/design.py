@@ -102,6 +102,8 @@ class Column:
     high: Floats
     bent: bool = False
     """The signals are not proportional to the size: coefficients tell little of it."""
+    tried: float = 1.0
+    """Of the block: out of so many it was chosen by looking at the data."""
 
     @property
     def index(self) -> Ints:
@@ -131,7 +133,9 @@ class Candidates:
                 continue
             width = signatures[0].shape[2]
             low, high = block.bounds(traces[0])
-            columns.append(Column(len(kept), first, width, low, high, not block.effect.is_linear))
+            columns.append(
+                Column(len(kept), first, width, low, high, not block.effect.is_linear, block.tried)
+            )
             kept.append(block)
             first += width
             for stack, each in zip(stacks, signatures, strict=True):

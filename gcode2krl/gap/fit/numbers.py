@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects import Applied, Effect, Role
+from gcode2krl.effects import Applied, Effect, Parameter, Role
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.units import RAD_PER_REV
 
 _AT_BOUND = 1e-3
+_MOMENT_S = 2.0
+"""Typical size of a moment: differences of a fiftieth of it are those of a short slip."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def free_of(applied: Applied, trace: Trace) -> Free:
         names.append(p.name)
         low.append(-of.high if p.name in vector else p.low)
         high.append(of.high)
-        scale.append(abs(start[of.name] - nominal[of.name]) or 0.1 * (p.high - p.low) or 1.0)
+        scale.append(_typical(p, abs(start[of.name] - nominal[of.name])))
     return Free(
         effect,
         target,
@@ -96,6 +98,13 @@ def free_of(applied: Applied, trace: Trace) -> Free:
         np.array(high),
         np.array(scale),
     )
+
+
+def _typical(p: Parameter, size: float) -> float:
+    """Return by how much a number typically is off, given how much its size is."""
+    if p.role is Role.MOMENT:
+        return _MOMENT_S
+    return size or 0.1 * (p.high - p.low) or 1.0
 
 
 def _vector(effect: Effect) -> tuple[str, ...]:

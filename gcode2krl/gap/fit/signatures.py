@@ -26,6 +26,8 @@ class Block:
     effect: Effect
     target: str | None
     shape: Mapping[str, float] = field(default_factory=dict)
+    tried: float = 1.0
+    """Out of so many independent ones it was chosen by looking at the data."""
 
     @property
     def key(self) -> tuple[str, str | None]:
@@ -99,6 +101,20 @@ def blocks_at(effect: Effect, target: str | None, frequencies_hz: Sequence[float
             if key not in seen:
                 seen.add(key)
                 yield Block(effect, target, rest | {frequency.name: value})
+
+
+def blocks_from(
+    effect: Effect, target: str | None, moments_s: Sequence[float], looked_at: float
+) -> Iterator[Block]:
+    """Yield the blocks of an effect that begins at a moment, at these out of so many that were looked at."""
+    moment = effect.moment
+    if moment is None:
+        return
+    for block in blocks_of(effect, target):
+        for at_s in moments_s:
+            yield Block(
+                effect, target, {**block.shape, moment.name: at_s}, max(1.0, looked_at / len(moments_s))
+            )
 
 
 def strongest_hz(

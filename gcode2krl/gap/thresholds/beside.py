@@ -68,6 +68,13 @@ class BesideThresholds:
         1.0, "longer than an instrument remembers; rows of one stretch stay together in every split"
     )
     frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
+    jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
+    jump_halves_s: tuple[float, ...] = convention(
+        (0.3, 1.5), "half of the windows in which a jump is looked for: quick motion, and noise"
+    )
+    least_jump: float = convention(
+        25.0, "log-likelihood ratio of a jump in its window; noise without memory shows one in 10,000 times"
+    )
 
     path_on_mm: float = physics(
         0.03, "right on the curve: the predicted path is right to 0.01 mm (docs/diagnose_check.md)"

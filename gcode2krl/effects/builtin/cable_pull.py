@@ -1,0 +1,59 @@
+"""A cable pulls at the end effector."""
+
+from types import MappingProxyType
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.arm import Load
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import Applied, Effect, every_joint
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.units import DEG_PER_RAD
+
+
+class CablePull(Effect):
+    """The sensor shows N_per_deg·(angle - angle at the run's start) more, along its own axes.
+
+    A cable that is slack at the start and is stretched, or pushed, with the travel of one joint. It bends the
+    arm too, by some µm, which is not in it; `hose_pack` goes with the turn of the tool instead.
+    """
+
+    name = "cable_pull"
+    family = "sensor"
+    links = frozenset({"force"})
+    where = frozenset({Where.FORCE_AXIS})
+    depends_on = frozenset({Dependence.OWN_ANGLE, Dependence.PLACE})
+    targets = staticmethod(every_joint)
+    vectors = MappingProxyType({"direction": DIRECTION})
+    direction = DIRECTION
+    parameters = (
+        Parameter(
+            name="N_per_deg",
+            unit="N/deg",
+            low=0.0,
+            high=20.0,
+            nominal=0.0,
+            start=0.5,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
+            source="a cable pulls with up to some 50 N; over 30 deg of travel 0.1-2",
+        ),
+        *direction_parameters("any"),
+    )
+
+    def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
+        """Return what the sensor states."""
+        if applied["N_per_deg"] == 0.0:
+            return load
+        pull_N = applied["N_per_deg"] * travelled_deg(inputs, applied.joint)[:, None] * applied.unit_vector()
+        return load[0] + (inputs.sensor_rotation @ pull_N[:, :, None])[:, :, 0], load[1]
+
+
+def travelled_deg(inputs: Inputs, joint: int) -> Floats:
+    """Return how far (m,) a joint is from where it began."""
+    q_rad = inputs.q_cmd_rad[:, joint]
+    return (q_rad - q_rad[:1]) * DEG_PER_RAD
+
+
+EFFECT = CablePull()

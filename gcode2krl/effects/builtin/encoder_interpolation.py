@@ -1,0 +1,94 @@
+"""The interpolation of a motor's encoder."""
+
+import math
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import Cell
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
+
+
+class EncoderInterpolation(Effect):
+    """Motor side: amplitude·sin(periods·gear ratio·q + phase) is added, q in rad as commanded.
+
+    Its sine and cosine signals are not alike, or not about zero (Heydemann 1981). ``periods`` a turn of the
+    motor; one error a period, twice that for signals of unlike size. Between two samples the motor may pass
+    whole periods: each value is the mean over its sample, which leaves nothing of an error that is faster.
+    """
+
+    name = "encoder_interpolation"
+    family = "joint"
+    links = frozenset({"servo"})
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.MOTOR_ANGLE})
+    parameters = (
+        Parameter(
+            name="amplitude_deg",
+            unit="deg",
+            low=0.0,
+            high=0.01,
+            nominal=0.0,
+            start=2e-4,
+            linear=True,
+            minimum=0.0,
+            role=Role.SIZE,
+            source="1 % of a period of 512 a turn through a gear of 250: 3e-5; a resolver's 0.1 deg: 4e-4",
+        ),
+        Parameter(
+            name="periods",
+            unit="",
+            low=1.0,
+            high=4096.0,
+            nominal=None,
+            start=512.0,
+            grid=(3.0, 4.0, 256.0, 512.0, 1024.0),
+            minimum=0.0,
+            role=Role.COUNT,
+            source="resolvers have 1-4 pole pairs, optical encoders of motors 256-2048 periods a turn",
+        ),
+        Parameter(
+            name="phase",
+            unit="rad",
+            low=-math.pi,
+            high=math.pi,
+            nominal=None,
+            start=0.0,
+            role=Role.PHASE,
+            source="any",
+        ),
+    )
+
+    def targets(self, cell: Cell) -> tuple[Target, ...]:
+        """Return the joints whose gear ratio the cell states."""
+        ratios = cell.robot.drives.gear_ratio
+        return () if ratios is None else tuple(j for j, n in zip(JOINTS, ratios, strict=True) if n != 0.0)
+
+    def why_not(self, cell: Cell, target: Target) -> str:
+        """Say that the gear ratio is missing."""
+        if target not in JOINTS or target in self.targets(cell):
+            return ""
+        return f"the gear ratio of {target} of {cell.robot.model} is not known: state robot.drives.gear_ratio"
+
+    def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the motor side as the encoder states it."""
+        ratios = inputs.cell.robot.drives.gear_ratio
+        if ratios is None or applied["amplitude_deg"] == 0.0:
+            return q_act_rad
+        q = np.array(q_act_rad)
+        turn = applied["periods"] * ratios[applied.joint] * inputs.q_cmd_rad[:, applied.joint]
+        error = np.sin(turn + applied["phase"]) * np.sinc(_passed(turn) / RAD_PER_REV)
+        q[:, applied.joint] += applied["amplitude_deg"] * RAD_PER_DEG * error
+        return q
+
+
+def _passed(turn: Floats) -> Floats:
+    """Return by how much (m,) a sine's argument changes over a sample."""
+    return np.gradient(turn) if len(turn) > 1 else np.zeros_like(turn)
+
+
+EFFECT = EncoderInterpolation()

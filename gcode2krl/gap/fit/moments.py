@@ -1,0 +1,77 @@
+"""Moments at which a residual jumps, beside whatever else it does around them.
+
+In a window of 2·h rows about a moment each component is a line and a jump; how surprising the jump is, is the
+log-likelihood ratio N·log(S/(S - g)) of least squares with and without it, N the rows, S the sum of squares
+beside the line and g what the jump takes of it (Quandt 1958, in a moving window). Only the order of moments
+matters here: an effect that begins at one of them is judged on all data.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import fftconvolve
+
+from gcode2krl.arrays import Floats
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.units import S_PER_H
+
+_LIMITS = THRESHOLDS.beside
+_ROUNDING = 1e-12
+"""Share of a component's power below which a sum of squares is that of rounding errors."""
+
+
+def strongest_moments(traces: Sequence[Trace], low_s: float, high_s: float) -> tuple[float, ...]:
+    """Return the moments of the clearest jumps, in s since the earliest run started, the clearest first."""
+    found = [
+        (jump, trace.inputs.hours * S_PER_H + float(trace.time_s[row]), half_s)
+        for trace in traces
+        for half_s in _LIMITS.jump_halves_s
+        for row, jump in _peaks(trace, half_s)
+    ]
+    moments: list[float] = []
+    for _, at_s, half_s in sorted(found, reverse=True):
+        apart = all(abs(at_s - other) > half_s for other in moments)
+        if apart and low_s <= at_s <= high_s and len(moments) < _LIMITS.jumps:
+            moments.append(at_s)
+    return tuple(moments)
+
+
+def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
+    """Return rows and sizes of the clearest jumps of a trace, not two of them within a window's half."""
+    step_s = float(np.median(np.diff(trace.time_s)))
+    half = max(3, round(half_s / step_s))
+    if len(trace.time_s) < 2 * half:
+        return []
+    clear = np.sum([jumps(column, half) for column in trace.residual.T], axis=0)
+    peaks: list[tuple[int, float]] = []
+    for row in np.argsort(-clear):
+        if clear[row] < _LIMITS.least_jump or len(peaks) == _LIMITS.jumps:
+            break
+        if all(abs(row - other) > half for other, _ in peaks):
+            peaks.append((int(row), float(clear[row])))
+    return peaks
+
+
+def jumps(values: Floats, half: int) -> Floats:
+    """Return how surprising a jump before each row of (n,) is; 0 within ``half`` rows of the ends."""
+    rows = np.arange(2 * half) - (half - 0.5)
+    line = rows / np.linalg.norm(rows)
+    jump = np.sign(rows) - line * float(line @ np.sign(rows))
+    jump /= np.linalg.norm(jump)
+    values = values - values.mean()
+    level, along, taken = (
+        _moving(values, each) for each in (np.full(2 * half, (2 * half) ** -0.5), line, jump)
+    )
+    power = _moving(values**2, np.ones(2 * half))
+    rest = np.maximum(power - level**2 - along**2, _ROUNDING * max(float(power.max()), 1e-300))
+    share = np.minimum(taken**2 / rest, 1.0 - _ROUNDING)
+    clear = np.zeros(len(values))
+    clear[half : half + len(share)] = -2.0 * half * np.log1p(-share)
+    return clear
+
+
+def _moving(values: Floats, kernel: Floats) -> Floats:
+    """Return the inner product of a kernel with each window of (n,)."""
+    found: Floats = fftconvolve(values, kernel[::-1], mode="valid")
+    return found
