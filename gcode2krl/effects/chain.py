@@ -31,10 +31,10 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     q_act = q_load = q_true = q_cmd
     for one in applied:
         q_act = one.effect.servo(q_act, inputs, one)
-    q_load = q_act if inputs.q_act_rad is None else inputs.q_act_rad
+    q_load = _measured(q_act, inputs.q_act_rad)
     for one in applied:
         q_load = one.effect.gear(q_load, inputs, one)
-    q_true = q_load if inputs.q_load_rad is None else inputs.q_load_rad
+    q_true = _measured(q_load, inputs.q_load_rad)
     for one in applied:
         q_true = one.effect.joints(q_true, inputs, one)
 
@@ -64,6 +64,14 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     for one in applied:
         signals = one.effect.instruments(signals, one)
     return signals
+
+
+def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
+    """Return the measured joints (m, 6), the model's where there are none: columns that are NaN."""
+    if measured_rad is None:
+        return model_rad
+    missing = np.isnan(measured_rad).all(axis=0)
+    return np.where(missing, model_rad, measured_rad) if missing.any() else measured_rad
 
 
 def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:

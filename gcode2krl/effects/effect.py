@@ -53,6 +53,8 @@ class Applied:
     values: Values = field(default_factory=dict)
     planned: bool = False
     """The inputs it is simulated from hold its plan already."""
+    held: frozenset[str] = frozenset()
+    """Numbers that a fit does not move: data do not show them."""
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
@@ -139,6 +141,10 @@ class Effect:
         joint.
         """
         return self
+
+    def joints_at(self, target: Target) -> frozenset[str]:
+        """Return the joints that it moves where it shows in one; none where the target does not say which."""
+        return frozenset(joint for joint in JOINTS if joint == target)
 
     def visible_links(self, examined: frozenset[str], target: Target = None) -> frozenset[str]:
         """Return the examined links in which it shows; what is not measured adds to the next link downstream.

@@ -44,9 +44,9 @@ class Inputs:
     hours: float = 0.0
     """Since the earliest of the runs started."""
     q_act_rad: Floats | None = None
-    """(m, 6) measured motor side, in place of the model's for all that follows."""
+    """(m, 6) measured motor side, in place of the model's for all that follows; NaN: a joint without."""
     q_load_rad: Floats | None = None
-    """(m, 6) measured behind the gear."""
+    """(m, 6) measured behind the gear; NaN for joints without an encoder there."""
     load_base_N: Floats | None = None
     """(m, 3) measured force that bends the arm."""
     toolpath: Toolpath | None = None

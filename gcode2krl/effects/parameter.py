@@ -57,6 +57,8 @@ class Parameter:
     """Not stated: a shape where ``nominal`` is None, else a size. Never None once made."""
     usual: Bound | None = None
     """By how much a size may be off its nominal value in a sound machine, of the table of bounds."""
+    minor: bool = False
+    """A size beside a larger one, nominal unless the data show it: a clock's skew beside its offset."""
 
     def __post_init__(self) -> None:
         """Set the role that the nominal value implies where none is stated."""

@@ -104,7 +104,13 @@ def _diagnosed(context: Context) -> Gap:
 
 def _with_data(context: Context) -> Context:
     """Return the context with the names of the links that have data."""
-    links = [link for link in SIGNALS if link.traces(context.pairs, link.base(context))]
+    traces = {link: link.traces(context.pairs, link.base(context)) for link in SIGNALS}
+    links = [link for link in SIGNALS if traces[link]]
+    joints = {
+        link.name: frozenset.intersection(*(frozenset(trace.components) for trace in traces[link]))
+        for link in links
+        if link.of_joints
+    }
     if any(link.tells_time for link in links):
         links.append(TIMING)
-    return replace(context, examined=frozenset(link.name for link in links))
+    return replace(context, examined=frozenset(link.name for link in links), joints=joints)

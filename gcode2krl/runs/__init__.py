@@ -14,7 +14,7 @@ from gcode2krl.runs.controller_trace import (
 from gcode2krl.runs.folder import Run, load_run
 from gcode2krl.runs.head import RunHead
 from gcode2krl.runs.krc_trace import read_krc_trace
-from gcode2krl.runs.measured import LEAST_ROWS, TIME, Controller, Force, Measured, Tracker
+from gcode2krl.runs.measured import LEAST_ROWS, TIME, Controller, Force, Measured, Poses, Tracker
 from gcode2krl.runs.rsi_log import read_rsi_log
 from gcode2krl.runs.scan import Scan
 
@@ -26,6 +26,7 @@ __all__ = [
     "ControllerTrace",
     "Force",
     "Measured",
+    "Poses",
     "Run",
     "RunHead",
     "Scan",

@@ -31,12 +31,14 @@ _LEAST_MOTION_MM = 0.5
 _COARSE = {"mm": 0.05, "deg": 0.005}
 """Larger steps of the last decimal are reported even where no noise is stated."""
 _POSITIONS = ("position_cmd_mm", "position_act_mm", "position_mm")
-_ANGLES = ("q_cmd_rad", "q_act_rad", "q_load_rad")
+_ANGLES = ("q_cmd_rad", "q_act_rad", "q_load_rad", "q_rad")
 
 
 def check_table(table: Measured, head: RunHead) -> None:
     """Raise `NotUnderstoodError` for time that does not rise or is not in s, and for impossible values."""
-    _check_time(table)
+    _check_order(table)
+    if table.sampled:
+        _check_cycle(table)
     for signal in SIGNALS[type(table)]:
         values = getattr(table, signal.name)
         if values is not None and signal.name in _POSITIONS:
@@ -98,7 +100,7 @@ def quantised(table: Measured, head: RunHead) -> Iterator[Issue]:
             yield Issue("warning", "trace-decimals", 0, words + than, "record more decimals")
 
 
-def _check_time(table: Measured) -> None:
+def _check_order(table: Measured) -> None:
     step = np.diff(table.time_s)
     back = np.flatnonzero(step <= 0)
     if len(back):
@@ -106,6 +108,10 @@ def _check_time(table: Measured) -> None:
         before, after = table.time_s[at], table.time_s[at + 1]
         words = f"row {table.row[at + 1]}, column {TIME}: {after:g} s does not come after {before:g} s"
         raise _error("trace-time", words, "export one recording, in order", table, at + 1)
+
+
+def _check_cycle(table: Measured) -> None:
+    step = np.diff(table.time_s)
     cycle_s = float(np.median(step))
     if not _SHORTEST_CYCLE_S < cycle_s <= _LONGEST_CYCLE_S:
         words = f"column {TIME}: {cycle_s:g} s between rows, so not seconds"

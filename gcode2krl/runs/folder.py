@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
 from gcode2krl.cell import load_cell
 from gcode2krl.errors import Issue, input_error
@@ -11,13 +11,14 @@ from gcode2krl.runs.checks import check_columns, check_table, check_together, qu
 from gcode2krl.runs.diadem import is_data_set
 from gcode2krl.runs.head import RunHead, read_head
 from gcode2krl.runs.krc_trace import read_krc_trace, recording_of
-from gcode2krl.runs.measured import Controller, Force, Measured, Tracker, build, columns_of
+from gcode2krl.runs.measured import Controller, Force, Measured, Poses, Tracker, build, columns_of
+from gcode2krl.runs.poses import read_poses
 from gcode2krl.runs.rsi_log import is_rsi_log, read_rsi_log
 from gcode2krl.runs.scan import Scan, read_scan
 from gcode2krl.runs.tables import Sheet, read_sheet
 
 AnyMeasured = TypeVar("AnyMeasured", bound=Measured)
-What = Literal["controller", "tracker", "force", "scan"]
+What = Literal["controller", "tracker", "force", "scan", "poses"]
 _ENDINGS = {"scan": (".csv", ".parquet", ".ply")}
 _RSI_NAMES = ("rsi.log", "rsi.xml", "rsi.txt", "rsi.csv")
 
@@ -34,6 +35,7 @@ class Run:
     force: Force | None = None
     scan: Scan | None = None
     issues: tuple[Issue, ...] = ()
+    poses: Poses | None = None
 
     def path(self, key: Literal["cell", "program", "prediction"]) -> Path | None:
         """Return a path that ``run.toml`` names, relative to the run's folder; None where it names none."""
@@ -60,7 +62,7 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
             "file-unreadable", "is not a folder", "a run is a folder with run.toml", source=str(place)
         )
     head, issues = read_head(place / "run.toml")
-    files = {what: _file_of(what, place, head) for what in ("controller", "tracker", "force", "scan")}
+    files = {what: _file_of(what, place, head) for what in get_args(What)}
 
     def controller_sheet(file: Path) -> Sheet:
         if is_data_set(file):
@@ -71,15 +73,15 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
     controller = _table(Controller, files["controller"], controller_sheet, head, partial or traced)
     tracker = _table(Tracker, files["tracker"], _sheet(Tracker), head, partial)
     force = _table(Force, files["force"], _sheet(Force), head, partial)
+    poses = _table(Poses, files["poses"], read_poses, head, partial)
     scan = read_scan(files["scan"]) if files["scan"] else None
     check_together(controller, tracker, force)
     check_columns(controller, tracker, head)
-    table_issues = [issue for table in (controller, tracker, force, scan) if table for issue in table.issues]
-    table_issues += [
-        issue for table in (controller, tracker, force) if table for issue in quantised(table, head)
-    ]
+    tables = (controller, tracker, force, poses)
+    table_issues = [issue for table in (*tables, scan) if table for issue in table.issues]
+    table_issues += [issue for table in tables if table for issue in quantised(table, head)]
     issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]), *table_issues)
-    return Run(place.resolve().name, place, head, controller, tracker, force, scan, issues)
+    return Run(place.resolve().name, place, head, controller, tracker, force, scan, issues, poses)
 
 
 def _sheet(kind: type[Measured]) -> Callable[[Path], Sheet]:
@@ -91,7 +93,7 @@ def _table(
 ) -> AnyMeasured | None:
     if file is None:
         return None
-    clock_s = getattr(head.clocks, f"{kind.__name__.lower()}_s")
+    clock_s = getattr(head.clocks, f"{kind.__name__.lower()}_s", 0.0)
     table = build(kind, read(file), partial=partial, clock_s=clock_s)
     check_table(table, head)
     return table

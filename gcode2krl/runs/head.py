@@ -71,6 +71,7 @@ class Files(_Table):
     controller: str | None = None
     tracker: str | None = None
     force: str | None = None
+    poses: str | None = None
     scan: str | None = None
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class Signal(NamedTuple):
     """A joint may be missing if only some joints are required."""
     gaps: bool = False
     """A missing value does not cost its row."""
+    some: bool = False
+    """There may be fewer columns than the format knows; the others are not missed."""
 
 
 def _six(pattern: str) -> tuple[str, ...]:
@@ -63,6 +65,9 @@ class Measured:
     constant: tuple[str, ...] = ()
     """Columns that never change."""
     issues: tuple[Issue, ...] = ()
+
+    sampled: ClassVar[bool] = True
+    """Rows follow each other at the rate of an instrument, so that a longer step is a gap."""
 
     def __post_init__(self) -> None:
         for spec in fields(self):
@@ -103,6 +108,10 @@ class Controller(Measured):
     """(n, 3) its A, B, C."""
     q_correction_rad: Floats | None = None
     """(n, 6) logged RSI correction of the joints (AKorr)."""
+    temperature_C: Floats | None = None
+    """(n, 8) of the places in the order of their columns, NaN where there is none or nothing was logged."""
+    ambient_C: Floats | None = None
+    """(n, 1)"""
 
     @property
     def joints_measured(self) -> tuple[int, ...]:
@@ -135,8 +144,30 @@ class Force(Measured):
     """(n, 3)"""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Poses(Measured):
+    """``poses.csv``: the TCP at poses in which the robot stands still, each one a row."""
+
+    q_rad: Floats
+    """(n, 6) indicated joints."""
+    position_mm: Floats
+    """(n, 3) measured TCP, in the frame that ``run.toml`` names for the tracker."""
+    abc_rad: Floats | None = None
+    """(n, 3)"""
+    temperature_C: Floats | None = None
+    """(n, 8)"""
+    ambient_C: Floats | None = None
+    """(n, 1)"""
+
+    sampled: ClassVar[bool] = False
+
+
 ABC_CMD, ABC = ("a_cmd_deg", "b_cmd_deg", "c_cmd_deg"), ("a_deg", "b_deg", "c_deg")
 XYZ = ("x_mm", "y_mm", "z_mm")
+TEMPERATURES = (
+    Signal("temperature_C", tuple(f"temp{n}_C" for n in range(1, 9)), each=True, gaps=True, some=True),
+    Signal("ambient_C", ("ambient_C",), gaps=True),
+)
 SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
     Controller: (
         Signal("position_cmd_mm", ("x_cmd_mm", "y_cmd_mm", "z_cmd_mm")),
@@ -151,6 +182,13 @@ SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
         Signal("correction_mm", ("x_corr_mm", "y_corr_mm", "z_corr_mm"), gaps=True),
         Signal("correction_rad", ("a_corr_deg", "b_corr_deg", "c_corr_deg"), RAD_PER_DEG, gaps=True),
         Signal("q_correction_rad", _six("q{}_corr_deg"), RAD_PER_DEG, each=True, gaps=True),
+        *TEMPERATURES,
+    ),
+    Poses: (
+        Signal("q_rad", _six("q{}_deg"), RAD_PER_DEG),
+        Signal("position_mm", XYZ),
+        Signal("abc_rad", ABC, RAD_PER_DEG),
+        *TEMPERATURES,
     ),
     Tracker: (Signal("position_mm", XYZ), Signal("abc_rad", ABC, RAD_PER_DEG)),
     Force: (
@@ -158,7 +196,7 @@ SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
         Signal("moment_Nmm", ("mx_Nm", "my_Nm", "mz_Nm"), MM_PER_M),
     ),
 }
-_ALWAYS = ("position_mm", "force_N")
+_ALWAYS = ("position_mm", "force_N", "q_rad")
 _USUAL = ("position_cmd_mm", "abc_cmd_rad", "q_cmd_rad", "q_act_rad")
 """Signals of the format that are not marked optional: their absence is reported."""
 AnyMeasured = TypeVar("AnyMeasured", bound=Measured)
@@ -191,7 +229,7 @@ def build(
     table = kind(
         time_s=time_s,
         row=kept + sheet.first_row,
-        segments=_segments(time_s, kept),
+        segments=_segments(time_s, kept) if kind.sampled else np.array([[0, len(kept)]], dtype=np.int64),
         source=sheet.source,
         dropped=_lost(needed, finite),
         dropped_rows=len(finite) - len(kept),
@@ -231,7 +269,7 @@ def _constant(names: Sequence[str], sheet: Sheet, kept: Ints) -> tuple[str, ...]
 def _expected(kind: type[Measured], used: list[Signal]) -> Iterator[str]:
     """Yield the columns whose absence is reported."""
     for signal in SIGNALS[kind]:
-        if signal in used or signal.name in _USUAL:
+        if (signal in used or signal.name in _USUAL) and not signal.some:
             yield from signal.columns
 
 

@@ -61,6 +61,15 @@ def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
     return Sheet(columns, names, first_row, str(file))
 
 
+def read_words(path: str | Path, name: str) -> list[str | None]:
+    """Return a column of a CSV or Parquet file as words, None where a cell is empty."""
+    import polars as pl
+
+    frame, _ = _read_frame(Path(path))
+    frame.columns = [printable(each.strip()) for each in frame.columns]
+    return frame[name].cast(pl.String).to_list()
+
+
 def printable(name: str) -> str:
     """Return a name from a file, safe to print on one line."""
     return name if name.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in name)

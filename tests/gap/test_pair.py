@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
+from gcode2krl.effects import Applied, library, simulate
 from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
 from gcode2krl.gap.beside.pair import usable_rows
 from gcode2krl.runs import Force, RunHead, Tracker
@@ -119,5 +120,30 @@ def test_a_measured_force_bends_the_arm_as_its_mean_over_50_ms_where_the_cutter_
     found = run.with_measured_load().inputs.load_base_N
     assert not found[~cuts].any()
     # 50 ms are two samples: one and the one before it
-    mean = (force[1:] + force[:-1]) / 2.0
-    np.testing.assert_allclose(found[1:][cuts[1:]], mean[cuts[1:]], atol=1e-9)
+    beside = force - inputs.force_base_N
+    expected = inputs.force_base_N[1:] + (beside[1:] + beside[:-1]) / 2.0
+    np.testing.assert_allclose(found[1:][cuts[1:]], expected[cuts[1:]], atol=1e-9)
+
+
+def test_edges_of_the_cut_stay_sharp_in_a_measured_load():
+    """A force 2 % above the model bends the arm by 2 % more, at the edges of the cut too."""
+    cuts = (INPUTS.time_s > 2.0) & (INPUTS.time_s < 7.0)
+    inputs = replace(INPUTS, force_base_N=np.where(cuts[:, None], 500.0, 0.0) * np.ones(3), forces=stub())
+    measured = Force(
+        time_s=inputs.time_s,
+        row=np.arange(500),
+        segments=np.array([[0, 500]]),
+        force_N=1.02 * inputs.force_base_N,
+    )
+    found = pair(inputs, force=measured).with_measured_load().inputs.load_base_N
+    np.testing.assert_allclose(found[cuts], 510.0, atol=5.0 + 1e-9)
+
+
+def test_what_the_sensor_alone_shows_does_not_bend_the_arm():
+    """Effects of the sensor are in what is measured, not in the load."""
+    inputs = replace(INPUTS, force_base_N=np.full((500, 3), 100.0), forces=stub())
+    zero = Applied(library()["force_offset"], None, {"fx_N": 40.0, "fy_N": 0.0, "fz_N": 0.0})
+    seen = simulate(inputs, [zero]).force_meas_base_N
+    measured = Force(time_s=inputs.time_s, row=np.arange(500), segments=np.array([[0, 500]]), force_N=seen)
+    found = pair(inputs, force=measured).with_measured_load([zero]).inputs.load_base_N
+    np.testing.assert_allclose(found, 100.0, atol=1e-9)

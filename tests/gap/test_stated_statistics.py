@@ -104,9 +104,9 @@ def test_a_sine_is_spanned_by_two_amplitudes_and_read_back():
 def test_a_search_tries_orders_of_the_grid_and_frequencies_of_the_spectrum():
     grid = [block.shape for block in blocks_of(Sine(), None)]
     assert grid == [{"order": n, "beat": hz} for n in (1.0, 2.0) for hz in (2.0, 4.0, 8.0)]
-    peaks = [block.shape for block in blocks_at(Sine(), None, (5.5, 6.5))]
+    peaks = [block.shape for block in blocks_at(Sine(), None, (5.5, 6.5), 30.0)]
     assert peaks == [{"order": n, "beat": hz} for n in (1.0, 2.0) for hz in (5.5, 6.5)]
-    assert list(blocks_at(Line(), None, (5.5,))) == []
+    assert list(blocks_at(Line(), None, (5.5,), 30.0)) == []
 
 
 def test_a_fit_moves_sizes_whatever_they_are_called_and_keeps_counts():

@@ -51,6 +51,7 @@ class WrongClock(Effect):
             nominal=0.0,
             start=1e-4,
             linear=True,
+            minor=True,
             role=Role.SIZE,
             source="free quartz oscillators 10-100 ppm, a wrong cycle time 1000 ppm",
         ),

@@ -4,7 +4,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect
+from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.parameter import Parameter, Role
 
@@ -34,6 +34,10 @@ class WristCoupling(Effect):
             source="couplings of hollow wrists are 1/50-1/200 before the controller takes them out",
         ),
     )
+
+    def joints_at(self, target: Target) -> frozenset[str]:
+        """Return the joints that follow A4."""
+        return frozenset({"A5", "A6"})
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gears of the wrist."""

@@ -1,7 +1,7 @@
 """What is known while the links are judged one after the other."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.mismatch import Mismatch
@@ -24,6 +24,8 @@ class Context:
     seed: int = 0
     examined: frozenset[str] = frozenset()
     """Names of the links that have data."""
+    joints: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Link of joints -> those that it has data of."""
     slips: tuple[Applied, ...] = ()
     """Set-up slips that every link's model has."""
     learned: tuple[Applied, ...] = ()
@@ -47,6 +49,10 @@ class Context:
     def has_data(self, link: str) -> bool:
         """Tell whether a link can be judged."""
         return link in self.examined
+
+    def examined_at(self, effect: Effect, target: str | None) -> frozenset[str]:
+        """Return the links with data of what an effect moves: load encoders may be on some joints only."""
+        return self.examined - unmeasured_at(effect, target, self.joints)
 
     def candidates(self) -> "list[Effect]":
         """Return the effects that links try: no slip beside one that was found, nor a second kind of stop."""
@@ -85,3 +91,9 @@ class Context:
         """Return the context whose judgement of a link lacks a cause."""
         judgements = tuple(each.without(applied) if each is judged else each for each in self.judgements)
         return replace(self, judgements=judgements)
+
+
+def unmeasured_at(effect: Effect, target: str | None, joints: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    """Return the links of joints, among those with data, that lack a joint which an effect moves."""
+    moved = effect.joints_at(target)
+    return frozenset(link for link, measured in joints.items() if not moved <= measured)

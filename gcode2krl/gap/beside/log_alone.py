@@ -13,15 +13,19 @@ from gcode2krl.gap.beside.decimals import resolution
 from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.pairing import first_start, hours_since
+from gcode2krl.gap.beside.poses import is_of_poses, pose_pair
 from gcode2krl.runs import Run
 
 
 def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:
-    """Return a pair for each run that has a controller's table."""
+    """Return a pair for each run that has a controller's table, or poses."""
     first, known_robot = first_start(runs), cell is not None
     cell = load_cell() if cell is None else cell
     pairs = []
     for number, run in enumerate(runs):
+        if is_of_poses(run):
+            pairs.append(pose_pair(run, number, cell, hours_since(first, run), known_robot))
+            continue
         inputs = _inputs(run, cell, hours_since(first, run), known_robot)
         if inputs is not None:
             pairs.append(Pair(run=run, number=number, inputs=inputs, from_log=True, known_robot=known_robot))

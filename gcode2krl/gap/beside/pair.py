@@ -1,12 +1,12 @@
 """One run beside its prediction: which signals there are, on which clock, and what the model is given."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.effects import Inputs
+from gcode2krl.effects import Applied, Inputs, simulate
 from gcode2krl.gap.beside.interpolation import cubic, linear, nearest_rows
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -26,6 +26,8 @@ class Pair:
     """There is no prediction: the inputs' commanded joints are those of the log."""
     known_robot: bool = True
     """The cell is that of the robot; without it there are no kinematics."""
+    still: bool = False
+    """The robot stands at each sample: poses, not a motion."""
     simulator: Simulator = field(default_factory=Simulator)
     """Shared by all runs of a prediction."""
     clock_s: Mapping[str, float] = field(default_factory=dict)
@@ -47,10 +49,12 @@ class Pair:
         """Return the pair with a clock error of ``offset_s`` taken off the stamps of a table."""
         return replace(self, clock_s={**self.clock_s, table: self.clock_s.get(table, 0.0) + offset_s})
 
-    def with_measured_load(self) -> "Pair":
+    def with_measured_load(self, applied: Sequence[Applied] = (), base: Sequence[Applied] = ()) -> "Pair":
         """Return the pair whose arm is bent by the measured force, for a model of the force that fails.
 
-        The force is averaged over 50 ms and is zero where the cutter is predicted in air.
+        The load is the model's with the effects ``base``, and what is measured beside the model with
+        ``applied``, averaged over 50 ms: the edges of the cut stay those of the model, where an average of
+        the force itself would smear them. It is zero where the cutter is predicted in air.
         """
         table, inputs = self.run.force, self.inputs
         if table is None or inputs.forces is None:
@@ -61,7 +65,10 @@ class Pair:
             turn = inputs.sensor_rotation if frame == "sensor" else inputs.tool_rotation
             force_N = np.einsum("nij,nj->ni", turn[nearest_rows(inputs.time_s, own_s)], force_N)
         rows = round(LIMITS.load_smooth_s / float(np.median(np.diff(own_s))))
-        load = linear(inputs.time_s, own_s, _smooth(force_N, rows))
+        seen = simulate(inputs, applied).force_meas_base_N if applied else inputs.force_base_N
+        bending = simulate(inputs, base).force_base_N if base else inputs.force_base_N
+        beside = linear(inputs.time_s, own_s, _smooth(force_N - linear(own_s, inputs.time_s, seen), rows))
+        load = bending + beside
         load[~inputs.force_base_N.any(axis=1)] = 0.0
         return replace(self, inputs=replace(inputs, load_base_N=load))
 
@@ -81,7 +88,9 @@ class Pair:
             actual_rad = commanded_rad + self._difference(table, "q_act_rad", table.q_cmd_rad)
         if upto == "q_act" or table.q_load_rad is None:
             return replace(self, inputs=replace(inputs, q_act_rad=actual_rad))
-        before_rad = commanded_rad if actual_rad is None else actual_rad
+        before_rad = commanded_rad
+        if actual_rad is not None:
+            before_rad = np.where(np.isnan(actual_rad), commanded_rad, actual_rad)
         load_rad = before_rad + self._difference(table, "q_load_rad", table.q_act_rad)
         return replace(self, inputs=replace(inputs, q_act_rad=actual_rad, q_load_rad=load_rad))
 
@@ -97,13 +106,19 @@ class Pair:
         return inputs.q_cmd_rad + linear(inputs.time_s, stamps, difference)
 
     def _difference(self, table: Controller, signal: str, before_rad: Floats | None) -> Floats:
-        """Return a signal less the one before it (m, 6), by its fitted model where there is one."""
+        """Return a signal less the one before it (m, 6), by its fitted model where there is one.
+
+        NaN for joints without that signal.
+        """
         inputs, stamps = self.inputs, self.stamps(table)
         difference = self.fitted.get(signal)
+        measured: Floats = getattr(table, signal)
         if difference is None:
             reference = cubic(stamps, inputs.time_s, inputs.q_cmd_rad) if before_rad is None else before_rad
-            difference = getattr(table, signal) - reference
-        return linear(inputs.time_s, stamps, np.nan_to_num(difference))
+            difference = measured - reference
+        apart = linear(inputs.time_s, stamps, np.nan_to_num(difference))
+        apart[:, np.isnan(measured).all(axis=0)] = np.nan
+        return apart
 
 
 def _smooth(values: Floats, rows: int) -> Floats:

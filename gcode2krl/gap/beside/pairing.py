@@ -8,6 +8,7 @@ from gcode2krl.effects import Inputs, inputs_of
 from gcode2krl.gap.beside.fine_prediction import refined_prediction
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.planning import remembered_plan
+from gcode2krl.gap.beside.poses import is_of_poses, pose_pair
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run
@@ -22,6 +23,9 @@ def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
     first = first_start(runs)
     shared: dict[str, tuple[Inputs, Simulator]] = {}
     for number, run in enumerate(runs):
+        if is_of_poses(run):
+            yield pose_pair(run, number, prediction.cell, hours_since(first, run))
+            continue
         folder = run.path("prediction")
         named = folder is not None and folder.exists()
         key = str(folder) if named else ""

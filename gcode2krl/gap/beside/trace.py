@@ -95,6 +95,8 @@ class Trace:
     in_sensor_frame: bool = False
     """The values are along the sensor's axes, which are those of the flange."""
     in_tool_frame: bool = False
+    still: bool = False
+    """Each row is a pose in which the robot stands."""
 
     @property
     def signal(self) -> str:
@@ -124,6 +126,8 @@ class Trace:
     @cached_property
     def rate(self) -> Floats:
         """(n, k) time derivative of the model, from the model's own samples."""
+        if self.still:
+            return np.zeros(self.shape)
         step = 1e-3
         return (self._at(self._plain, self.time_s + step) - self._at(self._plain, self.time_s - step)) / (
             2.0 * step

@@ -6,6 +6,7 @@ from functools import cache, partial
 import numpy as np
 
 from gcode2krl.effects import Effect
+from gcode2krl.effects.dependence import Dependence
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links import SIGNALS, Link
 from gcode2krl.gap.beside.stretches import stretches_of_all
@@ -15,6 +16,9 @@ from gcode2krl.gap.fit.moments import strongest_moments
 from gcode2krl.gap.fit.signatures import Block, blocks_at, blocks_from, blocks_of, strongest_hz
 from gcode2krl.gap.thresholds import THRESHOLDS
 
+_MOTION = frozenset({Dependence.VELOCITY, Dependence.ACCELERATION, Dependence.TONE})
+"""What poses do not have."""
+
 
 def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Question:
     """Return what a link is examined for."""
@@ -23,8 +27,9 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
     blocks = [
         block
         for effect in context.candidates()
+        if not (traces[0].still and effect.depends_on & _MOTION)
         for target in effect.targets(cell)
-        if effect.searched(link.name, target, context.examined)
+        if effect.searched(link.name, target, context.examined_at(effect, target))
         for block in _blocks(effect.at(target), target, traces, moments_s)
     ]
     upstream = frozenset(each.name for each in SIGNALS if not context.has_data(each.name))
@@ -36,6 +41,7 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
         link.clocks(context),
         link.clock_share(context),
         context.seed,
+        context.joints,
     )
 
 
@@ -61,4 +67,5 @@ def _blocks(
     residuals = [trace.residual for trace in traces]
     step_s = float(np.median(np.diff(traces[0].time_s)))
     peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)
-    yield from blocks_at(effect, target, peaks)
+    duration_s = float(traces[0].time_s[-1] - traces[0].time_s[0])
+    yield from blocks_at(effect, target, peaks, (p.high - p.low) * duration_s)

@@ -1,14 +1,18 @@
 """90 % intervals of parameters: the covariance of a fit by clusters, and what the model itself is off by."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Parameter, Role
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.constancy import spread_between_runs
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.fit.clusters import clustered_covariance
-from gcode2krl.gap.fit.fitted import Fitted
+from gcode2krl.gap.fit.fitted import Fitted, Numbers
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -29,12 +33,34 @@ class Interval(NamedTuple):
 def intervals_of(found: Examination) -> list[dict[str, Interval]]:
     """Return the interval of every parameter of every accepted effect.
 
-    Quantiles of draws from the fit's covariance, added in quadrature to the errors of models.
+    Quantiles of draws from the fit's covariance, added in quadrature to the errors of models and to what the
+    effect's size differs by from run to run. A size that was held has the interval that it would have if it
+    were free; a shape that was held was not found, and has none.
     """
     if not found.applied:
         return []
     draws = _draws(found.fitted, covariance_of(found.likelihood, found.fitted))
-    return [_effect_intervals(found, number, draws) for number in range(len(found.applied))]
+    intervals = [_effect_intervals(found, number, draws) for number in range(len(found.applied))]
+    if not any(each.held for each in found.applied):
+        return intervals
+    free = replace(found, fitted=_freed(found.fitted, found.traces[0]))
+    wide = intervals_of(free)
+    return [
+        {
+            name: wide[number][name] if name in applied.held else own
+            for name, own in intervals[number].items()
+            if name not in applied.held or not applied.effect.parameter(name).is_shape
+        }
+        for number, applied in enumerate(found.applied)
+    ]
+
+
+def _freed(fitted: Fitted, trace: Trace) -> Fitted:
+    """Return a fit at the same numbers with those free that were held."""
+    applied = tuple(replace(each, held=frozenset()) for each in fitted.applied)
+    numbers = Numbers.of(applied, trace)
+    x = numbers.start(applied)
+    return Fitted(applied, fitted.chi2, numbers, x, np.zeros((len(x), len(x))))
 
 
 def _draws(fitted: Fitted, covariance: Floats) -> Floats:
@@ -52,25 +78,36 @@ def _effect_intervals(found: Examination, number: int, draws: Floats) -> dict[st
     free, own = numbers.free[number], draws[:, numbers.slices[number]]
     drawn = [free.applied(x).values for x in np.clip(own, free.low, free.high)]
     share = _LIMITS.law_error if free.effect.plans_anew else _LIMITS.model_error
-    mismatch = _mismatch(found, number)
+    mismatch, between = _mismatch(found, number), _between_runs(found, number)
     return {
         name: _interval(
             free.effect.parameter(name),
             value,
             np.array([each[name] for each in drawn]),
-            float(np.hypot(share * value, mismatch.get(name, 0.0))),
+            float(np.linalg.norm([share * value, mismatch.get(name, 0.0), between * value])),
         )
         for name, value in values.items()
     }
 
 
-def _mismatch(found: Examination, number: int) -> dict[str, float]:
-    """Return the half-widths that normal mismatch of the same form adds to an effect in a joint.
+def _between_runs(found: Examination, number: int) -> float:
+    """Return the half-width, as a share, that the spread between runs adds where each has its own mismatch.
 
-    It is nuisance of the fit at its own small size, which at the size of the effect has another shape.
+    Student's quantile of the mean over the runs.
+    """
+    if not found.likelihood.own_alike(found.applied[number]):
+        return 0.0
+    spread, runs = spread_between_runs(found, number)
+    return float(stats.t.ppf(_ENDS[1], runs - 1) * spread / runs**0.5) if runs > 1 else 0.0
+
+
+def _mismatch(found: Examination, number: int) -> dict[str, float]:
+    """Return the half-widths that the normal mismatch which all runs share adds to an effect of its form.
+
+    The fit counts both as one number.
     """
     effect = found.applied[number].effect
-    if not found.link.of_joints or found.link.tells_time or not effect.is_nuisance:
+    if found.link.tells_time or not effect.is_nuisance:
         return {}
     bounds = effect.usual(found.question.mismatch, 1.0)
     return {name: _LIMITS.inside_bound * bound for name, bound in bounds.items()}

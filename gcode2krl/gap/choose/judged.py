@@ -7,6 +7,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.choose.gap_size import Size
@@ -31,6 +32,7 @@ class Cause:
     rms_after: float | None
     rivals: tuple[tuple[Rival, float], ...] | None = ()
     """None where no other effect was compared with it."""
+    constant: Constancy | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

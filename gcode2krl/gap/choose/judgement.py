@@ -9,6 +9,7 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.constancy import constancy_of
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import intervals_of
@@ -145,6 +146,7 @@ def _causes(found: Examination, sizes: Sequence[Size], unknown: float, held_out:
             shrink=shrink if held_out else None,
             rms_after=sizes[order + 1].after ** 0.5,
             rivals=tuple(zip(rivals, others, strict=True)),
+            constant=constancy_of(found, number),
         )
 
 

@@ -8,15 +8,17 @@ import numpy as np
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.examination import Examination, LinkData
+from gcode2krl.gap.choose.examination import Examination, Key, LinkData
 from gcode2krl.gap.choose.mismatch import within_mismatch
 from gcode2krl.gap.choose.ranking import ranked, shortlist
 from gcode2krl.gap.choose.replanning import replanned
 from gcode2krl.gap.choose.scoring import Score, surprise, threshold, tried
 from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
+from gcode2krl.gap.choose.shown_numbers import with_shown_numbers
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.noise_source import noise_of
+from gcode2krl.gap.fit.pose_noise import pose_noise
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.sensitivity import sensitivity_of
 from gcode2krl.gap.fit.signatures import Block, Signatures
@@ -38,9 +40,10 @@ def examine(
     known = known or Signatures()
     candidates = Candidates.of(question.blocks, traces, known)
     nuisance = nuisance_for(traces, question, known)
-    assumed = noise or noise_of(traces, candidates.signatures, nuisance)
+    still = traces[0].still
+    assumed = noise or (pose_noise if still else noise_of)(traces, candidates.signatures, nuisance)
     found = _pruned(_selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed)))
-    if noise is None and found.causes:
+    if noise is None and found.causes and not still:
         # what rings or hums looks like noise until its cause is known
         quieter = noise_of(traces, candidates.signatures, nuisance, found.applied)
         if _power(quieter) < _LIMITS.quieter_noise * _power(assumed):
@@ -135,7 +138,7 @@ def _trials(found: Examination, scores: Sequence[Score]) -> Iterator[_Trial]:
         if block.effect.plans_anew:
             fitted = replanned(found, block, start, _LIMITS.hopeless * best)
         else:
-            fitted = _refitted(found, start, best)
+            fitted = with_shown_numbers(found, _refitted(found, start, best))
         best = min(best, fitted.chi2)
         yield _Trial(score, block, fitted)
 
@@ -167,10 +170,13 @@ def _tested(found: Examination, trial: _Trial) -> float | None:
     """
     fitted = trial.fitted
     gain = found.fitted.chi2 - fitted.chi2
-    if fitted.at_bound[-1] or gain < _LIMITS.least_ratio**2 * found.data.times:
+    last = fitted.numbers.free[-1]
+    pushed = last.shapes_at_end(fitted.x[fitted.numbers.slices[-1]])  # the data want a form beyond its range
+    if fitted.at_bound[-1] or pushed or gain < _LIMITS.least_ratio**2 * found.data.times:
         return None
     sensitivity = sensitivity_of(found.likelihood, fitted, len(fitted.applied) - 1)
-    surprising = surprise(gain / sensitivity.inflation(), trial.score.column.width)
+    # shapes are searched too, so that chi2 has a degree for each of them
+    surprising = surprise(gain / sensitivity.inflation(), max(trial.score.column.width, len(last.names)))
     if surprising < found.level:
         return None
     if trial.block.effect.plans_anew:

@@ -1,7 +1,8 @@
 """The columns of the linear model: N of all traces side by side, and the signatures of the candidates."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -27,13 +28,17 @@ class Question:
     clock_share: float = 1.0
     """Of the clocks' normal mismatch, what is left after they were set."""
     seed: int = 0
+    joints: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Link of joints -> those that it has data of."""
 
 
 def nuisance_for(traces: Sequence[Trace], question: Question, known: Signatures) -> list[list[Nuisance]]:
     """Return the nuisance of each trace."""
     clock = question.clocks**0.5 * question.clock_share
     return [
-        nuisance_of(trace, question.library, question.mismatch, known, question.upstream, clock)
+        nuisance_of(
+            trace, question.library, question.mismatch, known, question.upstream, clock, question.joints
+        )
         for trace in traces
     ]
 
@@ -49,6 +54,19 @@ class NuisanceDesign:
     shared: int
     """So many coefficients stand first and are shared."""
     width: int
+
+    @cached_property
+    def of_runs(self) -> tuple[Ints, ...]:
+        """Return for each column that is each run's own the places of its coefficients, one a run."""
+        places: dict[tuple[str, int], list[int]] = {}
+        for items, at in zip(self.nuisance, self.places, strict=True):
+            first = 0
+            for each in items:
+                for number in range(_width(each)):
+                    if not each.shared:
+                        places.setdefault((each.name, number), []).append(int(at[first + number]))
+                first += _width(each)
+        return tuple(np.array(own, dtype=np.int64) for own in places.values())
 
     @classmethod
     def of(cls, nuisance: Sequence[Sequence[Nuisance]]) -> "NuisanceDesign":

@@ -40,6 +40,11 @@ class SignatureGram:
             for wide, members in zip(columns, self._rows, strict=True)
         ]
 
+    @cached_property
+    def totals(self) -> list[Floats]:
+        """Inner products (s + w, s + w) of signatures and nuisance of each trace."""
+        return [np.sum(stretches, axis=0) for stretches in self._fixed]
+
     def beside(self, data: Sequence[Floats]) -> "Gram":
         """Return the view with whitened data (k·n, 1 + t) of each trace: residual r and tangents T."""
         traces = []

@@ -1,6 +1,7 @@
 """The likelihood of a link's data; the model and its symbols are in `gcode2krl.gap.fit`."""
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +12,7 @@ from gcode2krl.gap.beside.stretches import stretches_of, stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.box import boxed
 from gcode2krl.gap.fit.clusters import cluster_scores
+from gcode2krl.gap.fit.counted_once import CountedOnce
 from gcode2krl.gap.fit.design import NuisanceDesign
 from gcode2krl.gap.fit.fitted import Numbers
 from gcode2krl.gap.fit.gram import SignatureGram
@@ -38,9 +40,16 @@ class Likelihood:
             self._whitened(trace, self.design.columns(number, trace))
             for number, trace in enumerate(self.traces)
         ]
+        self.once = CountedOnce(self.design)
         self._normal = np.eye(self.design.width)
         for columns, at in zip(self._columns, self.design.places, strict=True):
             self._normal[np.ix_(at, at)] += columns.T @ columns
+
+    def counting(self, once: CountedOnce) -> "Likelihood":
+        """Return the likelihood in which more nuisance gives way to effects of the same form."""
+        other = copy(self)
+        other.once = once
+        return other
 
     # Data and models as vectors
 
@@ -82,25 +91,52 @@ class Likelihood:
             [columns @ b[at] for columns, at in zip(self._columns, self.design.places, strict=True)]
         )
 
-    def nuisance_of(self, whitened: Floats) -> Floats:
-        """Return b (m,), within its bounds, that fits a whitened vector (v,) best."""
-        return boxed(self._normal, self._projections(whitened))
+    def nuisance_of(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
+        """Return b (m,), within its bounds, that fits a whitened vector (v,) best beside some effects."""
+        kept, normal = self._kept(applied), self._normal
+        projections = self._projections(whitened)
+        if kept is None:
+            return boxed(normal, projections)
+        free: Floats = kept @ boxed(_kept_normal(kept, normal), kept @ projections)
+        return free
 
-    def marginal(self, whitened: Floats) -> Floats:
+    def _kept(self, applied: Sequence[Applied]) -> Floats | None:
+        """Return the projection (m, m) of b onto what is left of it beside effects of the same form."""
+        return self.once.kept(applied)
+
+    def marginal(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return the marginal residual (v + m,) of a whitened vector."""
-        b = self.nuisance_of(whitened)
+        b = self.nuisance_of(whitened, applied)
         return np.concatenate([whitened - self._explained(b), b])
 
-    def projected(self, whitened: Floats) -> Floats:
+    def projected(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return the marginal residuals (v + m, c) of vectors (v, c) for unbounded nuisance."""
-        b = np.asarray(np.linalg.solve(self._normal, self._projections(whitened)), dtype=np.float64)
-        return np.concatenate([whitened - self._explained(b), b])
+        kept, normal, projections = self._kept(applied), self._normal, self._projections(whitened)
+        if kept is not None:
+            normal, projections = _kept_normal(kept, normal), kept @ projections
+        b = np.asarray(np.linalg.solve(normal, projections), dtype=np.float64)
+        return np.concatenate([whitened - self._explained(b if kept is None else kept @ b), b])
+
+    def own_alike(self, applied: Applied) -> bool:
+        """Tell whether nuisance that each run has for itself is of the form of an effect."""
+        return bool(self.once.gone(applied)[self.design.shared :].any())
+
+    def own_nuisance(self, applied: Applied) -> Floats:
+        """Return the whitened columns (v, m) of the runs' own nuisance but for that of an effect's form."""
+        columns = np.zeros((len(self.clusters), self.design.width))
+        ends = np.cumsum([0, *(len(own) for own in self._columns)])
+        for number, at in enumerate(self.design.places):
+            columns[ends[number] : ends[number + 1], at] = self._columns[number]
+        columns[:, self.once.gone(applied)] = 0.0
+        columns[:, : self.design.shared] = 0.0
+        return columns
 
     # Effects
 
     def residual(self, applied: Sequence[Applied]) -> Floats:
         """Return the marginal residual (v + m,) with some effects."""
-        return self.marginal(self.whiten([trace.measured - trace.sample(applied) for trace in self.traces]))
+        rest = self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
+        return self.marginal(rest, applied)
 
     def chi2(self, applied: Sequence[Applied]) -> float:
         """Return chi2 with some effects."""
@@ -133,7 +169,7 @@ class Likelihood:
             steps = numbers.box.steps(x, STEP_SHARE)
             return derivative(residual, x, residual(x), steps) * numbers.box.scale
         slopes = [self._whitened(*pair) for pair in zip(self.traces, self.tangents(numbers, x), strict=True)]
-        return self.projected(-np.concatenate(slopes))
+        return self.projected(-np.concatenate(slopes), numbers.applied(x))
 
     def scores(self, jacobian: Floats, residual: Floats) -> Floats:
         """Return White's scores (g, p) by stretches of time; rows of b belong to none."""
@@ -156,3 +192,10 @@ class Likelihood:
             self._whitened(trace, np.concatenate([r, t], axis=2))
             for trace, r, t in zip(self.traces, residuals, tangents, strict=True)
         ]
+
+
+def _kept_normal(kept: Floats, normal: Floats) -> Floats:
+    """Return the normal matrix (m, m) of b where only a projection of it reaches the data."""
+    identity = np.eye(len(normal))
+    inner: Floats = kept @ (normal - identity) @ kept + identity
+    return inner

@@ -1,6 +1,7 @@
 """Nuisance: what normal mismatch does to a signal, as columns with the standard deviation of each."""
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,12 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect
 from gcode2krl.effects.effect import LINKS, NO_TARGET
 from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.gap.beside.context import unmeasured_at
 from gcode2krl.gap.beside.instruments import CLOCK, clock_columns, time_law_columns
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of
+
+NO_JOINTS: Mapping[str, frozenset[str]] = MappingProxyType({})
 
 
 class Nuisance(NamedTuple):
@@ -22,6 +26,8 @@ class Nuisance(NamedTuple):
     shared: bool
     """One value for all runs, or one for each."""
     columns: Floats
+    block: Block | None = None
+    """Of which effect, target and shape it is the usual size; None for an instrument."""
 
 
 def nuisance_of(
@@ -31,13 +37,15 @@ def nuisance_of(
     known: Signatures,
     upstream: frozenset[str],
     clock: float = 1.0,
+    joints: Mapping[str, frozenset[str]] = NO_JOINTS,
 ) -> list[Nuisance]:
     """Return what normal mismatch may do to a trace.
 
-    ``upstream``: links that are not measured before it; ``clock``: mismatch of its clock over that of one.
+    ``upstream``: links that are not measured before it; ``clock``: mismatch of its clock over that of one;
+    ``joints``: of links of joints those with data.
     """
     every = [
-        *_of_effects(trace, library, mismatch, known, upstream),
+        *_of_effects(trace, library, mismatch, known, upstream, joints),
         *_of_instruments(trace, mismatch, upstream, clock),
     ]
     return [nuisance for nuisance in every if np.any(nuisance.columns)]
@@ -52,11 +60,13 @@ def _of_effects(
     mismatch: Mismatch,
     known: Signatures,
     upstream: frozenset[str],
+    joints: Mapping[str, frozenset[str]],
 ) -> Iterator[Nuisance]:
     cell = trace.inputs.cell
     for effect in _in_order(library, cell):
         for target in effect.targets(cell):
-            if trace.link.name in effect.disturbed(target, upstream):
+            missing = upstream | unmeasured_at(effect, target, joints)
+            if trace.link.name in effect.disturbed(target, missing):
                 for block in blocks_of(effect, target):
                     yield from _of_block(block, trace, mismatch, known)
 
@@ -91,7 +101,8 @@ def _of_block(block: Block, trace: Trace, mismatch: Mismatch, known: Signatures)
         words = (effect.name, target, *(f"{value:g}" for value in block.shape.values()))
         if len(sizes) > 1:
             words = (*words, p.name)
-        yield Nuisance(" ".join(filter(None, words)), True, own * (sigma(bound) / (size * typical)))
+        deviation = own * (sigma(bound) / (size * typical))
+        yield Nuisance(" ".join(filter(None, words)), True, deviation, block)
 
 
 # Instruments, each run its own value

@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied, Effect, Parameter, Role
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import RAD_PER_REV
 
+_LIMITS = THRESHOLDS.fit
 _AT_BOUND = 1e-3
 _MOMENT_S = 2.0
 """Typical size of a moment: differences of a fiftieth of it are those of a short slip."""
+_NORMAL_90 = 1.645
+"""Half-width of a 90 % interval in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,8 @@ class Free:
     low: Floats
     high: Floats
     scale: Floats
+    held: frozenset[str] = frozenset()
+    """Numbers that stay as they are, as the data do not show them."""
 
     def applied(self, x: Floats) -> Applied:
         """Return the effect at the numbers (p,)."""
@@ -63,10 +69,30 @@ class Free:
 
     def at_bound(self, x: Floats) -> bool:
         """Tell whether a size stands at an end of its plausible range."""
-        span = self.high - self.low
         sizes = np.array([not self.effect.parameter(name).is_shape for name in self.names])
-        near = (x - self.low < _AT_BOUND * span) | (self.high - x < _AT_BOUND * span)
-        return bool(np.any(near & sizes & np.isfinite(span)))
+        return bool(np.any(self._near(x) & sizes))
+
+    def _near(self, x: Floats) -> Bools:
+        """Tell which numbers (p,) stand at an end of their range."""
+        span = self.high - self.low
+        near: Bools = (x - self.low < _AT_BOUND * span) | (self.high - x < _AT_BOUND * span)
+        return near & np.isfinite(span)
+
+    def shapes_at_end(self, x: Floats) -> frozenset[str]:
+        """Return the shapes that stand at an end of their range."""
+        return frozenset(np.array(self.names, dtype=object)[self._near(x) & self._shapes])
+
+    def shapes_spanned(self, deviation: Mapping[str, float]) -> frozenset[str]:
+        """Return the shapes whose 90 % interval, from their standard deviations, spans nearly their range."""
+        width = np.array([2.0 * _NORMAL_90 * deviation[name] for name in self.names])
+        wide = width > _LIMITS.shape_span * (self.high - self.low)
+        return frozenset(np.array(self.names, dtype=object)[wide & self._shapes])
+
+    @property
+    def _shapes(self) -> Bools:
+        """Which numbers (p,) are shapes with a range of their own."""
+        roles = (self.effect.parameter(name).role for name in self.names)
+        return np.array([role in (Role.SHAPE, Role.FREQUENCY) for role in roles], dtype=np.bool_)
 
 
 def size_of(effect: Effect) -> str:
@@ -82,7 +108,7 @@ def free_of(applied: Applied, trace: Trace) -> Free:
     length = size if effect.direction is not None else ""
     names, low, high, scale = [], [], [], []
     for p in effect.parameters:
-        if p.role is Role.COUNT or p.name == length:
+        if p.role is Role.COUNT or p.name == length or p.name in applied.held:
             continue
         of = effect.parameter(size) if p.name in vector else p
         names.append(p.name)
@@ -97,6 +123,7 @@ def free_of(applied: Applied, trace: Trace) -> Free:
         np.array(low),
         np.array(high),
         np.array(scale),
+        applied.held,
     )
 
 

@@ -88,8 +88,14 @@ def blocks_of(effect: Effect, target: str | None) -> Iterator[Block]:
             yield Block(effect, target, form)
 
 
-def blocks_at(effect: Effect, target: str | None, frequencies_hz: Sequence[float]) -> Iterator[Block]:
-    """Yield the blocks of an effect with a frequency, at these frequencies in place of its grid's."""
+def blocks_at(
+    effect: Effect, target: str | None, frequencies_hz: Sequence[float], looked_at: float
+) -> Iterator[Block]:
+    """Yield the blocks of an effect with a frequency, at these in place of its grid's.
+
+    They were chosen out of ``looked_at`` independent ones: one for each 1/T of the range, T the duration of a
+    run (Scargle 1982).
+    """
     frequency = effect.frequency
     if frequency is None:
         return
@@ -100,7 +106,8 @@ def blocks_at(effect: Effect, target: str | None, frequencies_hz: Sequence[float
             key = (value, *sorted(rest.items()))
             if key not in seen:
                 seen.add(key)
-                yield Block(effect, target, rest | {frequency.name: value})
+                tried = max(1.0, looked_at / len(frequencies_hz))
+                yield Block(effect, target, rest | {frequency.name: value}, tried)
 
 
 def blocks_from(

@@ -62,7 +62,12 @@ class _Stops(NamedTuple):
 
 
 def _explaining_stops(pairs: Sequence[Pair], before: float) -> _Stops | None:
-    """Return the stops that take the gap ``before``; None where those that the runs show do not."""
+    """Return the fewest stops that take the gap ``before``; None where those that the runs show do not.
+
+    The corner after a stop may look late too. With it left out as much of the gap must go as with it: how
+    many stops there are and how long each holds then follow from the same data.
+    """
+    found: list[_Stops] = []
     delays = [_delays_at_stops(pair) for pair in pairs]
     sizes_s = sorted({0.0, *(late_s for by_row in delays for late_s in by_row.values())})
     for least_s in sizes_s[: _LIMITS.stop_dropped_delays]:
@@ -71,12 +76,13 @@ def _explaining_stops(pairs: Sequence[Pair], before: float) -> _Stops | None:
             for by_row in delays
         ]
         if not any(len(of_run) for of_run in rows):
-            return None
+            break
         hold_s, stopped = _held(pairs, rows)
         left = _rms(motion_traces([_on_time(pair) for pair in stopped]))
         if left**2 < (1.0 - _LIMITS.stop_explained_share) * before**2:
-            return _Stops(rows, hold_s, stopped, left)
-    return None
+            found.append(_Stops(rows, hold_s, stopped, left))
+    least = min((each.rms_left for each in found), default=0.0)
+    return next((each for each in reversed(found) if each.rms_left <= _LIMITS.stop_as_good * least), None)
 
 
 def _held(pairs: Sequence[Pair], stops: Sequence[Ints]) -> tuple[float, list[Pair]]:

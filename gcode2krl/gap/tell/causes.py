@@ -21,6 +21,7 @@ def cause_of(cause: Cause, judgement: Judged, link: str) -> CauseResult:
         parameters=cause.parameters,
         shrink=cause.shrink,
         rms_after=None if cause.rms_after is None else judgement.factor * cause.rms_after,
+        constant=cause.constant,
         indistinguishable_from=tuple(
             EffectAt(applied.effect.name, applied.target) for applied in alike[: THRESHOLDS.tell.most_alike]
         ),

@@ -6,6 +6,7 @@ from typing import Any
 
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Issue
+from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import NAMED
 from gcode2krl.gap.tell.as_json import gap_object
@@ -117,16 +118,6 @@ class RivalResult:
     effect: str
     target: str | None
     probability: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Constancy:
-    """Whether a cause's numbers are the same in all runs, halves of them and joints."""
-
-    inconstancy: float
-    """Spread of the size over parts of the data beyond what noise lets it vary, over the size."""
-    p: float
-    """Probability of at least that spread where the size is one number."""
 
 
 @dataclass(frozen=True, kw_only=True)

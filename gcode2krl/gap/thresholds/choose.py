@@ -57,6 +57,13 @@ class ChooseThresholds:
         1.0, "standard deviations by which an effect's number may be beyond normal mismatch"
     )
 
+    least_part: float = convention(
+        0.02, "of what an effect does: a part of the data with less of it does not tell its size"
+    )
+    minor_chi2: float = convention(
+        6.6, "fall of chi2 over its inflation, one in a hundred by chance: less does not show a minor number"
+    )
+
     # Size of the gap
     significant_sigma: float = convention(
         4.0, "excess power over its own standard deviation; one in 30,000 by chance"

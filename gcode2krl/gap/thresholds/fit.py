@@ -24,8 +24,16 @@ class FitThresholds:
         1.4, DEVELOPMENT, "of what run.toml states: what is above it is structure"
     )
 
+    # Nuisance
+    same_form: float = convention(
+        0.98, "share of a nuisance's power that an effect spans: both are then one deviation, judged as one"
+    )
+
     # Numbers of effects
     prior_sizes: float = convention(3.0, "the standard deviation of a size's prior, in typical sizes")
+    shape_span: float = convention(
+        0.8, "of its range: a shape whose 90 % interval is wider was not found, and is not stated"
+    )
     number_cost: float = convention(
         0.5, "of two effects that are one to the data the one with fewer numbers is named; as chi2"
     )

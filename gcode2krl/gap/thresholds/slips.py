@@ -58,6 +58,9 @@ class SlipThresholds:
     stop_most_corners: float = convention(
         0.5, "where a larger share of the corners is late, it is the time law"
     )
+    stop_as_good: float = convention(
+        1.1, "of the least rest: fewer stops that leave no more than this are named in place of more"
+    )
     stop_explained_share: float = calibrated(
         0.95, DEVELOPMENT, "share of the gap's power that planned stops must take"
     )

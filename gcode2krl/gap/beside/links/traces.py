@@ -105,6 +105,7 @@ def vector_trace(
         declared_sigma=sigma,
         in_sensor_frame=frame == "sensor",
         in_tool_frame=frame == "tcp",
+        still=pair.still,
     )
     return with_rows(trace, ~at_edges(pair.inputs, trace.time_s))
 

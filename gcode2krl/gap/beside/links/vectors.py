@@ -1,6 +1,6 @@
 """The links of the instruments at the tool: force and mechanics."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Inputs
@@ -51,7 +51,10 @@ class ForceLink(Link):
         learned = (applied.effect.learned(applied, self.name) for applied in judged.applied)
         context = context.with_learned(applied for applied in learned if applied is not None)
         if is_lost(judged):
-            context = context.with_pairs(pair.with_measured_load() for pair in context.pairs)
+            base = self.base(context)
+            seen, bending = (*base, *judged.applied), (*base, *context.learned)
+            pairs = (pair.with_measured_load(seen, bending) for pair in context.pairs)
+            context = context.with_pairs(pairs)
         return context
 
 
@@ -69,7 +72,8 @@ class MechanicsLink(Link):
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return the tip, beside the model from the measured joints."""
-        table, head = pair.run.tracker, pair.run.head
+        run, head = pair.run, pair.run.head
+        table = run.poses if pair.still else run.tracker
         if table is None or not pair.known_robot or (pair.from_log and head.angles == "relative"):
             return None
         pair = pair.with_measured_joints("q_load")
@@ -83,6 +87,11 @@ class MechanicsLink(Link):
             frame=head.frames.tracker,
             sigma=head.noise.tcp_mm,
         )
+
+    def traces(self, pairs: Iterable[Pair], base: Sequence[Applied] = ()) -> list[Trace]:
+        """Return the tips of all runs; of motions alone where some runs are of poses, whose noise differs."""
+        traces = super().traces(pairs, base)
+        return [trace for trace in traces if not trace.still] or traces
 
     def planned(self, inputs: Inputs) -> Floats:
         """Return the commanded tip (m, 3)."""

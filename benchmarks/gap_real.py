@@ -1,0 +1,235 @@
+"""Real data that a person has fetched, diagnosed: docs/real_data.md says what is expected of them.
+
+``python benchmarks/gap_real.py FOLDER`` with FOLDER a copy of JonasWeigand/Robot_Identification on GitHub
+(MIT): three logs of a KUKA KR 300 R2500 ultra. Its files become run folders, which are diagnosed from the log alone;
+what is measured is printed beside what was expected. ``--runs DIR`` keeps the run folders.
+"""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.io import loadmat
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.operators import play
+from gcode2krl.gap import diagnose_log
+from gcode2krl.gap.tell.result import Gap
+from gcode2krl.runs import load_run
+
+LOAD_ENCODERS = 3
+"""A1 to A3 have one."""
+PLAY_DEG = 0.06
+EXPECTED_LATE_MS = (2.3, 3.6)
+EXPECTED_INTERVAL_MS = 0.5
+CARRIED_SLACK = 0.05
+TORQUE_UNIT_NM = 10.0
+PLAYS = (0.1, 0.3, 0.6)
+"""Half-widths of the memory in torque, in units of it: a tenth to more than half of its amplitude."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """One recorded movement: times (n,), angles (n, 6) in degrees, motor torques (n, 6)."""
+
+    name: str
+    time_s: Floats
+    q_act_deg: Floats
+    q_load_deg: Floats
+    torque_Nm: Floats
+
+
+def read_logs(folder: Path) -> list[Log]:
+    """Return the recorded movements of a copy of the repository, in the order of their names."""
+    files = sorted(folder.glob("data/recorded_trajectories/*/data.mat"))
+    if not files:
+        raise SystemExit(f"{folder}: no data/recorded_trajectories/*/data.mat")
+    return [_log(file, f"run-{number}") for number, file in enumerate(files, start=1)]
+
+
+def _log(file: Path, name: str) -> Log:
+    record = loadmat(file, squeeze_me=True, struct_as_record=False)["rec"]
+    angles = (record.act_pos_mot_deg, record.act_pos_se_deg, record.act_torque_abs_nm)
+    actual, load, torque = (np.ascontiguousarray(np.asarray(each, dtype=float).T) for each in angles)
+    return Log(name, np.asarray(record.time_cont, dtype=float), actual, load, torque)
+
+
+def write_run(log: Log, parent: Path) -> Path:
+    """Write the run folder of a log; angles begin at zero, so they are relative."""
+    folder = parent / log.name
+    folder.mkdir(parents=True, exist_ok=True)
+    joints = range(1, 7)
+    names = ["t_s", *(f"q{j}_act_deg" for j in joints)]
+    names += [f"q{j}_load_deg" for j in joints[:LOAD_ENCODERS]] + [f"tau{j}_Nm" for j in joints]
+    table = np.column_stack([log.time_s, log.q_act_deg, log.q_load_deg[:, :LOAD_ENCODERS], log.torque_Nm])
+    np.savetxt(
+        folder / "controller.csv", table, delimiter=",", header=",".join(names), comments="", fmt="%.7f"
+    )
+    (folder / "run.toml").write_text('angles = "relative"\n', encoding="utf-8")
+    return folder
+
+
+def diagnosed(logs: Sequence[Log], parent: Path) -> Gap:
+    """Return what the logs alone tell."""
+    return diagnose_log([load_run(write_run(log, parent), partial=True) for log in logs])
+
+
+# Made-up logs
+
+
+def with_play(log: Log, joint: int, gap_deg: float) -> Log:
+    """Return the log as if a joint (0 to 5) had a play: its load encoder follows the motor within ± gap/2."""
+    load = log.q_load_deg.copy()
+    load[:, joint] += play(log.q_act_deg[:, joint], gap_deg / 2.0) - log.q_act_deg[:, joint]
+    return Log(log.name, log.time_s, log.q_act_deg, load, log.torque_Nm)
+
+
+def without_gap(log: Log, seed: int) -> Log:
+    """Return the log with load encoders that show the motor's angle, with noise as rough as the log's own."""
+    difference = (log.q_load_deg - log.q_act_deg)[:, :LOAD_ENCODERS]
+    sigma = np.std(np.diff(difference, n=2, axis=0), axis=0) / np.sqrt(6.0)  # 1, -2, 1: sum of squares 6
+    load = log.q_act_deg.copy()
+    load[:, :LOAD_ENCODERS] += np.random.default_rng(seed).normal(0.0, sigma, difference.shape)
+    return Log(log.name, log.time_s, log.q_act_deg, load, log.torque_Nm)
+
+
+# The rest against a joint's own torque
+
+
+def rest_deg(log: Log, joint: int, late_s: float) -> Floats:
+    """Return q_load - q_act (n,) without its mean and with the clock taken off."""
+    model = CubicSpline(log.time_s, log.q_act_deg[:, joint])(log.time_s - late_s)
+    rest = log.q_load_deg[:, joint] - model
+    return rest - rest.mean()
+
+
+def torque_columns(log: Log, joint: int) -> Floats:
+    """Return odd functions (n, c) of a joint's own torque with memory: itself and its plays."""
+    torque = np.ascontiguousarray(log.torque_Nm[:, joint] / TORQUE_UNIT_NM)
+    columns = np.column_stack([torque, *(play(torque, width) for width in PLAYS)])
+    return columns - columns.mean(axis=0)
+
+
+def carried_over(logs: Sequence[Log], joint: int, late_s: float) -> list[float]:
+    """Return R² of the rest on own torque in each log, by the coefficients of the others."""
+    rests = [rest_deg(log, joint, late_s) for log in logs]
+    columns = [torque_columns(log, joint) for log in logs]
+    found = []
+    for held in range(len(logs)):
+        others = [number for number in range(len(logs)) if number != held]
+        design = np.vstack([columns[number] for number in others])
+        values = np.concatenate([rests[number] for number in others])
+        coefficients = np.linalg.lstsq(design, values, rcond=None)[0]
+        left = rests[held] - columns[held] @ coefficients
+        found.append(float(1.0 - left @ left / (rests[held] @ rests[held])))
+    return found
+
+
+# What is printed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: what was measured beside what was expected, and whether they agree."""
+
+    what: str
+    expected: str
+    measured: str
+    agrees: bool
+
+
+def rows(logs: Sequence[Log], parent: Path) -> Iterator[Row]:
+    """Yield the lines of the table; each diagnosis takes some seconds."""
+    sets = [*([log] for log in logs), list(logs)]
+    late_s = float("nan")
+    for some in sets:
+        gap = diagnosed(some, parent / "as-logged")
+        name = some[0].name if len(some) == 1 else "all together"
+        yield _clock_row(name, gap)
+        late_s = next((c.parameters["offset_s"].value for c in gap.named_causes if _is_clock(c)), late_s)
+    yield from _torque_rows(logs, late_s)
+    gap = diagnosed([with_play(log, 1, PLAY_DEG) for log in logs], parent / "play")
+    yield _play_row(gap)
+    yield _null_row(diagnosed([without_gap(log, seed) for seed, log in enumerate(logs)], parent / "null"))
+
+
+def _is_clock(cause) -> bool:
+    return (cause.effect, cause.target) == ("clock", "q_load")
+
+
+def _clock_row(name: str, gap: Gap) -> Row:
+    low, high = EXPECTED_LATE_MS
+    expected = f"clock q_load {low} to {high} ms, within ± {EXPECTED_INTERVAL_MS} ms"
+    clock = next((cause for cause in gap.named_causes if _is_clock(cause)), None)
+    if clock is None:
+        return Row(f"clock, {name}", expected, f"{gap.verdict}: {_names(gap)}", False)
+    value, least, most = (1e3 * each for each in clock.parameters["offset_s"])
+    width = max(value - least, most - value)
+    words = f"{value:.2f} ms [{least:.2f}, {most:.2f}], p {clock.probability:.2f}"
+    if clock.constant is not None:
+        words += f", inconstancy {clock.constant.inconstancy:.3f} (p {clock.constant.p:.2f})"
+    words += f"; {gap.verdict}: {_names(gap)}"
+    return Row(f"clock, {name}", expected, words, low <= value <= high and width <= EXPECTED_INTERVAL_MS)
+
+
+def _names(gap: Gap) -> str:
+    return ", ".join(f"{c.effect} {c.target or ''}".strip() for c in gap.named_causes) or "nothing named"
+
+
+def _torque_rows(logs: Sequence[Log], late_s: float) -> Iterator[Row]:
+    if not np.isfinite(late_s):
+        yield Row("rest against own torque", "R² about 0.58 (A3), 0.33 (A2)", "no clock was found", False)
+        return
+    for joint, expected in ((0, None), (1, 0.33), (2, 0.58)):
+        r2 = carried_over(logs, joint, late_s)
+        words = ", ".join(f"{each:.2f}" for each in r2)
+        middle = float(np.median(r2))
+        agrees = expected is None or middle >= expected - CARRIED_SLACK
+        yield Row(
+            f"rest against own torque, A{joint + 1}",
+            "none stated" if expected is None else f"R² of {expected} or more",
+            f"R² {words} in the run left out; median {middle:.2f}",
+            agrees,
+        )
+
+
+def _play_row(gap: Gap) -> Row:
+    found = next((c for c in gap.named_causes if (c.effect, c.target) == ("backlash", "A2")), None)
+    expected = f"backlash A2, {PLAY_DEG} deg"
+    if found is None:
+        return Row("made-up play", expected, f"{gap.verdict}: {_names(gap)}", False)
+    value, low, high = found.parameters["gap_deg"]
+    words = f"{value:.4f} deg [{low:.4f}, {high:.4f}], p {found.probability:.2f}; {_names(gap)}"
+    return Row("made-up play", expected, words, low <= PLAY_DEG <= high)
+
+
+def _null_row(gap: Gap) -> Row:
+    return Row("made-up null", "no_gap", f"{gap.verdict}: {_names(gap)}", gap.verdict == "no_gap")
+
+
+def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] = print) -> int:
+    """Print the table; 0 where all agrees with what was expected."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument(
+        "--runs", type=Path, help="folder for the runs that are written; by default they are removed"
+    )
+    given = parser.parse_args(arguments)
+    logs = read_logs(given.folder)
+    with tempfile.TemporaryDirectory() as scratch:
+        found = []
+        for row in rows(logs, given.runs or Path(scratch)):
+            found.append(row.agrees)
+            write(f"{'as expected' if row.agrees else 'NOT AS EXPECTED':16}{row.what}")
+            write(f"{'':16}expected: {row.expected}")
+            write(f"{'':16}measured: {row.measured}")
+    return 0 if all(found) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,71 @@
+"""Constancy of a cause's size against sizes that are known part by part."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects import library
+from gcode2krl.gap.choose.constancy import constancy_of, spread_between_runs
+from gcode2krl.gap.choose.selection import examine
+from tests.gap.constructed import LINK, applied, examined, motion, noise, question, trace, wave
+from tests.gap.test_counted_once import examined as with_clocks
+from tests.gap.test_counted_once import late_encoders
+
+WAVE = wave(0.5, "ripple")
+TIME_S = motion().time_s
+
+
+def ripple(sizes, seed=0):
+    """Return traces of runs, each with its own size of one wave (n,) in the first joint."""
+    form = trace(np.zeros((500, 1))).sample([applied(WAVE, 1.0)])
+    return [
+        trace(np.asarray(size).reshape(-1, 1) * form + noise(500, seed + n, 0.1), number=n)
+        for n, size in enumerate(sizes)
+    ]
+
+
+def judged(sizes):
+    found = examined(ripple(sizes), [WAVE])
+    (number,) = found.cause_numbers
+    return constancy_of(found, number), found
+
+
+def test_one_size_in_all_runs_is_constant():
+    constant, found = judged([1.0, 1.0, 1.0])
+    assert constant.p > 0.01
+    assert constant.inconstancy < 0.03
+    assert spread_between_runs(found, 0)[1] == 3
+
+
+def test_a_size_that_differs_between_runs_is_not():
+    """Sizes 0.7, 1.0, 1.3: the standard deviation is 0.3 of the mean."""
+    constant, found = judged([0.7, 1.0, 1.3])
+    assert constant.p < 1e-4
+    assert constant.inconstancy == pytest.approx(0.3, abs=0.03)
+    assert spread_between_runs(found, 0)[0] == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_size_that_grows_within_a_run_is_not():
+    growing = np.where(TIME_S < 5.0, 0.7, 1.3)
+    constant, _ = judged([growing, growing])
+    assert constant.p < 1e-3
+    assert constant.inconstancy > 0.2
+
+
+def test_a_clock_is_one_number_in_all_joints():
+    found = with_clocks([3.07e-3])
+    constant = constancy_of(found, 0)
+    assert constant.p > 0.01
+    assert constant.inconstancy < 0.02
+
+
+def test_a_clock_of_one_joint_alone_is_not():
+    """A lag of one joint is fitted by a clock of all, and its size then differs from joint to joint."""
+    one = late_encoders(0.0)
+    late = late_encoders(4e-3)
+    mixed = np.where(np.arange(6) == 1, late.measured, one.measured)
+    asked = question([library()["clock"]], "q_load")
+    found = examine(LINK["gear"], [replace(one, measured=mixed)], asked)
+    for number in range(len(found.applied)):
+        assert constancy_of(found, number).p < 1e-6

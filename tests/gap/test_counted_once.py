@@ -1,0 +1,74 @@
+"""A clock and its nuisance are one deviation: what is judged against the bound is their sum."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects import Applied, library
+from gcode2krl.gap.choose.mismatch import within_mismatch
+from gcode2krl.gap.choose.selection import examine
+from gcode2krl.gap.choose.set_clocks import with_set_clocks
+from gcode2krl.gap.fit.signatures import Signatures, blocks_of
+from tests.gap.constructed import LINK, columns_nuisance, likelihood, motion, noise, question, trace
+
+CLOCK = library()["clock"]
+SIGMA_RAD = 2e-6
+
+
+def late_encoders(offset_s, number=0):
+    """Return the gear of a run whose load encoders are late, by their own true signal."""
+    nominal = trace(np.zeros((500, 6)), "gear", number=number)
+    true = replace(nominal, plus_late_s=offset_s).nominal
+    return replace(nominal, measured=true + noise(500, 70 + number, SIGMA_RAD, 6))
+
+
+def examined(offsets_s):
+    asked = question([CLOCK], "q_load")
+    known = Signatures()
+    traces = with_set_clocks([late_encoders(each, n) for n, each in enumerate(offsets_s)], asked, known)
+    return examine(LINK["gear"], traces, asked, known)
+
+
+@pytest.mark.parametrize("offsets_s", [[3.07e-3], [3.07e-3, 3.0e-3, 3.1e-3]])
+def test_a_clock_beyond_the_bound_is_a_cause_with_all_of_its_number(offsets_s):
+    """Beside a free clock of the runs 3.07 ms were split into 0.90 and 2.17, and the 2.17 called usual."""
+    found = examined(offsets_s)
+    (cause,) = found.causes
+    assert cause["offset_s"] == pytest.approx(np.mean(offsets_s), abs=2e-5)
+
+
+def test_a_clock_within_the_bound_is_none():
+    assert not examined([1.7e-3]).causes
+    assert not examined([1.8e-3, 1.6e-3, 1.9e-3]).causes
+
+
+def test_runs_may_differ_from_a_common_clock_as_mismatch_lets_them():
+    """What is common to the runs is the effect's, how they differ is nuisance."""
+    found = examined([5.5e-3, 4.5e-3, 5.0e-3])
+    (cause,) = found.causes
+    assert cause["offset_s"] == pytest.approx(5e-3, abs=1e-4)
+    left = found.likelihood.residual(found.applied)
+    assert float(left @ left) < 1.3 * found.data.values
+
+
+def test_the_whole_deviation_is_compared_with_the_bound():
+    found = examined([3.07e-3])
+    assert not within_mismatch(found, 0)
+    wider = replace(found.question.mismatch, clock_s=4e-3)
+    data = replace(found.data, question=replace(found.question, mismatch=wider))
+    assert within_mismatch(replace(found, data=data), 0)
+
+
+def test_nuisance_that_all_runs_share_goes_while_its_effect_is_in_the_model():
+    one = trace(noise(500, 1, 1.0, 1))
+    column = np.sin(motion().time_s)
+    play = library()["backlash"]
+    (block,) = blocks_of(play, "A1")
+    own = columns_nuisance("backlash A1", column)._replace(block=block)
+    made = likelihood([one], [[own]])
+    beside = [Applied(play, "A1", {"gap_deg": 0.0})]
+    flat = made.whiten([column[:, None]])
+    assert abs(made.nuisance_of(flat)[0]) > 0.5
+    assert made.nuisance_of(flat, beside)[0] == 0.0
+    assert made.nuisance_of(flat, [Applied(play, "A2", {"gap_deg": 0.0})])[0] != 0.0

@@ -1,0 +1,131 @@
+"""Static poses as a run: offsets of joints from poses of a robot that are computed another way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl import load_cell, robot
+from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.gap import diagnose_log
+from gcode2krl.gap.beside.links import MECHANICS
+from gcode2krl.gap.beside.log_alone import log_pairs
+from gcode2krl.gap.beside.poses import is_of_poses
+from gcode2krl.gap.fit.pose_noise import pose_noise
+from gcode2krl.runs import load_run
+
+COVERS = ("gcode2krl.gap.fit.pose_noise",)
+
+CELL = load_cell()
+POSES = 60
+SIGMA_MM = 0.02
+
+
+def written(folder, offset_deg=(0.0,) * 6, seed=1, head="[noise]\ntcp_mm = 0.02\n", time="t_s", extra=""):
+    """Write a run of poses of a robot whose joints are off by some degrees; return it as read."""
+    generator = np.random.default_rng(seed)
+    middle = np.array([0.0, -90.0, 100.0, 20.0, 40.0, 10.0])
+    q_deg = middle + generator.uniform(-35.0, 35.0, (POSES, 6))
+    tip, _ = robot.forward(np.radians(q_deg + offset_deg), CELL, 1)
+    tip = tip + SIGMA_MM * generator.standard_normal(tip.shape)
+    names = [time, *(f"q{n}_deg" for n in range(1, 7)), "x_mm", "y_mm", "z_mm", "temp1_C", "ambient_C"]
+    lines = [",".join(names)]
+    for n in range(POSES):
+        when = f"2024-05-06T07:{n:02d}:30" if time == "time" else f"{30.0 * n:g}"
+        warm = "" if n == 3 else f"{20.0 + 0.1 * n:.2f}"
+        lines.append(
+            ",".join([when, *(f"{v:.6f}" for v in q_deg[n]), *(f"{v:.5f}" for v in tip[n]), warm, "21.5"])
+        )
+    folder.mkdir()
+    (folder / "poses.csv").write_text("\n".join(lines) + "\n" + extra, encoding="utf-8")
+    (folder / "run.toml").write_text(head, encoding="utf-8")
+    return load_run(folder)
+
+
+def test_columns_are_read_with_temperatures_and_without_gaps(tmp_path):
+    run = written(tmp_path / "run")
+    table = run.poses
+    assert len(table) == POSES  # a missing temperature does not cost its row
+    assert table.temperature_C.shape == (POSES, 8)
+    assert np.isnan(table.temperature_C[3, 0])
+    assert table.temperature_C[10, 0] == pytest.approx(21.0)
+    assert np.isnan(table.temperature_C[:, 1:]).all()
+    assert (table.ambient_C == 21.5).all()
+    assert (table.segments == [[0, POSES]]).all()
+    assert is_of_poses(run)
+    assert not any("temp2_C" in issue.message for issue in run.issues)
+
+
+def test_dates_become_seconds_from_the_first_pose(tmp_path):
+    run = written(tmp_path / "run", time="time")
+    np.testing.assert_allclose(run.poses.time_s, 60.0 * np.arange(POSES))
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "words"),
+    [
+        (lambda text: text.replace("q3_deg", "q3"), "trace-column", "q3_deg"),
+        (lambda text: text.replace("x_mm", "x"), "trace-column", "x_mm"),
+        (lambda text: text.replace("\n60,", "\n10,"), "trace-time", "10 s does not come after 30 s"),
+        (lambda text: text.replace("\n60,", "\nsixty,"), "trace-number", "row 4"),
+        (lambda text: text.replace("t_s", "when"), "trace-column", "t_s"),
+    ],
+)
+def test_a_wrong_table_is_an_error_that_names_row_and_column(tmp_path, change, code, words):
+    written(tmp_path / "run")
+    file = tmp_path / "run" / "poses.csv"
+    file.write_text(change(file.read_text("utf-8")), encoding="utf-8")
+    with pytest.raises(NotUnderstoodError) as error:
+        load_run(tmp_path / "run")
+    assert error.value.issues[0].code == code
+    assert words in error.value.issues[0].message
+
+
+def test_a_date_that_is_none_is_an_error(tmp_path):
+    written(tmp_path / "run", time="time")
+    file = tmp_path / "run" / "poses.csv"
+    file.write_text(file.read_text("utf-8").replace("2024-05-06T07:02:30", "yesterday"), encoding="utf-8")
+    with pytest.raises(NotUnderstoodError, match="'yesterday' is no date"):
+        load_run(tmp_path / "run")
+
+
+def test_each_pose_is_one_sample_of_the_mechanics_without_a_clock(tmp_path):
+    run = written(tmp_path / "run")
+    (pair,) = log_pairs([run], CELL)
+    (trace,) = MECHANICS.traces([pair])
+    assert trace.shape == (POSES, 3)
+    assert not trace.rate.any()
+    assert np.std(trace.residual) == pytest.approx(SIGMA_MM, rel=0.15)
+
+
+def test_noise_is_white_and_as_stated_or_what_nothing_explains(tmp_path):
+    run = written(tmp_path / "run", head="")
+    (trace,) = MECHANICS.traces(log_pairs([run], CELL))
+    form = np.random.default_rng(3).standard_normal((3, POSES, 20))
+    pushed = replace(trace, measured=trace.measured + form.sum(axis=2).T)
+    for noise in pose_noise([pushed], [form], [[]]):
+        assert len(noise.a) == 0
+        assert noise.sigma == pytest.approx(SIGMA_MM, rel=0.15)
+    many = np.random.default_rng(4).standard_normal((3, POSES, 150))
+    assert pose_noise([pushed], [many], [[]])[0].sigma > 1.0  # too few poses for so many forms
+    assert pose_noise([replace(pushed, declared_sigma=0.5)], [form], [[]])[0].sigma == 0.5
+
+
+def test_a_wrong_mastering_is_found_from_poses(tmp_path):
+    run = written(tmp_path / "run", offset_deg=(0.0, 0.03, 0.0, 0.0, 0.0, 0.0))
+    gap = diagnose_log([run], CELL)
+    (cause,) = gap.named_causes
+    assert (cause.effect, cause.target, cause.link) == ("mastering", "A2", "mechanics")
+    value, low, high = cause.parameters["offset_deg"]
+    assert low <= 0.03 <= high
+    assert value == pytest.approx(0.03, abs=0.002)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_sound_poses_are_no_gap(tmp_path, seed):
+    assert diagnose_log([written(tmp_path / "run", seed=seed)], CELL).verdict == "no_gap"
+
+
+def test_without_a_known_robot_poses_say_nothing(tmp_path):
+    gap = diagnose_log([written(tmp_path / "run")])
+    assert "mechanics" in {each.link for each in gap.not_examined}
