@@ -35,6 +35,11 @@ def _column(dtype: DTypeLike, *tail: int | None) -> Any:
     return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
 
 
+def _derived_column(dtype: DTypeLike, *tail: int) -> Any:
+    """Declare a column that the table derives from the others where it is not given."""
+    return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail})
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
     """Base of all tables: checks and freezes the columns."""
@@ -158,6 +163,35 @@ class Motion(Table):
     """(m,) True inside an approximated corner."""
     tool: Ints32 = _column(np.int32)
     """(m,) tool number whose frame moves."""
+    direction: Floats = _derived_column(np.float64, 3)
+    """(m, 3) unit tangent of the path at the sample, zero in a turn on the spot; where it is not given, that
+    of the chords beside the sample."""
+
+    def __post_init__(self) -> None:
+        if self.direction is None:
+            object.__setattr__(self, "direction", chord_directions(np.asarray(self.position_mm, np.float64)))
+        super().__post_init__()
+
+
+STRAIGHT_ON = 0.985
+"""Cosine of the turn at a sample, 10 degrees, above which its tangent is the mean of both chords."""
+_NO_CHORD_MM = 1e-9
+
+
+def chord_directions(position_mm: Floats) -> Floats:
+    """Return unit tangents (m, 3) from the chords of positions: of both beside a sample, at a corner of the
+    one before it; zero where nothing moves."""
+    position = position_mm.reshape(-1, 3)
+    before = np.diff(position, axis=0, prepend=position[:1])
+    after = np.roll(before, -1, axis=0)
+    after[-1:] = 0.0
+    from_mm, to_mm = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
+    begins = from_mm < _NO_CHORD_MM
+    straight = (before * after).sum(axis=1) > STRAIGHT_ON * from_mm * to_mm
+    straight &= ~begins & (to_mm > _NO_CHORD_MM)
+    tangent = np.where(begins[:, None], after, np.where(straight[:, None], before + after, before))
+    length_mm = np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.where(length_mm > _NO_CHORD_MM, tangent / np.maximum(length_mm, _NO_CHORD_MM), 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,6 +19,7 @@ from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.reading import Result, cut_strip
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path
+from gcode2krl.tables import chord_directions
 
 _BINS = 16
 _FEWEST_BINS = 96
@@ -42,6 +43,8 @@ def engage(
     tools: Sequence[Tool],
     law: Floats,
     threads: int | None = None,
+    direction: Floats | None = None,
+    read: Bools | None = None,
 ) -> Result:
     """Cut a motion out of a field (in place); return engagement and mean force of every sample.
 
@@ -57,6 +60,8 @@ def engage(
     f_z_mm : (n,) feed per tooth along the path.
     law : (8,) force law as in `slices.arc_force`.
     threads : how many; default: all cores.
+    direction : (n, 3) unit tangents; by default those of the chords.
+    read : (n,) False at points that only shape the sweep and get no result; default: none.
 
     Notes
     -----
@@ -72,7 +77,15 @@ def engage(
         return result
     cell_mm = float(field.cell_mm.max())
     first = np.concatenate([[True], tool[1:] != tool[:-1]])
-    path = Path(position, tool, np.ascontiguousarray(rapid, dtype=np.bool_), first, outlines_of(tools))
+    path = Path(
+        position,
+        tool,
+        np.ascontiguousarray(rapid, dtype=np.bool_),
+        first,
+        outlines_of(tools),
+        np.ascontiguousarray(_tangents(position, first) if direction is None else direction),
+        np.ones(count, dtype=np.bool_) if read is None else np.ascontiguousarray(read, dtype=np.bool_),
+    )
     cutters = _cutters(tools, cell_mm)
     steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
     way_mm = np.concatenate([[0.0], np.cumsum(steps)])
@@ -117,6 +130,12 @@ def engage(
 
 
 _Piece = tuple[Grid, int, int, int, Floats]
+
+
+def _tangents(position_mm: Floats, first: Bools) -> Floats:
+    """Return the tangents (n, 3) of chords, none of which joins two tools."""
+    parts = np.split(position_mm, np.flatnonzero(first)[1:])
+    return np.concatenate([chord_directions(part) for part in parts])
 
 
 def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:

@@ -14,8 +14,10 @@ from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
 from gcode2krl.cutting.raw_part import height_field_of
+from gcode2krl.cutting.reading import Result
 from gcode2krl.cutting.stock_checks import Work, stock_findings
 from gcode2krl.cutting.tool_use import uses
+from gcode2krl.cutting.turns import Shaped, shaped
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.tables import Forces, Motion, Toolpath
 
@@ -81,8 +83,21 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     before = _uncut(field)
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
-    engaged = engage(field, position, tool, wholly_rapid, f_z_mm, [_with_shank(one) for one in tools], law)
-    overlap_mm = np.array(engaged.overlap_mm, dtype=np.float64)
+    way = _way(position, motion, to_field, tool)
+    rows = way.sample
+    found = engage(
+        field,
+        way.position_mm,
+        tool[rows],
+        wholly_rapid[rows],
+        f_z_mm[rows],
+        [_with_shank(one) for one in tools],
+        law,
+        direction=(motion.direction @ to_field.T)[rows],
+        read=way.read,
+    )
+    overlap_mm = way.gathered(found.overlap_mm)
+    engaged = Result(*(column[way.read] for column in found))
     flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
     overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
     # a rapid through material is reported as a collision, and is not a cut
@@ -139,6 +154,12 @@ def remove(toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = 
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))
     return Removal(replace(forces, issues=ordered), field)
+
+
+def _way(position_mm: Floats, motion: Motion, to_field: Floats, tool: Ints32) -> Shaped:
+    """Return the path of the tip in the frame of the field, with the turns between samples."""
+    joined = np.concatenate([[False], tool[1:] == tool[:-1]])
+    return shaped(position_mm, motion.direction @ to_field.T, motion.path_mm, joined)
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:

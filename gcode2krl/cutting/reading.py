@@ -21,8 +21,6 @@ from gcode2krl.cutting.walls import draw_walls, height_at
 _STRAIGHT = 0.03  # sine of the angle in plan below which a path counts as straight
 _LEVEL = 0.15  # the same up or down, where it only moves the angle at which the chip begins
 _TURN = 2.0 * math.pi
-STRAIGHT_ON = 0.985
-"""Cosine of the turn at a sample, 10 degrees, above which its direction is the mean of before and after."""
 
 
 class Result(NamedTuple):
@@ -62,7 +60,7 @@ def cut_strip(
         if i < n:
             if path.first[i]:
                 lag = i
-            if not low <= path.position_mm[i, axis] < high:
+            if not (path.read[i] and low <= path.position_mm[i, axis] < high):
                 continue
             limit = way_mm[i] - cutters.lag_mm[path.tool[i]]
             while lag + 1 < i and way_mm[lag + 1] <= limit:
@@ -77,7 +75,7 @@ def cut_strip(
         if path.tool[i] != tool:
             tool = path.tool[i]
             fill_turn(work.turn, cutters.wall_bins[tool], cutters.ring_bins[tool])
-        _read(grid, path, cutters, law, f_z_mm[i], i, lag, work, result)
+        _read(grid, path, cutters, law, f_z_mm[i], way_mm, i, lag, work, result)
 
 
 @inlined
@@ -95,7 +93,7 @@ def _apply(grid, path, k, n, axis, low, high, index, rapid_mm):
 
 
 @inlined
-def _read(grid, path, cutters, law, f_z_mm, i, lag, work, result):
+def _read(grid, path, cutters, law, f_z_mm, way_mm, i, lag, work, result):
     """Read the engagement at sample i and write its row."""
     tool, position = path.tool[i], path.position_mm
     x, y, z = position[i, 0], position[i, 1], position[i, 2]
@@ -103,7 +101,7 @@ def _read(grid, path, cutters, law, f_z_mm, i, lag, work, result):
     radius = outline[0]
     if cutters.above[tool, 0] > radius or cutters.above[tool, 2] > radius:
         _collide(grid, x, y, z, radius, cutters.above, tool, result.overlap_mm, i)
-    fx, fy, sink, level = _heading(position, path.first, i)
+    fx, fy, sink, level = _heading(path.direction, i)
     if sink == 0.0 and level == 0.0:
         return
     result.ramp_rad[i] = math.atan2(sink, level)
@@ -116,7 +114,8 @@ def _read(grid, path, cutters, law, f_z_mm, i, lag, work, result):
             grid.place, grid.shift, grid.height, grid.wall, path.position_mm, path.outlines, path.tool, x, y
         ) - max(z, grid.bottom_mm)
         result.centre_mm[i] = below if below > FEEL_MM else 0.0
-    recent = _recent(position, i, lag, fx * level, fy * level, -sink, work.recent)
+    met = _met(way_mm, i, lag, f_z_mm)
+    recent = _recent(position, i, lag, met, fx * level, fy * level, -sink, work.recent)
     total = work.total
     total[:] = 0.0
     total[LEAST], total[MOST] = math.inf, -math.inf
@@ -140,51 +139,41 @@ def _read(grid, path, cutters, law, f_z_mm, i, lag, work, result):
 
 
 @kernel
-def _step(position, first, i):
-    """Return the step that leads to sample i, and its length; zero where there is none."""
-    if i >= first.size or first[i]:
-        return 0.0, 0.0, 0.0, 0.0
-    dx, dy = position[i, 0] - position[i - 1, 0], position[i, 1] - position[i - 1, 1]
-    dz = position[i, 2] - position[i - 1, 2]
-    return dx, dy, dz, math.sqrt(dx * dx + dy * dy + dz * dz)
+def _heading(direction, i):
+    """Return the unit vector in plan of the path's tangent at a sample, sine and cosine of its descent."""
+    dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+    plan = math.sqrt(dx * dx + dy * dy)
+    if plan < 1e-9:
+        return 1.0, 0.0, -dz, 0.0
+    return dx / plan, dy / plan, -dz, plan
 
 
 @kernel
-def _heading(position, first, i):
-    """Return the direction of the path at a sample: unit vector in plan, sine and cosine of the descent.
+def _met(way_mm, i, lag, f_z_mm):
+    """Return the last point whose sweep the edge at sample i finds cut: a feed per tooth before it.
 
-    From the sample before to the one after; only from the one before where the path has a corner or ends.
+    What an edge meets is what the tooth before has left. A step of the sampling or of the path's shape in its
+    place would make the force depend on how densely points lie.
     """
-    bx, by, bz, before = _step(position, first, i)
-    ax, ay, az, after = _step(position, first, i + 1)
-    if before < 1e-9:
-        bx, by, bz, before = ax, ay, az, after
-    elif after > 1e-9 and ax * bx + ay * by + az * bz > STRAIGHT_ON * before * after:
-        bx, by, bz = bx + ax, by + ay, bz + az
-        before = math.sqrt(bx * bx + by * by + bz * bz)
-    if before < 1e-9:
-        return 1.0, 0.0, 0.0, 0.0
-    plan = math.sqrt(bx * bx + by * by)
-    if plan < 1e-9 * before:
-        return 1.0, 0.0, -math.copysign(1.0, bz), 0.0
-    return bx / plan, by / plan, -bz / before, plan / before
+    met = i - 1
+    while met > lag and way_mm[met] > way_mm[i] - f_z_mm:
+        met -= 1
+    return met
 
 
 @kernel
-def _recent(position, i, lag, dx, dy, dz, recent):
-    """List the sweeps that the field does not show yet and that were not on a straight path to sample i.
-
-    The sweep that ends at the sample itself is not one of them: its engagement comes before its removal.
-    """
-    stride = max((i - lag + MOST_RECENT - 1) // MOST_RECENT, 1)
+def _recent(position, i, lag, met, dx, dy, dz, recent):
+    """List the sweeps up to point ``met`` that the field does not show yet and that were not on a straight
+    path to sample i."""
+    stride = max((met - lag + MOST_RECENT - 1) // MOST_RECENT, 1)
     count = 0
-    for start in range(lag, i - 1, stride):
+    for start in range(lag, met, stride):
         ax, ay = position[i, 0] - position[start, 0], position[i, 1] - position[start, 1]
         az = position[i, 2] - position[start, 2]
         back, aside = ax * dx + ay * dy + az * dz, ax * dy - ay * dx
         off = ax * ax + ay * ay + az * az - back * back
         if back < 0.0 or off > (_LEVEL * back) ** 2 + 1e-12 or abs(aside) > _STRAIGHT * back:
-            recent[count, 0], recent[count, 1] = start, min(start + stride, i - 1)
+            recent[count, 0], recent[count, 1] = start, min(start + stride, met)
             count += 1
     return count
 

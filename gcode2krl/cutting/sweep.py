@@ -44,7 +44,7 @@ class Grid(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Samples in the order of time, in the frame of the field (z = tool axis)."""
+    """Points in the order of time, in the frame of the field (z = tool axis)."""
 
     position_mm: Floats
     """(n, 3) tips."""
@@ -55,6 +55,10 @@ class Path(NamedTuple):
     """(n,) True where no sweep leads to the sample: the first one, and after a change of tool."""
     outlines: Floats
     """(t, 7) radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
+    direction: Floats
+    """(n, 3) unit tangents."""
+    read: Bools
+    """(n,) True where the engagement is read: False at points that only shape the sweep."""
 
 
 # Small functions take numbers and the few arrays they need: passing a whole `Grid` costs more than the

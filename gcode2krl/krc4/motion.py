@@ -174,6 +174,7 @@ def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, 
         path_mm=samples.path_mm,
         move=move,
         corner=samples.corner,
+        direction=samples.direction,
         tool=chain.tool[samples.move],
     )
 

@@ -31,6 +31,8 @@ class Samples(NamedTuple):
     """(m,) fraction of the move that is done."""
     corner: Bools
     """(m,) True inside an approximated corner."""
+    direction: Floats
+    """(m, 3) unit tangent of the path; zero in a turn on the spot."""
 
 
 def sample_times(profile: Profile, dt_s: float) -> Floats:
@@ -54,6 +56,7 @@ def sample(
     move, begins = np.empty(count, dtype=np.int64), _sums(length_mm)
     law = tuple(np.empty((4, count)))  # speed, acceleration, jerk and path
     part, corner, position = np.empty(count), np.empty(count, dtype=np.bool_), np.empty((count, 3))
+    direction = np.empty((count, 3))
     pieces = profile[:5]
 
     def law_of(start: int, end: int) -> None:
@@ -64,14 +67,15 @@ def sample(
     def place(start: int, end: int) -> None:
         rows = slice(start, end)
         figures = tuple(row[rows] for row in law)
-        _place(move[rows], moves, begins, way, saved, figures, position[rows], part[rows], corner[rows])
+        places = position[rows], direction[rows]
+        _place(move[rows], moves, begins, way, saved, figures, places, part[rows], corner[rows])
 
     in_chunks(law_of, chunk_borders(count))
     _moves(law[3], begins, move)
     way, saved = _way_to_moves(moves)
     in_chunks(place, chunk_borders(count))
     speed, acceleration, jerk, path = law
-    return Samples(position, speed, acceleration, jerk, path, move, part, corner)
+    return Samples(position, speed, acceleration, jerk, path, move, part, corner, direction)
 
 
 class _Moves(NamedTuple):
@@ -169,8 +173,9 @@ def _savings(moves, first, behind, size, saving):
 
 
 @njit(cache=True, nogil=True)
-def _place(move, moves, begins, way_to, saved_to, law, position, part, corner):
-    """Write position, part and corner, and over ``law`` the magnitudes in space and the arc length."""
+def _place(move, moves, begins, way_to, saved_to, law, places, part, corner):
+    """Write places (position, tangent), part, corner; over ``law`` the magnitudes in space and arc length."""
+    position, direction = places
     start, end, length, blend = moves
     speed, acceleration, jerk_of, path = law
     u, w = np.zeros(3), np.zeros(3)
@@ -213,6 +218,9 @@ def _place(move, moves, begins, way_to, saved_to, law, position, part, corner):
             speed2 += (first[c] * v) ** 2
             acceleration2 += (first[c] * a + second[c] * v * v) ** 2
             jerk2 += (first[c] * jerk + 3.0 * second[c] * v * a) ** 2
+        steep = math.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
+        for c in range(3):
+            direction[row, c] = first[c] / steep if steep > 0.0 else 0.0
         speed[row], acceleration[row] = math.sqrt(speed2), math.sqrt(acceleration2)
         jerk_of[row], path[row] = math.sqrt(jerk2), way
         part[row] = inside / length[i] if length[i] > 0.0 else 1.0

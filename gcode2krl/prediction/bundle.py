@@ -7,7 +7,7 @@ side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -277,6 +277,8 @@ def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
         width = tail[0] if tail else 0
         names = _names_on_disk(spec, len(_counted(spec.name, frame.columns)) if width is None else width)
         absent = [name for name in names if name not in frame.columns]
+        if absent and spec.default is not MISSING:
+            continue
         if absent:
             raise ValueError(f"column {absent[0]} is missing")
         parts = [frame[name].to_numpy() for name in names]
