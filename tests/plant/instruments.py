@@ -1,10 +1,11 @@
 """The measured signals of a run, their noise and clocks: clean readings first, then noise on top."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tests.plant import arm as arms
+from tests.plant import foreign as strange
 from tests.plant import memory
 from tests.plant.robot import SIGN, SLOW, Run
 from tests.plant.scene import DEGREE, JOINT_ROW, GRAVITY_m_s2
@@ -38,6 +39,8 @@ class Instruments:
     scan: bool = False
     tables: tuple = ("controller", "tracker", "force")
     drop_outs: bool = True
+    foreign: tuple = ()  # of foreign.Foreign
+    blank: tuple = ()  # columns that are not there
 
 
 def drawn(rng: np.random.Generator, needs: frozenset, twist: bool = False) -> Instruments:
@@ -75,6 +78,20 @@ def drawn(rng: np.random.Generator, needs: frozenset, twist: bool = False) -> In
     )
 
 
+def without(how: Instruments, missing: tuple[str, ...]) -> Instruments:
+    """A chain that lacks tables, or columns of one."""
+    tables = tuple(t for t in how.tables if t not in missing)
+    blank = tuple(m for m in missing if m not in READERS)
+    if not tables:
+        raise ValueError("a run without any table is none; leave one")
+    return replace(how, tables=tables, blank=how.blank + blank)
+
+
+def disturbed(how: Instruments, kinds: tuple) -> Instruments:
+    """A chain with foreign noise on top."""
+    return replace(how, foreign=kinds)
+
+
 def true_times(run: Run, table: str, stamps_s: np.ndarray) -> np.ndarray:
     """When the samples with these stamps were taken: stamp = t·(1 + skew) + offset."""
     offset, skew = run.clocks.get(table, (0.0, 0.0))
@@ -85,12 +102,24 @@ def true_times(run: Run, table: str, stamps_s: np.ndarray) -> np.ndarray:
     return taken
 
 
+def simulated(run: Run, times_s: np.ndarray) -> np.ndarray:
+    """Times of the run as times of the simulation, which leaves out the middle of long dwells."""
+    return np.interp(times_s, run.elapsed_s, run.t_s) if run.pauses else times_s
+
+
 def _at(times_s: np.ndarray, grid_s: np.ndarray, columns: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(times_s, grid_s, columns[:, k]) for k in range(columns.shape[1])], axis=1)
 
 
 def _stamps(run: Run, step_s: float) -> np.ndarray:
-    return np.arange(0.0, run.t_s[-1] - 0.05, step_s)
+    """Stamps of a table; the middle of a long dwell is not logged."""
+    stamps = np.arange(0.0, run.elapsed_s[-1] - 0.05, step_s)
+    logged = np.ones(len(stamps), bool)
+    gone = 0.0
+    for at_s, seconds in run.pauses:
+        logged &= (stamps <= at_s + gone) | (stamps >= at_s + gone + seconds)
+        gone += seconds
+    return stamps[logged]
 
 
 def _turned_degrees(axes: np.ndarray) -> np.ndarray:
@@ -113,7 +142,7 @@ def _motor_torques(run: Run) -> np.ndarray:
 
 def _tracker(run: Run, how: Instruments) -> dict:
     stamps = _stamps(run, 1.0 / how.tracker_hz)
-    taken = true_times(run, "tracker", stamps)
+    taken = simulated(run, true_times(run, "tracker", stamps))
     place = _at(taken, run.t_s, run.tip_mm) * run.units.get("tracker", 1.0)
     table = {"t_s": stamps, **{f"{a}_mm": place[:, i] for i, a in enumerate(XYZ)}}
     if how.tracker_turns:
@@ -124,14 +153,17 @@ def _tracker(run: Run, how: Instruments) -> dict:
 
 def _force(run: Run, how: Instruments) -> dict:
     stamps = _stamps(run, 1.0 / how.force_hz)
-    taken = true_times(run, "force", stamps)
+    taken = simulated(run, true_times(run, "force", stamps))
     force, moment = run.sensed_N, run.sensed_Nmm / 1000.0
     if how.force_frame == "sensor":  # moments about the sensor's middle, 28 mm in front of the flange
         lever = run.believed.tool.origin_mm - np.array([0.0, 0.0, 28.0])
         moment = moment + np.cross(lever, force) / 1000.0
     else:  # about the TCP, turned by the nominal tool frame, upright
         turn = run.sensor_axes[0] if how.force_frame == "base" else run.believed.tool.axes.T
-        force, moment = force @ turn.T, moment @ turn.T
+        if how.force_frame == "base" and run.axes is not None:
+            force, moment = (np.einsum("nij,nj->ni", run.sensor_axes, v) for v in (force, moment))
+        else:
+            force, moment = force @ turn.T, moment @ turn.T
     force = _at(taken, run.slow_s, force) * run.units.get("force", 1.0)
     table = {"t_s": stamps, **{f"f{a}_N": force[:, i] for i, a in enumerate(XYZ)}}
     if how.force_moments:
@@ -143,11 +175,15 @@ def _force(run: Run, how: Instruments) -> dict:
 def _controller(run: Run, how: Instruments) -> dict:
     stamps = _stamps(run, how.controller_s)
     taken = true_times(run, "controller", stamps)
-    ahead = true_times(run, "q_cmd", taken)
-    behind = true_times(run, "q_load", taken)
+    ahead = simulated(run, true_times(run, "q_cmd", taken))
+    behind = simulated(run, true_times(run, "q_load", taken))
+    taken = simulated(run, taken)
     place = _at(ahead, run.t_s, run.reported_mm)
     table = {"t_s": stamps, **{f"{a}_cmd_mm": place[:, i] for i, a in enumerate(XYZ)}}
-    table |= {f"{a}_cmd_deg": np.zeros(len(stamps)) for a in "abc"}
+    turns = np.zeros((len(stamps), 3))
+    if run.axes is not None:
+        turns = _at(ahead, run.t_s, _turned_degrees(run.axes))
+    table |= {f"{a}_cmd_deg": turns[:, i] for i, a in enumerate("abc")}
     q_cmd, q_act = _at(ahead, run.t_s, run.q_cmd) / DEGREE, _at(taken, run.t_s, run.q_act) / DEGREE
     table |= {f"q{j + 1}_cmd_deg": q_cmd[:, j] for j in range(6)}
     table |= {f"q{j + 1}_act_deg": q_act[:, j] for j in range(6)}
@@ -167,7 +203,8 @@ READERS = {"tracker": _tracker, "force": _force, "controller": _controller}
 
 def clean(run: Run, how: Instruments) -> dict[str, dict]:
     """All tables of a run without noise."""
-    return {name: READERS[name](run, how) for name in how.tables}
+    read = {name: READERS[name](run, how) for name in how.tables}
+    return {name: {c: v for c, v in table.items() if c not in how.blank} for name, table in read.items()}
 
 
 def sigma(column: str, how: Instruments) -> tuple[float, float, int]:
@@ -196,9 +233,11 @@ def noisy(
 ) -> dict[str, dict]:
     """Noise, quantisation and drop-outs (empty or missing rows) on clean tables."""
     out = {}
+    own = np.random.default_rng(int(rng.integers(1 << 62))) if how.foreign else rng
     for name, table in tables.items():
         n = len(table["t_s"])
         unit = units.get(name, 1.0)
+        table = strange.on_top(table, how.foreign, unit, own)
         seen = {}
         for column, values in table.items():
             spread, keeps, decimals = sigma(column, how)

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from tests.plant.cases import make_case
+from tests.plant.cases import line_of, make_case
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN
 
 
@@ -43,13 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
         except ValueError as error:
             print(f"make_cases: {error}", file=sys.stderr)
             return 2
-        print(f"case-{i + 1:04d}  {time.perf_counter() - start:4.1f} s  {_line(label)}")
+        print(f"case-{i + 1:04d}  {time.perf_counter() - start:4.1f} s  {line_of(label)}")
     return 0
-
-
-def _line(label: dict) -> str:
-    names = [f"{e['effect']} {e['target'] or ''} ({e['form']}, {e['ratio']:.2f})" for e in label["effects"]]
-    return " + ".join(names) or "none"
 
 
 if __name__ == "__main__":

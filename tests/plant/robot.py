@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from tests.plant import arm as arms
-from tests.plant import chips, memory, path
+from tests.plant import chips, memory, path, turning
+from tests.plant.programs import Track
 from tests.plant.scene import DEGREE, GEAR_RATIO, JOINT_ROW, GRAVITY_m_s2, World
 from tests.plant.waypoints import Waypoints
 
@@ -44,7 +46,7 @@ class Mismatch:
 class Run:
     """State of one run; arrays are per sample at `t_s` (fast) or `slow_s` (every fourth)."""
 
-    def __init__(self, way: Waypoints, world: World, mismatch: Mismatch, age_s: float = 0.0):
+    def __init__(self, way: Waypoints | Track, world: World, mismatch: Mismatch, age_s: float = 0.0):
         self.way, self.mismatch = way, mismatch
         self.believed = world  # the world that controller and prediction assume
         self.world = world.but(stiffness_Nmm_rad=world.stiffness_Nmm_rad * mismatch.stiffness[:, None])
@@ -56,6 +58,9 @@ class Run:
         self.jumps = {}  # table -> (time, seconds)
         self.units = {}
         self.depth_taper_mm = 0.0
+        self.axes = None  # of the tool in `$BASE` where it is not upright
+        self.pauses = ()  # of a long dwell: when, and the seconds that are not simulated
+        self.spindle = ()  # from second, rpm; else as the world's cutter
 
     def delay(self, table: str, offset_s: float, skew: float = 0.0) -> None:
         """Add an offset and a skew to a table's clock."""
@@ -83,20 +88,50 @@ def to_base(world: World, place_mm: np.ndarray) -> np.ndarray:
     return (place_mm - world.base.origin_mm) @ world.base.axes
 
 
-def joints_for(world: World, place_mm: np.ndarray) -> np.ndarray:
-    """The controller's angles for an upright tool at places in `$BASE`."""
-    axes = np.broadcast_to(world.base.axes, (len(place_mm), 3, 3))
-    return arms.inverse(world, to_root(world, place_mm), axes)
+def joints_for(world: World, place_mm: np.ndarray, axes: np.ndarray | None = None) -> np.ndarray:
+    """The controller's angles at places in `$BASE`, with the tool upright or its axes there (n, 3, 3)."""
+    axes = np.broadcast_to(np.eye(3), (len(place_mm), 3, 3)) if axes is None else axes
+    return arms.inverse(world, to_root(world, place_mm), world.base.axes @ axes)
 
 
 def _command(run: Run) -> None:
-    run.links = path.chains(run.way, run.believed)
-    run.t_s = np.arange(0.0, run.links[-1].end_s + TAIL_s, STEP_s)
+    if isinstance(run.way, Track):
+        _follow(run, run.way)
+    else:
+        _plan(run)
     run.slow_s = run.t_s[::SLOW]
-    run.place_mm = path.commanded(run.links, run.t_s, run.believed)
     run.reported_mm = run.place_mm.copy()
-    run.q_cmd = joints_for(run.believed, run.place_mm)
+    run.elapsed_s = run.t_s.copy()
+    for at_s, seconds in run.pauses:
+        run.elapsed_s[run.t_s >= at_s] += seconds
+    run.spindle_rad_s = np.full(len(run.t_s), run.world.cutter.spindle_rad_s)
+    for from_s, rpm in run.spindle:
+        run.spindle_rad_s[run.elapsed_s >= from_s] = rpm * np.pi / 30.0
     run.lag_s = np.broadcast_to(run.mismatch.lag_s + run.world.lag_s, run.q_cmd.shape).copy()
+
+
+def _plan(run: Run) -> None:
+    """The plant's own law of motion along waypoints."""
+    run.links = path.chains(run.way, run.believed)
+    if not run.links:
+        raise ValueError("these waypoints go nowhere; give the joints as a track")
+    last_s = run.links[-1].end_s + run.way.hold_s[-1]
+    run.t_s = np.arange(0.0, last_s + TAIL_s, STEP_s)
+    run.place_mm = path.commanded(run.links, run.t_s, run.believed)
+    upright = run.way.turns_deg is None or not np.any(run.way.turns_deg)
+    run.axes = None if upright else turning.axes_at(run.way, run.links, run.t_s)
+    run.q_cmd = joints_for(run.believed, run.place_mm, run.axes)
+    if np.abs(np.diff(run.q_cmd, axis=0)).max() > 0.1:
+        raise ValueError("the wrist flips on these waypoints; give their joints as a track")
+
+
+def _follow(run: Run, track: Track) -> None:
+    """Joints that are given over time, smooth between their samples."""
+    run.links = []
+    run.t_s = np.arange(0.0, track.t_s[-1] + TAIL_s, STEP_s)
+    run.q_cmd = PchipInterpolator(track.t_s, track.q_rad, axis=0)(np.minimum(run.t_s, track.t_s[-1]))
+    place, axes = arms.pose(arms.reference_pose(run.believed), np.ascontiguousarray(run.q_cmd))
+    run.place_mm, run.axes = to_base(run.believed, place), run.believed.base.axes.T @ axes
 
 
 def _servo(run: Run) -> None:
@@ -139,6 +174,13 @@ def cut_at(run: Run, t_s: np.ndarray, place_mm: np.ndarray) -> chips.Cut:
 
 
 def take_cut(run: Run) -> None:
+    """The cut of waypoints; a track is driven in the air."""
+    if not run.links:
+        n = len(run.slow_s)
+        zero = np.zeros((n, 3))
+        run.cut = chips.Cut(zero, zero, np.zeros(n), np.zeros(n), np.zeros((n, 2)))
+        run.force_N, run.moment_Nmm, run.metres_cut = zero.copy(), zero.copy(), np.zeros(n)
+        return
     run.pieces = chips.pieces(run.links, run.believed)
     place = run.place_mm[::SLOW]
     run.cut = cut_at(run, run.slow_s, place)
@@ -209,10 +251,19 @@ def _sense(run: Run) -> None:
     run.sensed_Nmm = np.einsum("nji,nj->ni", flange, moment) * run.mismatch.gain
 
 
-def simulate(way: Waypoints, world: World, effects: list[Hooks], mismatch=None, age_s=0.0, number=0) -> Run:
-    """Drive the waypoints with these effects at work."""
+def simulate(
+    way: Waypoints | Track,
+    world: World,
+    effects: list[Hooks],
+    mismatch=None,
+    age_s=0.0,
+    number=0,
+    pauses=(),
+    spindle=(),
+) -> Run:
+    """Drive waypoints or a track with these effects at work."""
     run = Run(way, world, mismatch or Mismatch(), age_s)
-    run.number = number
+    run.number, run.pauses, run.spindle = number, pauses, spindle
 
     def at(stage: str) -> None:
         for hooks in effects:

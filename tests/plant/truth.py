@@ -22,8 +22,8 @@ def signals(tables: dict[str, dict]) -> dict[str, tuple[np.ndarray, np.ndarray]]
         columns = {k: np.stack([t[f"q{j}_{k}_deg"] for j in range(1, 7)], axis=1) for k in ("cmd", "act")}
         out["joint_commanded"] = t["t_s"], columns["cmd"]
         out["joint_actual"] = t["t_s"], columns["act"] - columns["cmd"]
-        if "q1_load_deg" in t:
-            load = np.stack([t[f"q{j}_load_deg"] for j in range(1, 7)], axis=1)
+        if any(f"q{j}_load_deg" in t for j in range(1, 7)):  # a joint without one reads as its motor
+            load = np.stack([t.get(f"q{j}_load_deg", t[f"q{j}_act_deg"]) for j in range(1, 7)], axis=1)
             out["joint_load"] = t["t_s"], load - columns["act"]
     return out
 
@@ -63,7 +63,15 @@ def sizes(per_run: list[dict], how: Instruments) -> dict[str, dict]:
         square = np.mean(change**2, axis=0)
         rms = np.sqrt(square.mean() if name in ("tcp", "force") else square.max())
         out[name] = {"rms": float(rms), "ratio": float(rms / noise_of(name, how))}
+        if name in ("tcp", "force"):
+            out[name]["constant_share"] = _constant_share(change)
     return out
+
+
+def _constant_share(change: np.ndarray) -> float:
+    """Share of a change's power that one constant vector takes: 1 is an offset and nothing else."""
+    power = float(np.mean(np.sum(change**2, axis=1)))
+    return float(np.sum(change.mean(axis=0) ** 2) / power) if power > 0.0 else 0.0
 
 
 def places(per_run: list[dict], signal: str) -> list[list[list[float]]]:
@@ -93,4 +101,15 @@ def _joined(spans: list[list[float]]) -> list[list[float]]:
             out[-1][1] = span[1]
         else:
             out.append(span)
+    return out
+
+
+def above_noise(per_run: list[dict], signal: str, how: Instruments) -> list[list[list[float]]]:
+    """Intervals of each run in which the smoothed change exceeds the noise of a column."""
+    out = []
+    for run in per_run:
+        t, change = run[signal]
+        width = max(1, int(SMOOTH_s / (t[1] - t[0])))
+        power = np.convolve(np.sum(change**2, axis=1), np.ones(width) / width, mode="same")
+        out.append(_joined(_spans(np.sqrt(power) > noise_of(signal, how), t)))
     return out

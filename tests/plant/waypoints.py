@@ -16,6 +16,7 @@ class Waypoints:
     cdis_mm: np.ndarray  # 0 is an exact stop
     hold_s: np.ndarray
     cutting: np.ndarray  # a feed move
+    turns_deg: np.ndarray | None = None  # A, B, C of the tool in `$BASE`, (n, 3); none is upright
 
     def __len__(self) -> int:
         return len(self.position_mm)

@@ -104,7 +104,7 @@ def thermal(draw: Draw):
 
     def at(size):
         def tip(run: Run):
-            hours = (run.age_s + run.t_s) / 3600.0
+            hours = (run.age_s + run.elapsed_s) / 3600.0
             grown = size * constant_h * -np.expm1(-hours / constant_h)
             run.tip_mm = run.tip_mm + grown[:, None] * way
 
@@ -121,7 +121,7 @@ def thermal_of_two_bodies(draw: Draw):
 
     def at(size):
         def tip(run: Run):
-            hours = ((run.age_s + run.t_s) / 3600.0)[:, None]
+            hours = ((run.age_s + run.elapsed_s) / 3600.0)[:, None]
             quick, late = (size * c * -np.expm1(-hours / c) for c in (fast_h, slow_h))
             run.tip_mm = run.tip_mm + quick * (0.5 * one + 0.5 * two) + late * two
 

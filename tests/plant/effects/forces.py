@@ -167,7 +167,7 @@ def force_drift(draw: Draw):
 
     def at(size):
         def sense(run: Run):
-            hours = (run.age_s + run.slow_s) / 3600.0
+            hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
             run.sensed_N = run.sensed_N + size * hours[:, None] * way
 
         return numbers(N_per_h=size, direction=way), {"sense": sense}
@@ -182,7 +182,7 @@ def force_drift_that_settles(draw: Draw):
 
     def at(size):
         def sense(run: Run):
-            hours = (run.age_s + run.slow_s) / 3600.0
+            hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
             run.sensed_N = run.sensed_N - size * constant_h * np.expm1(-hours / constant_h)[:, None] * way
 
         return numbers(N_per_h=size, direction=way, time_constant_h=constant_h), {"sense": sense}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tests.plant.effects.depends import LIBRARY_DEPENDS, Depends
 from tests.plant.robot import Hooks
 from tests.plant.scene import JOINTS
 
@@ -22,7 +23,17 @@ class Kind:
     needs: frozenset
     same: Callable
     hours: bool = False  # shows only between runs that are hours apart
+    all_runs: bool = False  # sized on all runs, and twice: begins late, or is not linear in its size
+    depends: Depends | None = None
     others: list = field(default_factory=list)
+    others_depend: dict = field(default_factory=dict)
+
+    def depends_of(self, form: str) -> Depends:
+        """On what a form depends: as the kind unless it says otherwise."""
+        own = self.others_depend.get(form) or self.depends or LIBRARY_DEPENDS.get(self.name)
+        if own is None:
+            raise ValueError(f"{self.name} does not say on what it depends")
+        return own
 
 
 LIBRARY: dict[str, Kind] = {}
@@ -30,22 +41,37 @@ UNKNOWN: dict[str, Kind] = {}
 SLIPS: dict[str, Kind] = {}
 
 
-def declare(shelf: dict, family: str, low: float, high: float, *, signal="any", needs=(), hours=False):
+def declare(
+    shelf: dict,
+    family: str,
+    low: float,
+    high: float,
+    *,
+    signal="any",
+    needs=(),
+    hours=False,
+    all_runs=False,
+    depends: Depends | None = None,
+):
     """Put a builder on a shelf under its own name; sizes from `low` to `high` are plausible."""
 
     def keep(build):
         name = build.__name__
-        shelf[name] = Kind(name, family, (low, high), signal, frozenset(needs), build, hours)
+        shelf[name] = Kind(
+            name, family, (low, high), signal, frozenset(needs), build, hours, all_runs, depends
+        )
         return build
 
     return keep
 
 
-def other_form(name: str):
+def other_form(name: str, depends: Depends | None = None):
     """Another form of the same physics; a name's forms are tried with equal chance."""
 
     def keep(build):
         LIBRARY[name].others.append(build)
+        if depends is not None:
+            LIBRARY[name].others_depend[build.__name__] = depends
         return build
 
     return keep

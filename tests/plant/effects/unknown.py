@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.plant.effects.depends import force, joint, tip
 from tests.plant.effects.registry import UNKNOWN, Draw, declare, numbers
 from tests.plant.robot import Run, fast
 from tests.plant.scene import DEGREE
@@ -12,7 +13,7 @@ def _after(run: Run, share: float) -> np.ndarray:
     return (run.t_s > share * run.t_s[-1]).astype(float)[:, None]
 
 
-@declare(UNKNOWN, "part", 0.05, 2.0, signal="tcp")
+@declare(UNKNOWN, "part", 0.05, 2.0, signal="tcp", depends=tip("step", "time_step"))
 def fixture_slip(draw: Draw):
     """The fixture, with the tracker's reference on it, slips in the middle of one run and stays there."""
     way, share = draw.direction() * np.array([1.0, 1.0, 0.1]), draw.uniform(0.2, 0.7)
@@ -27,7 +28,7 @@ def fixture_slip(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "sensor", 0.04, 1.0, signal="tcp")
+@declare(UNKNOWN, "sensor", 0.04, 1.0, signal="tcp", depends=tip("smooth", "time_smooth", "place"))
 def tracker_refraction(draw: Draw):
     """Warm air wanders through the beam: a slow error across it, growing with the distance."""
     stand = draw.rng.uniform([-3500.0, -3500.0, -200.0], [-2000.0, 3500.0, 800.0])
@@ -48,7 +49,7 @@ def tracker_refraction(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "geometry", 0.04, 0.4, signal="tcp")
+@declare(UNKNOWN, "geometry", 0.04, 0.4, signal="tcp", depends=tip("drift", "time_since_start"))
 def spindle_growth(draw: Draw):
     """The spindle grows along its axis within seconds after it starts, as at high speed."""
     constant_s = draw.uniform(2.0, 8.0)
@@ -62,7 +63,9 @@ def spindle_growth(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "force", 15.0, 300.0)
+@declare(
+    UNKNOWN, "force", 15.0, 300.0, depends=force("smooth", "place", "travel", links=("force", "mechanics"))
+)
 def cable_snag(draw: Draw):
     """A cable catches at one place: it pulls like a spring and lets go at once."""
     place, reach = draw.rng.uniform([-40.0, -60.0, 0.0], [140.0, 60.0, 30.0]), draw.uniform(40.0, 90.0)
@@ -82,7 +85,7 @@ def cable_snag(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "geometry", 0.02, 0.4, signal="tcp")
+@declare(UNKNOWN, "geometry", 0.02, 0.4, signal="tcp", depends=tip("periodic", "tone"))
 def bearing_wobble(draw: Draw):
     """A worn spindle bearing: the axis wobbles at a slow beat, wider under load."""
     hz, phase = draw.uniform(0.7, 3.0), draw.uniform(0.0, 6.28)
@@ -100,7 +103,14 @@ def bearing_wobble(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "servo", 0.001, 0.01, signal="joint_actual")
+@declare(
+    UNKNOWN,
+    "servo",
+    0.001,
+    0.01,
+    signal="joint_actual",
+    depends=joint("periodic", "motor_angle", links=("servo",)),
+)
 def encoder_interpolation(draw: Draw):
     """A motor encoder whose sine and cosine are uneven: the reading errs with each of its lines."""
     name, j = draw.joint()
@@ -117,7 +127,7 @@ def encoder_interpolation(draw: Draw):
     return name, at
 
 
-@declare(UNKNOWN, "joint", 0.003, 0.08, signal="tcp")
+@declare(UNKNOWN, "joint", 0.003, 0.08, signal="tcp", depends=joint("step", "time_step"))
 def collision_step(draw: Draw):
     """The arm is hit: from then on a joint and its neighbour stand a little elsewhere."""
     name, j = draw.joint()
@@ -134,7 +144,7 @@ def collision_step(draw: Draw):
     return name, at
 
 
-@declare(UNKNOWN, "geometry", 0.04, 1.0, signal="tcp")
+@declare(UNKNOWN, "geometry", 0.04, 1.0, signal="tcp", depends=tip("periodic", "tone", "time_smooth"))
 def floor_sways(draw: Draw):
     """A press next door: the floor tilts to and fro in bursts, whatever the robot does."""
     way, hz, every = draw.direction(), draw.uniform(1.5, 4.0), draw.uniform(3.0, 6.0)
@@ -150,7 +160,7 @@ def floor_sways(draw: Draw):
     return None, at
 
 
-@declare(UNKNOWN, "force", 0.15, 1.5, needs=("cut",))
+@declare(UNKNOWN, "force", 0.15, 1.5, needs=("cut",), depends=force("smooth", "force_by_place", "place"))
 def hard_spot(draw: Draw):
     """A weld or an inclusion in the block: the force is higher in one region of it."""
     place, radius = draw.rng.uniform([30.0, -45.0], [130.0, 45.0]), draw.uniform(40.0, 70.0)

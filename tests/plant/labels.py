@@ -1,0 +1,127 @@
+"""The truth of a case: what acts, where, on what it depends, how large it is, and which answers are right."""
+
+from dataclasses import asdict
+
+from tests.plant import faults as acting
+from tests.plant import instruments, truth
+from tests.plant.effects import LIBRARY, SLIPS
+from tests.plant.faults import Fault
+from tests.plant.instruments import Instruments
+from tests.plant.plans import Plan
+from tests.plant.robot import Run
+
+SCHEMA = "plant/label/2"
+
+
+def label_of(plan: Plan, sizes: list[float], driven: list[Run], without: list[Run]) -> dict:
+    """Everything that was drawn and what it did to the signals."""
+    entries = _entries(plan, sizes, driven, without)
+    return {
+        "schema": SCHEMA,
+        "seed": plan.seed,
+        "asked": plan.name,
+        "null": not plan.faults,
+        "slip": any(f.kind in SLIPS.values() for f in plan.faults),
+        "in_library": all(f.kind in LIBRARY.values() or f.kind in SLIPS.values() for f in plan.faults),
+        "wanted_ratio": plan.ratio,
+        "visible": any(_visible(entry) for entry in entries),
+        "effects": entries,
+        "answers": answers(plan),
+        "instruments": asdict(plan.how),
+        "foreign_noise": [asdict(kind) for kind in plan.how.foreign],
+        "mismatch_law": asdict(plan.options.law),
+        "robot_mismatch": asdict(plan.days[0].mismatch),
+        "runs": [
+            {
+                "run": f"run-{day.number + 1}",
+                "program": day.program,
+                "started": day.started.isoformat(),
+                "age_s": day.age_s,
+                "duration_s": float(run.t_s[-1]),
+                "shift_mm": day.mismatch.shift_mm,
+                "turn_rad": day.mismatch.turn_rad,
+                "clocks_s": day.mismatch.clocks_s,
+                "force_zero_N": day.mismatch.force_zero_N,
+            }
+            for day, run in zip(plan.days, driven, strict=True)
+        ],
+    }
+
+
+def _visible(entry: dict) -> bool:
+    """Whether some measured signal changes by its noise."""
+    seen = [s["ratio"] for name, s in entry["signals"].items() if name != "joint_commanded"]
+    return max([entry["ratio"], *seen]) >= 1.0
+
+
+def answers(plan: Plan) -> list[dict]:
+    """The answer that is right: nothing for no effect and for one that no library has."""
+    known = [f for f in plan.faults if f.kind in LIBRARY.values() or f.kind in SLIPS.values()]
+    return [{"effect": f.kind.name, "target": f.target} for f in known]
+
+
+def _entries(plan: Plan, sizes: list[float], driven: list[Run], without: list[Run]) -> list[dict]:
+    bare = [instruments.clean(run, plan.how) for run in without]
+    out = []
+    for fault, size in zip(plan.faults, sizes, strict=True):
+        alone = driven
+        if len(plan.faults) > 1:
+            alone = [plan.drive(day, [fault.hooks(size)]) for day in plan.days]
+        seen = [instruments.clean(run, plan.how) for run in alone]
+        changes = [truth.differences(a, b) for a, b in zip(seen, bare, strict=True)]
+        out.append(_entry(fault, size, changes, plan.how))
+    return out
+
+
+def _entry(fault: Fault, size: float, changes: list[dict], how: Instruments) -> dict:
+    sized = truth.sizes(changes, how)
+    if fault.kind.signal == "scan":
+        main, main_ratio = "scan", 0.5 * size / how.scan_mm
+    else:
+        main = fault.kind.signal
+        if main not in sized:
+            main = acting.clearest(sized) if sized else None
+        main_ratio = sized[main]["ratio"] if main else 0.0
+    where = truth.places(changes, main) if main in sized else []
+    above = truth.above_noise(changes, main, how) if main in sized else []
+    values, depends = fault.values(size), fault.depends
+    entry = {
+        "effect": fault.kind.name,
+        "family": fault.kind.family,
+        "target": fault.target,
+        "form": "same" if fault.same else "other",
+        "form_name": fault.form,
+        "size": size,
+        "parameters": values,
+        "main_signal": main,
+        "ratio": main_ratio,
+        "signals": sized,
+        "where": _spans(where),
+        "above_noise": _spans(above),
+        "depends": {
+            "where": depends.where,
+            "target": fault.target,
+            "joints": _joints(fault),
+            "on": list(depends.on),
+            "form": depends.form,
+            "links": list(depends.links),
+        },
+    }
+    if depends.form == "step" and "at_s" in values:
+        entry["step"] = {k: values[k] for k in ("run", "at_s", "size", "unit", "direction") if k in values}
+    return entry
+
+
+def _joints(fault: Fault) -> list[str]:
+    """Joints that an effect acts in."""
+    if fault.kind.name == "wrist_coupling":
+        return ["A5", "A6"]
+    return [fault.target] if fault.target in ("A1", "A2", "A3", "A4", "A5", "A6") else []
+
+
+def _spans(per_run: list) -> list[dict]:
+    return [
+        {"run": f"run-{i + 1}", "t_start_s": a, "t_end_s": b}
+        for i, intervals in enumerate(per_run)
+        for a, b in intervals
+    ]
