@@ -1,57 +1,40 @@
-"""Cases of the check on withheld data: which seed asks for what, and one case from plant to record.
+"""Which seed asks for what: kinds of cases, how many of each, and the predictions that all share.
 
-Every kind of case has its own block of seeds behind the first one, so that asking for more cases never
-changes those already done. Seeds below ``SCORED_FROM`` are for development and calibration; what is scored
-starts there.
+Every kind has its own block of seeds behind the first one, so that asking for more cases never changes those
+already done, and a part of the check is the first cases of each kind. Seeds below ``SCORED_FROM`` are for
+development and calibration; what is scored starts there.
 """
 
-import contextlib
-import hashlib
-import importlib
-import inspect
-import json
-import shutil
 import sys
-import time
-import traceback
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [each for each in (str(ROOT), str(Path(__file__).parent)) if each not in sys.path]
 
-import numpy as np  # noqa: E402
-
-from gcode2krl import Prediction, load_cell, load_run, predict  # noqa: E402
-from tests.plant.cases import make_case  # noqa: E402
+from gcode2krl import load_cell, predict  # noqa: E402
+from gcode2krl.effects import library  # noqa: E402
+from tests.plant.cases import has_other_form  # noqa: E402
+from tests.plant.confounded import PAIRS  # noqa: E402
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN  # noqa: E402
 from tests.plant.scene import CELL_TOML  # noqa: E402
 from tests.plant.waypoints import PROGRAMS  # noqa: E402
 
-SCORED_FROM = 10_000
+SCORED_FROM = 30_000
 BLOCK = 1_000
-KINDS = ("null", "single", "slip", "open", "pair", "deleted")
-MIXED = {"null": 0.15, "single": 0.55, "slip": 0.08, "open": 0.10, "pair": 0.07, "deleted": 0.05}
-FULL = {"null": 300, "single": 400}
-DELETED = (
-    "backlash",
-    "friction",
-    "transmission",
-    "mastering",
-    "stiffness",
-    "servo_lag",
-    "force_delay",
-    "tool_wear",
-    "thermal",
-    "vibration",
-)
-"""Effects that are also tried with themselves taken out of the library."""
-
-
-NOT_SIMULATED = ("other_program",)
-"""Causes that can be found but not predicted, so there is no oracle."""
+NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
+KINDS = ("null", "single", "slip", "open", "pair", "deleted", *NULLS[1:], "confounded", "missing")
+"""The n-th kind has the n-th block of seeds."""
+MIXED = {"null": 0.12, "single": 0.40, "slip": 0.06, "open": 0.12, "pair": 0.07, "deleted": 0.08}
+MIXED |= {"null_foreign_noise": 0.05, "null_foreign_mismatch": 0.04, "confounded": 0.03, "missing": 0.03}
+FULL = {"null": 300, "null_foreign_noise": 100, "null_foreign_mismatch": 100, "single": 600, "pair": 200}
+FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60}
+DELETED_EACH = 10
+"""Cases of each effect with that effect taken out of the library."""
+OTHER_IN_FIVE = 2
+"""Of five cases of an effect that has another form, so many have it: a third of all single-effect cases."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +43,9 @@ class Case:
 
     seed: int
     kind: str
-    effect: str
+    effect: str | None
+    """None where the kind draws it."""
+    form: str | None = None
     without: tuple[str, ...] = ()
     """Effects taken out of the library."""
 
@@ -70,64 +55,19 @@ class Case:
         return f"{self.kind}-{self.seed:05d}"
 
 
-@dataclass(frozen=True)
-class How:
-    """Further computations for every case."""
-
-    oracle: bool = True
-    baselines: bool = True
-    keep: bool = False
-    """Keep the runs of the case."""
-    code: str = ""
-    """Fingerprint of the code under test; records of another one are made again."""
-    predictions: dict[str, str] = field(default_factory=dict)
+def deletable() -> list[str]:
+    """Return every effect of the library that the plant can do; slips are no effects of the robot."""
+    return sorted(name for name, effect in library().items() if effect.kind != "slip" and name in LIBRARY)
 
 
-def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -> list[Case]:
-    """Return the cases of each kind; named effects alone where some are given, every one in turn.
-
-    Raises ValueError where a block overflows, an effect is unknown, or both sorts of seeds mix.
-    """
-    last = first_seed + len(KINDS) * BLOCK - 1
-    if first_seed < SCORED_FROM <= last:
-        raise ValueError(
-            f"seed {first_seed}: cases would reach seed {last}; calibration stays below {SCORED_FROM}, so "
-            f"give at most {SCORED_FROM - len(KINDS) * BLOCK}, or {SCORED_FROM} and more for what is scored"
-        )
-    shelves = {
-        "single": sorted(LIBRARY),
-        "slip": sorted(SLIPS),
-        "open": [f"open:{n}" for n in sorted(UNKNOWN)],
-    }
-    unknown = {name.partition("@")[0] for name in effects} - {
-        name for shelf in shelves.values() for name in shelf
-    }
-    if unknown:
-        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.make_cases --list")
-    cases: list[Case] = []
-    for number, kind in enumerate(KINDS):
-        count = counts.get(kind, 0)
-        if count > BLOCK:
-            raise ValueError(f"{count} cases of kind {kind}: at most {BLOCK}")
-        names = [name for name in effects if name.partition("@")[0] in shelves.get(kind, ())]
-        names = names or shelves.get(kind, [])
-        for i in range(count if names or kind in ("null", "pair", "deleted") else 0):
-            seed = first_seed + number * BLOCK + i
-            cases.append(_case(kind, seed, i, names))
-    return cases
+def not_simulated() -> list[str]:
+    """Return the effects of the library that the plant cannot do, so that they are never asked for."""
+    return sorted(name for name, effect in library().items() if effect.kind != "slip" and name not in LIBRARY)
 
 
-def _case(kind: str, seed: int, i: int, names: Sequence[str]) -> Case:
-    if kind == "null":
-        return Case(seed, kind, "none")
-    if kind == "pair":
-        choice = np.random.default_rng(seed).choice(
-            sorted(set(LIBRARY) - {"tool_diameter"}), 2, replace=False
-        )
-        return Case(seed, kind, "+".join(choice))
-    if kind == "deleted":
-        return Case(seed, kind, DELETED[i % len(DELETED)], (DELETED[i % len(DELETED)],))
-    return Case(seed, kind, names[i % len(names)])
+def full_counts() -> dict[str, int]:
+    """Return how many cases of each kind the whole check has."""
+    return FULL | {"deleted": DELETED_EACH * len(deletable())}
 
 
 def mixed(count: int) -> dict[str, int]:
@@ -137,13 +77,63 @@ def mixed(count: int) -> dict[str, int]:
     return counts
 
 
-def fingerprint() -> str:
-    """Return a digest of the code that a diagnosis depends on."""
-    digest = hashlib.sha256()
-    for room in ("gap", "effects"):
-        for file in sorted((ROOT / "gcode2krl" / room).rglob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
+def scaled(counts: dict[str, int], scale: float) -> dict[str, int]:
+    """Return the counts of a part of a check; at least one case of each kind that has any."""
+    return {kind: ceil(scale * count) for kind, count in counts.items()}
+
+
+def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -> list[Case]:
+    """Return the cases of each kind; named effects alone where some are given, every one in turn.
+
+    Raises ValueError where a block overflows, an effect is unknown, or both sorts of seeds mix.
+    """
+    _check_seeds(first_seed)
+    shelves = {
+        "single": sorted(LIBRARY),
+        "slip": sorted(SLIPS),
+        "open": [f"open:{name}" for name in sorted(set(UNKNOWN) - set(library()))],
+        "deleted": deletable(),
+        "confounded": sorted(PAIRS),
+    }
+    known = {name for shelf in shelves.values() for name in shelf}
+    unknown = {name.partition("@")[0] for name in effects} - known
+    if unknown:
+        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.make_cases --list")
+    cases: list[Case] = []
+    for number, kind in enumerate(KINDS):
+        count = counts.get(kind, 0)
+        if count > BLOCK:
+            raise ValueError(f"{count} cases of kind {kind}: at most {BLOCK}")
+        shelf = shelves.get(kind, [])
+        wanted = [name for name in effects if name.partition("@")[0] in shelf] or shelf
+        cases += [_case(kind, first_seed + number * BLOCK + i, i, wanted) for i in range(count)]
+    return cases
+
+
+def _check_seeds(first_seed: int) -> None:
+    last = first_seed + len(KINDS) * BLOCK - 1
+    if first_seed < SCORED_FROM <= last:
+        raise ValueError(
+            f"seed {first_seed}: cases would reach seed {last}; calibration stays below {SCORED_FROM}, so "
+            f"give at most {SCORED_FROM - len(KINDS) * BLOCK}, or {SCORED_FROM} and more for what is scored"
+        )
+
+
+def _case(kind: str, seed: int, i: int, names: Sequence[str]) -> Case:
+    if not names:
+        return Case(seed, kind, "none" if kind in NULLS else None)
+    name = names[i % len(names)]
+    if kind == "single":
+        return Case(seed, kind, name, _form(name, i, len(names)))
+    if kind == "deleted":
+        return Case(seed, kind, name, without=(name.partition("@")[0],))
+    return Case(seed, kind, name)
+
+
+def _form(name: str, i: int, names: int) -> str:
+    """Return the form of the i-th single case: both in every round of all effects, another one each round."""
+    other = (i % names + i // names) % 5 < OTHER_IN_FIVE and has_other_form(name)
+    return "other" if other else "same"
 
 
 def predictions(folder: Path) -> dict[str, str]:
@@ -160,78 +150,3 @@ def predictions(folder: Path) -> dict[str, str]:
             predict(part, load_cell(cell_file)).save(place)
         places[name] = place.resolve().as_posix()
     return places
-
-
-def run_case(case: Case, folder: Path, how: How) -> dict[str, Any]:
-    """Make a case, diagnose it without its label, and return the record; an exception is part of it."""
-    place = folder / "cases" / case.name
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
-    record: dict[str, Any] = {"case": asdict(case), "code": how.code, "error": None, "result": None}
-    start = time.perf_counter()
-    # the label is written beside the case, and taken away before the diagnosis starts
-    parent = Path(next(iter(how.predictions.values()))).parent.as_posix()
-    make_case(case.seed, place / "case", case.effect, predictions=parent)
-    record["label"] = json.loads((place / "case.label.json").read_text(encoding="utf-8"))
-    (place / "case.label.json").unlink()
-    record["plant_s"] = time.perf_counter() - start
-    try:
-        _diagnose(case, place / "case", how, record)
-        _beside(case, place / "case", how, record)
-    except Exception:  # the check goes on, and shows it
-        record["error"] = traceback.format_exc()
-    if not how.keep:
-        shutil.rmtree(place, ignore_errors=True)
-    return record
-
-
-def loaded(place: Path, names: Sequence[str]) -> tuple[list[Any], list[Prediction]]:
-    """Return the runs of a case and the prediction that each names."""
-    runs = [load_run(place / name) for name in names]
-    return runs, [Prediction.load(run.path("prediction") or "") for run in runs]
-
-
-def _diagnose(case: Case, place: Path, how: How, record: dict[str, Any]) -> None:
-    from gcode2krl.gap import diagnose
-
-    start, own = time.perf_counter(), time.process_time()
-    names = sorted(each.name for each in place.glob("run-*"))
-    runs = [load_run(place / name) for name in names]
-    prediction = Prediction.load(runs[0].path("prediction") or "")
-    with removed(case.without) as extra:
-        record["result"] = diagnose(prediction, runs, **extra).as_dict()
-    record["diagnosis_s"] = time.perf_counter() - start
-    record["diagnosis_cpu_s"] = time.process_time() - own
-
-
-def _beside(case: Case, place: Path, how: How, record: dict[str, Any]) -> None:
-    """Add the results of an oracle and of simple methods on the same case."""
-    label = record["label"]
-    names = [run["run"] for run in label["runs"]]
-    first = label["effects"][0] if label["effects"] else {"effect": "", "ratio": 0.0}
-    possible = case.kind in ("single", "slip") and first["effect"] not in NOT_SIMULATED
-    if how.oracle and possible and first["ratio"] >= 1.0:
-        from gap_blind_oracle import oracle
-
-        record["oracle"] = oracle(label, record["result"], place, names)
-    if how.baselines and case.kind in ("null", "single"):
-        from gap_blind_baselines import baselines
-
-        record["baselines"] = baselines(place, names, how.predictions)
-
-
-@contextlib.contextmanager
-def removed(effects: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield what `diagnose` is called with so that these effects are not in its library."""
-    module = importlib.import_module("gcode2krl.gap.diagnosis")
-    if not effects:
-        yield {}
-    elif "exclude" in inspect.signature(module.diagnose).parameters:
-        yield {"exclude": tuple(effects)}
-    else:
-        whole = module.known_effects
-        module.known_effects = lambda extra: {k: v for k, v in whole(extra).items() if k not in effects}
-        try:
-            yield {}
-        finally:
-            module.known_effects = whole

@@ -5,7 +5,6 @@ plant's effect has another form than the library's, the oracle takes the size th
 mismatch of the signal fitted beside it: per run a shift, a clock, for forces a gain.
 """
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +12,9 @@ from typing import Any
 
 import numpy as np
 
-LINK = {
-    "timing": "path",
-    "joint_commanded": "path",
-    "joint_actual": "servo",
-    "joint_load": "gear",
-    "force": "force",
-    "tcp": "mechanics",
-}
+LINK = {"timing": "PATH", "joint_commanded": "PATH", "joint_actual": "SERVO", "joint_load": "GEAR"}
+LINK |= {"force": "FORCE", "tcp": "MECHANICS"}
+"""Signal of the answer -> its link's name in ``gcode2krl.gap.beside.links``."""
 RENAMED = {"kg": "mass_kg", "frame_off_mm": ("x_mm", "y_mm", "z_mm"), "h0_N": ("h0_x_N", "h0_y_N", "h0_z_N")}
 RENAMED |= {"direction": ("direction_x", "direction_y", "direction_z")}
 RENAMED |= {"H_N_rad": tuple(f"H_{row}{column}_N_rad" for row in "xyz" for column in "xyz")}
@@ -40,7 +34,7 @@ def flat(parameters: dict[str, Any]) -> dict[str, float]:
     return out
 
 
-def oracle(label: dict, result: dict, place: Path, names: Sequence[str]) -> dict[str, Any] | None:
+def oracle(label: dict, result: dict, folder: Path) -> dict[str, Any] | None:
     """Return the power that the truth takes from the signal that the diagnosis reports; None if it cannot.
 
     In the squared unit of the report, a mean over the rows of all runs; none of them chose anything here, so
@@ -49,33 +43,34 @@ def oracle(label: dict, result: dict, place: Path, names: Sequence[str]) -> dict
     signal = (result.get("gap") or {}).get("signal")
     if signal not in LINK:
         return None
-    parts = _parts(LINK[signal], place, names)
+    traces = _traces(LINK[signal], folder)
     entry = label["effects"][0]
-    truth = _applied(entry, parts[0].inputs) if parts else None
+    truth = _applied(entry, traces[0].inputs) if traces else None
     if truth is None:
         return None
-    nominal = truth.effect.nominal(parts[0].inputs, truth.target)
+    nominal = truth.effect.nominal(traces[0].inputs, truth.target)
     tried = [truth] if entry["form"] == "same" else [_times(truth, nominal, size) for size in TRIALS]
-    best = min(tried, key=lambda one: _left(parts, one))
-    usual = [_mismatch(part, best) for part in parts]
-    before = _mean_square([part.residual for part in parts])
-    gap = _mean_square([part.residual - own for part, own in zip(parts, usual, strict=True)])
+    best = min(tried, key=lambda one: _left(traces, one))
+    usual = [_mismatch(trace, best) for trace in traces]
+    before = _mean_square([trace.residual for trace in traces])
+    gap = _mean_square([trace.residual - own for trace, own in zip(traces, usual, strict=True)])
     left = _mean_square(
-        [part.measured - part.sample([best]) - own for part, own in zip(parts, usual, strict=True)]
+        [trace.measured - trace.sample([best]) - own for trace, own in zip(traces, usual, strict=True)]
     )
-    unit = parts[0].factor ** 2
+    unit = traces[0].factor ** 2
     return {"signal": signal, "before": before * unit, "removed": (gap - left) * unit}
 
 
-def _parts(link: str, place: Path, names: Sequence[str]) -> list[Any]:
+def _traces(link: str, folder: Path) -> list[Any]:
     """Return the measured signal of a link beside its model, run by run."""
-    from gap_blind_cases import loaded
+    from gap_blind_run import loaded
 
-    module = importlib.import_module("gcode2krl.gap.diagnosis")
-    links = importlib.import_module("gcode2krl.gap.beside.links")
-    runs, predictions = loaded(place, names)
-    sides = list(module._sides(predictions[0], runs))
-    return links.parts_of(link, sides)
+    from gcode2krl.gap.beside import links
+    from gcode2krl.gap.beside.pairing import pairs_of
+
+    runs, predictions = loaded(folder)
+    found: list[Any] = getattr(links, link).traces(list(pairs_of(predictions[0], runs)))
+    return found
 
 
 def _applied(entry: dict, inputs: Any) -> Any:
@@ -101,28 +96,28 @@ def _times(one: Any, nominal: dict[str, float], size: float) -> Any:
     return replace(one, values=values)
 
 
-def _nuisance(part: Any) -> np.ndarray:
+def _nuisance(trace: Any) -> np.ndarray:
     """Return (n·k, c): a shift of each column, the clock, and for forces a gain of each column."""
-    n, k = part.shape
-    late = replace(part, minus=None).rate
+    n, k = trace.shape
+    late = replace(trace, minus=None).rate
     columns = [np.kron(np.eye(k), np.ones((n, 1))), late.T.reshape(-1, 1)]
-    if part.signal == "force":
-        columns.append(np.kron(np.eye(k), np.ones((n, 1))) * part.nominal.T.reshape(-1, 1))
+    if trace.signal == "force":
+        columns.append(np.kron(np.eye(k), np.ones((n, 1))) * trace.nominal.T.reshape(-1, 1))
     return np.concatenate(columns, axis=1)
 
 
-def _left(parts: Sequence[Any], one: Any) -> float:
+def _left(traces: Sequence[Any], one: Any) -> float:
     """Return the sum of squares that an effect and the nuisance leave."""
     return sum(
-        float(np.sum((part.measured - part.sample([one]) - _mismatch(part, one)) ** 2)) for part in parts
+        float(np.sum((trace.measured - trace.sample([one]) - _mismatch(trace, one)) ** 2)) for trace in traces
     )
 
 
-def _mismatch(part: Any, one: Any) -> np.ndarray:
+def _mismatch(trace: Any, one: Any) -> np.ndarray:
     """Return the part of the residual (n, k) with an effect in the model that the nuisance explains."""
-    residual = (part.measured - part.sample([one])).T.ravel()
-    wide = _nuisance(part)
-    return (wide @ np.linalg.lstsq(wide, residual, rcond=None)[0]).reshape(part.shape[1], -1).T
+    residual = (trace.measured - trace.sample([one])).T.ravel()
+    wide = _nuisance(trace)
+    return (wide @ np.linalg.lstsq(wide, residual, rcond=None)[0]).reshape(trace.shape[1], -1).T
 
 
 def _mean_square(residuals: Sequence[np.ndarray]) -> float:

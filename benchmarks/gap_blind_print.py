@@ -1,170 +1,184 @@
-"""The tables of the check."""
+"""The tables of the check as text."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
-from gap_blind_score import (
-    HALF,
-    TOLERANCE,
-    UNKNOWN,
-    Judged,
-    Rate,
-    by_effect,
-    calibration_error,
-    rate,
-    smallest_seen,
-)
+from gap_blind_cases import full_counts, not_simulated
+from gap_blind_figures import Rate, grouped, rate, smallest_seen
+from gap_blind_next import rows as next_rows
+from gap_blind_rows import metrics
+from gap_blind_score import Judged
+from gap_blind_tests import Ablation, ablation
+
+SLOWEST = 6
+MOST_LINES = 60
+"""Lines of the longest tables."""
 
 
-def metrics(cases: Sequence[Judged]) -> list[tuple[str, str, str, str]]:
-    """Return a row for each metric: name, same form, other form, aim."""
-    null = [each for each in cases if each.kind == "null"]
-    alarms = rate(bool(each.named) or each.verdict != "no_gap" for each in null)
-    rows = [("false alarms on effect-free runs", _at_most(alarms), "", "<= 1 % of 300")]
-    causes = rate(bool(each.named) for each in null)
-    rows.append(("  of them with a named cause", _at_most(causes), "", ""))
-    forms = [
-        [each for each in cases if each.kind == "single" and each.form == form] for form in ("same", "other")
-    ]
-
-    def both(name: str, aim: str, figure) -> None:
-        rows.append((name, *(figure(form) for form in forms), aim))
-
-    def seen(form: Iterable[Judged]) -> list[Judged]:
-        return [each for each in form if each.observable]
-
-    both(
-        "right: effect and target, effect >= noise",
-        ">= .98",
-        lambda f: _at_least(rate(e.exact for e in seen(f))),
-    )
-    both("  within the declared set", "", lambda f: _at_least(rate(e.declared for e in seen(f))))
-    both("  truth among the named", "", lambda f: _at_least(rate(e.hit for e in seen(f))))
-    both(
-        "  something else named",
-        "",
-        lambda f: _at_most(rate(bool(e.named) and not e.declared for e in seen(f))),
-    )
-    both(
-        "right at half the noise, declared set",
-        ">= .99",
-        lambda f: _at_least(rate(e.declared for e in _half(f))),
-    )
-    both("  said no gap there", "", lambda f: _at_most(rate(e.verdict == "no_gap" for e in _half(f))))
-    both(
-        "shrink on held-out runs / oracle (median)",
-        ">= .95",
-        lambda f: _middle(e.relative_shrink for e in seen(f)),
-    )
-    both("parameter error (median)", "5 %", lambda f: _middle(x for e in seen(f) for x in e.errors))
-    both("  within 5 %", "", lambda f: _at_least(rate(x <= TOLERANCE for e in seen(f) for x in e.errors)))
-    both("coverage of the 90 % interval", ".88-.92", lambda f: _plain(rate(x for e in f for x in e.covered)))
-    both("place: overlap (median)", ">= .85", lambda f: _middle(e.overlap for e in seen(f)))
-    both(
-        "calibration error",
-        "<= .03",
-        lambda f: f"{calibration_error([p for e in f for p in e.probabilities]):.3f}",
-    )
-    rows.append(("  null and open set included", f"{_calibration(cases):.3f}", "", "<= .03"))
-    rows += _others(cases)
-    return rows
-
-
-def _others(cases: Sequence[Judged]) -> list[tuple[str, str, str, str]]:
-    rows = []
-    for kind, name in (("slip", "set-up slips: right"), ("pair", "two effects: both exactly right")):
-        mine = [each for each in cases if each.kind == kind and each.observable]
-        rows.append(
-            (name, _at_least(rate(each.exact for each in mine)), "", ">= .90" if kind == "pair" else "")
-        )
-        rows.append(("  within the declared sets", _at_least(rate(each.declared for each in mine)), "", ""))
-    for kind, name in (("open", "of no library"), ("deleted", "taken out of the library")):
-        mine = [each for each in cases if each.kind == kind and each.observable]
-        flagged = rate(each.verdict in UNKNOWN for each in mine)
-        rows.append((f"{name}: flagged unknown", _at_least(flagged), "", ">= .97"))
-        wrong = rate(each.verdict == "explained" and bool(each.named) for each in mine)
-        rows.append(("  wrongly named with confidence", _at_most(wrong), "", "<= 1 %"))
-        rows.append(("  with any wrong name", _at_most(rate(bool(each.named) for each in mine)), "", ""))
-        rows.append(("  place: overlap (median)", _middle(each.overlap for each in mine), "", ""))
-    return rows
-
-
-def _calibration(cases: Iterable[Judged]) -> float:
-    return calibration_error([pair for each in cases for pair in each.probabilities])
-
-
-def _half(cases: Iterable[Judged]) -> list[Judged]:
-    return [each for each in cases if HALF[0] <= each.ratio <= HALF[1]]
-
-
-def _at_least(one: Rate) -> str:
-    return f"{one.value:.3f} (>= {one.lower:.3f}, n {one.of})" if one.of else "-"
-
-
-def _at_most(one: Rate) -> str:
-    return f"{one.value:.3f} (<= {one.upper:.3f}, n {one.of})" if one.of else "-"
-
-
-def _plain(one: Rate) -> str:
-    return f"{one.value:.3f} (n {one.of})" if one.of else "-"
-
-
-def _middle(values: Iterable[float | None]) -> str:
-    known = [value for value in values if value is not None]
-    return f"{np.median(known):.3f} (n {len(known)})" if known else "-"
-
-
-def report(cases: Sequence[Judged], title: str) -> str:
-    """Return all tables as text."""
-    parts = [title, _table(("metric", "same form (95 % bound)", "other form", "aim"), metrics(cases))]
+def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
+    """Return all tables as text; ``driven``: the records of the next runs."""
+    rows = [(row.metric, row.figure, row.worst, row.aim) for row in metrics(cases)]
+    parts = [title, table(("metric", "figure (95 % bound)", "worst", "aim"), rows)]
     single = [each for each in cases if each.kind in ("single", "slip")]
     if single:
-        parts += [
-            "By effect, the worst first (single effects and slips):",
-            _table(_EFFECT_HEAD, _effects(single)),
-        ]
-        parts += ["Wrong answers, effects >= noise:", _wrong(single)]
+        parts += ["By effect, the worst first (single effects and slips):", _by_effect(single)]
+    unknown = [each for each in cases if each.kind in ("open", "deleted") and each.observable]
+    if unknown:
+        parts += ["Outside the library and taken out of it, effect >= noise, the worst first:"]
+        parts += [_by_unknown(unknown)]
+    parts += ["What the tests did to candidates that were not named (wrong ones stopped, right ones lost;"]
+    parts[-1] += " alone: no other test failed, so that without it they would be named):"
     parts += [
-        "Simple methods on the same cases, exactly right:",
-        _table(("method", "effect >= noise", "no effect"), _methods(cases)),
+        _tests(cases),
+        "Right names lost, effects >= noise, and the tests that they failed:",
+        _lost(cases),
     ]
+    parts += ["Wrong answers, effects >= noise:", _wrong(cases)]
+    if any(each.baselines for each in cases):
+        parts += ["Simple methods on the same cases, exactly right:", _methods(cases)]
+    if driven:
+        parts += [f"Ambiguity gone after one more run, {len(driven)} cases that were left open:"]
+        parts += [table(("one more run", "settled (95 % bound)", "skipped", "aim"), next_rows(driven))]
     parts.append(_time(cases))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-_EFFECT_HEAD = (
-    "effect",
-    "n",
-    "n>=noise",
-    "exact",
-    "declared",
-    "error",
-    "shrink/oracle",
-    "IoU",
-    "smallest seen",
-)
-
-
-def _effects(cases: Sequence[Judged]) -> list[tuple[str, ...]]:
+def _by_effect(cases: Sequence[Judged]) -> str:
+    head = ("effect", "n", "n>=noise", "exact", "declared", "error", "shrink/oracle", "IoU", "smallest seen")
     rows = []
-    for name, mine in by_effect(cases).items():
+    for name, mine in grouped(cases, lambda e: e.subject).items():
         seen = [each for each in mine if each.observable]
-        least = smallest_seen(mine)
-        exact, declared = rate(e.exact for e in seen), rate(e.declared for e in seen)
+        least = smallest_seen([(each.ratio, each.declared) for each in mine])
+        declared = rate(each.declared for each in seen)
         row = (
-            name,
+            str(name),
             str(len(mine)),
             str(len(seen)),
-            f"{exact.count}/{exact.of}",
-            f"{declared.count}/{declared.of}",
-            _short(x for e in seen for x in e.errors),
-            _short(e.relative_shrink for e in seen),
-            _short(e.overlap for e in seen),
+            _count(rate(each.exact for each in seen)),
+            _count(declared),
+            _short(error for each in seen for error in each.errors),
+            _short(each.shrink for each in seen),
+            _short(each.place.noise for each in seen),
             "-" if least is None else f"{least:.2f} x noise",
         )
         rows.append((declared.value if seen else 2.0, row))
-    return [row for _, row in sorted(rows, key=lambda each: each[0])]
+    return table(head, [row for _, row in sorted(rows, key=lambda each: each[0])])
+
+
+def _by_unknown(cases: Sequence[Judged]) -> str:
+    rows = []
+    for (kind, name), mine in grouped(cases, lambda e: (e.kind, e.subject)).items():
+        wrong, told = rate(bool(each.named) for each in mine), [e.told for e in mine if e.told is not None]
+        flagged = rate(each.flagged for each in mine)
+        answers = Counter(each.answer for each in mine if each.named)
+        row = (
+            str(name) + (" (taken out)" if kind == "deleted" else ""),
+            str(len(mine)),
+            _count(wrong),
+            _count(flagged),
+            _count(rate(each.place for each in told)),
+            _count(rate(each.family for each in told)),
+            ", ".join(f"{answer} {times}" for answer, times in answers.most_common(3)),
+        )
+        rows.append((-wrong.value, flagged.value, row))
+    head = ("effect", "n", "named", "flagged", "place", "family", "named as")
+    return table(head, [row for *_, row in sorted(rows, key=lambda each: each[:2])])
+
+
+def _tests(cases: Sequence[Judged]) -> str:
+    tested = [each for case in cases if case.observable or not case.truths for each in case.tested]
+    rows = [_ablated(each) for each in ablation(tested)]
+    named = [each for each in tested if each.is_named]
+    right = sum(each.is_right for each in named)
+    rows.append(("(named with all tests)", str(len(named) - right), "", str(right), ""))
+    return table(("test", "wrong stopped", "alone", "right lost", "alone"), rows)
+
+
+def _ablated(row: Ablation) -> tuple[str, ...]:
+    numbers = (row.wrong_stopped, row.wrong_alone, row.right_lost, row.right_alone)
+    return (row.test, *map(str, numbers))
+
+
+def _lost(cases: Sequence[Judged]) -> str:
+    """Return each case whose true cause was not named, and which tests it failed."""
+    rows = [
+        (f"{case.kind}-{case.seed:05d}", case.name, case.answer, ", ".join(sorted(each.failed)))
+        for case in cases
+        if case.observable
+        for each in case.tested
+        if each.is_right and not each.is_named
+    ]
+    left = len(rows) - MOST_LINES
+    text = table(("case", "truth", "answer", "failed"), rows[:MOST_LINES]) if rows else "none"
+    return text + (f"\n{left} more" if left > 0 else "")
+
+
+def _wrong(cases: Iterable[Judged]) -> str:
+    """Return the confusions: kind, truth and answer, with how often."""
+    wrong = [each for each in cases if not each.exact and (each.observable or not each.truths)]
+    found = Counter((each.kind, each.name, each.answer) for each in wrong).most_common()
+    rows = [(*key, str(times)) for key, times in found[:MOST_LINES]]
+    text = table(("kind", "truth", "answer", "times"), rows) if rows else "none"
+    left = len(found) - MOST_LINES
+    return text + (f"\n{left} more, each less often than these" if left > 0 else "")
+
+
+def _methods(cases: Sequence[Judged]) -> str:
+    beside = [each for each in cases if each.baselines]
+    single = [each for each in beside if each.kind == "single" and each.observable]
+    null = [each for each in beside if not each.truths]
+    rows = [("diagnose", _plain(rate(e.exact for e in single)), _plain(rate(not e.named for e in null)))]
+    for method in dict.fromkeys(name for each in beside for name, _ in each.baselines):
+        columns = (_plain(rate(dict(e.baselines)[method] for e in group)) for group in (single, null))
+        rows.append((method, *columns))
+    return table(("method", "effect >= noise", "no effect"), rows)
+
+
+def _time(cases: Sequence[Judged]) -> str:
+    """Return how long the cases took, and what the whole check takes at that rate."""
+    wall, own, plant = (
+        np.array([value for each in cases if (value := getattr(each, name)) > 0.0] or [0.0])
+        for name in ("seconds", "cpu_s", "plant_s")
+    )
+    whole_h = sum(full_counts().values()) * (own.mean() + plant.mean()) / 2.0 / 3600.0
+    costs = {
+        name: np.mean([e.cpu_s for e in mine]) for name, mine in grouped(cases, lambda e: e.subject).items()
+    }
+    slow = sorted(costs, key=lambda name: -costs[name])[:SLOWEST]
+    failed = [f"{each.kind}-{each.seed:05d}" for each in cases if each.failed]
+    lines = [
+        f"Seconds a case: diagnosis median {np.median(wall):.2f}, worst {wall.max():.2f} (processor "
+        f"{np.median(own):.2f}, mean {own.mean():.2f}, worst {own.max():.2f}); plant median "
+        f"{np.median(plant):.2f}, worst {plant.max():.2f}.",
+        f"At this rate the full check of {sum(full_counts().values())} cases takes {whole_h:.1f} h on two "
+        "cores, without the next runs.",
+        f"The slowest, processor seconds a case: {', '.join(f'{name} {costs[name]:.0f}' for name in slow)}.",
+    ]
+    if failed:
+        lines.append(f"No result, an exception: {', '.join(failed)}")
+    if untried := not_simulated():
+        lines.append(f"Effects of the library that the plant cannot do: {', '.join(untried)}")
+    return "\n".join(lines)
+
+
+def failures(records: Iterable[dict], folder: Path) -> None:
+    """Write the exceptions of a check to a file beside its records."""
+    text = "\n".join(
+        f"{record['case']['kind']}-{record['case']['seed']:05d}\n{record['error']}"
+        for record in records
+        if record["error"]
+    )
+    (folder / "failures.txt").write_text(text, encoding="utf-8")
+
+
+def _count(one: Rate) -> str:
+    return f"{one.count}/{one.of}"
+
+
+def _plain(one: Rate) -> str:
+    return f"{one.value:.3f} (n {one.of})" if one.of else "-"
 
 
 def _short(values: Iterable[float | None]) -> str:
@@ -172,41 +186,8 @@ def _short(values: Iterable[float | None]) -> str:
     return f"{np.median(known):.2f}" if known else "-"
 
 
-def _wrong(cases: Iterable[Judged]) -> str:
-    """Return the confusions: truth and answer, with how often."""
-    found = Counter((each.name, each.answer) for each in cases if each.observable and not each.exact)
-    rows = [(truth, answer, str(count)) for (truth, answer), count in sorted(found.items())]
-    return _table(("truth", "answer", "times"), rows) if rows else "none"
-
-
-def _methods(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
-    single = [each for each in cases if each.kind == "single" and each.observable]
-    null = [each for each in cases if each.kind == "null"]
-    rows = [("diagnose", _plain(rate(e.exact for e in single)), _plain(rate(not e.named for e in null)))]
-    methods = dict.fromkeys(method for each in cases for method in each.baselines)
-    for method in methods:
-        columns = (
-            _plain(rate(each.baselines[method] for each in group if method in each.baselines))
-            for group in (single, null)
-        )
-        rows.append((method, *columns))
-    return rows
-
-
-def _time(cases: Sequence[Judged]) -> str:
-    seconds = np.array([each.seconds for each in cases if each.seconds > 0.0] or [0.0])
-    plant = np.array([each.plant_s for each in cases if each.plant_s > 0.0] or [0.0])
-    own = np.array([each.cpu_s for each in cases if each.cpu_s > 0.0] or [0.0])
-    failed = [f"{each.kind}-{each.seed:05d}" for each in cases if each.failed]
-    text = (
-        f"Seconds a case: diagnosis median {np.median(seconds):.2f}, worst {seconds.max():.2f} "
-        f"(processor {np.median(own):.2f}, {own.max():.2f}); plant median {np.median(plant):.2f}, "
-        f"worst {plant.max():.2f}."
-    )
-    return text + (f"\nNo result, an exception: {', '.join(failed)}" if failed else "")
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown with columns of equal width."""
     lines = [head, ["-" * len(name) for name in head], *rows]
     width = [max(len(line[i]) for line in lines) for i in range(len(head))]
     return "\n".join(

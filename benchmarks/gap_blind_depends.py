@@ -1,0 +1,109 @@
+"""Whether an answer says where a gap sits and on what it depends, as the label has it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from gap_blind_names import named_of
+
+STATED = 0.5
+"""Probability from which on a dependence counts as stated."""
+AXES = frozenset({"fx", "fy", "fz"})
+JOINTS = frozenset({"A1", "A2", "A3", "A4", "A5", "A6"})
+TIMING = "timing"
+"""``at`` of what moves all joints along the path, and of the links that see it."""
+PLACES = {"tip": {"tip"}, "force": AXES, "part": {"tip", "part"}, "clock": {"tip", TIMING} | AXES | JOINTS}
+"""Where, in the words of a label -> ``at``, in those of an answer. A joint is the label's own."""
+INPUTS = {
+    "time_smooth": {"time in the run"},
+    "time_step": {"step in time", "time in the run"},
+    "time_since_start": {"time since the run's start"},
+    "own_torque_memory": {"own torque"},
+    "force_memory": {"force"},
+}
+"""Input in the words of a label -> ``on``; the others differ by their spaces alone."""
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What a label allows: places, inputs and the form."""
+
+    at: frozenset[str]
+    on: frozenset[str]
+    form: str
+
+
+@dataclass(frozen=True)
+class Said:
+    """A dependence that an answer states; a named cause states no form."""
+
+    at: str
+    on: str
+    form: str | None
+    probability: float
+
+
+@dataclass(frozen=True)
+class Told:
+    """What an answer tells right about the place and the family of a gap."""
+
+    place: bool
+    family: bool
+    """Place and input."""
+    form: bool
+    """Place, input and form."""
+
+
+NOTHING = Told(False, False, False)
+
+
+def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
+    """Compare the most probable dependence that an answer states with those that the label allows.
+
+    A named cause states its own family; a dependence of the rest counts where nothing is named. None where
+    the label knows none.
+    """
+    allowed = allowed_by(entry)
+    if allowed is None:
+        return None
+    stated = [*_of_causes(named_of(result))] or [*_of_rest(result)]
+    stated = [each for each in stated if each.probability >= STATED]
+    return _compared(max(stated, key=lambda each: each.probability), allowed) if stated else NOTHING
+
+
+def probabilities(entry: dict[str, Any], result: dict[str, Any]) -> list[tuple[float, bool]]:
+    """Return the probability of each dependence of the rest, and whether place and input are right."""
+    allowed = allowed_by(entry)
+    if allowed is None:
+        return []
+    return [(each.probability, _compared(each, allowed).family) for each in _of_rest(result)]
+
+
+def allowed_by(entry: dict[str, Any]) -> Allowed | None:
+    """Return what the label of an effect allows, in the words of an answer."""
+    depends = entry.get("depends")
+    if not depends:
+        return None
+    places = set(depends["joints"]) if depends["where"] == "joint" else PLACES[depends["where"]]
+    if TIMING in depends.get("links", ()):
+        places = places | {TIMING}
+    inputs = {word for on in depends["on"] for word in INPUTS.get(on, {on.replace("_", " ")})}
+    return Allowed(frozenset(places), frozenset(inputs), depends["form"])
+
+
+def _of_rest(result: dict[str, Any]) -> Iterable[Said]:
+    for each in result["unexplained"].get("depends_on") or ():
+        yield Said(each["at"], each["on"], each["form"], each["probability"])
+
+
+def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:
+    for cause in causes:
+        if cause.get("family"):
+            at, _, on = cause["family"].partition(", ")
+            yield Said(at, on, None, cause["probability"])
+
+
+def _compared(said: Said, allowed: Allowed) -> Told:
+    place = said.at in allowed.at
+    family = place and said.on in allowed.on
+    return Told(place, family, family and said.form in (None, allowed.form))

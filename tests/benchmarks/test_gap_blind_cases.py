@@ -1,0 +1,159 @@
+"""Seeds of the check, its parts, and the records that it resumes from."""
+
+import json
+import sys
+from collections import Counter
+from functools import partial
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+
+from tests.benchmarks import hand_made
+
+cases = import_module("gap_blind_cases")
+workers = import_module("gap_blind_workers")
+runs = import_module("gap_blind_run")
+blind = import_module("gap_blind")
+
+
+def test_blocks_of_seeds_never_mix():
+    some = cases.plan(1, {"null": 3, "single": 5, "pair": 2, "deleted": 1, "missing": 2})
+    more = cases.plan(1, {"null": 9, "single": 50, "slip": 7, "pair": 2, "deleted": 1, "missing": 4})
+    assert set(some) <= set(more)
+    assert len({case.seed for case in more}) == len(more)
+    assert max(case.seed for case in more) < cases.SCORED_FROM
+
+
+def test_no_call_has_seeds_on_both_sides():
+    last = cases.SCORED_FROM - len(cases.KINDS) * cases.BLOCK
+    assert cases.plan(last, {"null": 1})[0].seed == last
+    for seed in (last + 1, cases.SCORED_FROM - 1):
+        with pytest.raises(ValueError, match="calibration"):
+            cases.plan(seed, {"null": 1})
+    assert cases.plan(cases.SCORED_FROM, {"null": 1})[0].seed == cases.SCORED_FROM
+
+
+def test_what_is_asked_for_must_exist():
+    with pytest.raises(ValueError, match="no effect blacklash"):
+        cases.plan(1, {"single": 1}, ["blacklash"])
+    with pytest.raises(ValueError, match="at most 1000"):
+        cases.plan(1, {"null": 1001})
+
+
+def test_the_whole_check_has_what_was_promised():
+    counts = cases.full_counts()
+    nulls = sum(counts[kind] for kind in cases.NULLS)
+    assert nulls >= 500
+    assert counts["null_foreign_noise"] >= nulls / 5
+    assert counts["null_foreign_mismatch"] >= nulls / 5
+    assert (counts["single"], counts["pair"], counts["open"]) == (600, 200, 500)
+    planned = cases.plan(1, counts)
+    deleted = Counter(case.without for case in planned if case.kind == "deleted")
+    assert set(deleted) == {(name,) for name in cases.deletable()}
+    assert min(deleted.values()) >= 10
+    other = sum(case.form == "other" for case in planned if case.kind == "single")
+    assert other >= 600 / 3
+
+
+def test_a_part_is_the_first_of_each_kind():
+    counts = cases.full_counts()
+    whole, part = cases.plan(1, counts), cases.plan(1, cases.scaled(counts, 0.1))
+    assert set(part) < set(whole)
+    for kind, count in counts.items():
+        first = [case for case in whole if case.kind == kind][: -(-count // 10)]
+        assert [case for case in part if case.kind == kind] == first
+    singles = [case for case in part if case.kind == "single"]
+    assert {case.form for case in singles} == {"same", "other"}
+
+
+@pytest.mark.parametrize("count", [30, 34, 35])
+def test_each_effect_comes_in_both_forms(monkeypatch, count):
+    monkeypatch.setattr(cases, "has_other_form", lambda name: True)
+    forms = {k: {cases._form("", k + count * turn, count) for turn in range(5)} for k in range(count)}
+    assert all(each == {"same", "other"} for each in forms.values())
+
+
+def test_what_the_library_has_is_not_outside_it(monkeypatch):
+    monkeypatch.setattr(cases, "UNKNOWN", {"backlash": None, "cable_snag": None})
+    asked = {case.effect for case in cases.plan(1, {"open": 4})}
+    assert asked == {"open:cable_snag"}
+
+
+def test_a_mixed_check_has_as_many_as_asked():
+    assert sum(cases.mixed(200).values()) == 200
+    assert set(cases.mixed(200)) == set(cases.KINDS)
+
+
+def test_a_record_is_kept_for_its_case_and_its_code(tmp_path):
+    case = cases.Case(1001, "single", "backlash", "same")
+    record = {"case": {"seed": 1001, "kind": "single", "effect": "backlash", "form": "same"}, "code": "a"}
+    workers.store(record, tmp_path)
+    assert workers.done(case, tmp_path, "a") == record
+    assert workers.done(case, tmp_path, None) == record
+    assert workers.done(case, tmp_path, "b") is None
+    assert workers.done(cases.Case(1001, "single", "backlash", "other"), tmp_path, "a") is None
+    assert workers.done(cases.Case(1002, "single", "backlash", "same"), tmp_path, "a") is None
+    assert [file.name for file in (tmp_path / "results").iterdir()] == ["single-01001.json"]
+
+
+def test_a_cluster_needs_dask(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    options = ["--null", "1", "--resume", str(tmp_path), "--scheduler", "tcp://127.0.0.1:1"]
+    assert blind.main(options) == 2
+    assert "python -m pip install distributed" in capsys.readouterr().err
+
+
+def test_a_worker_with_other_code_is_refused():
+    with pytest.raises(workers.NoClusterError, match="another state"):
+        workers.at_worker(cases.Case(1, "null", "none"), runs.How(code="something else"))
+
+
+def test_reports_take_records_of_any_code(tmp_path, capsys):
+    record = hand_made.record(kind="null") | {"code": "old"}
+    record["case"] |= {"effect": "none", "form": None}
+    workers.store(record, tmp_path)
+    assert blind.main(["--null", "2", "--resume", str(tmp_path), "--only-report"]) == 0
+    out = capsys.readouterr().out
+    assert "1 cases from seed 1 (calibration, not to be quoted), code old" in out
+    assert "| false alarms, usual noise" in out
+    assert blind.main(["--null", "2", "--resume", str(tmp_path), "--only-report", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["exact"]
+
+
+class Cluster:
+    """A scheduler with one worker: this process."""
+
+    def __init__(self, address, timeout):
+        if address.endswith(":1"):
+            raise OSError("nobody there")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        return None
+
+    def map(self, function, items, pure, **given):
+        return [SimpleNamespace(result=partial(function, item, **given), release=list) for item in items]
+
+
+def test_a_cluster_hands_every_record_back(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=Cluster, as_completed=reversed))
+    monkeypatch.setattr(workers, "_own_folder", lambda: (tmp_path, {}))
+    made = []
+
+    def run_case(case, folder, how, places):
+        made.append(case.seed)
+        asked = {"seed": case.seed, "kind": case.kind, "effect": case.effect, "form": case.form}
+        return hand_made.record(kind="null") | {"case": asked, "code": how.code}
+
+    monkeypatch.setattr(workers, "run_case", run_case)
+    options = ["--null", "3", "--resume", str(tmp_path), "--scheduler", "tcp://127.0.0.1:2"]
+    assert blind.main(options) == 0
+    assert "0.000 (<= 0.632, n 3)" in capsys.readouterr().out
+    assert blind.main(options) == 0
+    assert "3 cases, 3 already there" in capsys.readouterr().err
+    assert made == [3, 2, 1]  # in the order in which they are ready, and each once
+    assert blind.main([*options[:-1], "tcp://127.0.0.1:1", "--null", "4"]) == 2
+    assert "no scheduler answers at tcp://127.0.0.1:1: nobody there" in capsys.readouterr().err

@@ -1,0 +1,116 @@
+"""Which answers a further run is driven for, which program it is, and when the answer is settled."""
+
+import json
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.benchmarks.hand_made import answer, cause, effect, record
+
+following = import_module("gap_blind_next")
+canned = import_module("gap_blind_canned")
+
+TRUTH = ("backlash", "A2")
+LEFT_OPEN = [cause(alike=[("hysteresis", "A2")])]
+
+
+def test_settled_is_the_truth_alone_and_told_from_all_others():
+    assert following.is_settled(answer([cause()]), TRUTH)
+    for causes in (
+        LEFT_OPEN,
+        [cause(probability=0.4)],
+        [cause(), cause("clock", None)],
+        [cause("clock")],
+        [],
+    ):
+        assert not following.is_settled(answer(causes), TRUTH)
+
+
+def test_only_answers_that_list_the_truth_and_leave_it_open_get_another_run():
+    assert following.is_left_open(record([effect()], LEFT_OPEN))
+    assert following.is_left_open(record([effect()], [cause(probability=0.3)], "unexplained"))
+    for other in (
+        record([effect()], [cause()]),
+        record([effect()], [cause("friction")]),
+        record([effect(ratio=0.5)], LEFT_OPEN),
+        record([effect(), effect("friction")], LEFT_OPEN),
+        record([effect()], LEFT_OPEN, kind="open"),
+        record([effect()], LEFT_OPEN) | {"result": None},
+    ):
+        assert not following.is_left_open(other)
+
+
+def test_programs_of_the_three_ways(monkeypatch):
+    made = record([effect()], LEFT_OPEN, next_run={"program": "reversals"})
+    made["label"]["runs"] = [{"program": "zigzag"}]
+    monkeypatch.setattr(following, "names", lambda: ("circle", "weights"))
+    assert following.chosen_program(following.ASKED, made, TRUTH) == ("reversals", None)
+    assert following.chosen_program(following.REPEAT, made, TRUTH) == ("zigzag", None)
+    random, skipped = following.chosen_program(following.RANDOM, made, TRUTH)
+    assert random in ("circle", "weights")
+    assert skipped is None
+
+
+def test_what_is_skipped_says_why(monkeypatch):
+    none = record([effect()], LEFT_OPEN)
+    monkeypatch.setattr(following, "names", lambda: ())
+    assert following.chosen_program(following.ASKED, none, TRUTH) == (None, following.NONE_ASKED)
+    assert following.chosen_program(following.RANDOM, none, TRUTH) == (None, following.NO_CANNED)
+    law = ("velocity_rule", None)
+    assert following.chosen_program(following.RANDOM, none, law) == (None, following.OWN_LAW)
+
+
+def test_rates_leave_out_what_was_skipped_and_count_it():
+    def drive(way, settled, skipped=None):
+        return {"way": way, "program": "circle", "settled": settled, "skipped": skipped}
+
+    driven = [
+        {"drives": [drive(following.ASKED, True), drive(following.REPEAT, False)]},
+        {"drives": [drive(following.ASKED, False, following.NONE_ASKED), drive(following.REPEAT, False)]},
+    ]
+    asked, random, repeat = following.rows(driven)
+    assert asked[1:] == ("1.000 (>= 0.050, n 1)", f"{following.NONE_ASKED}: 1", ">= .85")
+    assert random[1] == "-"
+    assert repeat[1] == "0.000 (>= 0.000, n 2)"
+
+
+def test_stored_runs_are_not_driven_again(tmp_path):
+    made = record([effect()], LEFT_OPEN) | {"code": "a"}
+    stored = {"case": made["case"], "code": "a", "drives": []}
+    (tmp_path / "next").mkdir()
+    (tmp_path / "next" / "single-00001.json").write_text(json.dumps(stored), encoding="utf-8")
+    assert following.next_records([made], tmp_path, "a", 5, only_stored=False) == [stored]
+    assert following.next_records([made], tmp_path, "b", 5, only_stored=True) == [stored]
+    assert following.next_records([made], tmp_path, "a", 0, only_stored=False) == []
+
+
+def test_a_program_that_make_test_does_not_have(tmp_path):
+    with pytest.raises(canned.NotCannedError, match="somersault"):
+        canned.predicted("somersault", tmp_path / "cell.toml", tmp_path)
+
+
+def predicted_of(lines, speeds):
+    """A prediction whose sample i moves, or not, on a line of the program."""
+    table = SimpleNamespace(source_line=np.array(sorted({line for line, _ in speeds})))
+    move = np.array([table.source_line.tolist().index(line) for line, _ in speeds])
+    speed = np.array([speed for _, speed in speeds], float)
+    motion = SimpleNamespace(time_s=0.5 * np.arange(len(speeds)), speed_mm_s=speed, move=move)
+    return canned.LineClock(lines, SimpleNamespace(motion=motion, toolpath=table))
+
+
+def test_lines_are_reached_after_the_last_move_and_the_dwells_since():
+    lines = ["G0 X1", "G4 P1.5", "S6000 M3", "G4 P2", "M5", "G0 X2"]
+    moving = [(1, 9.0), (1, 9.0), *[(1, 0.0)] * 8, (6, 9.0), (6, 9.0)]
+    clock = predicted_of(lines, moving)
+    assert clock.at(2) == 0.5  # the last sample that moves on line 1
+    assert list(clock.spindle()) == [[0.0, 0.0], [2.0, 6000.0], [4.0, 0.0]]
+
+
+def test_weights_hang_until_the_next_change_and_pull_down_only():
+    lines = ["G0 X1", "M0", "G4 P2", "M0", "G4 P2", "M0", "G4 P1"]
+    clock = predicted_of(lines, [(1, 9.0), *[(1, 0.0)] * 20])
+    pulls = [(2, (0.0, 0.0, -98.0665)), (4, (200.0, 0.0, 0.0)), (6, (0.0, 0.0, 0.0))]
+    assert list(clock.weights(pulls)) == [{"from_s": 0.0, "to_s": 2.0, "kg": pytest.approx(10.0)}]
+    assert list(clock.weights([])) == []

@@ -1,0 +1,179 @@
+"""Parts of the judgement: places in time, parameters, dependences, tests; on answers made by hand."""
+
+from importlib import import_module
+
+import pytest
+
+from tests.benchmarks.hand_made import answer, cause, depends, effect
+
+places = import_module("gap_blind_places")
+numbers = import_module("gap_blind_numbers")
+dependences = import_module("gap_blind_depends")
+tests = import_module("gap_blind_tests")
+
+
+def said(value, low, high):
+    return {"value": value, "low": low, "high": high}
+
+
+@pytest.mark.parametrize(
+    ("spans", "expected"),
+    [
+        ([(1.0, 3.0)], 1.0),
+        ([(2.0, 4.0)], 1.0 / 3.0),
+        ([(1.0, 2.0), (2.0, 3.0)], 1.0),
+        ([], 0.0),
+        ([(5.0, 6.0)], 0.0),
+    ],
+)
+def test_overlap(spans, expected):
+    intervals = [{"run": "run-1", "signal": "tcp", "t_start_s": a, "t_end_s": b} for a, b in spans]
+    assert places.overlap(effect(), intervals) == pytest.approx(expected)
+    other = [each | {"run": "run-2"} for each in intervals]
+    assert places.overlap(effect(), other) == 0.0
+
+
+def test_overlap_by_either_definition():
+    wide = effect(above_noise=[{"run": "run-1", "t_start_s": 0.0, "t_end_s": 4.0}])
+    told = [{"run": "run-1", "signal": "tcp", "t_start_s": 1.0, "t_end_s": 3.0}]
+    assert places.overlap(wide, told, places.OWN) == pytest.approx(1.0)
+    assert places.overlap(wide, told, places.NOISE) == pytest.approx(0.5)
+    assert places.overlap(effect(above_noise=[]), told, places.NOISE) is None
+    assert places.overlap(effect("base_frame"), told) is None  # acts everywhere
+
+
+def test_errors_are_shares_of_what_differs_from_nominal():
+    found = numbers.numbers(
+        effect("stiffness", "A2", parameters={"scale": 0.8}), cause(scale=said(0.75, 0.7, 0.79))
+    )
+    assert found == (pytest.approx((0.25,)), (False,))
+
+
+def test_a_vector_is_one_error():
+    true = {"x_mm": 3.0, "y_mm": 4.0, "z_mm": 0.0}
+    told = {name: said(value + 0.5 * (name == "z_mm"), -9.0, 9.0) for name, value in true.items()}
+    assert numbers.numbers(effect("base_frame", None, parameters=true), cause(**told))[0] == pytest.approx(
+        (0.1,)
+    )
+
+
+def test_a_line_has_no_way_round_and_a_phase_no_first_turn():
+    true = {"direction": [1.0, 0.0, 0.0], "hz": 9.0}
+    told = {"direction_x": said(-1.0, -1.1, -0.9), "direction_y": said(0.0, -0.1, 0.1)}
+    told |= {"direction_z": said(0.0, -0.1, 0.1)}
+    shakes = effect("vibration", None, parameters=true)
+    assert numbers.numbers(shakes, cause(**told))[1] == (True, True, True)
+    turned = effect(parameters={"phase": 6.2})
+    assert numbers.numbers(turned, cause(phase=said(-0.08, -0.2, 0.0)))[1] == (True,)
+
+
+def told(entry, causes=(), rest=()):
+    found = dependences.told(entry, answer(causes, "unexplained", rest=rest))
+    return found.place, found.family, found.form
+
+
+def test_a_dependence_is_compared_level_by_level():
+    assert told(effect(), rest=[depends()]) == (True, True, True)
+    assert told(effect(), rest=[depends(form="smooth")]) == (True, True, False)
+    assert told(effect(), rest=[depends(on="velocity")]) == (True, False, False)
+    assert told(effect(), rest=[depends(at="tip")]) == (False, False, False)
+    assert told(effect(), rest=[depends(probability=0.4)]) == (False, False, False)
+
+
+def test_the_most_probable_dependence_counts():
+    rest = [depends(at="tip", probability=0.6), depends(probability=0.8)]
+    assert told(effect(), rest=rest) == (True, True, True)
+
+
+def test_a_named_cause_states_its_own_family():
+    named = [cause("friction", family="A2, reversals")]
+    assert told(effect(), named, [depends(at="tip")]) == (True, True, True)
+    assert told(effect(), [cause("friction", family="A3, reversals")]) == (False, False, False)
+
+
+@pytest.mark.parametrize(
+    ("on", "stated"),
+    [("time_step", "step in time"), ("time_step", "time in the run"), ("own_torque_memory", "own torque")],
+)
+def test_words_of_the_label_and_of_the_answer(on, stated):
+    tip = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "step"})
+    assert told(tip, rest=[depends("tip", stated, "step")]) == (True, True, True)
+
+
+def test_what_the_timing_sees_may_be_told_of_the_timing():
+    law = {
+        "where": "tip",
+        "joints": [],
+        "on": ["acceleration"],
+        "form": "smooth",
+        "links": ["timing", "path"],
+    }
+    assert told(effect(depends=law), rest=[depends("timing", "acceleration", "smooth")]) == (True, True, True)
+    assert not told(effect(), rest=[depends("timing")])[0]
+
+
+def test_every_word_of_the_plant_is_one_of_the_answer():
+    from gcode2krl.effects.dependence import Dependence
+    from tests.plant.effects.depends import ON, WHERE
+
+    known = {each.value for each in Dependence}
+    for on in set(ON) - {"noise"}:
+        entry = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "smooth"})
+        assert dependences.allowed_by(entry).on & known, on
+    assert set(WHERE) == {*dependences.PLACES, "joint"}
+
+
+def test_a_label_without_dependences_is_not_scored():
+    assert dependences.told(effect(depends=None), answer()) is None
+
+
+TRUTHS = (("backlash", "A2"),)
+
+
+def fates(causes, rest=(), verdict="unexplained", truths=TRUTHS):
+    return tests.tested_of(answer(causes, verdict, rest=rest), truths)
+
+
+def test_tests_that_an_answer_states_count():
+    stated = {"family": True, "form": {"passed": False}, "rest": False}
+    assert fates([cause("friction", probability=0.2, tests=stated)], truths=())[0].failed == {"form", "rest"}
+    listed = [{"test": "form", "passed": False}, {"test": "rest", "passed": True}]
+    assert fates([cause(probability=0.2, tests=listed)])[0].failed == {"form"}
+
+
+def test_tests_are_read_from_the_contract_where_none_are_stated():
+    wrong = cause("friction", probability=0.2, family="A2, reversals", form_fits=0.5)
+    assert fates([wrong], truths=())[0].failed == {"form"}
+    assert fates([wrong], [depends("tip")], truths=())[0].failed == {"form", "family"}
+    assert fates([wrong], [depends("tip", share=0.01)], truths=())[0].failed == {"form"}
+    unsteady = cause(probability=0.2, constant={"inconstancy": 0.4, "p": 1e-4})
+    assert fates([unsteady])[0].failed == {"constancy"}
+    assert fates([cause(probability=0.2)])[0].failed == {tests.UNDECIDED}
+
+
+def test_a_right_cause_that_is_not_there_is_lost_too():
+    assert fates([], verdict="no_gap")[0].failed == {tests.NO_GAP}
+    wrong, right = fates([cause("friction")])
+    assert (wrong.is_right, wrong.is_named) == (False, True)
+    assert (right.is_right, right.failed) == (True, {tests.UNLISTED})
+
+
+def test_each_of_two_truths_has_a_fate():
+    two = (("backlash", "A2"), ("clock", "force"))
+    named, lost = fates([cause(), cause("clock", "force", 0.3)], truths=two)
+    assert (named.is_right, named.is_named) == (True, True)
+    assert (lost.is_right, lost.is_named) == (True, False)
+    assert fates([cause()], truths=two)[1].failed == {tests.UNLISTED}
+
+
+def test_ablation_counts_what_no_other_test_stopped():
+    made = [
+        tests.Tested(False, False, frozenset({"form"})),
+        tests.Tested(False, False, frozenset({"form", "rest"})),
+        tests.Tested(True, False, frozenset({"rest"})),
+        tests.Tested(True, True, frozenset()),
+    ]
+    assert tests.ablation(made) == [
+        tests.Ablation("form", 2, 1, 0, 0),
+        tests.Ablation("rest", 1, 0, 1, 1),
+    ]

@@ -1,0 +1,85 @@
+"""The tables of the check, from judgements made by hand."""
+
+from importlib import import_module
+
+from tests.benchmarks.hand_made import cause, depends, effect, record
+
+rows = import_module("gap_blind_rows")
+tables = import_module("gap_blind_print")
+score = import_module("gap_blind_score")
+
+
+def figures(*records):
+    return {row.metric: row for row in rows.metrics([score.judge(each) for each in records])}
+
+
+def test_false_alarms_by_what_is_foreign():
+    walk = {"foreign_noise": [{"channel": "tracker", "kind": "random_walk"}]}
+    made = figures(
+        record(kind="null"),
+        record(kind="null_foreign_noise", verdict="unexplained", label=walk),
+        record(kind="null_foreign_noise"),
+        record(kind="null_foreign_mismatch", causes=[cause()]),
+    )
+    assert made["false alarms, usual noise"].figure == "0.000 (<= 0.950, n 1)"
+    foreign = made["false alarms, foreign noise"]
+    assert foreign.figure.startswith("0.500 (<= ")
+    assert foreign.worst == "tracker random_walk 1/1"
+    assert made["  any of them with a named cause"].figure.startswith("0.250")
+
+
+def test_forms_stand_apart_and_small_effects_do_not_count():
+    made = rows.metrics(
+        [
+            score.judge(record([effect()], [cause()])),
+            score.judge(record([effect(ratio=0.5)])),
+            score.judge(record([effect("friction", form="other")], [cause()])),
+        ]
+    )
+    found = [(row.metric, row.figure, row.worst) for row in made]
+    assert ("same form, >= noise: declared set", "1.000 (>= 0.050, n 1)", "") in found
+    assert ("  half the noise: declared set", "0.000 (>= 0.000, n 1)", "backlash 0/1") in found
+    assert ("other form, >= noise: declared set", "0.000 (>= 0.000, n 1)", "friction 0/1") in found
+    assert ("  something else named", "1.000 (<= 1.000, n 1)", "friction 1/1") in found
+
+
+def test_unknowns():
+    made = figures(
+        record([effect("cable_snag", None)], [cause()], kind="open"),
+        record([effect()], [], "unexplained", "deleted", rest=[depends()]),
+        record([effect(ratio=0.5)], [cause()], kind="open"),
+    )
+    assert made["outside the library: wrongly named"].figure == "1.000 (<= 1.000, n 1)"
+    assert made["taken out of the library: wrongly named"].figure == "0.000 (<= 0.950, n 1)"
+    assert made["family and place of an unknown right"].figure.startswith("0.500 (>= ")
+
+
+def test_names_that_are_sure_of_themselves():
+    made = figures(
+        record([effect()], [cause(probability=0.95)]),
+        record([effect()], [cause("friction", probability=0.92)]),
+        record([effect()], [cause("friction", probability=0.89)]),
+    )
+    assert made["precision of names with p >= .9, all kinds"].figure.startswith("0.500")
+
+
+def test_an_explanation_leaves_no_significant_rest():
+    made = figures(
+        record([effect()], [cause()]),
+        record([effect()], [cause()], significant=True),
+        record([effect()], [], "unexplained", significant=True),
+    )
+    assert made["explained, beside a significant rest"].figure.startswith("0.500 (<= ")
+
+
+def test_the_report_names_what_was_confused():
+    judged = [
+        score.judge(record([effect()], [cause("friction")])),
+        score.judge(record([effect("cable_snag", None)], [cause()], kind="open")),
+        score.judge({"case": {"seed": 7, "kind": "null"}, "label": {"effects": []}, "error": "boom"}),
+    ]
+    text = tables.report(judged, [], "a title")
+    assert text.startswith("a title")
+    assert "| single | backlash A2 | friction A2" in text.replace("  ", " ")
+    assert "No result, an exception: null-00007" in text
+    assert "full check of" in text
