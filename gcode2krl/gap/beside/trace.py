@@ -30,6 +30,8 @@ class Signal:
     """The table of a run whose clock stamps it."""
     of_joints: bool = False
     """Its components are joints."""
+    of_tip: bool = False
+    """Its components are those of the tip."""
     tells_time: bool = False
     """It shows when the robot is where: timing is the part of it along the motion."""
     model_rms: float = 0.0

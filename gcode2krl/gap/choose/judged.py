@@ -9,6 +9,7 @@ from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
 from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.intervals import Interval
@@ -33,6 +34,8 @@ class Cause:
     rivals: tuple[tuple[Rival, float], ...] | None = ()
     """None where no other effect was compared with it."""
     constant: Constancy | None = None
+    tests: FamilyTests | None = None
+    """What families say of it; None where they were not asked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +80,8 @@ class Judgement(Judged):
     """Accepted effects that are within normal mismatch."""
     every: tuple[Trace, ...] = field(default=())
     """The traces with the held-out ones."""
+    rest: Rest | None = None
+    """On what depends what is left beside the named causes; None where it was not asked."""
 
     def fitted(self, trace: Trace) -> Floats:
         """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""

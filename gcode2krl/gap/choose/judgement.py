@@ -11,6 +11,7 @@ from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.constancy import constancy_of
 from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.choose.family_tests import LinkFamilies, Rest
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
@@ -30,8 +31,9 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
     found = examine(link, traces, question, known)
+    families = LinkFamilies(found, (*traces, *held))
     if not found.causes:
-        return _without_causes(found, (*traces, *held))
+        return _without_causes(found, (*traces, *held), families.rest)
     trials = list(_trials(found, held))
     counts = range(len(found.causes) + 1)
     if trials:
@@ -39,7 +41,7 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     else:
         sizes = [_size(found, traces, found.causes[:count]) for count in counts]
     whole = _size(found, traces, found.causes)
-    return replace(_judgement(found, sizes, whole, bool(trials)), every=(*traces, *held))
+    return replace(_judgement(found, sizes, whole, families, bool(trials)), every=(*traces, *held))
 
 
 def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]) -> Size:
@@ -48,14 +50,22 @@ def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]
     return size_of_gap(traces, nuisance, found.noise, causes, found.mismatch)
 
 
-def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
+def _without_causes(found: Examination, every: tuple[Trace, ...], rest: Rest) -> Judgement:
     size = _size(found, every, ())
-    verdict = "unexplained" if size.significant else "no_gap"
-    return replace(_of(found, verdict, (), size, held_out=True), every=every)
+    # a model that is met to its own accuracy leaves what no noise explains, and is met all the same
+    is_gap = size.significant or (rest.is_gap and found.link.model_rms == 0.0)
+    verdict = "unexplained" if is_gap else "no_gap"
+    return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
 
 
 def _of(
-    found: Examination, verdict: str, causes: tuple[Cause, ...], size: Size, *, held_out: bool
+    found: Examination,
+    verdict: str,
+    causes: tuple[Cause, ...],
+    size: Size,
+    rest: Rest,
+    *,
+    held_out: bool,
 ) -> Judgement:
     return Judgement(
         link=found.link,
@@ -67,6 +77,7 @@ def _of(
         traces=found.traces,
         examination=found,
         usual=found.mismatch,
+        rest=rest,
     )
 
 
@@ -106,7 +117,9 @@ def _trials(found: Examination, held: Sequence[Trace]) -> Iterator[_Trial]:
 # Causes and verdict
 
 
-def _judgement(found: Examination, sizes: Sequence[Size], whole: Size, held_out: bool) -> Judgement:
+def _judgement(
+    found: Examination, sizes: Sequence[Size], whole: Size, families: LinkFamilies, held_out: bool
+) -> Judgement:
     """Return the judgement from the sizes of the gap with the first 0, 1, 2 … causes.
 
     ``whole`` is the size on the data that the causes were fitted to.
@@ -117,10 +130,12 @@ def _judgement(found: Examination, sizes: Sequence[Size], whole: Size, held_out:
     unknown = unknown_probability(last.share_left, left)
     if len(found.causes) > _LIMITS.most_together:
         unknown = max(unknown, 1.0 - _LIMITS.unsupported)
-    causes = sorted(_causes(found, sizes, unknown, held_out), key=lambda cause: -cause.probability)
-    rest = left and last.share_left > _LIMITS.unknown_share
-    verdict = _verdict(any(cause.probability >= NAMED for cause in causes), rest, sizes[0].significant)
-    return _of(found, verdict, tuple(causes), last, held_out=held_out)
+    causes = sorted(_causes(found, sizes, unknown, families, held_out), key=lambda cause: -cause.probability)
+    named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
+    rest = families.beside(named)
+    is_left = left and last.share_left > _LIMITS.unknown_share
+    verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), sizes[0].significant)
+    return _of(found, verdict, tuple(causes), last, rest, held_out=held_out)
 
 
 def _verdict(named: bool, rest: bool, gap: bool) -> str:
@@ -129,7 +144,9 @@ def _verdict(named: bool, rest: bool, gap: bool) -> str:
     return "unexplained" if gap else "no_gap"
 
 
-def _causes(found: Examination, sizes: Sequence[Size], unknown: float, held_out: bool) -> Iterator[Cause]:
+def _causes(
+    found: Examination, sizes: Sequence[Size], unknown: float, families: LinkFamilies, held_out: bool
+) -> Iterator[Cause]:
     """Yield the causes in the order in which they were accepted."""
     intervals = intervals_of(found)
     for order, number in enumerate(found.cause_numbers):
@@ -138,15 +155,17 @@ def _causes(found: Examination, sizes: Sequence[Size], unknown: float, held_out:
         shrink = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
         if held_out and shrink < _least_shrink(found, sizes, order):
             probability *= _LIMITS.unsupported
+        tests = families.tests[order]
         yield Cause(
             applied=found.applied[number],
             link=found.link.name,
-            probability=probability,
+            probability=probability * tests.weight,
             parameters=intervals[number],
             shrink=shrink if held_out else None,
             rms_after=sizes[order + 1].after ** 0.5,
             rivals=tuple(zip(rivals, others, strict=True)),
             constant=constancy_of(found, number),
+            tests=tests,
         )
 
 

@@ -8,13 +8,13 @@ import numpy as np
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.examination import Examination, Key, LinkData
+from gcode2krl.gap.choose.examination import Examination, LinkData
 from gcode2krl.gap.choose.mismatch import within_mismatch
 from gcode2krl.gap.choose.ranking import ranked, shortlist
 from gcode2krl.gap.choose.replanning import replanned
 from gcode2krl.gap.choose.scoring import Score, surprise, threshold, tried
-from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
 from gcode2krl.gap.choose.shown_numbers import with_shown_numbers
+from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.noise_source import noise_of

@@ -14,6 +14,7 @@ from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
+from gcode2krl.gap.tell.depends_on import depends_on
 from gcode2krl.gap.tell.result import (
     CauseResult,
     Detectable,
@@ -40,7 +41,7 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         links=tuple(_links(judgements, slips)),
         where=_where(largest, judgements),
         causes=_causes(judgements, slips),
-        unexplained=_unexplained(largest),
+        unexplained=_unexplained(largest, signals),
         not_examined=tuple(_not_examined(judgements, slips)),
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
@@ -195,15 +196,20 @@ def _reported_in(cause: Cause, judgement: Judged) -> Link:
     return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
 
 
-def _unexplained(largest: Judgement | None) -> Unexplained:
-    """Return what is left of the largest gap."""
+def _unexplained(largest: Judgement | None, signals: Sequence[Judgement]) -> Unexplained:
+    """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
-    size, significant = largest.size, bool(largest.size.significant)
+    size = largest.size
+    families = [
+        result for judgement in sorted(signals, key=_weight, reverse=True) for result in depends_on(judgement)
+    ]
+    significant = bool(size.significant) or any(each.link == largest.link.name for each in families)
     return Unexplained(
         rms=largest.factor * max(size.after, 0.0) ** 0.5,
         significant=significant,
         structure="structured" if significant else "white",
+        depends_on=tuple(families),
     )
 
 

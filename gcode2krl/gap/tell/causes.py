@@ -30,7 +30,16 @@ def cause_of(cause: Cause, judgement: Judged, link: str) -> CauseResult:
         else tuple(
             RivalResult(applied.effect.name, applied.target, probability) for applied, probability in others
         ),
+        family=_family(cause),
+        form_fits=None if cause.tests is None else cause.tests.form_ratio,
     )
+
+
+def _family(cause: Cause) -> str | None:
+    """Return where and on what a cause depends: the best member of its family, ``A2, reversals``."""
+    if cause.tests is None or cause.tests.family is None:
+        return None
+    return f"{cause.tests.family.place.name}, {cause.tests.family.on.value}"
 
 
 def slip_cause(slip: Slip) -> CauseResult:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from gcode2krl.gap.thresholds.beside import BesideThresholds
 from gcode2krl.gap.thresholds.choose import ChooseThresholds
+from gcode2krl.gap.thresholds.families import FamilyThresholds
 from gcode2krl.gap.thresholds.fit import FitThresholds
 from gcode2krl.gap.thresholds.slips import SlipThresholds
 from gcode2krl.gap.thresholds.tell import TellThresholds
@@ -17,6 +18,7 @@ class Thresholds:
 
     beside: BesideThresholds = field(default_factory=BesideThresholds)
     fit: FitThresholds = field(default_factory=FitThresholds)
+    families: FamilyThresholds = field(default_factory=FamilyThresholds)
     choose: ChooseThresholds = field(default_factory=ChooseThresholds)
     slips: SlipThresholds = field(default_factory=SlipThresholds)
     tell: TellThresholds = field(default_factory=TellThresholds)

@@ -64,6 +64,7 @@ class MechanicsLink(Link):
     name = "mechanics"
     signal = "tcp"
     unit = "mm"
+    of_tip = True
     needs = "tracker.csv, absolute angles and a known robot"
     table = "tracker"
     sets_clocks = True

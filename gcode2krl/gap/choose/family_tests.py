@@ -1,0 +1,206 @@
+"""What families say of a named cause and of the rest: the tests that stand between a form and a name.
+
+A cause is named only if (a) its family is the best when the cause is taken out of the model, or one to the
+data with the best; (b) its form takes nearly all that its family takes; (c) beside it no other family takes a
+share of the gap worth naming. All of it is on every run, those that explained included.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied
+from gcode2krl.effects.dependence import Where
+from gcode2krl.effects.effect import JOINTS
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.families.evidence import Evidence
+from gcode2krl.gap.families.grid import TIMING, Grid
+from gcode2krl.gap.families.rows import Rows
+from gcode2krl.gap.families.study import Study, studies
+from gcode2krl.gap.families.view import View
+from gcode2krl.gap.fit.design import nuisance_for
+from gcode2krl.gap.fit.likelihood import Likelihood
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.families
+_PRIOR = THRESHOLDS.fit.prior_sizes
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyTests:
+    """What families say of one cause; the numbers are features of its probability."""
+
+    margin: float
+    """Evidence of its own family over that of the best other one with the cause taken out, in nats, over the
+    inflation; the refitted form counts as a member of its family."""
+    form_ratio: float
+    """Of what its own family takes, the share that its form takes."""
+    other_share: float
+    """Of the gap's power, what the best other family takes beside the refitted effect; 0 where none does."""
+    other_p: float
+    """Of an evidence as large as that, if nothing admissible explains the rest."""
+    family: Evidence | None
+    """The best member of its own family."""
+    better: Evidence | None
+    """The best other family with the cause taken out."""
+
+    @property
+    def is_best(self) -> bool:
+        """Tell whether no other family is better beyond what the data can tell."""
+        return self.margin > -_LIMITS.alike_nats
+
+    @property
+    def form_fits(self) -> bool:
+        """Tell whether its form takes nearly all that its family takes."""
+        return self.form_ratio >= _LIMITS.form_ratio
+
+    @property
+    def is_alone(self) -> bool:
+        """Tell whether no other family takes a share worth naming beside it."""
+        return self.other_share < _LIMITS.other_share
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether the cause may be named."""
+        return self.is_best and self.form_fits and self.is_alone
+
+    @property
+    def weight(self) -> float:
+        """Return what the probability of the cause is multiplied by, 0 to 1.
+
+        The product of three logistic steps, each 0.5 at the limit of its test and not above 1/2 of what is
+        certain beyond it; a calibrated table replaces it.
+        """
+        steps = (
+            (self.margin + _LIMITS.alike_nats) / _LIMITS.margin_width,
+            (self.form_ratio - _LIMITS.form_ratio) / _LIMITS.ratio_width,
+            (_LIMITS.other_share - self.other_share) / _LIMITS.share_width,
+        )
+        return float(np.prod([1.0 / (1.0 + np.exp(-np.clip(step, -30.0, 30.0))) for step in steps]))
+
+
+def net_gain(evidence: Evidence) -> float:
+    """Return twice the evidence: the gain minus what its numbers cost; 0 where it is not significant."""
+    significant = evidence.nats / evidence.inflation > _LIMITS.least_evidence
+    return 2.0 * evidence.nats if significant else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """On what depends what is left of a link beside some effects."""
+
+    study: Study
+    gap_gain: float
+    """Fall of chi2 by all that is known to explain the gap: the power of the gap beyond noise."""
+    blocks: int
+    """Number of whitened values."""
+
+    def share(self, evidence: Evidence) -> float:
+        """Return the share of the gap's power that a family takes; 0 where it is not significant."""
+        return min(net_gain(evidence) / max(self.gap_gain, 1e-30), 1.0)
+
+    @property
+    def is_gap(self) -> bool:
+        """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
+        best = max(self.study.evidences, key=net_gain, default=None)
+        if best is None or self.study.p > _LIMITS.gap_p:
+            return False
+        certain = best.nats / best.inflation >= _LIMITS.gap_evidence
+        return certain and net_gain(best) >= _LIMITS.gap_power * self.blocks
+
+    @property
+    def worth_naming(self) -> tuple[Evidence, ...]:
+        """Return the families that take a share of the gap worth naming, the most probable first."""
+        if self.study.p > _LIMITS.significant_p:
+            return ()
+        return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
+
+
+class LinkFamilies:
+    """The families of a link: what each says beside all accepted effects, and with each cause taken out."""
+
+    def __init__(self, found: Examination, traces: Sequence[Trace]) -> None:
+        """Take the traces that explain and those that are held out."""
+        nuisance = nuisance_for(traces, found.question, found.data.known)
+        likelihood = Likelihood(traces, nuisance, found.noise)
+        self._found, self._rows = found, Rows(likelihood)
+        tangents = likelihood.tangents(found.fitted.numbers, found.fitted.x)
+        self._whole = View.of(self._rows, self._left(found.applied), tangents)
+        self._grid = Grid(traces, [noise.sigma for noise in found.noise])
+        numbers = found.cause_numbers
+        outs = [self._without((number,)) for number in numbers]
+        everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
+        largest = max((net_gain(each) for each in everything.evidences), default=0.0)
+        explained = self._without(numbers).chi2 - self._whole.chi2 if numbers else 0.0
+        self.rest = Rest(everything, explained + largest, len(self._rows))
+        """Beside all accepted effects."""
+        self.tests = tuple(
+            self._tests(number, out, study)
+            for number, out, study in zip(numbers, outs, self._outs, strict=True)
+        )
+        """Of each cause, in the order of `Examination.cause_numbers`."""
+
+    def beside(self, named: Collection[int]) -> Rest:
+        """Return on what depends what is left beside the named causes alone, by their numbers."""
+        unnamed = tuple(number for number in self._found.cause_numbers if number not in named)
+        if not unnamed:
+            return self.rest
+        if len(unnamed) == 1:
+            study = self._outs[self._found.cause_numbers.index(unnamed[0])]
+        else:
+            view = self._without(unnamed)
+            (study,) = studies(self._rows, [view], self._grid, self._found.question.seed)
+        return replace(self.rest, study=study)
+
+    def _left(self, applied: Sequence[Applied]) -> list[Floats]:
+        return [trace.measured - trace.sample(applied) for trace in self._rows.traces]
+
+    def _without(self, numbers: Sequence[int]) -> View:
+        """Return the view with some accepted effects taken out of the model, the others where they are."""
+        kept = [number for number in range(len(self._found.applied)) if number not in numbers]
+        left = [each.T[:, :, None] for each in self._left([self._found.applied[number] for number in kept])]
+        slices = self._found.fitted.numbers.slices
+        columns = [np.arange(slices[number].start, slices[number].stop) for number in kept]
+        at = np.concatenate([np.zeros(0, dtype=int), *columns])
+        return self._whole.beside(self._rows.of(left)[:, 0], self._whole.tangents[:, at])
+
+    def _tests(self, number: int, out: View, study: Study) -> FamilyTests:
+        applied = self._found.applied[number]
+        own = [each for each in study.evidences if _is_of(applied, each)]
+        better = next((each for each in study.evidences if not _is_of(applied, each)), None)
+        form = out.chi2 - self._whole.chi2
+        form_nats = 0.5 * form - 0.5 * self._cost(out, number)
+        margin = np.inf
+        if better is not None:
+            best = max([form_nats, *(each.nats for each in own)])
+            margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
+        rest = self.rest.study
+        own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
+        others = [each for each in rest.evidences if not _is_of(applied, each)]
+        other = max(others, key=net_gain, default=None)
+        return FamilyTests(
+            margin=float(margin),
+            form_ratio=form / max(form + own_rest, 1e-30),
+            other_share=0.0 if other is None else self.rest.share(other),
+            other_p=1.0 if other is None else rest.p_of(other),
+            family=own[0] if own else None,
+            better=better,
+        )
+
+    def _cost(self, out: View, number: int) -> float:
+        """Return what the numbers of an effect cost as chi2, as in `Fitted.occam`."""
+        tangents = self._whole.tangents[:, self._found.fitted.numbers.slices[number]]
+        information = tangents.T @ out.without_fixed(tangents)
+        return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
+
+
+def _is_of(applied: Applied, evidence: Evidence) -> bool:
+    """Tell whether a family is that of an effect at its target."""
+    effect, place = applied.effect, evidence.place
+    if evidence.on not in effect.depends_on or place.where not in effect.where:
+        return False
+    at_a_joint = place.where is Where.JOINT and applied.target in JOINTS
+    return not at_a_joint or place.name in (applied.target, TIMING)

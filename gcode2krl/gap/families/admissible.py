@@ -1,0 +1,167 @@
+"""Admissible inputs: what a deviation of a link can be a function of, at the rows of a trace."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.effects import arm
+from gcode2krl.effects.inputs import gradient
+from gcode2krl.effects.operators import lag, play, since_reversal
+from gcode2krl.gap.beside.interpolation import linear, nearest_rows
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.units import MM_PER_M
+
+_PLAYS_RAD = (1e-4, 1e-3, 1e-2)
+"""Half-widths of play: 0.006°, 0.06° and 0.6° cover what gears have."""
+_SETTLES_S = (0.05, 0.3)
+"""After a reversal: a stick-slip spike, and what an arm needs to come to rest."""
+_WARMS_S = (2.0, 8.0, 30.0)
+"""Time constants with which a spindle grows after it has started."""
+_PLAYS_TORQUE = (0.1, 0.4)
+"""Half-widths of play of a torque, over its range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Admissible:
+    """The inputs of one trace's link, each at its rows (n,) or (n, c)."""
+
+    trace: Trace
+
+    def _at(self, values: Floats) -> Floats:
+        """Return values (m,) or (m, c) of the model's samples at the rows."""
+        wide = values[:, None] if values.ndim == 1 else values
+        found = linear(self.trace.time_s, self.trace.inputs.time_s, wide)
+        return found[:, 0] if values.ndim == 1 else found
+
+    @cached_property
+    def _nearest(self) -> Ints:
+        return nearest_rows(self.trace.inputs.time_s, self.trace.time_s)
+
+    # Time
+
+    @cached_property
+    def since_start_s(self) -> Floats:
+        """(n,) since the run's first sample."""
+        since_s: Floats = self.trace.time_s - self.trace.inputs.time_s[0]
+        return since_s
+
+    @cached_property
+    def hours(self) -> Floats:
+        """(n,) since the earliest of the runs started."""
+        return self._at(self.trace.inputs.run_hours)
+
+    # Path and process
+
+    @cached_property
+    def travel_mm(self) -> Floats:
+        """(n,) length of the path so far."""
+        return self._at(self.trace.inputs.path_mm)
+
+    @cached_property
+    def cut_m(self) -> Floats:
+        """(n,) metres that each tool has cut so far."""
+        inputs = self.trace.inputs
+        step_mm = np.where(
+            self._force_N.any(axis=1), np.diff(inputs.path_mm, prepend=inputs.path_mm[:1]), 0.0
+        )
+        cut_m = np.empty(len(inputs))
+        for _, rows in arm.tool_rows(inputs.tool):
+            cut_m[rows] = np.cumsum(step_mm[rows]) / MM_PER_M
+        return self._at(cut_m)
+
+    @cached_property
+    def position_mm(self) -> Floats:
+        """(n, 3) commanded tip."""
+        return self._at(self.trace.inputs.position_mm)
+
+    @cached_property
+    def velocity_mm_s(self) -> Floats:
+        """(n, 3) of the commanded tip."""
+        return self._at(self.trace.inputs.velocity_mm_s)
+
+    @cached_property
+    def acceleration_mm_s2(self) -> Floats:
+        """(n, 3) of the commanded tip."""
+        inputs = self.trace.inputs
+        return self._at(gradient(inputs.velocity_mm_s, inputs.time_s))
+
+    @cached_property
+    def tool_axes(self) -> Floats:
+        """(n, 3, 3) rotations of the tool."""
+        return self.trace.inputs.tool_rotation[self._nearest]
+
+    @cached_property
+    def force_N(self) -> Floats:
+        """(n, 3) the force that bends the arm: the measured one where the model has it."""
+        return self._at(self._force_N)
+
+    @cached_property
+    def spindle(self) -> Floats:
+        """(n, c) spindle speed, and the same with lags as a spindle warms up, from rest at the start."""
+        inputs = self.trace.inputs
+        speed = np.ascontiguousarray(inputs.spindle_rad_s, dtype=float)
+        started = np.append(0.0, speed)
+        step_s = np.append(inputs.time_s[0] - 1e-3, inputs.time_s)
+        return self._at(np.stack([speed, *(lag(started, step_s, tau)[1:] for tau in _WARMS_S)], axis=1))
+
+    @cached_property
+    def _force_N(self) -> Floats:
+        inputs = self.trace.inputs
+        return inputs.force_base_N if inputs.load_base_N is None else inputs.load_base_N
+
+    # Joints
+
+    @cached_property
+    def q_rad(self) -> Floats:
+        """(n, 6) commanded joints."""
+        return self._at(self.trace.inputs.q_cmd_rad)
+
+    @cached_property
+    def rate_rad_s(self) -> Floats:
+        """(n, 6) velocities of the joints."""
+        return self._at(self._rate)
+
+    @cached_property
+    def acceleration_rad_s2(self) -> Floats:
+        """(n, 6) accelerations of the joints."""
+        return self._at(gradient(self._rate, self.trace.inputs.time_s))
+
+    @cached_property
+    def _rate(self) -> Floats:
+        return gradient(self.trace.inputs.q_cmd_rad, self.trace.inputs.time_s)
+
+    @cached_property
+    def torque_Nm(self) -> Floats:
+        """(n, 6) of the force at the tip, by the arm's statics."""
+        return self._at(self._torque)
+
+    @cached_property
+    def _torque(self) -> Floats:
+        inputs = self.trace.inputs
+        return arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm)
+
+    def torque_with_memory(self, joint: int) -> Floats:
+        """Return what play operators leave of a joint's torque (n, c)."""
+        torque = np.ascontiguousarray(self._torque[:, joint])
+        reach = float(np.ptp(torque))
+        plays = [torque - play(torque, 0.5 * share * reach) for share in _PLAYS_TORQUE]
+        return self._at(np.stack(plays, axis=1))
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """(n, 3, 6) by how much the tip moves with each joint, mm/rad."""
+        return self.trace.inputs.jacobian[self._nearest, :3]
+
+    def reversals(self, joint: int) -> Floats:
+        """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.
+
+        Beside them what dies down after each reversal.
+        """
+        inputs = self.trace.inputs
+        q = np.ascontiguousarray(inputs.q_cmd_rad[:, joint])
+        direction, since_s = since_reversal(q, inputs.time_s)
+        plays = [(q - play(q, width)) / width for width in _PLAYS_RAD]
+        settling = [direction * np.exp(-since_s / tau) for tau in _SETTLES_S]
+        return np.stack([direction, *plays, *settling], axis=1)[self._nearest]

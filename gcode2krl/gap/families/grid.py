@@ -1,0 +1,241 @@
+"""The grid of hypotheses of a link: where by on what."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.families.admissible import Admissible
+from gcode2krl.gap.families.functions import (
+    Functions,
+    free,
+    odd,
+    polynomials,
+    products,
+    smooth,
+    smooth_in_each,
+)
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.families
+_WARMS_H = (0.1, 0.3, 1.0, 3.0)
+"""Time constants over which a cell drifts between runs."""
+
+
+TIMING = "timing"
+"""The place of what is late along the path."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a deviation is: its name, and the columns (k, n, d) of each trace that a unit of it makes."""
+
+    name: str
+    where: Where
+    units: Sequence[Floats]
+    joint: int | None = None
+    component: int | None = None
+    """Where it is one component of the signal alone; ``units`` are then (1, n, d)."""
+
+    def lifted(self, functions: Functions) -> tuple[list[Floats], tuple[Floats, ...]]:
+        """Return columns (k, n, f·d) of functions at this place, and the roots of their covariances."""
+        columns: list[Floats] = [
+            (own[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
+            for own, unit in zip(functions.columns, self.units, strict=True)
+        ]
+        directions = np.eye(self.units[0].shape[2])
+        roots = [np.asarray(np.kron(root, directions), dtype=np.float64) for root in functions.roots]
+        return columns, tuple(roots)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A place and an input, and the columns (k, n, c) of each trace that functions of it make there."""
+
+    place: Place
+    on: Dependence
+    columns: Sequence[Floats]
+    roots: tuple[Floats, ...]
+
+
+class Grid:
+    """All hypotheses of a link, over all of its traces."""
+
+    def __init__(self, traces: Sequence[Trace], sigma: Sequence[float]) -> None:
+        """Take the rms (k,) of each component's noise: columns are in units of it."""
+        self.traces = tuple(traces)
+        self.inputs = [Admissible(trace) for trace in self.traces]
+        self._sigma = np.array(sigma)
+
+    @cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Where a deviation of the link can be: a joint, the tip and each joint, or the force."""
+        trace = self.traces[0]
+        if trace.link.tells_time:
+            return (self._timing, *self._own_joints())
+        if trace.link.of_joints:
+            return tuple(self._own_joints())
+        if trace.link.of_tip:
+            return (self._axes("tip", Where.TIP), *self._arm_joints())
+        return (self._axes("force", Where.FORCE_AXIS),)
+
+    @property
+    def _timing(self) -> Place:
+        """How late the run is along its path."""
+        rms = np.sqrt(np.mean(np.concatenate([trace.rate for trace in self.traces]) ** 2, axis=0))
+        scale = float(np.max(rms / self._sigma))
+        units = [trace.rate.T[:, :, None] / max(scale, 1e-300) for trace in self.traces]
+        return Place(TIMING, Where.JOINT, tuple(units))
+
+    def _axes(self, name: str, where: Where) -> Place:
+        units = []
+        for trace in self.traces:
+            n, k = trace.shape
+            units.append(np.repeat(np.diag(self._sigma)[:, None, :], n, axis=1).reshape(k, n, k))
+        return Place(name, where, tuple(units))
+
+    def _own_joints(self) -> Iterator[Place]:
+        trace = self.traces[0]
+        for j, (name, column) in enumerate(zip(trace.components, trace.columns, strict=True)):
+            units = [np.full((1, each.shape[0], 1), self._sigma[j]) for each in self.traces]
+            yield Place(name, Where.JOINT, units, column, j)
+
+    def _arm_joints(self) -> Iterator[Place]:
+        columns = list(self.traces[0].columns)
+        for joint in range(6):
+            lifted = [np.moveaxis(own.jacobian[:, columns, joint], 1, 0)[:, :, None] for own in self.inputs]
+            power = np.mean(np.concatenate(lifted, axis=1)[:, :, 0] ** 2, axis=1)
+            scale = float(np.max(np.sqrt(power) / self._sigma))
+            if scale > 0.0:
+                yield Place(f"A{joint + 1}", Where.JOINT, tuple(each / scale for each in lifted), joint)
+
+    def families(self) -> Iterator[Family]:
+        """Yield every family that is no step and no tone."""
+        for place in self.places:
+            for on, functions in self._functions(place):
+                if functions.width:
+                    yield Family(place, on, *place.lifted(functions))
+            if place.where is Where.TIP:
+                yield from self._of_the_pose(place)
+
+    # Functions at a place
+
+    def _functions(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
+        own = self.inputs
+        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in own])
+        yield from self._of_time()
+        yield from self._of_motion(place)
+        yield Dependence.TRAVEL, smooth([each.travel_mm for each in own])
+        if place.joint is not None:
+            yield from self._of_joint(place.joint)
+        if any(each.force_N.any() for each in own):
+            yield from self._of_force(place)
+        if place.where is not Where.TIP:
+            yield Dependence.PLACE, free(self._pose(place.where is Where.FORCE_AXIS))
+
+    def _of_time(self) -> Iterator[tuple[Dependence, Functions]]:
+        own, count = self.inputs, len(self.inputs)
+        yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in own])
+        if count > 1:
+            runs = [np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(own)]
+            yield Dependence.RUN_TO_RUN, free(runs)
+        grown = [np.stack([-np.expm1(-each.hours / tau) for tau in _WARMS_H], axis=1) for each in own]
+        yield Dependence.WALL_CLOCK, free(grown)
+        yield Dependence.RUN_START, smooth([each.since_start_s for each in own])
+        if any(each.spindle.any() for each in own):
+            yield Dependence.SPINDLE_SPEED, free([each.spindle for each in own])
+
+    def _of_motion(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
+        own = self.inputs
+        if place.joint is not None:
+            yield Dependence.VELOCITY, smooth([each.rate_rad_s[:, place.joint] for each in own])
+            yield Dependence.ACCELERATION, smooth([each.acceleration_rad_s2[:, place.joint] for each in own])
+            return
+        velocity = [each.velocity_mm_s for each in own]
+        speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]
+        along = [v / np.maximum(s, 1.0) for v, s in zip(velocity, speed, strict=True)]
+        joined = [np.concatenate(each, axis=1) for each in zip(velocity, along, speed, strict=True)]
+        yield Dependence.VELOCITY, free(joined)
+        yield Dependence.ACCELERATION, free([each.acceleration_mm_s2 for each in own])
+
+    def _of_joint(self, joint: int) -> Iterator[tuple[Dependence, Functions]]:
+        own = self.inputs
+        angle = [each.q_rad[:, joint] for each in own]
+        yield Dependence.OWN_ANGLE, smooth(angle)
+        yield Dependence.REVERSALS, free([each.reversals(joint) for each in own])
+        ratios = self.traces[0].inputs.cell.robot.drives.gear_ratio
+        if ratios is not None and ratios[joint] != 0.0:
+            orders = ratios[joint] * np.arange(1, _LIMITS.harmonics + 1)
+            turned = [each[:, None] * orders for each in angle]
+            yield (
+                Dependence.MOTOR_ANGLE,
+                free([np.concatenate([np.cos(each), np.sin(each)], axis=1) for each in turned]),
+            )
+        if any(each.torque_Nm[:, joint].any() for each in own):
+            loops = [each.torque_with_memory(joint) for each in own]
+            single = odd([each.torque_Nm[:, joint] for each in own])
+            joined = [np.concatenate(pair, axis=1) for pair in zip(single, loops, strict=True)]
+            yield Dependence.OWN_TORQUE, free(joined)
+
+    def _of_force(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
+        own = self.inputs
+        force = [each.force_N for each in own]
+        size = [np.linalg.norm(each, axis=1, keepdims=True) for each in force]
+        most = max(float(each.max()) for each in size)
+        unit = [f / np.maximum(s, 1e-3 * most) for f, s in zip(force, size, strict=True)]
+        bent = [f * s / most for f, s in zip(force, size, strict=True)]
+        columns = [np.concatenate(each, axis=1) for each in zip(force, bent, unit, size, strict=True)]
+        yield Dependence.FORCE, free(columns)
+        place_ = polynomials([each.position_mm for each in own], 1)
+        yield Dependence.FORCE_BY_PLACE, free(products(force, place_))
+        cut = polynomials([each.cut_m[:, None] for each in own], 2)
+        grows = products(force, [each[:, 1:] for each in cut])
+        yield (
+            Dependence.METRES_CUT,
+            free([np.concatenate(pair, axis=1) for pair in zip(grows, force, cut, strict=True)]),
+        )
+
+    def _pose(self, turned: bool) -> list[Floats]:
+        """Return low polynomials of the position, with the axes of the tool where they matter."""
+        position = polynomials([each.position_mm for each in self.inputs], 2)
+        if not turned:
+            return position
+        axes = [each.tool_axes.reshape(-1, 9) for each in self.inputs]
+        middle = np.concatenate(axes).mean(axis=0)
+        return [np.concatenate([p, a - middle], axis=1) for p, a in zip(position, axes, strict=True)]
+
+    def _of_the_pose(self, place: Place) -> Iterator[Family]:
+        """Yield what depends on the pose, and on force by it, in a way that the arm makes."""
+        columns, _ = place.lifted(free(self._pose(turned=False)))
+        tool, arm_, bends = [], [], []
+        at = list(self.traces[0].columns)
+        sigma = float(np.mean(self._sigma))
+        for each in self.inputs:
+            tool.append(np.moveaxis(each.tool_axes[:, at], 1, 0) * sigma)
+            arm_.append(np.moveaxis(each.jacobian[:, at], 1, 0))
+            bends.append(arm_[-1] * each.torque_Nm)
+        with_arm = [columns, tool, _scaled(arm_, sigma)]
+        yield Family(place, Dependence.PLACE, *_joined(with_arm))
+        if any(each.any() for each in bends):
+            force = products(
+                [each.force_N for each in self.inputs],
+                polynomials([each.position_mm for each in self.inputs], 1),
+            )
+            lifted, _ = place.lifted(free(force))
+            yield Family(place, Dependence.FORCE_BY_PLACE, *_joined([lifted, _scaled(bends, sigma)]))
+
+
+def _scaled(columns: Sequence[Floats], size: float) -> list[Floats]:
+    """Return columns (k, n, c), each with this rms over components and traces."""
+    rms = np.sqrt(np.mean(np.concatenate(columns, axis=1) ** 2, axis=(0, 1)))
+    return [each * (size / np.maximum(rms, 1e-300)) for each in columns]
+
+
+def _joined(parts: Sequence[Sequence[Floats]]) -> tuple[list[Floats], tuple[Floats, ...]]:
+    """Return the columns of several parts (k, n, c) side by side, with independent weights."""
+    joined = [np.concatenate(each, axis=2) for each in zip(*parts, strict=True)]
+    return joined, (np.eye(joined[0].shape[2]),)

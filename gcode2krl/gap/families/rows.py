@@ -1,0 +1,97 @@
+"""Rows on which families are compared: whitened values, averaged over short blocks of time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.gap.beside.stretches import stretches_of_all
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.fit.likelihood import Likelihood
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+
+class Rows:
+    """Blocks of the whitened values of all traces, component after component.
+
+    A block is the sum of its values over the root of their number: white noise of unit variance stays that.
+    """
+
+    def __init__(self, likelihood: Likelihood) -> None:
+        self.likelihood, self.traces = likelihood, likelihood.traces
+        self.starts = [_block_starts(trace) for trace in self.traces]
+        """First rows of the blocks of each trace."""
+        stretches = self._of_values(stretches_of_all(self.traces))
+        self.members = _members(stretches)
+        """(g, v) 1 where a block belongs to a stretch of time."""
+        self.components: Ints = self._of_values(
+            np.concatenate([np.repeat(np.arange(k), n) for n, k in (trace.shape for trace in self.traces)])
+        )
+        """(v,) the component of each block."""
+        self.nuisance: Floats = self._nuisance()
+        """(v, m) N."""
+
+    def __len__(self) -> int:
+        return len(self.components)
+
+    @property
+    def step_s(self) -> float:
+        """Return the time between blocks."""
+        return float(np.median(np.diff(self.traces[0].time_s[self.starts[0]])))
+
+    def of(self, columns: Sequence[Floats], component: int | None = None) -> Floats:
+        """Return columns (k, n, c) of each trace whitened and in blocks, (v, c).
+
+        With ``component`` they are (1, n, c) of that one, and so are the blocks.
+        """
+        used = range(len(self.likelihood.noise)) if component is None else (component,)
+        blocks = [
+            self._averaged(number, self.likelihood.noise[j].whiten(own, self.traces[number].segments))
+            for number, each in enumerate(columns)
+            for j, own in zip(used, each, strict=True)
+        ]
+        return np.concatenate(blocks)
+
+    def _nuisance(self) -> Floats:
+        design = self.likelihood.design
+        columns = []
+        for number, trace in enumerate(self.traces):
+            wide = np.zeros((*trace.shape[::-1], design.width))
+            wide[:, :, design.places[number]] = design.columns(number, trace)
+            columns.append(wide)
+        return self.of(columns)
+
+    def _averaged(self, number: int, values: Floats) -> Floats:
+        """Return the blocks of values (n, c) of one trace."""
+        starts = self.starts[number]
+        lengths = np.diff(np.append(starts, len(values)))
+        if len(starts) == len(values):
+            return values
+        sums = values[starts]
+        for i in range(1, int(lengths.max())):
+            more = lengths > i
+            sums[more] += values[starts[more] + i]
+        averaged: Floats = sums / np.sqrt(lengths)[:, None]
+        return averaged
+
+    def _of_values(self, numbers: Ints) -> Ints:
+        """Return the number (v,) of each block's first value."""
+        ends = np.cumsum([trace.measured.size for trace in self.traces])[:-1]
+        parts = []
+        for trace, starts, own in zip(self.traces, self.starts, np.split(numbers, ends), strict=True):
+            n, k = trace.shape
+            parts.append(own.reshape(k, n)[:, starts].ravel())
+        return np.concatenate(parts)
+
+
+def _block_starts(trace: Trace) -> Ints:
+    """Return the first rows of blocks; none reaches over a gap of the data."""
+    step_s = float(np.median(np.diff(trace.time_s)))
+    length = max(1, int(1.0 / (THRESHOLDS.families.rows_hz * step_s) + 1e-6))
+    return np.concatenate([np.arange(first, last, length) for first, last in trace.segments])
+
+
+def _members(stretches: Ints) -> csr_array:
+    names, at = np.unique(stretches, return_inverse=True)
+    return csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(names), len(at)))

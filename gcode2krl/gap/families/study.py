@@ -1,0 +1,91 @@
+"""All families of a link beside several views of it, and the null of the largest."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.gap.families.evidence import Evidence, evidence_of
+from gcode2krl.gap.families.grid import Grid, Place
+from gcode2krl.gap.families.rows import Rows
+from gcode2krl.gap.families.steps import Steps, step_evidence
+from gcode2krl.gap.families.tones import angle_tones, tones
+from gcode2krl.gap.families.view import View
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.families
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What every family says of one view, the most probable first."""
+
+    chi2: float
+    """Of the view, with nothing explained."""
+    evidences: tuple[Evidence, ...]
+    p: float
+    """Of an evidence as large as the largest, if nothing admissible explains what is left."""
+
+    def p_of(self, evidence: Evidence) -> float:
+        """Return the same of one of its evidences."""
+        return _p(self.evidences, evidence.unbounded)
+
+
+def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> list[Study]:
+    """Return what every family says of some views of the same rows."""
+    found: list[list[Evidence]] = [[] for _ in views]
+    signs = [_signs(view, seed) for view in views]
+    for family in grid.families():
+        place = family.place
+        columns = rows.of(family.columns, place.component)
+        for view, own, sign in zip(views, found, signs, strict=True):
+            at = view.at(place.component)
+            _add(own, [evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)])
+    for place in grid.places:
+        for own, evidences in zip(found, _searched(rows, views, place, signs), strict=True):
+            _add(own, evidences)
+    return [_study(view, own) for view, own in zip(views, found, strict=True)]
+
+
+def _searched(
+    rows: Rows, views: Sequence[View], place: Place, signs: Sequence[Floats]
+) -> Iterator[list[Evidence | None]]:
+    """Yield for each view the families at a place whose moment or frequency the data must find."""
+    steps = Steps(rows, place)
+    coarse = steps.blocks(steps.coarse())
+    for view, sign in zip(views, signs, strict=True):
+        at = view.at(place.component)
+        yield [
+            step_evidence(at, steps, coarse, sign),
+            *tones(rows, at, place, sign),
+            *angle_tones(rows, at, place, sign),
+        ]
+
+
+def _add(found: list[Evidence], evidences: Sequence[Evidence | None]) -> None:
+    found += [each for each in evidences if each is not None]
+
+
+def _signs(view: View, seed: int) -> Floats:
+    """Return random signs (flips, g) of the stretches of time."""
+    generator = np.random.default_rng(seed)
+    shape = (_LIMITS.flips, view.members.shape[0])
+    signs: Floats = np.where(generator.random(shape) < 0.5, -1.0, 1.0)
+    return signs
+
+
+def _study(view: View, found: Sequence[Evidence]) -> Study:
+    """Return the study: one evidence for each place and input, and p of the largest."""
+    best: dict[object, Evidence] = {}
+    for each in sorted(found, key=lambda evidence: -evidence.nats):
+        best.setdefault(each.key, each)
+    if not found:
+        return Study(view.chi2, (), 1.0)
+    return Study(view.chi2, tuple(best.values()), _p(found, max(each.unbounded for each in found)))
+
+
+def _p(found: Sequence[Evidence], nats: float) -> float:
+    """Return p of an evidence, from the largest over all families for random signs of stretches."""
+    random = np.max(np.stack([each.flipped for each in found]), axis=0)
+    return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))

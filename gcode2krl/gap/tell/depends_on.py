@@ -1,0 +1,98 @@
+"""On what a gap without a name depends, in words and numbers: a family as the answer states it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.choose.judged import Judgement
+from gcode2krl.gap.families.evidence import Evidence
+from gcode2krl.gap.tell.result import DependsOnResult
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.families
+_FORMS = {
+    Dependence.RUN_TIME_STEP: "step",
+    Dependence.RUN_TIME: "drift",
+    Dependence.RUN_START: "drift",
+    Dependence.RUN_TO_RUN: "drift",
+    Dependence.WALL_CLOCK: "drift",
+    Dependence.TEMPERATURE: "drift",
+    Dependence.MOTOR_ANGLE: "periodic",
+    Dependence.TONE: "periodic",
+    Dependence.REVERSALS: "loop",
+}
+"""What a function of these looks like; of all others it is smooth."""
+_AXES = ("fx", "fy", "fz")
+_TIP = "tip"
+
+
+def depends_on(judgement: Judgement) -> Iterator[DependsOnResult]:
+    """Yield on what the gap of a link without a name, or beside named causes, may depend; best first."""
+    rest = judgement.rest
+    if rest is None or judgement.verdict in ("no_gap", "explained") or not rest.worth_naming:
+        return
+    evidences = rest.study.evidences
+    for evidence, probability in zip(evidences, _probabilities(evidences), strict=True):
+        if probability >= _LIMITS.least_probability:
+            yield _result(judgement, evidence, probability, rest.share(evidence))
+
+
+def _probabilities(evidences: tuple[Evidence, ...]) -> list[float]:
+    """Return the probability of each family: evidences over the best one's inflation, and what none is.
+
+    Like differences of chi2 they are divided by the temperature: no model is exact.
+    """
+    scale = evidences[0].inflation * THRESHOLDS.choose.temperature
+    nats = np.array([0.0, *(each.nats for each in evidences)]) / scale
+    weights = np.exp(nats - nats.max())
+    weights *= (1.0 - THRESHOLDS.choose.least_unknown) / weights.sum()
+    probabilities: list[float] = weights[1:].tolist()
+    return probabilities
+
+
+def _result(judgement: Judgement, evidence: Evidence, probability: float, share: float) -> DependsOnResult:
+    signals = evidence.signal
+    is_step = evidence.on is Dependence.RUN_TIME_STEP
+    largest = _largest(signals)
+    along = largest if is_step else _main_axis(signals)
+    moment = evidence.at if is_step else None
+    is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
+    length = float(np.linalg.norm(along))
+    return DependsOnResult(
+        link=judgement.link.name,
+        at=_at(evidence, signals),
+        on=(Dependence.RUN_TIME if is_step else evidence.on).value,
+        form=_FORMS.get(evidence.on, "smooth"),
+        probability=probability,
+        share=share,
+        at_time_s=None if moment is None else moment[1],
+        run=None if moment is None else judgement.every[moment[0]].run,
+        size=judgement.factor * float(np.linalg.norm(largest)),
+        unit=judgement.link.unit,
+        direction=tuple((along / length).tolist()) if is_vector and length > 0.0 else None,
+    )
+
+
+def _at(evidence: Evidence, signals: tuple[Floats, ...]) -> str:
+    """Return the place as the answer names it: of a force the axis that has most of it."""
+    if evidence.place.where is Where.FORCE_AXIS:
+        return _AXES[int(np.argmax(np.sum(np.concatenate(signals) ** 2, axis=0)))]
+    if evidence.place.where is Where.JOINT and evidence.place.joint is None:
+        return _TIP  # it is late along the path
+    return evidence.place.name
+
+
+def _largest(signals: tuple[Floats, ...]) -> Floats:
+    """Return the row (k,) of signals (n, k) with the largest length."""
+    rows = np.concatenate(signals)
+    row: Floats = rows[int(np.argmax(np.sum(rows**2, axis=1)))]
+    return row
+
+
+def _main_axis(signals: tuple[Floats, ...]) -> Floats:
+    """Return the unit vector (k,) along which signals have most of their power, as the largest points."""
+    rows = np.concatenate(signals)
+    axis: Floats = np.linalg.eigh(rows.T @ rows)[1][:, -1]
+    return axis * (np.sign(axis @ _largest(signals)) or 1.0)

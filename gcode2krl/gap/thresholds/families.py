@@ -1,0 +1,55 @@
+"""Thresholds of families/: what functions are tried, and when a family forbids a name."""
+
+from dataclasses import dataclass
+
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
+
+
+@dataclass(frozen=True)
+class FamilyThresholds:
+    """What functions are tried, and when a family forbids a name."""
+
+    # Functions
+    rows_hz: float = physics(
+        50.0, "rows are averaged down to no less than this rate: modes of an arm end at 25 Hz"
+    )
+    knots: int = convention(12, "of functions of one input, over its range in all runs")
+    lengths: tuple[float, ...] = convention(
+        (1.0, 3.0, 9.0), "correlation lengths that are tried, in distances of knots"
+    )
+    amplitudes: tuple[float, ...] = convention(
+        (0.1, 0.4, 1.6, 6.4, 25.6, 102.4), "amplitudes that are tried, in rms of the noise"
+    )
+    step_s: float = convention(0.5, "between moments at which a step is tried; then a tenth around the best")
+    tone_least_hz: float = convention(0.5, "a slower tone is a drift of a short run")
+    harmonics: int = physics(4, "of a motor's turn: eccentricity, the two teeth of a wave, and theirs")
+
+    # Null
+    flips: int = convention(200, "random signs of stretches: p of half a percent can be told")
+    significant_p: float = convention(0.01, "a family explains some of the rest from this p on")
+    least_evidence: float = convention(4.6, "log 100: less evidence, over its inflation, is none")
+
+    gap_p: float = convention(0.005, "the least p that the flips can tell: a gap whatever its size")
+    gap_evidence: float = calibrated(
+        23.0, DEVELOPMENT, "log 1e10, over the inflation: sound runs have families of up to 9 at this p"
+    )
+    gap_power: float = calibrated(
+        0.02, DEVELOPMENT, "of the noise: what a family takes of sound runs is below a hundredth"
+    )
+
+    # Names
+    form_ratio: float = calibrated(
+        0.85, DEVELOPMENT, "of what its own family takes, which the form of a named cause takes at least"
+    )
+    other_share: float = calibrated(
+        0.05, DEVELOPMENT, "of the gap's power: what another family may take beside a named cause"
+    )
+    alike_nats: float = convention(
+        4.6, "log 100: data that favour one of two families by less do not tell them apart"
+    )
+    margin_width: float = convention(2.0, "nats of the step from named to not at `alike_nats`")
+    ratio_width: float = convention(0.01, "of the step from named to not at `form_ratio`")
+    share_width: float = convention(0.005, "of the step from named to not at `other_share`")
+
+    # The answer
+    least_probability: float = convention(0.05, "a less probable family is not listed")
