@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
+from scipy.stats import norm, t
 
 from gcode2krl.gap.choose.gap_size import Size, size_of_gap
-from gcode2krl.gap.fit.noise import white
+from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, white
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
 
 COUNT, SIGMA = 500, 0.5
@@ -78,34 +79,48 @@ def test_what_is_usual_is_out_of_both():
     assert found.after == pytest.approx(np.mean((y - 0.7 * slow.form(TIME_S) - 2.0 * SINE) ** 2))
 
 
-def test_the_deviation_is_that_of_means_over_seconds():
-    """By the median absolute deviation, times 1.4826 for that of a normal distribution."""
-    y = noise(COUNT, 7, SIGMA)[:, 0]
-    means = np.array([np.mean(y[50 * i : 50 * i + 50] ** 2) for i in range(10)])
-    spread = 1.4826 * np.median(np.abs(means - np.median(means)))
-    assert size(y).deviation == pytest.approx(spread / np.sqrt(10.0), rel=1e-6)
-    assert size(y, count=3).deviation == pytest.approx(spread / np.sqrt(30.0), rel=1e-6)
+def test_the_deviation_joins_the_noises_model_and_the_scatter_between_seconds():
+    """Of ten degrees of freedom the model's, of 0.37 a stretch the scatter's; never less than the model's."""
+    steady = noise(COUNT, 7, SIGMA)[:, 0]
+    growing = steady * np.linspace(0.2, 1.8, COUNT)
+    model = 2.0 / COUNT * SIGMA**4
+    assert size(steady).deviation == pytest.approx(np.sqrt(model))
+    assert size(steady, count=3).deviation == pytest.approx(np.sqrt(model / 3.0))
+    means = np.array([np.mean(growing[50 * i : 50 * i + 50] ** 2) for i in range(10)])
+    scatter = (1.4826 * np.median(np.abs(means - np.median(means)))) ** 2 / 10.0
+    joined = (10.0 * model + 0.37 * 9.0 * scatter) / (10.0 + 0.37 * 9.0)
+    assert size(growing).deviation == pytest.approx(np.sqrt(joined), rel=1e-6)
+    assert size(growing).freedom == pytest.approx(10.0 + 0.37 * 9.0)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "count"),
-    [
-        (60.0, 100),
-        pytest.param(
-            10.0,
-            400,
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="four deviations, said to be one in 30,000, are one in 200 by ten stretches: "
-                "a median of ten absolute deviations is often half of what it should be",
-            ),
-        ),
-    ],
-)
+def test_the_model_s_deviation_is_that_of_drawn_noise():
+    """Mean squares of noise with a slow part scatter far more than those of white noise of the same power."""
+    slow = Noise(np.array([0.5]), 1.0, 1.0 / np.sqrt(0.75), (Slow(np.exp(-0.02 / 0.5), 1.5),))
+    squares = [np.mean(drawn_noise(slow, COUNT, np.random.default_rng(seed)) ** 2) for seed in range(2000)]
+    c = slow.autocovariance(COUNT)
+    assert c[0] == pytest.approx(slow.sigma**2)
+    predicted = np.sqrt(2.0 / COUNT * (c[0] ** 2 + 2.0 * np.sum(c[1:] ** 2)))
+    assert np.std(squares) == pytest.approx(predicted, rel=0.07)
+    found = size_of_gap([trace(np.zeros((COUNT, 1)))], [[]], [slow], [])
+    assert found.deviation > predicted  # the rms of the slow part is learnt
+
+
+@pytest.mark.parametrize(("seconds", "count"), [(60.0, 100), (10.0, 400), (5.0, 400)])
 def test_white_noise_is_hardly_ever_significant(seconds, count):
     rows = round(seconds / 0.02)
     alarms = sum(size(noise(rows, 100 + seed, SIGMA)[:, 0]).significant for seed in range(count))
     assert alarms == 0
+
+
+@pytest.mark.parametrize("seconds", [5.0, 20.0])
+def test_slow_noise_is_hardly_ever_significant(seconds):
+    rows = round(seconds / 0.02)
+    slow = Noise(np.zeros(0), 1.0, 1.0, (Slow(np.exp(-0.02 / 1.0), 1.0),))
+    alarms = 0
+    for seed in range(200):
+        x = drawn_noise(slow, rows, np.random.default_rng(seed))
+        alarms += size_of_gap([trace(x[:, None])], [[]], [slow], []).significant
+    assert alarms <= 1
 
 
 PLAIN = Size(
@@ -129,6 +144,15 @@ def test_shares_by_hand():
     assert replace(PLAIN, after=30.0).shrink == 0.0
     assert replace(PLAIN, before=1.9).shrink == 0.0  # no gap, nothing to shrink
     assert replace(PLAIN, excess=-1.0).share_left == 0.0
+
+
+def test_few_stretches_need_more_deviations():
+    """A t distribution of 11.5 degrees of freedom beyond about six is as rare as a normal one beyond four."""
+    certain = replace(PLAIN, deviation=1.0, noise=1.0, freedom=11.5)
+    rare = norm.sf(SIGNIFICANT_SIGMA)
+    assert not replace(certain, excess=0.99 * t.isf(rare, 11.5)).significant
+    assert replace(certain, excess=1.01 * t.isf(rare, 11.5)).significant
+    assert 5.5 < t.isf(rare, 11.5) < 6.5
 
 
 def test_significance_needs_both_a_certain_excess_and_one_that_counts():

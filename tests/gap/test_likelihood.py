@@ -1,7 +1,7 @@
 """The likelihood and its fast view against dense textbook algebra on small cases.
 
-The reference knows nothing of filters or Gram matrices: it writes down the matrix L⁻¹ of the AR(3) noise, its
-covariance Σ = L·Lᵀ, and solves generalised least squares with it.
+The reference knows nothing of filters or Gram matrices: it writes down the covariance Σ = L·Lᵀ of the noise,
+AR(3) and a slow part, and solves generalised least squares with it.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.optimize import lsq_linear
 
 from gcode2krl.errors import NotUnderstoodError
@@ -18,7 +19,7 @@ from gcode2krl.gap.fit.fitted import Numbers
 from gcode2krl.gap.fit.hooke_jeeves import pattern_search
 from gcode2krl.gap.fit.least_squares import Box, Damped, Shortened, derivative, gauss_newton
 from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import Noise
+from gcode2krl.gap.fit.noise import Noise, Slow
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -31,7 +32,7 @@ COVERS = (
 PRIOR = THRESHOLDS.fit.prior_sizes
 NOISE = (
     Noise(np.array([0.6, -0.2, 0.1]), 0.5, 0.7),
-    Noise(np.array([0.3, 0.25, -0.15]), 1.3, 1.5),
+    Noise(np.array([0.3, 0.25, -0.15]), 1.3, 1.5, (Slow(0.9, 0.8),)),
 )
 ROWS = ((17, ((0, 6), (6, 8), (8, 17))), (13, ((0, 13),)))
 """Rows and segments of two runs; one segment is shorter than the memory of the noise."""
@@ -43,16 +44,17 @@ STEP_S = 0.3
 
 
 def dense_filter(noise, rows, segments):
-    """Return L⁻¹ (n, n) of one component: heads of segments by the rms, the rest by the AR model."""
+    """Return L⁻¹ (n, n) of one component: of each segment the covariance of a stationary process."""
+    pulse = [1.0]
+    for row in range(1, 200):
+        pulse.append(sum(a * pulse[row - lag] for lag, a in enumerate(noise.a, start=1) if lag <= row))
+    lagged = [noise.scale**2 * np.dot(pulse[: 200 - lag], pulse[lag:]) for lag in range(rows)]
+    for part in noise.slow:
+        lagged = lagged + part.sigma**2 * part.pole ** np.arange(rows)
     inverse = np.zeros((rows, rows))
     for first, last in segments:
-        for row in range(first, last):
-            if row - first < len(noise.a):
-                inverse[row, row] = 1.0 / max(noise.sigma, noise.scale)
-                continue
-            inverse[row, row] = 1.0 / noise.scale
-            for lag, a in enumerate(noise.a, start=1):
-                inverse[row, row - lag] = -a / noise.scale
+        covariance = toeplitz(lagged[: last - first])
+        inverse[first:last, first:last] = np.linalg.inv(np.linalg.cholesky(covariance))
     return inverse
 
 

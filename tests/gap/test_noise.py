@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_triangular, toeplitz
 
-from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, unbiased, white
+from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased, white
 
 
 def _segments(count):
@@ -50,16 +51,50 @@ def test_noise_is_no_more_than_it_is_stated_to_be():
     assert at_most(white(1.0), 1.4).sigma == 1.0
 
 
-def test_whitening_is_the_sum_over_lags_row_by_row():
-    model = Noise(np.array([0.5, -0.3, 0.2]), 0.7, 0.9)
+@pytest.mark.parametrize("slow", [(), (Slow(0.97, 1.3),), (Slow(0.9, 0.5), Slow(0.995, 2.0))])
+def test_whitening_is_the_inverse_cholesky_factor_of_the_covariance(slow):
+    """Each segment by itself, from its first row on; the covariance is made of the autocovariance."""
+    a = np.array([0.5, -0.3, 0.2])
+    power = drawn_noise(Noise(a, 0.7, 1.0), 400_000, np.random.default_rng(1)).std()
+    model = Noise(a, 0.7, steady_rms(a, 0.7), slow)
+    assert model.short_sigma == pytest.approx(power, rel=0.01)
     values = np.random.default_rng(2).standard_normal((40, 2))
     segments = np.array([[0, 17], [17, 19], [19, 40]], dtype=np.int64)
     expected = np.empty_like(values)
     for first, last in segments:
-        for row in range(first, last):
-            past = sum(model.a[lag] * values[row - 1 - lag] for lag in range(3) if row - first >= 3)
-            expected[row] = (values[row] - past) / 0.7 if row - first >= 3 else values[row] / 0.9
-    np.testing.assert_allclose(model.whiten(values, segments), expected, rtol=1e-12)
+        covariance = toeplitz(model.autocovariance(last - first))
+        expected[first:last] = solve_triangular(
+            np.linalg.cholesky(covariance), values[first:last], lower=True
+        )
+    np.testing.assert_allclose(model.whiten(values, segments), expected, rtol=1e-8, atol=1e-9)
+
+
+def steady_rms(a, scale):
+    """Return the rms of an autoregressive process, by its pulse response."""
+    h = [1.0]
+    for _ in range(300):
+        h.append(sum(coefficient * h[-1 - lag] for lag, coefficient in enumerate(a) if lag < len(h)))
+    return scale * float(np.sqrt(np.sum(np.square(h))))
+
+
+def test_the_short_part_is_what_the_slow_one_leaves_of_the_lags():
+    true = Noise(np.array([0.5]), 1.0, 1.0 / np.sqrt(0.75), (Slow(0.99, 1.5),))
+    generator = np.random.default_rng(3)
+    count = 100_000
+    x = drawn_noise(true, count, generator)
+    slow = [(drawn_slow(true.slow[0], count, generator), _segments(count))]
+    found = fit([(x, _segments(count))], 1e-9, slow)
+    np.testing.assert_allclose(found.a, [0.5, 0.0, 0.0], atol=0.05)
+    assert found.short_sigma == pytest.approx(true.short_sigma, rel=0.05)
+    # a slow part larger than the data is taken off only as far as a short part is left
+    loud = [(4.0 * values, segments) for values, segments in slow]
+    assert fit([(x, _segments(count))], 1e-9, loud).short_sigma > 0.3
+
+
+def test_the_slow_part_is_no_more_than_an_instrument_may_wander():
+    wild = Noise(np.zeros(0), 1.0, 1.0, (Slow(0.99, 7.0),))
+    assert at_most(wild, np.inf).slow == (Slow(0.99, 2.0),)
+    assert at_most(wild, 0.5).slow == (Slow(0.99, 1.0),)
 
 
 def test_a_jump_at_a_gap_is_no_innovation():

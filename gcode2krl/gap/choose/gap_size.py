@@ -3,10 +3,16 @@
 Clocks, frames and zeros of one run are fitted within their bounds and taken out. With b the mismatch of
 machine and tool that fits the rest best within its bounds and sigma the noise, the floor is
 sqrt(sigma² + |N·b|²).
+
+**How sure the excess is.** Under the model of the noise alone the mean of x² over n rows has the variance
+(2/n)·Σ_k C(k)², C the autocovariance (Bartlett 1946): a slow part makes it large, few rows too. The spread of
+the means over stretches of time says the same without the model, but of few stretches roughly. Both are
+joined as scaled inverse chi2, and the excess is compared with a t distribution of their freedom (Smyth 2004).
 """
 
+import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +28,10 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 _LIMITS = THRESHOLDS.choose
 _NORMAL_MAD = 1.4826
 """The standard deviation of a normal over its median absolute deviation."""
-_LEAST_STRETCHES = 3
+_MAD_EFFICIENCY = 0.37
+"""Of the median absolute deviation for normal values (Rousseeuw & Croux 1993)."""
+_MOST_LAGS = 2000
+"""Over which the autocovariance is summed; a slow part has forgotten by then."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,8 @@ class Size:
     """Standard deviation of the excess."""
     largest_before: float
     largest_after: float
+    freedom: float = np.inf
+    """Degrees of freedom of the deviation."""
 
     @property
     def power(self) -> float:
@@ -51,8 +62,8 @@ class Size:
     @property
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
-        least = max(_LIMITS.significant_sigma * self.deviation, _LIMITS.significant_share * self.noise)
-        return self.excess > least
+        certain = _as_many_deviations(self.freedom) * self.deviation
+        return self.excess > max(certain, _LIMITS.significant_share * self.noise)
 
     @property
     def share_left(self) -> float:
@@ -84,6 +95,7 @@ def pooled(sizes: Sequence[Size]) -> Size:
         deviation=mean([size.deviation for size in sizes]) / len(sizes) ** 0.5,
         largest_before=max(size.largest_before for size in sizes),
         largest_after=max(size.largest_after for size in sizes),
+        freedom=sum(size.freedom for size in sizes),
     )
 
 
@@ -102,6 +114,7 @@ def size_of_gap(
     after, before = _less(left, own), _less(gap, own)
     sigma2 = sum(each.sigma**2 for each in noise)
     structured = _less(after, shared)
+    deviation, freedom = _deviation(traces, [_squares(each) for each in structured], noise)
     return Size(
         rows=sum(len(each) for each in after),
         before=_mean_square(before),
@@ -110,9 +123,10 @@ def size_of_gap(
         noise=sigma2,
         excess=_mean_square(structured) - sigma2,
         excess_before=_mean_square(_less(before, shared)) - sigma2,
-        deviation=_deviation(traces, [_squares(each) for each in structured], sigma2),
+        deviation=deviation,
         largest_before=_largest(before),
         largest_after=_largest(after),
+        freedom=freedom,
     )
 
 
@@ -152,17 +166,44 @@ def _mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> tuple[list
     return own, shared
 
 
-def _deviation(traces: Sequence[Trace], squares: Sequence[Floats], sigma2: float) -> float:
-    """Return the standard deviation of the mean square, from its spread over stretches of time."""
+def _deviation(
+    traces: Sequence[Trace], squares: Sequence[Floats], noise: Sequence[Noise]
+) -> tuple[float, float]:
+    """Return the standard deviation of the mean square, and its degrees of freedom."""
     stretches = [_stretch_means(trace, values) for trace, values in zip(traces, squares, strict=True)]
     means, counts = (np.concatenate(each) for each in zip(*stretches, strict=True))
-    if len(means) < _LEAST_STRETCHES:
-        return sigma2
-    mean = float(np.average(means, weights=counts))
     # robust, since a gap in a few stretches must not hide itself
     spread = _NORMAL_MAD * float(np.median(np.abs(means - np.median(means))))
-    least = _LIMITS.least_spread * abs(mean) / np.sqrt(len(means))
-    return float(max(spread, least) / np.sqrt(len(means)))
+    least = _LIMITS.least_spread * abs(float(np.average(means, weights=counts))) / np.sqrt(len(means))
+    scattered = max(spread, least) ** 2 / len(means)
+    modelled = sum(_variance_of_power(each, float(counts.sum())) for each in noise)
+    freedom, of_model = _MAD_EFFICIENCY * (len(means) - 1), _LIMITS.modelled_freedom
+    joined = (freedom * scattered + of_model * modelled) / (freedom + of_model)
+    return float(np.sqrt(max(joined, modelled))), freedom + of_model
+
+
+def _variance_of_power(noise: Noise, rows: float) -> float:
+    """Return the variance of the mean of x² over rows of noise.
+
+    That of a slow part counts twice: its rms is learnt from as few independent values as it is compared with.
+    """
+
+    def summed(model: Noise) -> float:
+        c = model.autocovariance(min(int(rows), _MOST_LAGS))
+        return float(2.0 * (c[0] ** 2 + 2.0 * np.sum(c[1:] ** 2)) / rows)
+
+    short = summed(replace(noise, slow=()))
+    return short if not noise.slow else 2.0 * summed(noise) - short
+
+
+@functools.lru_cache
+def _as_many_deviations(freedom: float) -> float:
+    """Return how many deviations are as rare as `significant_sigma` of a normal distribution."""
+    from scipy.special import ndtr, stdtrit
+
+    if not np.isfinite(freedom):
+        return _LIMITS.significant_sigma
+    return float(-stdtrit(freedom, ndtr(-_LIMITS.significant_sigma)))
 
 
 def _stretch_means(trace: Trace, values: Floats) -> tuple[Floats, Floats]:

@@ -1,43 +1,79 @@
-"""Coloured noise: an autoregressive model, the filter that whitens, and where the model comes from.
+"""Noise of an instrument: a short part, autoregressive, and a slow part that forgets within seconds.
 
-Data and signatures go through the same filter, which starts anew at each gap; raw data are never differenced.
-The model is that of short memory: what an instrument does over a second and longer is told from the part's
-structure only by comparing runs of one program.
+    x_t = u_t + v_t,    u_t = Σ_i a_i·u_{t-1-i} + s·w_t,    v_t = φ·v_{t-1} + σ_v·√(1 - φ²)·w'_t
+
+v is an Ornstein-Uhlenbeck process sampled once a row; its time constant τ is -Δt/log φ. The sum is whitened
+by its innovations (`innovations`), begun anew in the stationary state at each gap. Data and signatures go
+through the same filter; raw data are never differenced.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.gap.fit.innovations import innovation_gains, innovations
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.fit
 _SETTLED = 500
 """Rows after which nothing is left of a start, with the largest pole allowed."""
+_MOST_SETTLING = 4000
+"""Rows within which the filter of a slow part is steady."""
+_LEAST_LEFT = 0.05
+"""Of the power of the lags, along each direction: what the slow part leaves of it to the short part."""
+_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
+"""Of the slow part that is taken off the lags, the largest first that leaves a short part."""
+
+
+@dataclass(frozen=True)
+class Slow:
+    """A part of the noise with v[t] = pole·v[t-1] + …, whose rms is ``sigma``."""
+
+    pole: float
+    sigma: float
 
 
 @dataclass(frozen=True)
 class Noise:
-    """x[t] = sum of a[i]·x[t-1-i] + e[t], e white with ``scale``; ``sigma`` is the rms of x."""
+    """The short part u[t] = sum of a[i]·u[t-1-i] + e[t], e white with ``scale``, and slow parts on top.
+
+    ``a`` (p,); ``short_sigma`` is the rms of the short part.
+    """
 
     a: Floats
     scale: float
-    sigma: float
+    short_sigma: float
+    slow: tuple[Slow, ...] = ()
+
+    @property
+    def sigma(self) -> float:
+        """Return the rms of all parts together."""
+        return float(np.sqrt(self.short_sigma**2 + sum(each.sigma**2 for each in self.slow)))
+
+    @cached_property
+    def _gains(self) -> tuple[Floats, Floats]:
+        return innovation_gains(self.a, self.scale, self._slow, _MOST_SETTLING)
+
+    @property
+    def _slow(self) -> list[tuple[float, float]]:
+        return [(each.pole, each.sigma) for each in self.slow]
 
     def whiten(self, values: Floats, segments: Ints) -> Floats:
-        """Return (n, c) filtered to white noise of unit variance, each segment by itself.
+        """Return (n, c) filtered to white noise of unit variance, each segment by itself."""
+        gains, variances = self._gains
+        return innovations(values, segments, self.a, self._slow, gains, variances)
 
-        The first rows of a segment are scaled by the rms alone, as what was before them is not known.
-        """
-        out = values / self.scale
-        for lag, a in enumerate(self.a, start=1):
-            out[lag:] -= (a / self.scale) * values[:-lag]
-        for first, last in segments:
-            head = slice(first, min(first + len(self.a), last))
-            out[head] = values[head] / max(self.sigma, self.scale)
-        return out
+    def autocovariance(self, count: int) -> Floats:
+        """Return E[x[t]·x[t+k]] for k = 0 … count - 1, the short part scaled to its rms."""
+        short = _short_autocovariance(self.a, count)
+        found: Floats = self.short_sigma**2 * short / short[0]
+        lags = np.arange(count)
+        for each in self.slow:
+            found = found + each.sigma**2 * each.pole**lags
+        return found
 
 
 def white(sigma: float) -> Noise:
@@ -45,28 +81,61 @@ def white(sigma: float) -> Noise:
     return Noise(np.zeros(0), sigma, sigma)
 
 
-def fit(residuals: Sequence[tuple[Floats, Ints]], floor: float, order: int = _LIMITS.noise_order) -> Noise:
-    """Return the model of some residuals (n,) with their segments, by least squares over all of them.
+def fit(
+    residuals: Sequence[tuple[Floats, Ints]],
+    floor: float,
+    slow: Sequence[tuple[Floats, Ints]] = (),
+    order: int = _LIMITS.noise_order,
+) -> Noise:
+    """Return the short part of some residuals (n,) with their segments, by least squares over all of them.
 
-    ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less.
+    ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less. ``slow``:
+    draws of the slow part; the power of their lags is taken off that of the residuals.
     """
-    past, now = [], []
+    lagged = _lagged(residuals, order)
+    everything = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
+    power = float(np.mean(everything**2))
+    if len(lagged) < _LIMITS.noise_least_rows:
+        return white(max(float(np.sqrt(power)), floor))
+    products = lagged.T @ lagged / len(lagged)
+    if slow:
+        drawn = _lagged(slow, order)
+        share = _share_off(products, drawn)
+        products = products - share * (drawn.T @ drawn) / len(drawn)
+        power = max(power - share * float(np.mean(np.concatenate([each for each, _ in slow]) ** 2)), 0.0)
+        power = max(power, float(products[0, 0]))
+    rms = max(float(np.sqrt(power)), floor)
+    # a tenth of the floor's power: colour is not learnt from the rounding of decimals
+    x, y = products[1:, 1:], products[1:, 0]
+    ridge = 1e-6 * float(np.trace(x)) + floor**2 * 0.1 + 1e-30
+    a = _stable(np.asarray(np.linalg.solve(x + ridge * np.eye(order), y), dtype=np.float64))
+    left = float(products[0, 0] - 2.0 * a @ y + a @ x @ a)
+    scale = max(float(np.sqrt(max(left, 0.0))), _LIMITS.noise_least_scale * floor)
+    return Noise(a, scale, max(rms, scale))
+
+
+def _lagged(residuals: Sequence[tuple[Floats, Ints]], order: int) -> Floats:
+    """Return rows (m, 1 + order) of each value and those before it."""
+    rows = [np.zeros((0, 1 + order))]
     for values, segments in residuals:
         for first, last in segments:
             x = values[first:last]
             if len(x) > order + 1:
-                past.append(np.stack([x[order - i - 1 : len(x) - i - 1] for i in range(order)], axis=1))
-                now.append(x[order:])
-    everything = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
-    rms = max(float(np.sqrt(np.mean(everything**2))), floor)
-    if sum(len(each) for each in now) < _LIMITS.noise_least_rows:
-        return white(rms)
-    x, y = np.concatenate(past), np.concatenate(now)
-    # a tenth of the floor's power: colour is not learnt from the rounding of decimals
-    ridge = 1e-6 * float(np.sum(x**2)) + len(y) * floor**2 * 0.1 + 1e-30
-    a = _stable(np.asarray(np.linalg.solve(x.T @ x + ridge * np.eye(order), x.T @ y), dtype=np.float64))
-    scale = max(float(np.sqrt(np.mean((y - x @ a) ** 2))), _LIMITS.noise_least_scale * floor)
-    return Noise(a, scale, max(rms, scale))
+                rows.append(np.stack([x[order - i : len(x) - i] for i in range(order + 1)], axis=1))
+    return np.concatenate(rows)
+
+
+def _share_off(products: Floats, drawn: Floats) -> float:
+    """Return how much of the slow part's lags may be taken off so that a short part is left."""
+    off = drawn.T @ drawn / max(len(drawn), 1)
+    differences = np.eye(len(products))[:-1] - np.eye(len(products))[1:]
+    for share in _SHARES:
+        left = products - share * off
+        # what the slow part hardly has is left whole: the differences of neighbours
+        least = _LEAST_LEFT * np.trace(differences @ products @ differences.T) / (2.0 * len(differences))
+        if np.linalg.eigvalsh(left)[0] > 0.0 and left[0, 0] > least:
+            return share
+    return 0.0
 
 
 def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Floats:
@@ -75,32 +144,61 @@ def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Flo
 
     white_ = noise.scale * generator.standard_normal(count + _SETTLED)
     drawn: Floats = lfilter([1.0], np.concatenate([[1.0], -noise.a]), white_)[_SETTLED:]
+    for each in noise.slow:
+        drawn = drawn + drawn_slow(each, count, generator)
+    return drawn
+
+
+def drawn_slow(slow: Slow, count: int, generator: np.random.Generator) -> Floats:
+    """Return a slow part (count,), in its steady state."""
+    from scipy.signal import lfilter
+
+    w = generator.standard_normal(count)
+    w[1:] *= np.sqrt(1.0 - slow.pole**2)
+    drawn: Floats = lfilter([1.0], [1.0, -slow.pole], slow.sigma * w)
     return drawn
 
 
 def at_most(noise: Noise, sigma: float) -> Noise:
-    """Return a model of no more than this rms, white where it was larger: the rest is structure."""
-    return noise if noise.sigma <= sigma else white(sigma)
+    """Return a model whose short part has no more than this rms, white where it was larger.
+
+    The rest is structure. What an instrument states is its short noise: the slow part has a bound of its own.
+    """
+    short = noise if noise.short_sigma <= sigma else replace(white(sigma), slow=noise.slow)
+    most = _LIMITS.noise_most_slow * short.short_sigma
+    return replace(short, slow=tuple(replace(each, sigma=min(each.sigma, most)) for each in short.slow))
 
 
 def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
-    """Return a model, corrected by the model that noise drawn from it came out as."""
+    """Return a model, its short part corrected by the model that noise drawn from it came out as."""
     if len(noise.a) != len(of_drawn.a) or len(noise.a) == 0:
         return noise
     a = _stable(2.0 * noise.a - of_drawn.a)
     scale = max(noise.scale**2 / of_drawn.scale, _LIMITS.noise_least_scale * floor)
     steady = _gain(noise.a) * noise.scale
-    sigma = max(noise.sigma * steady / of_drawn.sigma, floor, scale)
-    return Noise(a, scale, sigma)
+    sigma = max(noise.short_sigma * steady / of_drawn.short_sigma, floor, scale)
+    return Noise(a, scale, sigma, noise.slow)
 
 
 def _gain(a: Floats) -> float:
-    """Return the rms of x for white e of unit variance, by its impulse response."""
+    """Return the rms of x for white e of unit variance."""
+    return float(np.sqrt(_short_autocovariance(a, 1)[0]))
+
+
+def _short_autocovariance(a: Floats, count: int) -> Floats:
+    """Return the autocovariance (count,) of the short part for white e of unit variance.
+
+    By its pulse response, of which nothing is left after `_SETTLED` rows.
+    """
     from scipy.signal import lfilter
 
-    pulse = np.zeros(_SETTLED)
+    pulse = np.zeros(2 * _SETTLED)
     pulse[0] = 1.0
-    return float(np.sqrt(np.sum(lfilter([1.0], np.concatenate([[1.0], -a]), pulse) ** 2)))
+    h = lfilter([1.0], np.concatenate([[1.0], -a]), pulse)
+    found = np.zeros(count)
+    for k in range(min(count, _SETTLED)):
+        found[k] = h[: len(h) - k] @ h[k:]
+    return found
 
 
 def _stable(a: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Where a link's noise is learnt: repeats of one program, or what is left of a run beside everything slow."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.decimals import resolution
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.noise import Noise, at_most, drawn_noise, fit, unbiased
+from gcode2krl.gap.fit.block_means import block_means
+from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.fit.slow_noise import SlowPart, slow_parts_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.fit
@@ -45,18 +47,34 @@ def noise_of(
     )
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
-    first = source.noise([trace.measured - trace.sample(applied) for trace in traces], floors)
+    residuals = [trace.measured - trace.sample(applied) for trace in traces]
+    means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
+    slow = [_of_rows(slow_parts_of(each), traces[0]) for each in means]
     generator = np.random.default_rng(0)
+    slow_drawn = [
+        np.stack([_drawn(parts, len(trace.time_s), generator) for parts in slow], axis=1) for trace in traces
+    ]
+    first = source.noise(residuals, floors, slow, slow_drawn)
     drawn = [
         np.stack([drawn_noise(noise, len(trace.time_s), generator) for noise in first], axis=1)
         for trace in traces
     ]
-    again = source.noise(drawn, [_EXACT] * len(first))
+    again = source.noise(drawn, [_EXACT] * len(first), slow, slow_drawn)
     most = _LIMITS.noise_most_stated * min(stated, default=np.inf)
     return [
         at_most(unbiased(noise, of_drawn, floor), most)
         for noise, of_drawn, floor in zip(first, again, floors, strict=True)
     ]
+
+
+def _of_rows(parts: Sequence[SlowPart], trace: Trace) -> tuple[Slow, ...]:
+    """Return slow parts as processes of a trace's rows."""
+    step_s = float(np.median(np.diff(trace.time_s)))
+    return tuple(Slow(float(np.exp(-step_s / part.time_constant_s)), part.sigma) for part in parts)
+
+
+def _drawn(parts: Sequence[Slow], count: int, generator: np.random.Generator) -> Floats:
+    return sum((drawn_slow(each, count, generator) for each in parts), np.zeros(count))
 
 
 def _floor(traces: Sequence[Trace], stated: Sequence[float], component: int) -> float:
@@ -105,12 +123,32 @@ class _Source:
     explained: tuple[_Explained, ...]
     repeats: list[Ints] | None
 
-    def noise(self, values: Sequence[Floats], floors: Sequence[float]) -> list[Noise]:
-        """Return the model of each component of values (n, k) of all traces."""
+    def noise(
+        self,
+        values: Sequence[Floats],
+        floors: Sequence[float],
+        slow: Sequence[tuple[Slow, ...]],
+        slow_drawn: Sequence[Floats],
+    ) -> list[Noise]:
+        """Return the model of each component of values (n, k) of all traces, beside the slow parts.
+
+        ``slow_drawn`` (n, k) is noise drawn of these; what is taken of it is taken of theirs in the values.
+        """
+        rests = self._rests(values)
+        drawn = self._rests(slow_drawn) if any(slow) else []
+        return [
+            replace(
+                fit(self._component(rests, j), floor, self._component(drawn, j) if parts else ()), slow=parts
+            )
+            for j, (floor, parts) in enumerate(zip(floors, slow, strict=True))
+        ]
+
+    def _rests(self, values: Sequence[Floats]) -> list[Floats]:
+        """Return values (n, k) less all that is or may be structure."""
         rests = [each.off(value) for each, value in zip(self.explained, values, strict=True)]
         if self.repeats is None:
             rests = [each.fast(rest) for each, rest in zip(self.explained, rests, strict=True)]
-        return [fit(self._component(rests, j), floor) for j, floor in enumerate(floors)]
+        return rests
 
     def _component(self, rests: Sequence[Floats], j: int) -> list[tuple[Floats, Ints]]:
         """Return one component (n,) of each trace with its segments, that of repeats less their mean."""

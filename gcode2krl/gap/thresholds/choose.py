@@ -66,7 +66,12 @@ class ChooseThresholds:
 
     # Size of the gap
     significant_sigma: float = convention(
-        4.0, "excess power over its own standard deviation; one in 30,000 by chance"
+        4.0,
+        "excess power over its own standard deviation; one in 30,000 by chance, by fewer stretches as many "
+        "deviations as are as rare",
+    )
+    modelled_freedom: float = convention(
+        10.0, "degrees of freedom that the scatter by the noise's model has beside that between stretches"
     )
     significant_share: float = calibrated(
         0.1, DEVELOPMENT, "excess power below this share of the noise's is within what its model is sure of"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,26 @@ class FitThresholds:
     # Nuisance
     same_form: float = convention(
         0.98, "share of a nuisance's power that an effect spans: both are then one deviation, judged as one"
+    )
+
+    # The slow part of noise
+    noise_block_s: float = physics(
+        0.05, "blocks of the slow part: half of the shortest memory that counts as slow, 0.1 s"
+    )
+    noise_most_slow: float = convention(
+        2.0, "times the short part's rms: an instrument that wanders by more is a finding, not noise"
+    )
+    noise_slow_gain: float = convention(
+        6.0, "twice the log likelihood that a slow part must bring to be in the model"
+    )
+    noise_explained: float = calibrated(
+        10.5,
+        DEVELOPMENT,
+        "-log of the probability of the likelihood ratio from which an input, and not slow noise, explains",
+    )
+    noise_most_explained: int = convention(6, "inputs that take their part of one component's slow noise")
+    noise_least_seen: float = convention(
+        0.02, "share of an input's power that mismatch leaves, or it explains nothing of its own"
     )
 
     # Numbers of effects

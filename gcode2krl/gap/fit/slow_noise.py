@@ -1,0 +1,294 @@
+"""The slow part of an instrument's noise: what no admissible input explains and is forgotten in 0.1 to 3 s.
+
+One component of all runs, as means over blocks of `noise_block_s`:
+
+    y = X·β + v + w,    v Ornstein-Uhlenbeck of time constant τ and variance ρ·σ_w²,    w white
+
+The likelihood is that of the innovations (`innovations`), profiled over β and σ_w. Columns of X are taken of
+many candidates and from tones, those of the most surprising likelihood ratio first, each fitted together with
+τ and ρ: a drift, a step or an effect is explained by its own column, of which v would have to imitate each
+value. What is left is the slow part, its variance by restricted likelihood, which allows for the numbers
+fitted (Patterson & Thompson 1971; Harville 1977).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.gap.fit.innovations import innovation_gains, innovations
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.fit
+_TIME_CONSTANTS_S = (0.1, 0.17, 0.3, 0.55, 1.0, 1.7, 3.0)
+_RATIOS = tuple(float(x) for x in 10.0 ** np.arange(-1.0, 3.01, 0.25))
+"""ρ, the variance of the slow part over that of a block's mean of the short one."""
+_SHORT_KEPT = (0.0, 0.15, 0.33)
+"""What a short part may keep from block to block: memories up to 45 ms are not slow."""
+_PADDED = 4
+"""Finer than the frequencies of a run, between which a tone would hide."""
+_LEAST_CYCLES = 1.5
+"""Of a tone in the longest run: fewer are a drift."""
+_RANK = 1e-9
+
+
+@dataclass(frozen=True)
+class SlowPart:
+    """An Ornstein-Uhlenbeck process: its time constant and rms."""
+
+    time_constant_s: float
+    sigma: float
+
+
+@dataclass(frozen=True, eq=False)
+class BlockMeans:
+    """One component of all runs, as means over blocks of time."""
+
+    values: Floats
+    """(n,)"""
+    segments: Ints
+    """(s, 2) blocks without a gap"""
+    known: Floats
+    """(n, p) what is never noise: constants and trends of each run, normal mismatch"""
+    candidates: Floats
+    """(n, c) what may be at work"""
+    runs: tuple[tuple[int, int], ...]
+    """Of each run or contrast, its first block and the one behind its last"""
+
+
+_Part = tuple[int, int]
+"""Indices of τ and ρ of a slow part."""
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """Where a likelihood is largest: the slow parts, and -2 log likelihood."""
+
+    parts: tuple[_Part, ...]
+    cost: float
+    variance: float
+    """σ_w²."""
+
+
+def slow_parts_of(means: BlockMeans) -> tuple[SlowPart, ...]:
+    """Return the slow parts of a component, none where the data need none."""
+    if len(means.values) < _LIMITS.noise_least_rows:
+        return ()
+    fit = _Fit(means)
+    explained, peak = _explained(fit)
+    basis = _basis(explained)
+    short = min(fit.peak(basis, (), kept=kept).cost for kept in _SHORT_KEPT)
+    if not peak.parts or short - peak.cost < _LIMITS.noise_slow_gain:
+        return ()
+    second = fit.best(basis, others=peak.parts)
+    if peak.cost - second.cost > _LIMITS.noise_slow_gain:
+        # of two parts the first is found anew beside the second
+        peak = fit.best(basis, others=second.parts[1:], start=second.parts[0])
+    return tuple(
+        SlowPart(_TIME_CONSTANTS_S[tau], float(np.sqrt(_RATIOS[ratio] * peak.variance)))
+        for tau, ratio in peak.parts
+    )
+
+
+def _explained(fit: "_Fit") -> tuple[Floats, _Peak]:
+    """Return X with all that explains more than slow noise would, and the likelihood beside it."""
+    explained = fit.means.known
+    basis = _basis(explained)
+    peak = fit.best(basis)
+    for _ in range(_LIMITS.noise_most_explained if peak.parts else 0):
+        trials = [_Trial.of(fit, basis, columns, peak) for columns in fit.promising(basis, peak)]
+        trial = max(trials, key=lambda each: each.surprise, default=None)
+        if trial is None or trial.surprise < _LIMITS.noise_explained:
+            break
+        explained = np.column_stack([explained, trial.columns])
+        basis = _basis(explained)
+        peak = fit.best(basis, start=_start(trial.peak))
+    return explained, peak
+
+
+@dataclass(frozen=True, eq=False)
+class _Filter:
+    """The filter of one model of block means."""
+
+    a: Floats
+    slow: list[tuple[float, float]]
+    gains: Floats
+    variances: Floats
+    log_determinant: float
+
+    @classmethod
+    def of(cls, segments: Ints, kept: float, slow: list[tuple[float, float]]) -> "_Filter":
+        """Return the filter of a short part that keeps a share from block to block, and of slow ones."""
+        a, lengths = np.array([kept]), segments[:, 1] - segments[:, 0]
+        gains, variances = innovation_gains(a, 1.0, slow, int(lengths.max()))
+        sums = np.concatenate([[0.0], np.cumsum(np.log(variances))])
+        settled = np.minimum(lengths, len(variances))
+        logs = sums[settled] + (lengths - settled) * float(np.log(variances[-1]))
+        return cls(a, slow, gains, variances, float(logs.sum()))
+
+    def applied(self, columns: Floats, segments: Ints) -> Floats:
+        """Return columns (n, c) as innovations."""
+        return innovations(columns, segments, self.a, self.slow, self.gains, self.variances)
+
+
+class _Fit:
+    """The likelihood of block means, with what was computed of it."""
+
+    def __init__(self, means: BlockMeans) -> None:
+        self.means = means
+        scale = np.sqrt(np.sum(means.candidates**2, axis=0))
+        self.usable = np.flatnonzero(scale > _RANK * max(float(scale.max(initial=0.0)), 1e-300))
+        self._filters: dict[tuple[tuple[_Part, ...], float], _Filter] = {}
+
+    def _filter(self, parts: tuple[_Part, ...], kept: float = 0.0) -> "_Filter":
+        """Return the filter of a model whose short part has innovations of unit variance."""
+        if (parts, kept) not in self._filters:
+            slow = [
+                (
+                    float(np.exp(-_LIMITS.noise_block_s / _TIME_CONSTANTS_S[tau])),
+                    float(np.sqrt(_RATIOS[ratio])),
+                )
+                for tau, ratio in parts
+            ]
+            self._filters[parts, kept] = _Filter.of(self.means.segments, kept, slow)
+        return self._filters[parts, kept]
+
+    def whitened(self, columns: Floats, parts: tuple[_Part, ...]) -> Floats:
+        """Return columns (n, c) as the innovations of a model."""
+        return self._filter(parts).applied(columns, self.means.segments)
+
+    def peak(
+        self, basis: Floats, parts: tuple[_Part, ...], kept: float = 0.0, more: Floats | None = None
+    ) -> _Peak:
+        """Return the restricted likelihood of a model, at its best β and σ_w.
+
+        It is that of the data without what a basis (n, p) explains. ``more`` (n, q) explain too; likelihoods
+        with and without them are of the same data.
+        """
+        extra = np.zeros((len(basis), 0)) if more is None else more
+        filter_ = self._filter(parts, kept)
+        white = filter_.applied(np.column_stack([basis, extra, self.means.values]), self.means.segments)
+        gram = white.T @ white
+        information, cross = gram[:-1, :-1], gram[:-1, -1]
+        ridge = _RANK * np.diag(np.diag(information))
+        left = max(float(gram[-1, -1] - cross @ np.linalg.solve(information + ridge, cross)), 1e-300)
+        width = basis.shape[1]
+        count = len(white) - width
+        determinant = float(np.linalg.slogdet(information[:width, :width])[1])
+        cost = count * np.log(left / count) + filter_.log_determinant + determinant
+        return _Peak(parts, float(cost), left / count)
+
+    def best(
+        self,
+        basis: Floats,
+        others: tuple[_Part, ...] = (),
+        start: _Part = (3, 8),
+        more: Floats | None = None,
+    ) -> _Peak:
+        """Return the largest likelihood of one slow part beside others, by steps along τ and ρ."""
+        seen: dict[tuple[_Part, ...], _Peak] = {}
+
+        def at(*own: _Part) -> _Peak:
+            if own not in seen:
+                seen[own] = self.peak(basis, (*own, *others), more=more)
+            return seen[own]
+
+        here, step = at(start), 4
+        while step:
+            better = min((at(each) for each in _neighbours(here.parts[0], step)), key=lambda peak: peak.cost)
+            if better.cost < here.cost:
+                here = better
+            else:
+                step //= 2
+        none = at()
+        return here if here.cost < none.cost else none
+
+    def promising(self, basis: Floats, peak: _Peak) -> Iterator[Floats]:
+        """Yield the candidate and the tone of the largest gain, beside the slow part and without one."""
+        numbers, tones = set(), set()
+        for parts in {peak.parts, ()}:
+            x = self.whitened(np.column_stack([basis, self.means.values]), parts)
+            known = np.linalg.qr(x[:, :-1])[0]
+            y = x[:, -1] - known @ (known.T @ x[:, -1])
+            numbers |= self._largest(known, y, parts)
+            tones |= self._strongest(y)
+        for number in numbers:
+            yield self.means.candidates[:, [number]]
+        for tone in tones:
+            yield self._tone(tone)
+
+    def _largest(self, basis: Floats, y: Floats, parts: tuple[_Part, ...]) -> set[int]:
+        """Return the candidate of the largest gain for whitened data y (n,), beside a whitened basis."""
+        if not len(self.usable):
+            return set()
+        columns = self.whitened(np.ascontiguousarray(self.means.candidates[:, self.usable]), parts)
+        whole = np.sum(columns**2, axis=0)
+        left = whole - np.sum((basis.T @ columns) ** 2, axis=0)
+        gain = (columns.T @ y) ** 2 / np.maximum(left, 1e-300)
+        gain[left < _LIMITS.noise_least_seen * whole] = 0.0
+        return {int(self.usable[int(np.argmax(gain))])}
+
+    def _strongest(self, y: Floats) -> set[float]:
+        """Return the frequency, per block, at which whitened data (n,) have the most power over all runs.
+
+        A tone stays one in the filter; its phase is each run's own.
+        """
+        runs = self.means.runs
+        longest = max(last - first for first, last in runs)
+        count = _PADDED * longest
+        spectra = [np.abs(np.fft.rfft(y[first:last], count)) ** 2 / (last - first) for first, last in runs]
+        power = np.sum(spectra, axis=0)
+        lowest = int(np.ceil(_LEAST_CYCLES * _PADDED))
+        return {(lowest + int(np.argmax(power[lowest:]))) / count} if len(power) > lowest else set()
+
+    def _tone(self, per_block: float) -> Floats:
+        """Return sine and cosine (n, 2r) of a frequency in each run."""
+        columns = np.zeros((len(self.means.values), 2 * len(self.means.runs)))
+        for number, (first, last) in enumerate(self.means.runs):
+            angle = 2.0 * np.pi * per_block * np.arange(last - first)
+            columns[first:last, 2 * number] = np.cos(angle)
+            columns[first:last, 2 * number + 1] = np.sin(angle)
+        return columns
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A fit beside some more columns, and how surprising its likelihood ratio is."""
+
+    peak: _Peak
+    columns: Floats
+    surprise: float
+    """-log of the probability of that ratio without them."""
+
+    @classmethod
+    def of(cls, fit: _Fit, basis: Floats, columns: Floats, before: _Peak) -> "_Trial":
+        """Return the fit of columns (n, q) beside a basis."""
+        from scipy.special import chdtrc
+
+        peak = fit.best(basis, start=_start(before), more=columns)
+        ratio = max(before.cost - peak.cost, 0.0)
+        return cls(peak, columns, float(-np.log(max(chdtrc(columns.shape[1], ratio), 1e-300))))
+
+
+def _start(peak: _Peak) -> _Part:
+    """Return where to look for the slow part next."""
+    return peak.parts[0] if peak.parts else (3, 0)
+
+
+def _neighbours(part: _Part, step: int) -> Iterator[_Part]:
+    """Yield the indices of τ and ρ beside a place, within their ranges."""
+    wide = max(1, step // 2)
+    for tau, ratio in ((-wide, 0), (wide, 0), (0, -step), (0, step), (-wide, step), (wide, -step)):
+        yield (
+            min(max(part[0] + tau, 0), len(_TIME_CONSTANTS_S) - 1),
+            min(max(part[1] + ratio, 0), len(_RATIOS) - 1),
+        )
+
+
+def _basis(columns: Floats) -> Floats:
+    """Return an orthonormal basis of columns (n, p)."""
+    scale = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
+    u, s, _ = np.linalg.svd(columns / scale, full_matrices=False)
+    basis: Floats = u[:, s > 1e-6 * max(float(s.max(initial=0.0)), 1e-300)]
+    return basis
