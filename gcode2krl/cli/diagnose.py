@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.inputs import common_options, effect_files, require_other
+from gcode2krl.cli.inputs import cell_files, common_options, effect_files, require_folder, require_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 @click.option("--effects", multiple=True, metavar="FOLDER", help="Folder with your own effects; repeatable.")
 @click.option("--from-log", is_flag=True, help="No prediction: compare the logged signals with one another.")
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the named causes into this cell file.")
+@click.option("--html", metavar="GAP.html", help="Write the answer as one page that needs no network.")
+@click.option(
+    "--plot", metavar="FOLDER", help="Draw each run: over time, on the path, by what it depends on."
+)
 @common_options
 def command(
     folders: tuple[str, ...],
@@ -27,6 +31,8 @@ def command(
     effects: tuple[str, ...],
     from_log: bool,
     apply_to: str | None,
+    html: str | None,
+    plot: str | None,
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
@@ -39,11 +45,12 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        if apply_to is not None:
-            require_other(Path(apply_to), *folders, *holdout, *effect_files(effects))
+        data: list[str | Path] = [*folders, *holdout, *effect_files(effects)]
+        _require_writable(apply_to, html, plot, data, cell_path)
         gap = _diagnosis(folders, holdout, effects, from_log, cell_path, console)
         sources = [Path(folder).name for folder in folders[0 if from_log else 1 :]]
         added = _apply(gap, apply_to, cell_path, sources)
+        written = _written(gap, html, plot, [*data, *cell_files(cell_path)], console)
     except Gcode2KrlError as error:
         if not as_json:
             raise
@@ -61,7 +68,38 @@ def command(
     console.say(text_report(gap))
     if apply_to is not None:
         console.say(f"{apply_to}: {added} effect{'' if added == 1 else 's'} added")
+    for file in written:
+        console.hint(f"{file} written")
     return 0
+
+
+def _require_writable(
+    apply_to: str | None, html: str | None, plot: str | None, data: list[str | Path], cell_path: str | None
+) -> None:
+    """Refuse outputs that cannot be written before the work begins, not after it."""
+    require_outputs([Path(each) for each in (apply_to, html) if each is not None], *data)
+    if html is not None:
+        require_outputs([Path(html)], *cell_files(cell_path))
+    require_folder(plot, (), ())
+
+
+def _written(
+    gap: "Gap", html: str | None, plot: str | None, inputs: list[str | Path], console: Console
+) -> list[Path]:
+    """Write the page and the pictures that are asked for; return the files."""
+    if html is None and plot is None:
+        return []
+    from gcode2krl.gap.tell.html.page import write_page
+    from gcode2krl.gap.tell.pictures import write_pictures
+
+    written = []
+    with console.progress("drawing", None):
+        if plot is not None:
+            written += write_pictures(gap, Path(plot), inputs)
+        if html is not None:
+            write_page(gap, Path(html), inputs)
+            written.append(Path(html))
+    return written
 
 
 def _diagnosis(

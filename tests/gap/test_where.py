@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.tell.where import PHASES, phase_of, place, structure
+from gcode2krl.gap.tell.where import PHASES, over_noise, phase_of, place
 from tests.gap.constructed import AMPLITUDE_RAD, HZ, applied, motion, trace, wave
 
-QUIET = [white(1e-9)]
 TIME_S = motion().time_s
 SLOW = replace(motion(), q_cmd_rad=np.tile(motion().q_cmd_rad[:1], (500, 1)))
 """No joint moves: no reversal."""
@@ -23,10 +21,12 @@ def bump(first_s, last_s, height=1.0):
     return np.where((first_s <= TIME_S) & (last_s >= TIME_S), height, 0.0)
 
 
-def found(residual, inputs=SLOW, link="servo", effects=(), **more):
+def found(residual, inputs=SLOW, link="servo", effects=(), noise=1e-9, **more):
+    """Return the place of a gap that is made of a residual or, where effects are given, of what they do."""
     residual = residual.reshape(500, -1)
     one = trace(residual, link, inputs=inputs, **more)
-    return place([one], QUIET * residual.shape[1], list(effects))
+    shape = one.sample(list(effects)) - one.nominal if effects else residual
+    return place([one], [shape], np.full(residual.shape[1], noise), list(effects))
 
 
 def test_phases_by_the_clock():
@@ -70,12 +70,14 @@ def test_a_corner_goes_before_everything_else():
     assert PHASES.index("corner") not in phase[170:]
 
 
-def test_intervals_are_where_the_gap_is_larger_than_its_rms():
-    where = found(bump(2.0, 2.5, 4.0) + bump(6.0, 7.0, 2.0))
+def test_intervals_are_where_the_gap_exceeds_the_noise_and_the_first_holds_most():
+    where = found(0.9 + bump(2.0, 2.5, 4.0) + bump(6.0, 7.0, 2.0), noise=1.0)
     first, second = where.intervals
     assert (first.t_start_s, first.t_end_s) == (pytest.approx(2.0, abs=0.07), pytest.approx(2.5, abs=0.07))
     assert (second.t_start_s, second.t_end_s) == (pytest.approx(6.0, abs=0.07), pytest.approx(7.0, abs=0.07))
-    assert first.rms == pytest.approx(4.0, rel=0.15)
+    assert first.rms == pytest.approx(4.9, rel=0.15)
+    power = np.array([25 * 4.9**2, 50 * 2.9**2])
+    assert [first.share, second.share] == pytest.approx(power / (power.sum() + 425 * 0.9**2), abs=0.05)
     assert (first.run, first.signal, first.what) == ("run-1", "joint_actual", "air")
     # one source line a sample, from 1
     assert first.lines == (pytest.approx(101, abs=4), pytest.approx(126, abs=4))
@@ -141,22 +143,44 @@ def test_of_an_explained_gap_the_place_is_that_of_the_effect():
     effect.form = lambda t: np.where((t > 4.0) & (t < 4.6), 1.0, 0.0)
     where = found(effect.form(TIME_S) + bump(8.0, 8.2, 0.5), effects=[applied(effect, 1.0)])
     (interval,) = where.intervals
+    assert interval.share == pytest.approx(1.0)
     assert interval.t_start_s == pytest.approx(4.0, abs=0.07)
     assert interval.t_end_s == pytest.approx(4.6, abs=0.07)
-    made = structure(trace(np.zeros((500, 1)), inputs=SLOW), [applied(effect, 1.0)])
-    np.testing.assert_allclose(made[:, 0], effect.form(TIME_S), atol=1e-12)
 
 
 def test_after_the_reversals_of_the_joint_that_an_effect_is_in():
     spike = Applied(library()["friction"], "A2", {"spike_deg": 0.01, "decay_s": 0.1})
-    where = found(np.zeros((500, 6)), motion(), effects=[spike])
+    where = found(np.zeros((500, 6)), motion(), effects=[spike], noise=1e-6)
     assert {interval.what for interval in where.intervals} == {"reversal of A2"}
     assert where.joints[0].joint == "A2"
     assert where.phases[0].phase == "reversal"
 
 
-@pytest.mark.parametrize("size", [0.1, 1.0 / 3.0, 7.3e-5])
-def test_a_constant_gap_has_no_interval_whatever_its_rounding(size):
-    sizes = size * (1.0 + 1e-14 * np.random.default_rng(1).standard_normal(500))
-    constant = found(np.stack([sizes, 2.0 * sizes, 2.0 * sizes], axis=1), link="mechanics")
-    assert constant.intervals == ()
+def test_a_constant_gap_is_one_stretch_that_holds_all_of_it_and_blames_no_phase():
+    constant = found(np.tile([0.1, 0.2, 0.2], (500, 1)), CUTTING, "mechanics", noise=0.05)
+    (interval,) = constant.intervals
+    assert (interval.t_start_s, interval.t_end_s) == (TIME_S[0], TIME_S[-1])
+    assert interval.share == pytest.approx(1.0)
+    assert interval.what == "throughout"
+
+
+def test_below_the_noise_there_is_no_stretch():
+    assert found(np.tile([0.1, 0.2, 0.2], (500, 1)), link="mechanics", noise=0.18).intervals == ()
+
+
+def test_a_blip_shorter_than_a_tenth_of_a_second_is_noise_unless_an_effect_makes_it():
+    blip = bump(4.0, 4.0, 1.0)
+    assert found(blip, noise=0.44).intervals == ()
+    effect = wave(1.0)
+    effect.form = lambda t: blip
+    (interval,) = found(blip, effects=[applied(effect, 1.0)], noise=0.44).intervals
+    assert interval.t_end_s - interval.t_start_s < 0.1
+
+
+def test_a_joint_stands_out_of_its_own_noise_and_not_of_that_of_six():
+    values = np.zeros((500, 6))
+    values[:, 2] = 1.5
+    joints = over_noise(trace(values, "servo", inputs=SLOW), values, np.ones(6))
+    np.testing.assert_allclose(joints, 1.5)
+    vector = over_noise(trace(values[:, :3], "mechanics", inputs=SLOW), values[:, :3], np.ones(3))
+    np.testing.assert_allclose(vector, 1.5 / np.sqrt(3.0))

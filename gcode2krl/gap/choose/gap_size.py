@@ -109,7 +109,7 @@ def size_of_gap(
     """Return the size of the gap of some traces with and without effects; ``usual`` are normal mismatch."""
     left = [trace.measured - trace.sample([*usual, *applied]) for trace in traces]
     gap = [trace.measured - trace.sample(usual) for trace in traces]
-    own, shared = _mismatch(Likelihood(traces, nuisance, noise), left)
+    own, shared = fitted_mismatch(Likelihood(traces, nuisance, noise), left)
     # clocks, frames and zeros within normal mismatch are taken out of the data, before and after alike
     after, before = _less(left, own), _less(gap, own)
     sigma2 = sum(each.sigma**2 for each in noise)
@@ -148,7 +148,7 @@ def _largest(values: Sequence[Floats]) -> float:
     return max(float(np.sqrt(_squares(each)).max()) for each in values)
 
 
-def _mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> tuple[list[Floats], list[Floats]]:
+def fitted_mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> tuple[list[Floats], list[Floats]]:
     """Return what nuisance adds to each trace (n, k): that of its own run, and that of all runs.
 
     No coefficient leaves its bounds: what is beyond them is a gap.

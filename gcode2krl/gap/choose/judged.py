@@ -49,6 +49,13 @@ class Judged:
     held_out: bool
     factor: float
     """From the inner unit to that of the report."""
+    size_with_named: Size | None = None
+    """The size with the named causes alone in the model; None where that is ``size``."""
+
+    @property
+    def told(self) -> Size:
+        """Return the size that the answer states: a cause without a name takes nothing of the gap."""
+        return self.size if self.size_with_named is None else self.size_with_named
 
     @property
     def applied(self) -> tuple[Applied, ...]:
@@ -57,8 +64,8 @@ class Judged:
 
     @property
     def shrink(self) -> float | None:
-        """Return the share of the explainable gap that is gone on held-out data; None without a cause."""
-        return self.size.shrink if self.causes and self.held_out else None
+        """Return the share of the explainable gap that is gone on held-out data; None without a name."""
+        return self.told.shrink if self.applied and self.held_out else None
 
     @property
     def reported(self) -> tuple[Cause, ...]:

@@ -41,7 +41,21 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     else:
         sizes = [_size(found, traces, found.causes[:count]) for count in counts]
     whole = _size(found, traces, found.causes)
-    return replace(_judgement(found, sizes, whole, families, bool(trials)), every=(*traces, *held))
+    judged = _judgement(found, sizes, whole, families, bool(trials))
+    with_named = _size_with_named(judged, sizes, trials)
+    return replace(judged, every=(*traces, *held), size_with_named=with_named)
+
+
+def _size_with_named(judged: Judgement, sizes: Sequence[Size], trials: Sequence["_Trial"]) -> Size | None:
+    """Return the size with the named causes alone in the model; None where all of the causes are named."""
+    named = judged.applied
+    if len(named) == len(judged.causes):
+        return None
+    if not named:
+        return sizes[0]
+    if trials:
+        return pooled([trial.size_with(named) for trial in trials])
+    return _size(judged.examination, judged.traces, named)
 
 
 def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]) -> Size:
@@ -98,6 +112,12 @@ class _Trial:
         if count < len(self.main.causes):
             names = [(each.effect.name, each.target) for each in self.main.causes[:count]]
             causes = tuple(each for each in causes if (each.effect.name, each.target) in names)
+        return _size(self.chosen, self.held, causes)
+
+    def size_with(self, named: Sequence[Applied]) -> Size:
+        """Return the size of the held-out gap with those of its effects that bear these names."""
+        names = [(each.effect.name, each.target) for each in named]
+        causes = [each for each in self.chosen.causes if (each.effect.name, each.target) in names]
         return _size(self.chosen, self.held, causes)
 
 

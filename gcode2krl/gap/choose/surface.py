@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,6 +98,7 @@ def _judgement(link: SurfaceLink, found: _Finding, context: Context) -> SurfaceJ
         verdict="explained" if sure else "no_gap",
         causes=(cause,) if found.is_gap and effect.name not in named else (),
         size=_size(found),
+        size_with_named=None if sure else replace(_size(found), after=found.before),
         held_out=True,
         factor=1.0,
         points=found.points,

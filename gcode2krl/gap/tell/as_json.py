@@ -20,6 +20,7 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "schema": SCHEMA,
         "verdict": gap.verdict,
         "gap": plain(gap.gap),
+        "at_part": plain(gap.at_part),
         "links": plain(gap.links),
         "where": plain(gap.where),
         "causes": plain(gap.causes),

@@ -1,10 +1,11 @@
 """The answer: judgements of the links, slips and clocks, put together."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from gcode2krl.effects import Dependence
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links import GEAR, JOINTS, LINKS, MECHANICS, PATH, TIMING, Link
@@ -13,9 +14,13 @@ from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
+from gcode2krl.gap.tell.at_part import at_part, at_part_of
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.depends_on import depends_on
+from gcode2krl.gap.tell.evidence import Depends, evidence_of
+from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
+    AtPart,
     CauseResult,
     Detectable,
     Gap,
@@ -35,13 +40,21 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
     judgements = [judged for judged in context.judgements if isinstance(judged, Judged)]
     signals = [judged for judged in judgements if isinstance(judged, Judgement)]
     largest = max(signals, key=_weight, default=None)
+    residuals = {
+        judged.link: residuals_of(judged)
+        for judged in signals
+        if judged is largest or judged.verdict != "no_gap"
+    }
+    unexplained = _unexplained(largest, signals)
+    of_largest = residuals[largest.link] if largest is not None else []
     return Gap(
         verdict=_verdict(judgements, slips),
         gap=_size(_with_largest_gap(judgements, largest), slips),
         links=tuple(_links(judgements, slips)),
-        where=_where(largest, judgements),
+        at_part=_at_part(judgements, slips, residuals),
+        where=_where(largest, judgements, of_largest),
         causes=_causes(judgements, slips),
-        unexplained=_unexplained(largest, signals),
+        unexplained=unexplained,
         not_examined=tuple(_not_examined(judgements, slips)),
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
@@ -53,7 +66,33 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         issues=(*issues, *_issues_of_runs(context.pairs)),
         runs=tuple(pair.name for pair in context.pairs),
         notes=tuple(_notes(context.pairs, signals)),
+        evidence=None
+        if largest is None
+        else evidence_of(largest, of_largest, _depends(largest, unexplained)),
     )
+
+
+def _at_part(
+    judgements: Sequence[Judged], slips: Sequence[Slip], residuals: Mapping[Link, Sequence[Residual]]
+) -> AtPart | None:
+    """Return the gap as it is met at the part; None where there is none."""
+    gapped = _gapped(judgements)
+    late = next((judged for judged in gapped if _is_timing(judged)), None)
+    if gapped:
+        return at_part(gapped, residuals, late)
+    return at_part_of(slips[0]) if slips else None
+
+
+def _depends(largest: Judgement, unexplained: Unexplained) -> Depends | None:
+    """Return on what a link's first named cause depends or, without one, what is left; None if unknown."""
+    if largest.applied:
+        cause = largest.applied[0]
+        return Depends(cause.target if cause.target in JOINTS else None, cause.effect.depends_on)
+    for found in unexplained.depends_on:
+        if found.link == largest.link.name:
+            at = found.at if found.at in JOINTS else None
+            return Depends(at, frozenset(each for each in Dependence if each.value == found.on))
+    return None
 
 
 def _gapped(judgements: Sequence[Judged]) -> list[Judged]:
@@ -89,7 +128,7 @@ def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
         return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
-    size, link, factor = largest.size, largest.link, largest.factor
+    size, link, factor = largest.told, largest.link, largest.factor
     return GapSize(
         signal=TIMING.signal if _is_timing(largest) else link.signal,
         unit=link.unit,
@@ -129,7 +168,7 @@ def _links(judgements: Sequence[Judged], slips: Sequence[Slip]) -> Iterator[Link
 
 def _timing(path: Judgement) -> LinkResult:
     """Return by how much runs are late along their path."""
-    before_s, after_s = timing_sizes(path.traces, path.examination.applied)
+    before_s, after_s = timing_sizes(path.traces, (*path.usual, *path.applied))
     return LinkResult(
         link=TIMING.name,
         rms_before=before_s,
@@ -142,7 +181,7 @@ def _timing(path: Judgement) -> LinkResult:
 
 def _link(judgement: Judged, slipped: bool) -> LinkResult:
     """Return a judged link; ``slipped``: a slip showed in it."""
-    factor, size = judgement.factor, judgement.size
+    factor, size = judgement.factor, judgement.told
     verdict = "no_gap" if _is_timing(judgement) else judgement.verdict
     return LinkResult(
         link=judgement.link.name,
@@ -164,7 +203,7 @@ def _zeros_deg(judgement: Judgement) -> dict[str, float] | None:
     return dict(zip(trace.components, zeros.tolist(), strict=True))
 
 
-def _where(largest: Judgement | None, judgements: Sequence[Judged]) -> Where:
+def _where(largest: Judgement | None, judgements: Sequence[Judged], residuals: Sequence[Residual]) -> Where:
     """Return which signals have a gap, and the place of the largest."""
     signals = tuple(
         SignalResult(
@@ -177,7 +216,8 @@ def _where(largest: Judgement | None, judgements: Sequence[Judged]) -> Where:
     )
     if largest is None or largest.verdict == "no_gap":
         return Where(signals=signals)
-    return replace(place(largest.traces, largest.examination.noise, largest.applied), signals=signals)
+    traces, shapes = [each.trace for each in residuals], [each.shape for each in residuals]
+    return replace(place(traces, shapes, residuals[0].noise, largest.applied), signals=signals)
 
 
 def _causes(judgements: Sequence[Judged], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
@@ -200,10 +240,10 @@ def _unexplained(largest: Judgement | None, signals: Sequence[Judgement]) -> Une
     """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
-    size = largest.size
     families = [
         result for judgement in sorted(signals, key=_weight, reverse=True) for result in depends_on(judgement)
     ]
+    size = largest.told
     significant = bool(size.significant) or any(each.link == largest.link.name for each in families)
     return Unexplained(
         rms=largest.factor * max(size.after, 0.0) ** 0.5,

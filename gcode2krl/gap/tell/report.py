@@ -1,30 +1,13 @@
-"""The diagnosis in words: one sentence a process engineer understands, then links, places, causes, limits."""
+"""The diagnosis in words: a first sentence that anyone understands, then links, places, causes, limits."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
-from gcode2krl.gap.tell.result import CauseResult, Gap, GapSize, IntervalResult, LinkResult
+from gcode2krl.gap.tell.headline import headline, stretch
+from gcode2krl.gap.tell.result import CauseResult, Gap, IntervalResult, LinkResult
+from gcode2krl.gap.tell.words import alike, depends, describe, kind, next_run, number
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
-_SIGNALS = {
-    "tcp": "at the tool tip",
-    "force": "of force",
-    "joint_actual": "of servo error",
-    "joint_load": "behind the gears",
-    "joint_commanded": "off the commanded path",
-    "timing": "off in time",
-    "scan": "on the part",
-}
-_PHASES = {
-    "corner": "at corners",
-    "reversal": "after reversals",
-    "entry": "where the cutter enters",
-    "exit": "where it leaves",
-    "cruise": "while cutting",
-    "air": "in air",
-}
-_SHARES = {0.9: "nearly all of it", 0.75: "four fifths of it", 0.6: "two thirds of it", 0.0: "half of it"}
-"""Least share -> words for it."""
 
 
 def text_report(gap: Gap) -> str:
@@ -37,73 +20,62 @@ def _lines(gap: Gap) -> Iterator[str]:
     if gap.links:
         yield from ("", "link        before      after       noise       verdict")
         yield from (_link(link) for link in gap.links)
-    intervals = gap.where.intervals
-    yield from _section("where", (_interval(each) for each in intervals[: _LIMITS.report_lines]))
-    if len(intervals) > _LIMITS.report_lines:
-        yield f"  … and {len(intervals) - _LIMITS.report_lines} more"
-    yield from _section("causes", (_cause(cause) for cause in gap.causes[: _LIMITS.report_lines]))
+    yield from _section("where", where_lines(gap))
+    yield from _section(
+        "causes", (line for cause in gap.causes[: _LIMITS.report_lines] for line in _cause(cause))
+    )
+    yield from _section("what is left depends on", left_lines(gap))
+    yield from _section("next run", [] if gap.next_run is None else next_run(gap.next_run))
     yield from _section("not examined", (f"{each.link}: needs {each.needs}" for each in gap.not_examined))
     yield from (f"note: {note}" for note in gap.notes)
 
 
 def _section(title: str, lines: Iterable[str]) -> Iterator[str]:
     """Yield a title and indented lines; nothing without lines."""
-    for number, line in enumerate(lines):
-        if number == 0:
+    for order, line in enumerate(lines):
+        if order == 0:
             yield from ("", title)
         yield f"  {line}"
 
 
-def headline(gap: Gap) -> str:
-    """Return the first sentence."""
-    size, named = gap.gap, gap.named_causes
-    slip = next((cause for cause in named if cause.words is not None), None)
-    if slip is not None:
-        return f"Set-up slip: {slip.words}."
-    if gap.verdict == "no_gap":
-        return f"No gap: {_with_unit(size.rms_before, size)} RMS are what noise and normal mismatch explain."
-    floor = f"noise floor {_with_unit(size.noise_floor, size)}"
-    first = f"{_with_unit(size.rms_before, size)} RMS {_SIGNALS.get(size.signal, '')}{_mostly(gap)}"
-    if not named:
-        return f"{first}: no effect of the library explains it; {floor}."
-    causes = " and ".join(describe(cause) for cause in named[: _LIMITS.headline_causes])
-    left = "more remain than noise explains: " if gap.unexplained.significant else ""
-    return (
-        f"{first}: {causes}; with {'it' if len(named) == 1 else 'them'} in the model {left}"
-        f"{_with_unit(size.rms_after, size)} on data not used; {floor}."
-    )
+def worst(intervals: Sequence[IntervalResult]) -> tuple[int, float]:
+    """Return how many of the stretches, worst first, hold four fifths of the gap, and the share they hold.
+
+    At most as many as the report prints; fewer where all together hold less.
+    """
+    held = 0.0
+    for count, interval in enumerate(intervals[: _LIMITS.report_lines], start=1):
+        held += interval.share or 0.0
+        if held >= _LIMITS.most_of_a_gap:
+            return count, held
+    return min(len(intervals), _LIMITS.report_lines), held
 
 
-def describe(cause: CauseResult) -> str:
-    """Return a cause with its parameters, ``backlash of A2, gap 0.021 deg ± 0.002 deg``."""
-    name = cause.effect.replace("_", " ")
-    texts = [f"{name} of {cause.target}" if cause.target else name]
-    for key, interval in cause.parameters.items():
-        stem, _, unit = key.rpartition("_")
-        half = (interval.high - interval.low) / 2.0
-        name, unit = ((stem or key).replace("_", " "), unit if stem else "")
-        texts.append(f"{name} {number(interval.value)} ± {half:.2g} {unit}".rstrip())
-    return ", ".join(texts)
+def where_words(intervals: Sequence[IntervalResult]) -> str:
+    """Return how much of the gap the worst stretches hold."""
+    count, held = worst(intervals)
+    if len(intervals) == 1:
+        return f"this stretch holds {held:.0%} of the gap"
+    which = f"these {count} of {len(intervals)}" if count < len(intervals) else f"these {count}"
+    return f"{which} stretches hold {held:.0%} of the gap"
 
 
-def number(value: float | None) -> str:
-    """Return a number with three significant digits."""
-    return "-" if value is None else f"{value:.3g}"
+def where_lines(gap: Gap) -> Iterator[str]:
+    """Yield the worst stretches, worst first; nothing without one."""
+    intervals = gap.where.intervals
+    if not intervals:
+        return
+    yield f"{where_words(intervals)}; in them it exceeds the noise"
+    for interval in intervals[: worst(intervals)[0]]:
+        share = "" if interval.share is None else f", {interval.share:.0%} of the gap"
+        unit = gap.gap.unit if interval.signal == gap.gap.signal else ""
+        yield f"{stretch(interval)}: {number(interval.rms)} {unit}".rstrip() + f" ({interval.what}){share}"
 
 
-def _with_unit(value: float | None, size: GapSize) -> str:
-    return f"{number(value)} {size.unit}"
-
-
-def _mostly(gap: Gap) -> str:
-    """Return in which phase most of a gap is, as the end of a clause; nothing where that is none."""
-    phases, joints = gap.where.phases, gap.where.joints
-    if not phases or phases[0].share < _LIMITS.phase_named_share:
-        return ""
-    first = phases[0]
-    share = next(words for least, words in _SHARES.items() if first.share >= least)
-    joint = f" of axis {joints[0].joint[1:]}" if first.phase == "reversal" and joints else ""
-    return f", {share} {_PHASES[first.phase]}{joint}"
+def left_lines(gap: Gap) -> Iterator[str]:
+    """Yield on what depends what no named cause explains, the most probable first."""
+    for found in gap.unexplained.depends_on[: _LIMITS.report_lines]:
+        yield f"{found.probability:.2f} {depends(found)}; takes {found.share:.0%} of what is left"
 
 
 def _link(link: LinkResult) -> str:
@@ -113,15 +85,17 @@ def _link(link: LinkResult) -> str:
     )
 
 
-def _interval(interval: IntervalResult) -> str:
-    lines = f", lines {interval.lines[0]}-{interval.lines[1]}" if interval.lines else ""
-    return (
-        f"{interval.run}: {interval.t_start_s:.2f}-{interval.t_end_s:.2f} s{lines}: "
-        f"{number(interval.rms)} ({interval.what})"
-    )
+def _cause(cause: CauseResult) -> Iterator[str]:
+    yield f"{cause.probability:.2f} {describe(cause)}{_taken(cause)}"
+    if cause.indistinguishable_from:
+        yield f"     these data cannot tell it from {alike(cause.indistinguishable_from)}"
+    of_kind = kind(cause)
+    if of_kind is not None:
+        yield f"     {of_kind}"
 
 
-def _cause(cause: CauseResult) -> str:
-    mark = "" if cause.is_named else " (not named)"
-    shrink = "" if cause.shrink is None else f", takes {cause.shrink:.0%} of the gap on data not used"
-    return f"{cause.probability:.2f} {describe(cause)}{shrink}{mark}"
+def _taken(cause: CauseResult) -> str:
+    if cause.is_named:
+        return "" if cause.shrink is None else f", takes {cause.shrink:.0%} of the gap on data not used"
+    would = "" if cause.shrink is None else f", would take {cause.shrink:.0%} of the gap"
+    return f"{would} (not named)"

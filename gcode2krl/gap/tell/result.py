@@ -1,7 +1,7 @@
 """What a diagnosis says. Its JSON object (docs/diagnose.md) is made of these by `as_json`, field by field."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from gcode2krl.effects import Applied
@@ -10,6 +10,7 @@ from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import NAMED
 from gcode2krl.gap.tell.as_json import gap_object
+from gcode2krl.gap.tell.evidence import Evidence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +28,23 @@ class GapSize:
     shrink: float | None = None
     """Share of the explainable gap that is gone on held-out data."""
     held_out: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtPart:
+    """The gap as it is met at the part, whatever signal shows it best."""
+
+    what: str
+    """tip or part, in mm; time, in s, where clocks or the time law alone are off; force, in N, and joints,
+    in deg, where nothing else is known."""
+    unit: str
+    rms_before: float
+    rms_after: float | None
+    """With the named causes in the model, on held-out data; None where that is not known."""
+    noise: float | None
+    """In the same unit; None where the size was converted, which takes the noise out of it."""
+    link: str
+    """The link that shows it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +74,7 @@ class SignalResult:
 
 @dataclass(frozen=True, kw_only=True)
 class IntervalResult:
-    """A stretch of time in which the gap is large."""
+    """A stretch of time in which the gap exceeds the noise."""
 
     run: str
     signal: str
@@ -94,7 +112,7 @@ class Where:
 
     signals: tuple[SignalResult, ...] = ()
     intervals: tuple[IntervalResult, ...] = ()
-    """The largest first."""
+    """All times at which the gap exceeds the noise; the stretch with the largest share first."""
     direction_base: tuple[float, ...] | None = None
     """Unit vector in ``$BASE``, where the signal is one."""
     phases: tuple[PhaseResult, ...] = ()
@@ -257,6 +275,10 @@ class Gap:
     issues: tuple[Issue, ...] = ()
     runs: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    at_part: AtPart | None = None
+    """None where there is no gap, or nothing to compare."""
+    evidence: Evidence | None = field(default=None, repr=False, compare=False)
+    """What the pictures are drawn from; not in the JSON object."""
 
     @property
     def named_causes(self) -> tuple[CauseResult, ...]:

@@ -10,34 +10,42 @@ from gcode2krl.effects.operators import since_reversal
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.noise import Noise
+from gcode2krl.gap.tell.residuals import smoothed
 from gcode2krl.gap.tell.result import IntervalResult, JointResult, PhaseResult, Where
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")
 _LIMITS = THRESHOLDS.tell
+_NO_NOISE = 1e-300
+"""Keeps a signal without noise from dividing by zero."""
 
 
-def place(traces: Sequence[Trace], noise: Sequence[Noise], applied: Sequence[Applied]) -> Where:
+def place(
+    traces: Sequence[Trace], shapes: Sequence[Floats], noise: Floats, applied: Sequence[Applied]
+) -> Where:
     """Return intervals, direction, phases, joints and band of the gap of one link.
 
-    Intervals are where the gap, as the rms over 0.1 s, is larger than its rms over all runs. The place of a
-    gap that effects explain is that of the effects, else that of the smoothed residual.
+    Intervals are all the times at which the gap, as the rms over 0.1 s, exceeds the noise of the signal: the
+    length of a vector that of the noise's vector, or any joint its own noise. The first holds the largest
+    share of the gap's power.
+
+    Parameters
+    ----------
+    shapes : (n, k) of each trace, what the gap is made of: what the causes do, or what is left, smoothed.
+    noise : (k,) standard deviation of each component.
+    applied : the named causes; without any, stretches shorter than 0.1 s are noise and left out.
     """
-    shapes = [structure(trace, applied) for trace in traces]
-    sigma = float(np.sqrt(sum(each.sigma**2 for each in noise)))
-    rms = float(np.sqrt(np.mean(np.concatenate([np.sum(shape**2, axis=1) for shape in shapes]))))
-    # a constant gap is nowhere larger than its rms, whatever the rounding
-    level = max(rms, 0.0 if applied else sigma) * (1.0 + _LIMITS.rounding)
     joints = [str(one.target) for one in applied if one.target in JOINTS]
+    least_s = 0.0 if applied else _LIMITS.smooth_s
+    power = sum(float(np.sum(shape**2)) for shape in shapes)
     intervals = [
         interval
         for trace, shape in zip(traces, shapes, strict=True)
-        for interval in _intervals(trace, _size(trace, shape), level, joints)
+        for interval in _intervals(trace, shape, _stretches(trace, shape, noise, least_s), power, joints)
     ]
     is_vector = traces[0].link in (FORCE, MECHANICS) and not traces[0].in_sensor_frame
     return Where(
-        intervals=tuple(sorted(intervals, key=lambda interval: -interval.rms)),
+        intervals=tuple(sorted(intervals, key=lambda interval: -(interval.share or 0.0))),
         direction_base=_direction(shapes) if is_vector else None,
         phases=_phases(traces, shapes),
         joints=_joints(traces, shapes, applied),
@@ -45,24 +53,30 @@ def place(traces: Sequence[Trace], noise: Sequence[Noise], applied: Sequence[App
     )
 
 
-def structure(trace: Trace, applied: Sequence[Applied]) -> Floats:
-    """Return (n, k) what the effects do to the signal; without any, the residual smoothed over 0.1 s."""
-    if applied:
-        return trace.sample(applied) - trace.nominal
-    return np.stack([_smooth(trace, column) for column in trace.residual.T], axis=1)
+def over_noise(trace: Trace, shape: Floats, noise: Floats) -> Floats:
+    """Return the size (n,) of a gap (n, k), as the rms over 0.1 s, over that of the noise (k,).
+
+    That of joints is the largest of theirs: one joint's gap is not hidden by the noise of five others.
+    """
+    if trace.link.of_joints:
+        ratios = np.maximum(smoothed(trace.time_s, shape**2), 0.0) / np.maximum(noise, _NO_NOISE) ** 2
+        largest: Floats = np.sqrt(ratios.max(axis=1))
+        return largest
+    length = max(float(np.sqrt(np.sum(noise**2))), _NO_NOISE)
+    size: Floats = np.sqrt(np.maximum(smoothed(trace.time_s, np.sum(shape**2, axis=1)), 0.0))
+    return size / length
 
 
-def _size(trace: Trace, shape: Floats) -> Floats:
-    """Return the length (n,) of vectors (n, k), as the rms over 0.1 s."""
-    size: Floats = np.sqrt(np.maximum(_smooth(trace, np.sum(shape**2, axis=1)), 0.0))
-    return size
-
-
-def _smooth(trace: Trace, values: Floats) -> Floats:
-    """Return the mean of (n,) over 0.1 s."""
-    kernel = np.ones(max(1, round(_LIMITS.smooth_s / float(np.median(np.diff(trace.time_s))))))
-    sums: Floats = np.convolve(values, kernel, mode="same")
-    return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
+def _stretches(trace: Trace, shape: Floats, noise: Floats, least_s: float) -> Iterator[Ints]:
+    """Yield the rows of each stretch in which a gap exceeds the noise; stretches that are near are one."""
+    inside = np.flatnonzero(over_noise(trace, shape, noise) > 1.0)
+    pieces = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
+    time_s = trace.time_s
+    kept = [piece for piece in pieces if len(piece) and time_s[piece[-1]] - time_s[piece[0]] >= least_s]
+    if not kept:
+        return
+    rows = np.concatenate(kept)
+    yield from np.split(rows, np.flatnonzero(np.diff(time_s[rows]) > _LIMITS.same_interval_s) + 1)
 
 
 def phase_of(inputs: Inputs) -> tuple[Ints, Ints]:
@@ -90,14 +104,13 @@ def phase_of(inputs: Inputs) -> tuple[Ints, Ints]:
     return phase, joint
 
 
-def _intervals(trace: Trace, size: Floats, level: float, joints: Sequence[str]) -> Iterator[IntervalResult]:
-    """Yield where the size (n,) of a gap exceeds a level; ``joints``: those of the effects in it."""
-    inside = np.flatnonzero(size > level)
-    if len(inside) == 0:
-        return
+def _intervals(
+    trace: Trace, shape: Floats, stretches: Iterator[Ints], power: float, joints: Sequence[str]
+) -> Iterator[IntervalResult]:
+    """Yield the stretches of a trace; ``power`` is that of all runs, ``joints`` are those of its causes."""
+    square = np.sum(shape**2, axis=1)
     phase, joint = phase_of(trace.inputs)
-    breaks = np.flatnonzero(np.diff(trace.time_s[inside]) > _LIMITS.same_interval_s) + 1
-    for rows in np.split(inside, breaks):
+    for rows in stretches:
         samples = nearest_rows(trace.inputs.time_s, trace.time_s[rows])
         lines = trace.inputs.source_line[samples]
         lines = lines[lines > 0]
@@ -107,15 +120,23 @@ def _intervals(trace: Trace, size: Floats, level: float, joints: Sequence[str]) 
             t_start_s=round(float(trace.time_s[rows[0]]), 4),
             t_end_s=round(float(trace.time_s[rows[-1]]), 4),
             lines=(int(lines.min()), int(lines.max())) if len(lines) else (),
-            rms=float(np.sqrt(np.mean(size[rows] ** 2))) * trace.factor,
-            what=_what(phase[samples], joint[samples], size[rows], joints),
+            rms=float(np.sqrt(np.mean(square[rows]))) * trace.factor,
+            what=_what(phase[samples], joint[samples], square[rows], joints),
+            share=float(np.sum(square[rows])) / max(power, _NO_NOISE),
         )
 
 
-def _what(phase: Ints, joint: Ints, size: Floats, joints: Sequence[str]) -> str:
-    """Return the phase that has most of the power of some rows, with the joint of a reversal."""
-    power = np.bincount(phase, weights=size**2, minlength=len(PHASES))
-    name = PHASES[int(np.argmax(power))]
+def _what(phase: Ints, joint: Ints, square: Floats, joints: Sequence[str]) -> str:
+    """Return the phase that has most of the power of some rows, with the joint of a reversal.
+
+    ``throughout`` where the gap is no larger in it than in the other phases of the stretch.
+    """
+    power = np.bincount(phase, weights=square, minlength=len(PHASES)) / max(float(square.sum()), _NO_NOISE)
+    first = int(np.argmax(power))
+    time_share = float(np.mean(phase == first))
+    if power[first] < _LIMITS.one_phase_share and power[first] < _LIMITS.phase_over_time * time_share:
+        return "throughout"
+    name = PHASES[first]
     if name != "reversal":
         return name
     if len(joints) == 1:
@@ -182,7 +203,7 @@ def _joints(
 
 def _power(traces: Sequence[Trace], applied: Applied) -> float:
     """Return the power of what one effect does to some traces."""
-    return sum(float(np.sum(structure(trace, [applied]) ** 2)) for trace in traces)
+    return sum(float(np.sum((trace.sample([applied]) - trace.nominal) ** 2)) for trace in traces)
 
 
 def _along_joints(traces: Sequence[Trace], shapes: Sequence[Floats]) -> Floats:

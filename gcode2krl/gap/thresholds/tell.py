@@ -30,4 +30,15 @@ class TellThresholds:
     )
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
     headline_causes: int = convention(3, "causes in the first sentence")
-    rounding: float = convention(1e-9, "a size that exceeds the level of an interval by less is equal to it")
+    headline_numbers: int = convention(4, "a cause with more numbers is without them in the first sentence")
+    phase_over_time: float = convention(
+        1.5,
+        "a phase is in the first sentence where its share of the power is this many times that of the time",
+    )
+    worth_a_word: float = convention(0.1, "a cause without a name is in the first sentence from here on")
+    most_of_a_gap: float = convention(0.8, "the report prints the worst stretches until they hold this share")
+    form_fits_well: float = convention(
+        0.9, "a form that takes a smaller share of what its family takes is said to fit badly"
+    )
+    constant_least_p: float = convention(0.05, "a size less likely to be one number is said to vary")
+    one_phase_share: float = convention(0.9, "a phase with more of a stretch's power is what goes on there")

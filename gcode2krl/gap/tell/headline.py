@@ -1,0 +1,135 @@
+"""The first sentence, in a person's words: how far the part is off, where most of it is, and why."""
+
+from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult
+from gcode2krl.gap.tell.words import depends, describe, listed, named, rounded
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.tell
+_OFF = {
+    "tip": "The tip is off by {size} RMS",
+    "part": "The part is off by {size} RMS",
+    "force": "The measured force is off by {size} RMS",
+    "joints": "The joints are off by {size} RMS",
+}
+_PHASES = {
+    "corner": "at corners",
+    "reversal": "after reversals",
+    "entry": "where the cutter enters",
+    "exit": "where it leaves",
+    "cruise": "while cutting",
+    "air": "in air",
+}
+_SHARES = {0.9: "nearly all of it", 0.75: "four fifths of it", 0.6: "two thirds of it", 0.0: "half of it"}
+"""Least share -> words for it."""
+
+
+def headline(gap: Gap) -> str:
+    """Return the first sentences: the size at the part and its causes, then what is left with them."""
+    slip = next((cause for cause in gap.named_causes if cause.words is not None), None)
+    if slip is not None:
+        return f"Set-up slip: {slip.words}."
+    if gap.verdict == "no_gap":
+        return _no_gap(gap)
+    return " ".join(filter(None, (f"{_off(gap)}{_mostly(gap)}: {_why(gap)}.", _left(gap))))
+
+
+def _no_gap(gap: Gap) -> str:
+    tip = next((link for link in gap.links if link.link == "mechanics"), None)
+    if tip is not None:
+        what = f"the tip is off by {amount(tip.rms_before, tip.unit)} RMS"
+        return f"No gap: {what}, which noise and normal mismatch explain."
+    size = gap.gap
+    if size.rms_before is None:
+        return "Nothing was compared: see what is not examined."
+    return f"No gap: {amount(size.rms_before, size.unit)} RMS are what noise and normal mismatch explain."
+
+
+def amount(value: float, unit: str) -> str:
+    """Return a size in a unit that a person would use: seconds below 0.1 as milliseconds."""
+    if unit == "s" and value < 0.1:
+        return f"{rounded(1000.0 * value)} ms"
+    return f"{rounded(value)} {unit}"
+
+
+def _off(gap: Gap) -> str:
+    at = gap.at_part
+    if at is None:
+        size = gap.gap
+        return "The runs differ" if size.rms_before is None else f"{rounded(size.rms_before)} {size.unit} RMS"
+    size_text = amount(at.rms_before, at.unit)
+    if at.what != "time":
+        return _OFF[at.what].format(size=size_text)
+    if at.link == "timing":
+        return f"The robot is {size_text} RMS early or late on its path"
+    return f"Time stamps are off by {size_text}"
+
+
+def _mostly(gap: Gap) -> str:
+    """Return in which phase most of a gap is, as the end of a clause; nothing where that says nothing.
+
+    A phase is named where the gap is larger than elsewhere, not where the robot merely is most of the time:
+    a constant offset has its power wherever the time is spent.
+    """
+    phases, joints, at = gap.where.phases, gap.where.joints, gap.at_part
+    if not phases or phases[0].share < _LIMITS.phase_named_share:
+        return ""
+    if at is not None and at.what == "time":
+        return ""
+    first = phases[0]
+    times = [phase.share / phase.rms**2 if phase.rms > 0.0 else 0.0 for phase in phases]
+    if first.share * sum(times) < _LIMITS.phase_over_time * times[0]:
+        return ""
+    share = next(words for least, words in _SHARES.items() if first.share >= least)
+    joint = f" of axis {joints[0].joint[1:]}" if first.phase == "reversal" and joints else ""
+    return f", {share} {_PHASES[first.phase]}{joint}"
+
+
+def _why(gap: Gap) -> str:
+    causes = gap.named_causes[: _LIMITS.headline_causes]
+    if causes:
+        return listed([describe(cause, _LIMITS.headline_numbers) for cause in causes])
+    words = "no effect of the library explains it"
+    if gap.unexplained.depends_on:
+        words += f"; it depends on {depends(gap.unexplained.depends_on[0])}"
+    unsure = [cause for cause in gap.causes if cause.probability >= _LIMITS.worth_a_word]
+    if unsure:
+        words += f"; perhaps {listed([_perhaps(cause) for cause in unsure], 'or')}"
+    return words
+
+
+def _perhaps(cause: CauseResult) -> str:
+    return f"{named(cause.effect, cause.target)} ({cause.probability:.2f})"
+
+
+def _left(gap: Gap) -> str:
+    """Return what is left with the named causes in the model; nothing without one."""
+    number = len(gap.named_causes)
+    if number == 0:
+        return ""
+    model = f"With {'it' if number == 1 else 'them'} in the model"
+    held = " on data not used" if gap.gap.held_out else ""
+    at = gap.at_part
+    if at is None or at.rms_after is None or at.what == "time":
+        if gap.gap.shrink is None:
+            return ""
+        return f"{model} {gap.gap.shrink:.0%} of the gap is gone{held}{_rest(gap)}."
+    return f"{model} {amount(at.rms_after, at.unit)} are left{held}{_beside(at)}{_rest(gap)}."
+
+
+def _beside(at: AtPart) -> str:
+    return "" if at.noise is None else f", the noise is {amount(at.noise, at.unit)}"
+
+
+def _rest(gap: Gap) -> str:
+    """Return that more is left than noise explains, and on what that depends; nothing where it is not."""
+    if not gap.unexplained.significant:
+        return ""
+    on = gap.unexplained.depends_on
+    return "; more is left than noise explains" + (f": {depends(on[0])}" if on else "")
+
+
+def stretch(interval: IntervalResult) -> str:
+    """Return where a stretch is: run, times and G-code lines."""
+    lines = f", lines {interval.lines[0]}-{interval.lines[1]}" if interval.lines else ""
+    first_s = max(interval.t_start_s, 0.0)
+    return f"{interval.run}: {first_s:.2f}-{interval.t_end_s:.2f} s{lines}"

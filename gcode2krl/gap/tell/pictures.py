@@ -1,0 +1,230 @@
+"""One picture a run: the residual over time, where on the path it is, and against the input it depends on.
+
+Needs no display; importing this module loads matplotlib, so it is imported only where a picture is asked for.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from gcode2krl.arrays import Floats
+from gcode2krl.files import make_folder, write_together
+from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
+from gcode2krl.gap.tell.residuals import smoothed
+from gcode2krl.gap.tell.result import Gap, IntervalResult
+from gcode2krl.report.drawing import BLUE, GREY, PALE, SKY, VERMILION, line_ticks, look, thin
+
+DPI = 110
+PATH_COLOURS = "viridis"
+_MOST_SEGMENTS = 3000
+_MOST_DOTS = 4000
+_LINES_ON_AXIS = 10
+_FLAT_MM = 0.5
+SIGNALS = {
+    "tcp": "tool tip",
+    "force": "force",
+    "joint_actual": "servo (actual minus commanded joints)",
+    "joint_load": "gears (joints behind minus before)",
+    "joint_commanded": "commanded joints",
+}
+
+
+def write_pictures(gap: Gap, folder: Path, inputs: Iterable[str | Path] = ()) -> list[Path]:
+    """Write ``gap_<run>.png`` of each run into a folder, all or none; return the files.
+
+    None where nothing was compared. Raises `NotUnderstoodError` where the folder cannot be written.
+    """
+    evidence = gap.evidence
+    if evidence is None:
+        return []
+    make_folder(folder)
+    figures = {folder / f"gap_{_file_name(run.run)}.png": run_figure(gap, run) for run in evidence.runs}
+    write_together({file: partial(_save, figure) for file, figure in figures.items()}, inputs)
+    return list(figures)
+
+
+def run_figure(gap: Gap, run: RunEvidence) -> Figure:
+    """Draw one run: the residual over time, the path coloured by it, and its dependence if one is known."""
+    evidence = _of(gap)
+    with look():
+        figure = Figure(figsize=(11.0, 7.5), layout="constrained")
+        grid = figure.add_gridspec(3, 2, height_ratios=(1.25, 1.0, 0.45), width_ratios=(1.15, 1.0))
+        draw_time(figure.add_subplot(grid[0, :]), evidence, run, gap.where.intervals)
+        views = views_of(run)
+        for number, view in enumerate(views):
+            rows = slice(number + 1, number + 2) if len(views) > 1 else slice(1, 3)
+            draw_path(figure.add_subplot(grid[rows, 0]), evidence, run, view)
+        draw_dependence(figure.add_subplot(grid[1:, 1]), evidence, run)
+        figure.suptitle(
+            f"{run.run}: measured minus predicted, {SIGNALS.get(evidence.signal, evidence.signal)}"
+        )
+    return figure
+
+
+def picture_bytes(figure: Figure) -> bytes:
+    """Return a figure as a PNG."""
+    buffer = BytesIO()
+    figure.savefig(buffer, dpi=DPI, format="png")
+    return buffer.getvalue()
+
+
+def draw_time(
+    axes: Axes, evidence: Evidence, run: RunEvidence, intervals: Sequence[IntervalResult] = ()
+) -> None:
+    """Draw the residual over time, before and after, with the noise, the stretches and the G-code lines.
+
+    The lines are means over 0.1 s; the dots behind them are the readings.
+    """
+    time_s = run.time_s
+    shaded = "larger than the noise"
+    for interval in intervals:
+        if interval.run == run.run and interval.signal == evidence.signal:
+            axes.axvspan(interval.t_start_s, interval.t_end_s, color=PALE, alpha=0.35, lw=0, label=shaded)
+            shaded = "_"
+    axes.axhspan(-evidence.noise, evidence.noise, color=SKY, alpha=0.35, lw=0, label="noise, ±1 σ")
+    for values, colour, label in ((run.before, VERMILION, "before"), (run.after, BLUE, "with the causes")):
+        if label != "before" and not has_causes(run):
+            continue
+        rows = _some(len(time_s), _MOST_DOTS)
+        axes.plot(time_s[rows], values[rows], ".", ms=1.2, color=colour, alpha=0.25)
+        axes.plot(*thin(*_with_gaps(time_s, smoothed(time_s, values))), color=colour, lw=1.2, label=label)
+    axes.set_xlim(float(time_s[0]), float(time_s[-1]))
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"{evidence.component} ({evidence.unit})")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=4)
+    _add_lines(axes, run)
+
+
+def draw_path(axes: Axes, evidence: Evidence, run: RunEvidence, view: tuple[int, int]) -> None:
+    """Draw the path along two axes of ``$BASE``, coloured by the size of the gap; words without a path."""
+    if run.position_mm is None:
+        _say(axes, "no path: the robot is not known")
+        return
+    first, second = view
+    rows = _some(len(run.time_s), _MOST_SEGMENTS)
+    points = run.position_mm[rows][:, [first, second]]
+    segments = np.stack([points[:-1], points[1:]], axis=1)
+    order = np.argsort(run.size_before[rows][1:], kind="stable")  # the worst on top
+    lines = LineCollection(list(segments[order]), cmap=PATH_COLOURS, lw=2.2, capstyle="round")
+    lines.set_array(run.size_before[rows][1:][order])
+    lines.set_clim(0.0, largest_size(evidence))
+    axes.add_collection(lines)
+    axes.autoscale()
+    axes.set_xlabel(f"{'XYZ'[first]} (mm)")
+    axes.set_ylabel(f"{'XYZ'[second]} (mm)")
+    axes.margins(0.05, 0.12)
+    worst = int(np.argmax(run.size_before))
+    axes.plot(*run.position_mm[worst, [first, second]], "o", ms=11, mfc="none", mec=VERMILION, mew=1.4)
+    if second == 1:
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.figure.colorbar(lines, ax=axes, label=f"gap ({evidence.size_unit})", shrink=0.9)
+    title = "from above; circle: largest" if second == 1 else "from the side, Z not to scale"
+    axes.set_title(title, loc="left")
+
+
+def draw_dependence(axes: Axes, evidence: Evidence, run: RunEvidence) -> None:
+    """Draw the residual against the input that the gap depends on, before and after."""
+    if run.against is None:
+        _say(axes, "no input is known that the gap depends on")
+        return
+    x, values = run.against.values, smoothed(run.time_s, run.before)
+    rows = _some(len(x), _MOST_DOTS)
+    axes.axhspan(-evidence.noise, evidence.noise, color=SKY, alpha=0.35, lw=0)
+    if run.against.across_runs:
+        _draw_others(axes, evidence, run)
+    direction = run.against.direction
+    if direction is None:
+        axes.plot(x[rows], values[rows], ".", ms=2.0, color=VERMILION, label="before")
+    else:
+        for sign, marker, label in (
+            (1.0, "^", "before, joint moving up"),
+            (-1.0, "v", "before, moving down"),
+        ):
+            moving = rows[direction[rows] == sign]
+            colour = VERMILION if sign > 0 else GREY
+            axes.plot(x[moving], values[moving], marker, ms=2.2, mew=0, color=colour, label=label)
+    if has_causes(run):
+        after = smoothed(run.time_s, run.after)
+        axes.plot(x[rows], after[rows], ".", ms=1.6, color=BLUE, alpha=0.6, label="with the causes")
+    axes.set_xlabel(run.against.name)
+    axes.set_ylabel(f"{evidence.component} ({evidence.unit})")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2, markerscale=2.5)
+
+
+def _draw_others(axes: Axes, evidence: Evidence, run: RunEvidence) -> None:
+    """Draw what the other runs show of an input that hardly changes within one."""
+    label = "other runs, before"
+    for other in evidence.runs:
+        if other is not run and other.against is not None:
+            rows = _some(len(other.time_s), _MOST_DOTS // 4)
+            values = smoothed(other.time_s, other.before)
+            axes.plot(other.against.values[rows], values[rows], ".", ms=1.6, color=PALE, label=label)
+            label = "_"
+
+
+def has_causes(run: RunEvidence) -> bool:
+    """Tell whether named causes change the residual."""
+    return bool(np.any(run.before != run.after))
+
+
+def views_of(run: RunEvidence) -> list[tuple[int, int]]:
+    """Return the axes of the views: from above and, where the tip goes up and down, from the side."""
+    if run.position_mm is None:
+        return [(0, 1)]
+    span = np.ptp(run.position_mm, axis=0)
+    side = (0 if span[0] >= span[1] else 1, 2)
+    return [(0, 1), side] if span[2] > _FLAT_MM else [(0, 1)]
+
+
+def largest_size(evidence: Evidence) -> float:
+    """Return the size that the end of the colour scale stands for, the same in all runs."""
+    sizes = np.concatenate([run.size_before for run in evidence.runs])
+    return max(float(np.percentile(sizes, 99.0)), 1e-12)
+
+
+def _of(gap: Gap) -> Evidence:
+    if gap.evidence is None:
+        raise ValueError("nothing was compared, so there is nothing to draw")
+    return gap.evidence
+
+
+def _add_lines(axes: Axes, run: RunEvidence) -> None:
+    """Add G-code lines along the top."""
+    if not np.any(run.line > 0):
+        return
+    times, labels = line_ticks(run.time_s, run.line.astype(np.int32), _LINES_ON_AXIS)
+    top = axes.secondary_xaxis("top")
+    top.set_xticks(times, labels)
+    top.set_xlabel("G-code line")
+
+
+def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return time and values with a missing one in each gap, so that no line is drawn across it."""
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    gaps = np.flatnonzero(np.diff(time_s) > 5.0 * step_s) + 1
+    return np.insert(time_s, gaps, time_s[gaps - 1] + step_s), np.insert(values, gaps, np.nan)
+
+
+def _some(count: int, most: int) -> Any:
+    """Return at most so many row numbers, evenly spread."""
+    return np.arange(0, count, max(1, -(-count // most)))
+
+
+def _say(axes: Axes, words: str) -> None:
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, words, ha="center", va="center", color=GREY, transform=axes.transAxes)
+
+
+def _file_name(run: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in run)
+
+
+def _save(figure: Figure, file: Path) -> None:
+    figure.savefig(file, dpi=DPI, format="png")

@@ -1,0 +1,171 @@
+"""Words for numbers, causes, dependences and the next run."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, NextRun
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.tell
+_AXES = ("x", "y", "z")
+_UNITS = (
+    "mm_per_h",
+    "N_per_h",
+    "per_m",
+    "cm_s2",
+    "m_s2",
+    "deg_per_kNm",
+    "mm",
+    "deg",
+    "rad",
+    "Nm",
+    "kg",
+    "ms",
+    "hz",
+    "N",
+    "s",
+    "h",
+    "m",
+)
+"""Ends of names of parameters that are units, the longer first."""
+_FORMS = {
+    "drift": "a drift with {on}",
+    "periodic": "periodic in {on}",
+    "loop": "a loop with {on}",
+    "smooth": "a smooth function of {on}",
+}
+
+
+def number(value: float | None) -> str:
+    """Return a number with three significant digits, ``-`` for None."""
+    return "-" if value is None else f"{value:.3g}"
+
+
+def rounded(value: float) -> str:
+    """Return a number with two significant digits, written out."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    decimals = max(0, 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def measured(interval: Interval, unit: str) -> str:
+    """Return a value and half of its interval, ``0.0212 deg ± 0.0020``: two digits of what is uncertain."""
+    half = (interval.high - interval.low) / 2.0
+    unit = f" {unit}" if unit else ""
+    if not math.isfinite(half) or half <= 0.0:
+        return f"{number(interval.value)}{unit}"
+    if abs(math.log10(half)) > 4.0:
+        return f"{interval.value:.3g}{unit} ± {half:.2g}"
+    first = math.floor(math.log10(half))
+    decimals = max(0, (1 if half / 10.0**first < 2.0 else 0) - first)
+    return f"{interval.value:.{decimals}f}{unit} ± {half:.{decimals}f}"
+
+
+def unit_of(name: str) -> tuple[str, str]:
+    """Return a parameter's name without its unit, and the unit: ``gap_deg`` is gap, in deg."""
+    for unit in _UNITS:
+        if name == unit or name.endswith(f"_{unit}"):
+            stem = name[: -len(unit)].strip("_").replace("_", " ")
+            return stem, unit.replace("_per_", "/").replace("per_", "1/").replace("_s2", "/s²")
+    return name.replace("_", " "), ""
+
+
+def named(effect: str, target: str | None) -> str:
+    """Return an effect and where it is, ``backlash of A2``."""
+    name = effect.replace("_", " ")
+    return name if target is None else f"{name} of {target.replace('_', ' ')}"
+
+
+def describe(cause: CauseResult, most: int | None = None) -> str:
+    """Return a cause with its numbers, ``backlash of A2, 0.0212 deg ± 0.0020``.
+
+    Components of a vector stand in brackets; where there are more than ``most`` numbers none is given.
+    """
+    numbers = _numbers(cause.parameters)
+    if most is not None and len(numbers) > most:
+        numbers = []
+    return ", ".join([named(cause.effect, cause.target), *numbers])
+
+
+def _numbers(parameters: Mapping[str, Interval]) -> list[str]:
+    """Return the numbers of a cause in words; a single one needs no name."""
+    names, numbers = list(parameters), []
+    while names:
+        vector = _vector(names)
+        if vector:
+            values = ", ".join(rounded(parameters[name].value) for name in vector)
+            numbers.append(f"along ({values})")
+            names = [name for name in names if name not in vector]
+            continue
+        name = names.pop(0)
+        stem, unit = unit_of(name)
+        value = measured(parameters[name], unit)
+        numbers.append(value if len(parameters) == 1 or not stem else f"{stem} {value}")
+    return numbers
+
+
+def _vector(names: Sequence[str]) -> list[str]:
+    """Return the three components of a direction, where the first names are one."""
+    head = list(names[:3])
+    is_direction = [name.rpartition("_")[2] for name in head] == list(_AXES) and head[0].startswith(
+        "direction"
+    )
+    return head if is_direction else []
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """Return words as an English list."""
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def alike(effects: Sequence[EffectAt]) -> str:
+    """Return what a cause cannot be told from."""
+    return listed([named(each.effect, each.target) for each in effects], "or")
+
+
+def depends(found: DependsOnResult) -> str:
+    """Return where a gap is and on what it depends: ``tip, a step at 11.2 s of run-1 and all later runs``."""
+    if found.form == "step" and found.at_time_s is not None:
+        run = f" of {found.run} and all later runs" if found.run else ""
+        form = f"a step at {found.at_time_s:.1f} s{run}"
+    else:
+        form = _FORMS.get(found.form, "a function of {on}").format(on=found.on)
+    words = [found.at, form]
+    if found.size is not None:
+        size = f"{rounded(found.size)} {found.unit or ''}".rstrip()
+        if found.direction is not None:
+            size += f" along ({', '.join(f'{round(value, 1) + 0.0:.1f}' for value in found.direction)})"
+        words.append(size)
+    return ", ".join(words)
+
+
+def kind(cause: CauseResult) -> str | None:
+    """Return what a reader should know of a cause's family, form and constancy; None where all is well."""
+    words = []
+    if cause.family is not None:
+        words.append(f"of the kind {cause.family}")
+    if cause.form_fits is not None and cause.form_fits < _LIMITS.form_fits_well:
+        words.append(f"its form takes {cause.form_fits:.0%} of what its kind takes")
+    if cause.constant is not None and cause.constant.p < _LIMITS.constant_least_p:
+        spread = cause.constant.inconstancy
+        words.append(f"its size varies by {spread:.0%} over runs and halves (p = {cause.constant.p:.2g})")
+    return "; ".join(words) or None
+
+
+def next_run(run: NextRun) -> list[str]:
+    """Return the next run in lines: the command, what it separates, what is expected in either case."""
+    minutes = f"{run.minutes:.0f} minutes" if run.minutes >= 1.5 else "a minute"
+    lines = [f"gcode2krl make-test {run.program}, {minutes}"]
+    for pair in run.separates:
+        first, second = pair.first.replace("_", " "), pair.second.replace("_", " ")
+        lines.append(f"separates {first} from {second}, odds {_odds(pair.odds)}")
+    lines += [f"if {each.answer.replace('_', ' ')}: {each.shows}" for each in run.expect]
+    return lines
+
+
+def _odds(odds: float) -> str:
+    return "over 1000 to 1" if odds > 1000.0 else f"{rounded(odds)} to 1"
