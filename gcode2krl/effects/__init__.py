@@ -1,7 +1,7 @@
 """What the nominal model leaves out, an effect a file: one implementation predicts it and finds it."""
 
 from gcode2krl.effects.apply import inputs_of, with_effects
-from gcode2krl.effects.chain import commanded, simulate
+from gcode2krl.effects.chain import commanded, drives, forces, simulate
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
@@ -22,7 +22,9 @@ __all__ = [
     "Signals",
     "Where",
     "commanded",
+    "drives",
     "effects_in",
+    "forces",
     "from_cell",
     "inputs_of",
     "library",

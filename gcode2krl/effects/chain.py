@@ -7,6 +7,7 @@ the chain is judged on its measured input.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,32 +28,18 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     the order given. Without effects the tip is the commanded one plus the nominal deflection.
     """
     inputs = _planned(inputs, applied)
-    q_cmd = inputs.q_cmd_rad
-    q_act = q_load = q_true = q_cmd
-    for one in applied:
-        q_act = one.effect.servo(q_act, inputs, one)
-    q_load = _measured(q_act, inputs.q_act_rad)
-    for one in applied:
-        q_load = one.effect.gear(q_load, inputs, one)
-    q_true = _measured(q_load, inputs.q_load_rad)
-    for one in applied:
-        q_true = one.effect.joints(q_true, inputs, one)
-
-    cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
-    for one in applied:
-        cut = one.effect.cut(cut, inputs, one)
+    q_act, q_load, q_true = _joints(inputs, applied)
+    cut = _cut(inputs, applied)
     cutting = cut if inputs.load_base_N is None else (inputs.load_base_N, inputs.moment_base_Nmm)
     bending = cutting
     for one in applied:
         bending = one.effect.load(bending, inputs, one)
 
     pose = _pose(inputs, applied, q_true, cutting, bending, rotation)
-    sensed = cut
-    for one in applied:
-        sensed = one.effect.sensor(sensed, inputs, one)
+    sensed = _sensed(cut, inputs, applied)
     signals = Signals(
         inputs=inputs,
-        q_cmd_rad=q_cmd,
+        q_cmd_rad=inputs.q_cmd_rad,
         q_act_rad=q_act,
         q_load_rad=q_load,
         force_base_N=cut[0],
@@ -61,9 +48,7 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
         moment_meas_base_Nmm=sensed[1],
         **pose,
     )
-    for one in applied:
-        signals = one.effect.instruments(signals, one)
-    return signals
+    return _stated(signals, applied)
 
 
 def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
@@ -76,9 +61,36 @@ def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
 
 def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
     """Return what `simulate` does as far as commanded joints and clocks go; the rest is nominal or zero."""
+    return _stated(_nominal(_planned(inputs, applied)), applied)
+
+
+def drives(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
+    """Return what `simulate` does as far as joints and clocks go; the rest is nominal or zero."""
     inputs = _planned(inputs, applied)
+    q_act, q_load, q_true = _joints(inputs, applied)
+    signals = replace(_nominal(inputs), q_act_rad=q_act, q_load_rad=q_load, q_true_rad=q_true)
+    return _stated(signals, applied)
+
+
+def forces(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
+    """Return what `simulate` does as far as forces and clocks go; the rest is nominal."""
+    inputs = _planned(inputs, applied)
+    cut = _cut(inputs, applied)
+    sensed = _sensed(cut, inputs, applied)
+    signals = replace(
+        _nominal(inputs),
+        force_base_N=cut[0],
+        moment_base_Nmm=cut[1],
+        force_meas_base_N=sensed[0],
+        moment_meas_base_Nmm=sensed[1],
+    )
+    return _stated(signals, applied)
+
+
+def _nominal(inputs: Inputs) -> Signals:
+    """Return the commanded motion as all signals, without forces."""
     q_cmd, nothing = inputs.q_cmd_rad, np.zeros_like(inputs.position_mm)
-    signals = Signals(
+    return Signals(
         inputs=inputs,
         q_cmd_rad=q_cmd,
         q_act_rad=q_cmd,
@@ -90,6 +102,36 @@ def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
         force_meas_base_N=nothing,
         moment_meas_base_Nmm=nothing,
     )
+
+
+def _joints(inputs: Inputs, applied: Sequence[Applied]) -> tuple[Floats, Floats, Floats]:
+    """Return the joints (m, 6) of the motor side, behind the gears, and as they truly are."""
+    q_act = inputs.q_cmd_rad
+    for one in applied:
+        q_act = one.effect.servo(q_act, inputs, one)
+    q_load = _measured(q_act, inputs.q_act_rad)
+    for one in applied:
+        q_load = one.effect.gear(q_load, inputs, one)
+    q_true = _measured(q_load, inputs.q_load_rad)
+    for one in applied:
+        q_true = one.effect.joints(q_true, inputs, one)
+    return q_act, q_load, q_true
+
+
+def _cut(inputs: Inputs, applied: Sequence[Applied]) -> Load:
+    cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
+    for one in applied:
+        cut = one.effect.cut(cut, inputs, one)
+    return cut
+
+
+def _sensed(load: Load, inputs: Inputs, applied: Sequence[Applied]) -> Load:
+    for one in applied:
+        load = one.effect.sensor(load, inputs, one)
+    return load
+
+
+def _stated(signals: Signals, applied: Sequence[Applied]) -> Signals:
     for one in applied:
         signals = one.effect.instruments(signals, one)
     return signals
@@ -112,8 +154,10 @@ def _pose(
     for one in applied:
         softness = softness if softness is None else one.effect.softness(softness, inputs, one)
         lengths_mm = one.effect.geometry(lengths_mm, inputs, one)
-    if q_true is inputs.q_cmd_rad and load[0] is inputs.force_base_N and softness is inputs.softness:
-        deflection = inputs.deflection_mm
+    plain_N = inputs.force_base_N if inputs.load_base_N is None else inputs.load_base_N
+    plain = load[0] is plain_N and load[1] is inputs.moment_base_Nmm
+    if plain and q_true is inputs.joints_rad and softness is inputs.softness:
+        deflection = inputs.bent_mm
     else:
         deflection, _ = arm.bend(q_true, *load, softness, inputs.cell, inputs.tool)
     turns = [one for one in applied if type(one.effect).elastic is not Effect.elastic]
@@ -123,9 +167,10 @@ def _pose(
         for one in turns:
             angle = one.effect.elastic(angle, torque, inputs, one)
         q_true = q_true + angle
-    tip = inputs.position_mm
-    if q_true is not inputs.q_cmd_rad or lengths_mm is not inputs.lengths_mm:
-        tip = tip + (arm.tip_mm(q_true, lengths_mm, inputs.cell, inputs.tool) - inputs._rigid_tip_mm)
+    if q_true is inputs.joints_rad and lengths_mm is inputs.lengths_mm:
+        tip = inputs.tip_mm
+    else:
+        tip = inputs.rigid_tip_mm(q_true, lengths_mm)
     tcp = tip + deflection
     for one in applied:
         tcp = one.effect.yielding(tcp, cutting, inputs, one)

@@ -125,11 +125,26 @@ class Inputs:
         """(10, 3) of the virtual joints in rad/(N·mm); None where the cell does not state all."""
         return arm.softness_of(self.cell)
 
+    @property
+    def joints_rad(self) -> Floats:
+        """(m, 6) the joints from which the tip follows: the last that were measured, else the commanded."""
+        measured = self.q_act_rad if self.q_load_rad is None else self.q_load_rad
+        return self.q_cmd_rad if measured is None else measured
+
     @cached_property
     def deflection_mm(self) -> Floats:
         """(m, 3) nominal deflection under the nominal load."""
+        if self.joints_rad is self.q_cmd_rad and self.load_base_N is None:
+            return self.bent_mm
         load = (self.force_base_N, self.moment_base_Nmm)
         return arm.bend(self.q_cmd_rad, *load, self.softness, self.cell, self.tool)[0]
+
+    @cached_property
+    def bent_mm(self) -> Floats:
+        """(m, 3) deflection at `joints_rad` under the cutting force, the measured one where there is one."""
+        force_N = self.force_base_N if self.load_base_N is None else self.load_base_N
+        load = (force_N, self.moment_base_Nmm)
+        return arm.bend(self.joints_rad, *load, self.softness, self.cell, self.tool)[0]
 
     @cached_property
     def velocity_mm_s(self) -> Floats:
@@ -142,7 +157,19 @@ class Inputs:
         return self.hours + self.time_s / S_PER_H
 
     @cached_property
-    def _rigid_tip_mm(self) -> Floats:
+    def tip_mm(self) -> Floats:
+        """(m, 3) the tip of the stiff arm in ``$BASE`` at `joints_rad`."""
+        if self.joints_rad is self.q_cmd_rad:
+            return self.position_mm
+        return self.rigid_tip_mm(self.joints_rad, self.lengths_mm)
+
+    def rigid_tip_mm(self, q_rad: Floats, lengths_mm: Floats) -> Floats:
+        """Return the tip (m, 3) of a stiff arm of these lengths: the commanded one, moved by what differs."""
+        tip_mm = arm.tip_mm(q_rad, lengths_mm, self.cell, self.tool)
+        return self.position_mm + (tip_mm - self._commanded_tip_mm)
+
+    @cached_property
+    def _commanded_tip_mm(self) -> Floats:
         return arm.tip_mm(self.q_cmd_rad, self.lengths_mm, self.cell, self.tool)
 
     @property

@@ -46,7 +46,7 @@ class EncoderInterpolation(Effect):
             high=4096.0,
             nominal=None,
             start=512.0,
-            grid=(3.0, 4.0, 256.0, 512.0, 1024.0),
+            grid=(3.0, 256.0, 512.0, 1024.0),
             minimum=0.0,
             role=Role.COUNT,
             source="resolvers have 1-4 pole pairs, optical encoders of motors 256-2048 periods a turn",

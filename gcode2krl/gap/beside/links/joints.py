@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects import Applied, Inputs, Signals
+from gcode2krl.effects import Applied, Inputs, Signals, drives
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.clocks import with_table_clock
 from gcode2krl.gap.beside.context import Context
@@ -94,6 +94,10 @@ class _DriveLink(Link):
 
     unit = "deg"
     of_joints = True
+
+    def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
+        """Return the joints and their clocks: a tip need not be computed."""
+        return drives(trace.inputs, applied)
 
     def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Let later links start from the fitted model, where it holds: encoders' noise stays out of them."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects import Applied, Inputs
+from gcode2krl.effects import Applied, Inputs, Signals, forces
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.instruments import component_columns, force_zero_columns, frame_columns
@@ -40,6 +40,10 @@ class ForceLink(Link):
             frame=head.frames.force,
             sigma=head.noise.force_N,
         )
+
+    def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
+        """Return the forces and their clock: a tip need not be computed."""
+        return forces(trace.inputs, applied)
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
         """Yield the zero and the gain of the force sensor."""

@@ -1,0 +1,197 @@
+"""Geometry, compliance and instruments at the tip: each new cause against its stated form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gcode2krl import robot
+from gcode2krl.effects import parse, simulate
+
+
+def run(inputs, known, text, **more):
+    return simulate(inputs, [parse(text, known, inputs.cell)], **more)
+
+
+def moved_by(inputs, known, text):
+    return run(inputs, known, text).tcp_base_mm - simulate(inputs).tcp_base_mm
+
+
+def tilted_tip(q, lengths, tilts):
+    """Eq. 1 of the arm, a turn written out at each axis: {joint: rotation in the frame of the link before}."""
+    a1, a2, c1, c2, c3, c4 = lengths
+    ways = ([0, 0, 0], [a1, 0, c1], [c2, 0, 0], [c3, 0, -a2], [0, 0, 0], [0, 0, 0])
+    axes = ("z", "y", "y", "x", "y", "x")
+    signs = (-1, 1, 1, -1, 1, -1)
+    place, turn = np.zeros(3), Rotation.identity()
+    for joint in range(6):
+        place = place + turn.apply(ways[joint])
+        turn = turn * tilts.get(joint, Rotation.identity())
+        turn = turn * Rotation.from_euler(axes[joint], signs[joint] * q[joint])
+    return place, turn, c4
+
+
+@pytest.mark.parametrize("joint", [1, 2, 3, 4, 5])
+def test_an_axis_is_tilted_at_right_angles_to_itself_and_the_one_before(swinging, known, joint):
+    """The same arm, multiplied out with a turn at that axis."""
+    cell, angle = swinging.cell, 0.8e-3
+    signals = run(swinging, known, f"axis_parallelism:target=A{joint + 1},mrad=0.8")
+    moved = signals.tcp_base_mm - simulate(swinging).tcp_base_mm
+    assert np.abs(moved).max() > 0.02
+    tool, to_base = cell.tool_matrix(1), np.linalg.inv(cell.base_matrix())
+    lengths = cell.robot.geometry.array()
+    for row in (0, 400, 1200):
+        q = swinging.q_cmd_rad[row]
+        # along the axes of the link before: -z x y, upper arm x y, y x -x, -x x y, y x -x
+        lines = {1: [1, 0, 0], 2: [0, 0, 1], 3: [0, 0, 1], 4: [0, 0, -1], 5: [0, 0, 1]}
+        tilt = {joint: Rotation.from_rotvec(angle * np.array(lines[joint]))}
+        tips = []
+        for tilts in (tilt, {}):
+            place, turn, c4 = tilted_tip(q, lengths, tilts)
+            flange = turn * Rotation.from_euler("y", np.pi / 2)
+            root = place + turn.apply([c4, 0, 0]) + flange.apply(tool[:3, 3])
+            tips.append(to_base[:3, :3] @ root + to_base[:3, 3])
+        # the deflection turns along: a thousandth of it
+        np.testing.assert_allclose(moved[row], tips[0] - tips[1], atol=1e-3)
+
+
+def test_a_tilted_axis_turns_the_tool_by_its_angle(swinging, known):
+    before = Rotation.from_quat(simulate(swinging, rotation=True).tcp_rotation)
+    signals = run(swinging, known, "axis_parallelism:target=A3,mrad=1.5", rotation=True)
+    turned = (Rotation.from_quat(signals.tcp_rotation) * before.inv()).magnitude()
+    np.testing.assert_allclose(turned, 1.5e-3, rtol=1e-6)
+
+
+def test_a_cutter_is_a_cantilever(swinging, known):
+    moved = moved_by(swinging, known, "cutter_bending:um_per_N=1.4")
+    axis = swinging.tool_rotation[:, :, 2]
+    np.testing.assert_allclose(np.sum(moved * axis, axis=1), 0.0, atol=1e-9)
+    lateral = np.cross(axis, np.cross(swinging.force_base_N, axis))
+    np.testing.assert_allclose(moved, 1.4e-3 * lateral, atol=1e-9)
+    signals = run(swinging, known, "cutter_bending:um_per_N=1.4")
+    np.testing.assert_array_equal(signals.q_true_rad, swinging.q_cmd_rad)
+
+
+def test_a_cutter_bends_under_the_measured_force_where_the_arm_does(swinging, known):
+    measured = replace(swinging, load_base_N=2.0 * swinging.force_base_N)
+    np.testing.assert_allclose(
+        moved_by(measured, known, "cutter_bending:um_per_N=1"),
+        2.0 * moved_by(swinging, known, "cutter_bending:um_per_N=1"),
+        atol=1e-9,
+    )
+
+
+def test_a_payload_does_not_bend_the_cutter(swinging, known):
+    texts = ("gravity:payload_kg=30", "cutter_bending:um_per_N=1")
+    both = simulate(swinging, [parse(text, known, swinging.cell) for text in texts]).tcp_base_mm
+    alone = sum(moved_by(swinging, known, text) for text in texts)
+    np.testing.assert_allclose(both - simulate(swinging).tcp_base_mm, alone, atol=1e-9)
+
+
+def test_a_yielding_part_shows_in_the_part_alone(swinging, known):
+    signals = run(swinging, known, "fixture_compliance:um_per_N=0.5/1/2")
+    np.testing.assert_array_equal(signals.tcp_base_mm, simulate(swinging).tcp_base_mm)
+    # pushed to +x by the part, the tool pushes the part to -x: on the part it is further towards +x
+    np.testing.assert_allclose(
+        signals.tip_on_part_mm - signals.tcp_base_mm,
+        swinging.force_base_N * [0.5e-3, 1e-3, 2e-3],
+        atol=1e-12,
+    )
+    np.testing.assert_array_equal(simulate(swinging).tip_on_part_mm, simulate(swinging).tcp_base_mm)
+
+
+def test_a_pedestal_tilts_by_the_moment_about_its_foot(swinging, known):
+    moved = moved_by(swinging, known, "pedestal_compliance:mrad_per_kNm=0.05")
+    foot = np.linalg.inv(swinging.cell.base_matrix())[:3, 3]
+    lever, force = swinging.position_mm - foot, swinging.force_base_N
+    moment = np.cross(lever, force) + swinging.moment_base_Nmm
+    arms = swinging.bodies.centre_mm - foot
+    moment += np.cross(arms, swinging.bodies_push_N).sum(axis=1)
+    turn = Rotation.from_rotvec(0.05e-3 / 1e6 * moment * [1.0, 1.0, 0.0])
+    np.testing.assert_allclose(moved, turn.apply(lever) - lever, atol=1e-4)
+    assert np.ptp(moved, axis=0).max() > 0.01
+
+
+def test_weight_does_not_turn_a_pedestal_about_the_vertical(swinging, known):
+    pushed = replace(swinging, force_base_N=np.zeros_like(swinging.force_base_N))
+    pushed = replace(pushed, moment_base_Nmm=np.tile([0.0, 0.0, 1e6], (len(swinging), 1)))
+    free = replace(pushed, moment_base_Nmm=np.zeros_like(swinging.force_base_N))
+    text = "pedestal_compliance:mrad_per_kNm=0.05"
+    np.testing.assert_allclose(moved_by(pushed, known, text), moved_by(free, known, text), atol=1e-9)
+
+
+def test_a_spindle_grows_from_nothing_in_every_run(swinging, known):
+    text = "spindle_growth:um_per_krpm=4,time_constant_s=6"
+    krpm = 1000.0 * 60.0 / (2.0 * np.pi) / 1000.0
+    t = swinging.time_s
+    for hours in (0.0, 2.0):
+        moved = moved_by(replace(swinging, hours=hours), known, text)
+        out = -np.sum(moved * swinging.tool_rotation[:, :, 2], axis=1)
+        np.testing.assert_allclose(out, 4e-3 * krpm * (1.0 - np.exp(-t / 6.0)), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), np.abs(out), atol=1e-9)
+
+
+def test_a_spindle_that_starts_later_grows_later(swinging, known):
+    on = np.where(swinging.time_s < 5.0, 0.0, 1000.0)
+    moved = moved_by(
+        replace(swinging, spindle_rad_s=on), known, "spindle_growth:um_per_krpm=4,time_constant_s=6"
+    )
+    out = -np.sum(moved * swinging.tool_rotation[:, :, 2], axis=1)
+    assert not out[swinging.time_s < 4.98].any()
+    krpm = 1000.0 * 60.0 / (2.0 * np.pi) / 1000.0
+    assert out[-1] == pytest.approx(
+        4e-3 * krpm * (1.0 - np.exp(-(swinging.time_s[-1] - 5.0) / 6.0)), rel=2e-3
+    )
+
+
+def test_a_tracker_drifts_and_the_part_does_not(swinging, known):
+    later = replace(swinging, hours=1.5)
+    moved = moved_by(later, known, "tracker_drift:mm_per_h=0.04,direction=0/0/-2")
+    hours = 1.5 + swinging.time_s / 3600.0
+    np.testing.assert_allclose(moved, 0.04 * hours[:, None] * [0.0, 0.0, -1.0], atol=1e-9)
+    effect = known["tracker_drift"]
+    assert effect.visible_links(frozenset({"mechanics", "part"})) == {"mechanics"}
+    assert effect.visible_links(frozenset({"part"})) == frozenset()
+    assert effect.learned(parse("tracker_drift:mm_per_h=0.04", known, swinging.cell), "mechanics") is None
+
+
+def test_a_beam_bends_towards_the_cold_air(swinging, known):
+    """By Snell's law in layers of air, integrated from the tracker: the ray to where the tip seems to be."""
+    up = -swinging.gravity
+    np.testing.assert_allclose(up, [0.0, 0.0, 1.0], atol=1e-12)
+    moved = moved_by(swinging, known, "tracker_refraction:K_per_m=8,tracker_x_m=9,tracker_y_m=-2")
+    assert not moved[:, :2].any()
+    away_m = np.hypot(*(swinging.position_mm[:, :2] / 1000.0 - [9.0, -2.0]).T)
+    row = 300
+    slope = -0.93e-6 * 8.0  # dn/dz
+    z, dz, step = 0.0, 0.0, away_m[row] / 20000
+    for _ in range(20000):  # eikonal equation of a nearly level ray: z'' = dn/dz / n
+        dz += slope / 1.00027 * step
+        z += dz * step
+    # a ray that leaves level arrives lower by -z: seen along its end, the tip is too high by as much
+    assert moved[row, 2] == pytest.approx(-z * 1000.0, rel=1e-3)
+    assert moved[row, 2] == pytest.approx(away_m[row] ** 2 / 2 * 0.93e-6 * 8.0 * 1000.0, rel=1e-9)
+
+
+def test_a_cable_pulls_with_the_travel_of_its_joint(swinging, known):
+    signals = run(swinging, known, "cable_pull:target=A1,N_per_deg=0.6,direction=0/-1/0")
+    pull = signals.force_meas_base_N - swinging.force_base_N
+    along = np.einsum("nji,nj->ni", swinging.sensor_rotation, pull)
+    travel = np.degrees(swinging.q_cmd_rad[:, 0] - swinging.q_cmd_rad[0, 0])
+    np.testing.assert_allclose(along[:, 1], -0.6 * travel, atol=1e-9)
+    np.testing.assert_allclose(along[:, [0, 2]], 0.0, atol=1e-9)
+    assert not pull[0].any()
+    np.testing.assert_array_equal(signals.tcp_base_mm, simulate(swinging).tcp_base_mm)
+
+
+def test_axes_are_where_the_kinematics_have_them(swinging):
+    """A turn about an axis leaves its own point where it is: the tip's way is a cross product."""
+    step = 1e-6
+    for joint in range(6):
+        q = np.array(swinging.q_cmd_rad)
+        q[:, joint] += step
+        way = (robot.forward(q, swinging.cell)[0] - swinging.position_mm) / step
+        along = swinging.jacobian[:, 3:, joint]
+        lever = swinging.position_mm - swinging.axes_mm[:, joint]
+        np.testing.assert_allclose(np.cross(along, lever), way, atol=2e-2)
