@@ -1,8 +1,8 @@
 """Real data that a person has fetched, diagnosed: docs/real_data.md says what is expected of them.
 
 ``python benchmarks/gap_real.py FOLDER`` with FOLDER a copy of JonasWeigand/Robot_Identification on GitHub
-(MIT): three logs of a KUKA KR 300 R2500 ultra. Its files become run folders, which are diagnosed from the log alone;
-what is measured is printed beside what was expected. ``--runs DIR`` keeps the run folders.
+(MIT): three logs of a KUKA KR 300 R2500 ultra. Its files become run folders, which are diagnosed from the log
+alone; what is measured is printed beside what was expected. ``--runs DIR`` keeps the run folders.
 """
 
 import argparse
@@ -28,6 +28,7 @@ PLAY_DEG = 0.06
 EXPECTED_LATE_MS = (2.3, 3.6)
 EXPECTED_INTERVAL_MS = 0.5
 CARRIED_SLACK = 0.05
+CONSTANT_P = 0.01
 TORQUE_UNIT_NM = 10.0
 PLAYS = (0.1, 0.3, 0.6)
 """Half-widths of the memory in torque, in units of it: a tenth to more than half of its amplitude."""
@@ -152,7 +153,11 @@ def rows(logs: Sequence[Log], parent: Path) -> Iterator[Row]:
         name = some[0].name if len(some) == 1 else "all together"
         yield _clock_row(name, gap)
         late_s = next((c.parameters["offset_s"].value for c in gap.named_causes if _is_clock(c)), late_s)
+    yield _one_number_row(logs, gap)
     yield from _torque_rows(logs, late_s)
+    for each in gap.unexplained.depends_on:
+        words = f"{each.at} on {each.on}, {each.form}, share {each.share:.2f}, p {each.probability:.2f}"
+        yield Row("the rest, by the diagnosis", "own torque at A3 and A2", words, each.on == "own torque")
     gap = diagnosed([with_play(log, 1, PLAY_DEG) for log in logs], parent / "play")
     yield _play_row(gap)
     yield _null_row(diagnosed([without_gap(log, seed) for seed, log in enumerate(logs)], parent / "null"))
@@ -175,6 +180,25 @@ def _clock_row(name: str, gap: Gap) -> Row:
         words += f", inconstancy {clock.constant.inconstancy:.3f} (p {clock.constant.p:.2f})"
     words += f"; {gap.verdict}: {_names(gap)}"
     return Row(f"clock, {name}", expected, words, low <= value <= high and width <= EXPECTED_INTERVAL_MS)
+
+
+def least_squares_late_ms(log: Log, joint: int) -> float:
+    """Return by how much a load encoder is late by plain least squares on the motor's rate."""
+    rate = CubicSpline(log.time_s, log.q_act_deg[:, joint])(log.time_s, 1)
+    difference = log.q_load_deg[:, joint] - log.q_act_deg[:, joint]
+    rate, difference = rate - rate.mean(), difference - difference.mean()
+    return float(-1e3 * (rate @ difference) / (rate @ rate))
+
+
+def _one_number_row(logs: Sequence[Log], gap: Gap) -> Row:
+    expected = "one number for A1 to A3 in all runs"
+    found = next((cause.constant for cause in gap.named_causes if _is_clock(cause)), None)
+    each = [[least_squares_late_ms(log, joint) for joint in range(LOAD_ENCODERS)] for log in logs]
+    words = "; ".join(" ".join(f"{late:.2f}" for late in joints) for joints in each)
+    if found is None:
+        return Row("clock, joint by joint", expected, f"no clock was found; least squares {words} ms", False)
+    measured = f"inconstancy {found.inconstancy:.3f}, p {found.p:.2f}; least squares {words} ms"
+    return Row("clock, joint by joint", expected, measured, found.p > CONSTANT_P)
 
 
 def _names(gap: Gap) -> str:

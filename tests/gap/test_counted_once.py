@@ -9,6 +9,8 @@ from gcode2krl.effects import Applied, library
 from gcode2krl.gap.choose.mismatch import within_mismatch
 from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
+from gcode2krl.gap.fit.counted_once import CountedOnce
+from gcode2krl.gap.fit.design import NuisanceDesign
 from gcode2krl.gap.fit.signatures import Signatures, blocks_of
 from tests.gap.constructed import LINK, columns_nuisance, likelihood, motion, noise, question, trace
 
@@ -72,3 +74,25 @@ def test_nuisance_that_all_runs_share_goes_while_its_effect_is_in_the_model():
     assert abs(made.nuisance_of(flat)[0]) > 0.5
     assert made.nuisance_of(flat, beside)[0] == 0.0
     assert made.nuisance_of(flat, [Applied(play, "A2", {"gap_deg": 0.0})])[0] != 0.0
+
+
+def test_of_nuisance_of_the_runs_own_their_mean_goes():
+    own = [[columns_nuisance("table clock", np.ones(3), shared=False)] for _ in range(3)]
+    once = CountedOnce(NuisanceDesign.of(own), {("clock", "q_load"): np.ones(3, dtype=bool)})
+    beside = Applied(CLOCK, "q_load", {"offset_s": 1e-3, "skew": 0.0})
+    kept = once.kept([beside])
+    np.testing.assert_allclose(kept @ [1.0, 1.0, 1.0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(kept @ [1.0, -1.0, 0.0], [1.0, -1.0, 0.0])
+    assert once.kept([]) is None
+    assert once.kept([replace(beside, target="force")]) is None
+
+
+def test_a_count_of_another_number_is_another_form():
+    """The second harmonic of a gear stays usual beside the first."""
+    swing = library()["transmission"]
+    blocks = list(blocks_of(swing, "A1"))
+    own = [columns_nuisance(f"swing {n}", np.ones(3))._replace(block=each) for n, each in enumerate(blocks)]
+    once = CountedOnce(NuisanceDesign.of([own]))
+    first = blocks[0].shape["harmonic"]
+    gone = once.gone(Applied(swing, "A1", {"amplitude_deg": 0.01, "harmonic": first, "phase": 0.0}))
+    assert gone.tolist() == [each.shape["harmonic"] == first for each in blocks]

@@ -1,9 +1,9 @@
 """Mismatch is counted once: nuisance of the form of an effect gives way while the effect is in the model.
 
 Two columns of one form share a deviation in any way: a clock that is 3.07 ms late was fitted as 0.90 ms of
-the effect and 2.17 ms of nuisance, each of which looks usual. Of nuisance that all runs share
-the column goes. Of nuisance that each run has for itself what is common to all runs goes, their mean; how the
-runs differ from it stays. So the effect's number is the whole deviation.
+the effect and 2.17 ms of nuisance, each of which looks usual. Of nuisance that all runs share the column
+goes. Of nuisance that each run has for itself what is common to all runs goes, their mean; how the runs
+differ from it stays. So the effect's number is the whole deviation.
 """
 
 from collections.abc import Iterable, Mapping

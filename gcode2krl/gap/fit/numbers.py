@@ -51,7 +51,7 @@ class Free:
             sine, cosine = values[size], values[effect.phase.name]
             values[size] = math.hypot(sine, cosine)
             values[effect.phase.name] = math.atan2(cosine, sine) % RAD_PER_REV
-        return Applied(effect, self.target, values)
+        return Applied(effect, self.target, values, held=self.held)
 
     def start(self, applied: Applied) -> Floats:
         """Return the numbers of an effect."""
