@@ -5,7 +5,7 @@ screw (direction, point) of that pose, every virtual joint an origin with three 
 Angles carry the controller's signs because the directions of A1, A4 and A6 point the other way.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -13,6 +13,7 @@ from numba import njit
 from tests.plant.scene import Frame, World
 
 X, Y, Z = np.eye(3)
+ELBOW = 2  # row of A3
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,29 @@ def reference_pose(world: World, tool: Frame | None = None) -> Arm:
         np.array(hinges),
         np.array(axes),
         np.array([1, 2, 2, 3, 3, 4, 5, 6, 6, 6]),
+    )
+
+
+def crooked(arm: Arm, joint: int, turn: np.ndarray) -> Arm:
+    """The arm with all that lies behind a joint's seat turned about its point; `turn` is a rotation."""
+    point = arm.points_mm[joint]
+
+    def moved(points: np.ndarray) -> np.ndarray:
+        return (points - point) @ turn.T + point
+
+    behind = arm.hinge_after > joint
+    axes, hinges = arm.hinge_axes.copy(), arm.hinges_mm.copy()
+    axes[behind], hinges[behind] = turn @ axes[behind], moved(hinges[behind])
+    screws, points = arm.screws.copy(), arm.points_mm.copy()
+    screws[joint:], points[joint:] = screws[joint:] @ turn.T, moved(points[joint:])
+    return replace(
+        arm,
+        screws=screws,
+        points_mm=points,
+        tcp_mm=moved(arm.tcp_mm),
+        tcp_axes=turn @ arm.tcp_axes,
+        hinges_mm=hinges,
+        hinge_axes=axes,
     )
 
 

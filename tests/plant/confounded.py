@@ -72,4 +72,28 @@ PAIRS = {
         "at one orientation the hose's first term is a constant force in the sensor",
         ("orientation",),
     ),
+    "thermal_or_tracker_drift": Pair(
+        "tracker_drift",
+        (("tracker_drift", None), ("thermal", None)),
+        "a straight creep over hours is the beginning of any warming",
+        ("dwell",),
+    ),
+    "cutter_or_fixture": Pair(
+        "cutter_bending",
+        (("cutter_bending", None), ("fixture_compliance", None)),
+        "a fixture as soft in x as in y moves the tip against it as a soft shank does",
+        ("weights",),
+    ),
+    "refraction_or_base": Pair(
+        "tracker_refraction",
+        (
+            ("tracker_refraction", None),
+            ("base_frame", None),
+            ("tool_frame", None),
+            ("link_length", "c1"),
+            ("link_length", "c4"),
+        ),
+        "over a small work the bend of the beam is a lift and a tilt",
+        ("circle",),
+    ),
 }

@@ -38,7 +38,7 @@ class Fault:
     @property
     def depends(self) -> Depends:
         """On what this form depends."""
-        return self.kind.depends_of(self.form)
+        return self.kind.depends_of(self.form, self.target)
 
 
 def find(name: str) -> Kind:

@@ -10,6 +10,7 @@ from tests.plant.instruments import Instruments
 from tests.plant.plans import Plan
 from tests.plant.robot import Run
 
+MANY_JOINTS = {"wrist_coupling": ("A5", "A6"), "axis_parallelism": ("A2", "A3")}
 SCHEMA = "plant/label/2"
 
 
@@ -114,8 +115,8 @@ def _entry(fault: Fault, size: float, changes: list[dict], how: Instruments) -> 
 
 def _joints(fault: Fault) -> list[str]:
     """Joints that an effect acts in."""
-    if fault.kind.name == "wrist_coupling":
-        return ["A5", "A6"]
+    if fault.kind.name in MANY_JOINTS:
+        return list(MANY_JOINTS[fault.kind.name])
     return [fault.target] if fault.target in ("A1", "A2", "A3", "A4", "A5", "A6") else []
 
 

@@ -98,7 +98,7 @@ def _hang(program: Program):
     """Known masses on the tool, as forces and moments at the TCP."""
 
     def load(run: Run) -> None:
-        arm, elapsed_s = arms.reference_pose(run.world), run.elapsed_s[::SLOW]
+        arm, elapsed_s = run.body(), run.elapsed_s[::SLOW]
         axes = arms.pose(arm, np.ascontiguousarray(run.q_load[::SLOW]))[1]
         for weight in program.weights:
             on = (elapsed_s >= weight.from_s) & (elapsed_s < weight.to_s)

@@ -58,9 +58,17 @@ class Run:
         self.jumps = {}  # table -> (time, seconds)
         self.units = {}
         self.depth_taper_mm = 0.0
+        self.reshape: list = []  # Arm -> Arm: what is crooked in the arm's reference pose
         self.axes = None  # of the tool in `$BASE` where it is not upright
         self.pauses = ()  # of a long dwell: when, and the seconds that are not simulated
         self.spindle = ()  # from second, rpm; else as the world's cutter
+
+    def body(self) -> arms.Arm:
+        """The true arm."""
+        arm = arms.reference_pose(self.world)
+        for change in self.reshape:
+            arm = change(arm)
+        return arm
 
     def delay(self, table: str, offset_s: float, skew: float = 0.0) -> None:
         """Add an offset and a skew to a table's clock."""
@@ -205,7 +213,7 @@ def _weight(run: Run, arm, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _structure(run: Run) -> None:
-    arm = arms.reference_pose(run.world)
+    arm = run.body()
     run.arm = arm
     q_true = run.q_load + run.zero_rad
     slow = np.ascontiguousarray(q_true[::SLOW])
@@ -224,7 +232,7 @@ def _structure(run: Run) -> None:
 
 def joint_torques(run: Run) -> np.ndarray:
     """Moments about the six joints by the cut, the controller's sign, N·mm, at the slow samples."""
-    arm = arms.reference_pose(run.world)
+    arm = run.body()
     slow = np.ascontiguousarray(run.q_load[::SLOW])
     turning = arms.torques(arm, slow, run.force_N, run.moment_Nmm)
     return turning[:, JOINT_ROW, 2] * SIGN

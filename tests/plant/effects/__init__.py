@@ -1,7 +1,18 @@
 """Every effect the plant can have, in three shelves: of the library, of no library, slips of the set-up."""
 
-from tests.plant.effects import body, forces, joints, slips, timing, unknown
+from tests.plant.effects import (
+    body,
+    forces,
+    joints,
+    readings,
+    slips,
+    steps,
+    structure,
+    surroundings,
+    timing,
+)
+from tests.plant.effects import open as open_
 from tests.plant.effects.registry import LIBRARY, SLIPS, UNKNOWN, Draw, Kind
 
 __all__ = ["LIBRARY", "SLIPS", "UNKNOWN", "Draw", "Kind"]
-SHELVES = (body, forces, joints, slips, timing, unknown)
+SHELVES = (body, forces, joints, readings, slips, steps, structure, surroundings, timing, *open_.FILES)

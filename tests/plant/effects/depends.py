@@ -1,5 +1,6 @@
 """On what an effect truly depends: where it acts, on which inputs, in what form, and which links see it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 WHERE = ("tip", "joint", "force", "clock", "part")
@@ -71,9 +72,16 @@ def timing(form: str, *on: str) -> Depends:
 
 
 TORQUE = joint("smooth", "own_torque", "force", links=("mechanics",))
+
+
+def by_spring(target: str | None) -> Depends:
+    """A joint's spring feels the joint's torque; one that is no joint's, the force at the tip."""
+    return TORQUE if target is not None and target[0] == "A" else tip("smooth", "force")
+
+
 FRAME = tip("smooth", "place", "constant")
 
-LIBRARY_DEPENDS = {
+LIBRARY_DEPENDS: dict[str, Depends | Callable[[str | None], Depends]] = {
     "clock": Depends("clock", ("velocity",), "smooth", ("timing", "servo", "gear", "force", "mechanics")),
     "velocity_rule": timing("smooth", "acceleration"),
     "corner": timing("smooth", "acceleration", "place"),
@@ -88,7 +96,7 @@ LIBRARY_DEPENDS = {
     "base_frame": FRAME,
     "tool_frame": FRAME,
     "thermal": tip("drift", "wall_clock", "time_smooth"),
-    "stiffness": TORQUE,
+    "stiffness": by_spring,
     "nonlinear_stiffness": TORQUE,
     "hysteresis": joint("loop", "own_torque_memory", "force_memory", links=("mechanics",)),
     "gravity": tip("smooth", "place", "own_torque"),

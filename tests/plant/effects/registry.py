@@ -24,16 +24,16 @@ class Kind:
     same: Callable
     hours: bool = False  # shows only between runs that are hours apart
     all_runs: bool = False  # sized on all runs, and twice: begins late, or is not linear in its size
-    depends: Depends | None = None
+    depends: Depends | Callable[[str | None], Depends] | None = None  # or by the target
     others: list = field(default_factory=list)
     others_depend: dict = field(default_factory=dict)
 
-    def depends_of(self, form: str) -> Depends:
+    def depends_of(self, form: str, target: str | None) -> Depends:
         """On what a form depends: as the kind unless it says otherwise."""
         own = self.others_depend.get(form) or self.depends or LIBRARY_DEPENDS.get(self.name)
         if own is None:
             raise ValueError(f"{self.name} does not say on what it depends")
-        return own
+        return own if isinstance(own, Depends) else own(target)
 
 
 LIBRARY: dict[str, Kind] = {}
@@ -51,7 +51,7 @@ def declare(
     needs=(),
     hours=False,
     all_runs=False,
-    depends: Depends | None = None,
+    depends: Depends | Callable[[str | None], Depends] | None = None,
 ):
     """Put a builder on a shelf under its own name; sizes from `low` to `high` are plausible."""
 

@@ -1,0 +1,210 @@
+"""Spindle, tracker and cables: what warms, wanders and pulls beside the arm."""
+
+import numpy as np
+
+from tests.plant import memory
+from tests.plant.effects.depends import force as force_
+from tests.plant.effects.depends import tip as tip_
+from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.robot import SLOW, Run
+from tests.plant.scene import DEGREE
+
+RATED_rad_s = 13000.0 * np.pi / 30.0
+
+
+def grown(run: Run, constant_s: float) -> np.ndarray:
+    """Warming of a spindle that was cold at the start, 1 in the end at rated speed; loss with speed².
+
+    dx/dt = ((speed/rated)² - x) / T, exact over stretches of one speed.
+    """
+    drive = (run.spindle_rad_s / RATED_rad_s) ** 2
+    out, now, begin = np.empty(len(drive)), 0.0, 0
+    for end in [*(np.flatnonzero(np.diff(drive)) + 1), len(drive)]:
+        since = run.elapsed_s[begin:end] - run.elapsed_s[begin]
+        out[begin:end] = drive[begin] + (now - drive[begin]) * np.exp(-since / constant_s)
+        if end < len(drive):
+            whole = run.elapsed_s[end] - run.elapsed_s[begin]
+            now = drive[begin] + (now - drive[begin]) * np.exp(-whole / constant_s)
+        begin = end
+    return out
+
+
+def _out(run: Run) -> np.ndarray:
+    """Unit vectors out of the spindle along the tool, in `$BASE`."""
+    return -run.tip_axes[:, :, 2]
+
+
+GROWTH = tip_("drift", "time_since_start", "spindle_speed")
+
+
+@declare(LIBRARY, "geometry", 0.004, 0.6, signal="tcp", all_runs=True, depends=GROWTH)
+def spindle_growth(draw: Draw):
+    """`size` in mm along the tool in the end at 13000 rpm; from 0 at each start of the spindle."""
+    constant_s = draw.log_uniform(2.0, 12.0)
+
+    def at(size):
+        def tip(run: Run):
+            run.tip_mm = run.tip_mm + size * grown(run, constant_s)[:, None] * _out(run)
+
+        return numbers(mm=size, time_constant_s=constant_s), {"tip": tip}
+
+    return None, at
+
+
+@other_form("spindle_growth")
+def spindle_growth_of_two(draw: Draw):
+    """Shaft and housing warm with a time each."""
+    quick_s, late_s, share = draw.log_uniform(1.0, 4.0), draw.log_uniform(10.0, 40.0), draw.uniform(0.3, 0.7)
+
+    def at(size):
+        def tip(run: Run):
+            both = share * grown(run, quick_s) + (1.0 - share) * grown(run, late_s)
+            run.tip_mm = run.tip_mm + size * both[:, None] * _out(run)
+
+        values = numbers(mm=size, time_constant_s=quick_s, second_s=late_s, first_share=share)
+        return values, {"tip": tip}
+
+    return None, at
+
+
+def _hours(run: Run) -> np.ndarray:
+    return ((run.age_s + run.elapsed_s) / 3600.0)[:, None]
+
+
+DRIFT = tip_("drift", "wall_clock", "time_smooth")
+
+
+@declare(LIBRARY, "sensor", 0.005, 1.5, signal="tcp", hours=True, all_runs=True, depends=DRIFT)
+def tracker_drift(draw: Draw):
+    """The tracker's stand creeps by `size` in mm an hour from the first run's start."""
+    way = draw.direction()
+
+    def at(size):
+        def tip(run: Run):
+            run.tip_mm = run.tip_mm + size * _hours(run) * way
+
+        return numbers(mm_per_h=size, direction=way), {"tip": tip}
+
+    return None, at
+
+
+@other_form("tracker_drift")
+def tracker_drift_with_the_heating(draw: Draw):
+    """The creep swings with the hall's heating and turns the tracker a little about its stand."""
+    way, turn, period_h = draw.direction(), draw.direction() * 1e-4, draw.uniform(0.5, 1.5)
+    stand = draw.rng.uniform([-3500.0, -3500.0, -200.0], [-2000.0, 3500.0, 800.0])
+
+    def at(size):
+        def tip(run: Run):
+            hours = _hours(run)
+            gone = hours + 0.3 * period_h * np.sin(2.0 * np.pi * hours / period_h)
+            turned = np.cross(turn, run.tip_mm - stand)
+            run.tip_mm = run.tip_mm + size * gone * (way + turned)
+
+        return numbers(mm_per_h=size, direction=way, period_h=period_h), {"tip": tip}
+
+    return None, at
+
+
+AIR = tip_("smooth", "place", "constant")
+STAND_mm = np.array([[-2200.0, -1800.0, -200.0], [-1200.0, 1800.0, 900.0]])
+
+
+def _beam(run: Run, stand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of the beam and its length over 2 m, (n, 1)."""
+    beam = run.tip_mm - stand
+    reach = np.linalg.norm(beam, axis=1, keepdims=True)
+    return beam / reach, reach / 2000.0
+
+
+@declare(LIBRARY, "sensor", 0.004, 2.0, signal="tcp", all_runs=True, depends=AIR)
+def tracker_refraction(draw: Draw):
+    """Warm air above cold bends the beam upwards by `size` mm at 2 m, with the square of its length.
+
+    Rays bend towards the denser air: sag = grad(n)·L²/2, grad(n) = -0.93e-6 per kelvin times the gradient.
+    """
+    stand = draw.rng.uniform(*STAND_mm)
+
+    def at(size):
+        def tip(run: Run):
+            _, reach = _beam(run, stand)
+            run.tip_mm = run.tip_mm + size * reach**2 * np.array([0.0, 0.0, 1.0])
+
+        return numbers(mm_at_2m=size, stand_mm=stand), {"tip": tip}
+
+    return None, at
+
+
+@other_form("tracker_refraction", tip_("smooth", "time_smooth", "place"))
+def tracker_refraction_that_wanders(draw: Draw):
+    """The air moves: slow errors across the beam in both directions."""
+    stand, hz = draw.rng.uniform(*STAND_mm), draw.uniform(0.08, 0.4)
+    phase = draw.rng.uniform(0.0, 2.0 * np.pi, 2)
+
+    def at(size):
+        def tip(run: Run):
+            beam, reach = _beam(run, stand)
+            up = np.array([0.0, 0.0, 1.0])
+            swing = [np.sin(2.0 * np.pi * hz * (1.0 + 0.37 * i) * run.t_s + phase[i]) for i in (0, 1)]
+            bent = swing[0][:, None] * np.cross(beam, up) + (0.5 + swing[1])[:, None] * up
+            run.tip_mm = run.tip_mm + size * reach**2 * bent
+
+        return numbers(mm_at_2m=size, stand_mm=stand, hz=hz), {"tip": tip}
+
+    return None, at
+
+
+PULL = force_("smooth", "travel", "own_angle", links=("force", "mechanics"))
+
+
+def _pulling(j: int, way: np.ndarray, law) -> dict:
+    """A force on the tool by the travel of a joint since the start, `law(travel in deg)` in N."""
+
+    def load(run: Run):
+        travel = (run.q_load[::SLOW, j] - run.q_load[0, j]) / DEGREE
+        run.force_N = run.force_N + law(travel)[:, None] * way
+
+    return {"load": load}
+
+
+@declare(LIBRARY, "force", 0.02, 60.0, signal="force", all_runs=True, depends=PULL)
+def cable_pull(draw: Draw):
+    """A cable drum or hose pulls at the tool with the travel of a joint, `size` in N per degree."""
+    name, j = draw.joint()
+    way = draw.direction()
+
+    def at(size):
+        return numbers(N_per_deg=size, direction=way), _pulling(j, way, lambda travel: size * travel)
+
+    return name, at
+
+
+@other_form("cable_pull", force_("loop", "travel", "own_angle", "reversals", links=("force", "mechanics")))
+def cable_pull_that_rubs(draw: Draw):
+    """The cable drags in its guide: a loop over the travel."""
+    name, j = draw.joint()
+    way, share = draw.direction(), draw.uniform(0.15, 0.35)
+
+    def at(size):
+        def law(travel):
+            half = np.full(len(travel), share * (travel.max() - travel.min()) / 2.0)
+            return size * memory.play(travel.copy(), half, 0.0)
+
+        return numbers(N_per_deg=size, direction=way, drag_share=share), _pulling(j, way, law)
+
+    return name, at
+
+
+@other_form("cable_pull")
+def cable_pull_that_tightens(draw: Draw):
+    """A bow that straightens: the further, the harder."""
+    name, j = draw.joint()
+    way, soft_deg = draw.direction(), draw.uniform(3.0, 10.0)
+
+    def at(size):
+        def law(travel):
+            return size * travel * (0.5 + np.abs(travel) / soft_deg)
+
+        return numbers(N_per_deg=size, direction=way, soft_deg=soft_deg), _pulling(j, way, law)
+
+    return name, at
