@@ -55,7 +55,7 @@ class Case:
         return f"{self.kind}-{self.seed:05d}"
 
 
-def deletable() -> list[str]:
+def simulated() -> list[str]:
     """Return every effect of the library that the plant can do; slips are no effects of the robot."""
     return sorted(name for name, effect in library().items() if effect.kind != "slip" and name in LIBRARY)
 
@@ -65,9 +65,20 @@ def not_simulated() -> list[str]:
     return sorted(name for name, effect in library().items() if effect.kind != "slip" and name not in LIBRARY)
 
 
+def shelves() -> dict[str, list[str]]:
+    """Return what each kind takes in turn; the plant draws for kinds that are not here."""
+    return {
+        "single": simulated(),
+        "slip": sorted(SLIPS),
+        "open": [f"open:{name}" for name in sorted(set(UNKNOWN) - set(library()))],
+        "deleted": simulated(),
+        "confounded": sorted(PAIRS),
+    }
+
+
 def full_counts() -> dict[str, int]:
     """Return how many cases of each kind the whole check has."""
-    return FULL | {"deleted": DELETED_EACH * len(deletable())}
+    return FULL | {"deleted": DELETED_EACH * len(simulated())}
 
 
 def mixed(count: int) -> dict[str, int]:
@@ -88,14 +99,8 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
     Raises ValueError where a block overflows, an effect is unknown, or both sorts of seeds mix.
     """
     _check_seeds(first_seed)
-    shelves = {
-        "single": sorted(LIBRARY),
-        "slip": sorted(SLIPS),
-        "open": [f"open:{name}" for name in sorted(set(UNKNOWN) - set(library()))],
-        "deleted": deletable(),
-        "confounded": sorted(PAIRS),
-    }
-    known = {name for shelf in shelves.values() for name in shelf}
+    every = shelves()
+    known = {name for shelf in every.values() for name in shelf}
     unknown = {name.partition("@")[0] for name in effects} - known
     if unknown:
         raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.make_cases --list")
@@ -104,7 +109,7 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
         count = counts.get(kind, 0)
         if count > BLOCK:
             raise ValueError(f"{count} cases of kind {kind}: at most {BLOCK}")
-        shelf = shelves.get(kind, [])
+        shelf = every.get(kind, [])
         wanted = [name for name in effects if name.partition("@")[0] in shelf] or shelf
         cases += [_case(kind, first_seed + number * BLOCK + i, i, wanted) for i in range(count)]
     return cases

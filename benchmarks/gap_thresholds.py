@@ -19,7 +19,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from gap_blind_cases import NULLS, ROOT, SCORED_FROM, plan, predictions
+import numpy as np
+from gap_blind_cases import NULLS, ROOT, SCORED_FROM, plan, predictions, shelves
 from gap_blind_figures import rate
 from gap_blind_print import table
 from gap_blind_run import fingerprint, made
@@ -70,7 +71,9 @@ def make(folder: Path, count: int, seed: int) -> None:
         raise ValueError(
             f"seed {seed}: from {SCORED_FROM} on cases are scored; thresholds are never set on them"
         )
-    cases = plan(seed, {kind: max(1, round(share * count)) for kind, share in KINDS.items()})
+    counts = {kind: max(1, round(share * count)) for kind, share in KINDS.items()}
+    names = sorted({name for shelf in shelves().values() for name in shelf})
+    cases = plan(seed, counts, np.random.default_rng(seed).permutation(names).tolist())
     places = predictions(folder / "predictions")
     for case in cases:
         if _label_file(folder, case.name).exists():
