@@ -3,8 +3,8 @@
 A gap without a name is described by them too, so that it can be compared with effects.
 
 An effect that states several places or inputs is a function of any of them or of all together: its family has
-a member for each pair of a place and an input, and the effect's own form, which may join them, is one more. An
-effect at a joint has the families of that joint only.
+a member for each pair of a place and an input, and the effect's own form, which may join them, is one more.
+An effect at a joint has the families of that joint only.
 """
 
 from enum import Enum

@@ -71,15 +71,15 @@ class FamilyTests:
     def weight(self) -> float:
         """Return what the probability of the cause is multiplied by, 0 to 1.
 
-        The product of three logistic steps, each 0.5 at the limit of its test and not above 1/2 of what is
-        certain beyond it; a calibrated table replaces it.
+        The least of three ramps, each a half at the limit of its test and 0 and 1 two widths before and
+        beyond it: monotone in every number. It is no probability yet; a calibrated table takes its place.
         """
         steps = (
             (self.margin + _LIMITS.alike_nats) / _LIMITS.margin_width,
             (self.form_ratio - _LIMITS.form_ratio) / _LIMITS.ratio_width,
             (_LIMITS.other_share - self.other_share) / _LIMITS.share_width,
         )
-        return float(np.prod([1.0 / (1.0 + np.exp(-np.clip(step, -30.0, 30.0))) for step in steps]))
+        return float(np.clip(0.5 + min(steps) / 4.0, 0.0, 1.0))
 
 
 def net_gain(evidence: Evidence) -> float:
@@ -133,9 +133,8 @@ class LinkFamilies:
         numbers = found.cause_numbers
         outs = [self._without((number,)) for number in numbers]
         everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
-        largest = max((net_gain(each) for each in everything.evidences), default=0.0)
-        explained = self._without(numbers).chi2 - self._whole.chi2 if numbers else 0.0
-        self.rest = Rest(everything, explained + largest, len(self._rows))
+        self._bare = self._without(numbers)
+        self.rest = Rest(everything, self._gap_gain(everything.evidences, None), len(self._rows))
         """Beside all accepted effects."""
         self.tests = tuple(
             self._tests(number, out, study)
@@ -167,6 +166,11 @@ class LinkFamilies:
         at = np.concatenate([np.zeros(0, dtype=int), *columns])
         return self._whole.beside(self._rows.of(left)[:, 0], self._whole.tangents[:, at])
 
+    def _gap_gain(self, beside: Sequence[Evidence], component: int | None) -> float:
+        """Return the fall of chi2 by all causes and the best family beside them, in one component or all."""
+        explained = self._bare.at(component).chi2 - self._whole.at(component).chi2
+        return explained + max((net_gain(each) for each in beside), default=0.0)
+
     def _tests(self, number: int, out: View, study: Study) -> FamilyTests:
         applied = self._found.applied[number]
         own = [each for each in study.evidences if _is_of(applied, each)]
@@ -179,12 +183,13 @@ class LinkFamilies:
             margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
         rest = self.rest.study
         own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
-        others = [each for each in rest.evidences if not _is_of(applied, each)]
-        other = max(others, key=net_gain, default=None)
+        near = [each for each in rest.evidences if _is_near(applied, each)]
+        other = max((each for each in near if not _is_of(applied, each)), key=net_gain, default=None)
+        gap_gain = 0.0 if other is None else self._gap_gain(near, other.place.component)
         return FamilyTests(
             margin=float(margin),
             form_ratio=form / max(form + own_rest, 1e-30),
-            other_share=0.0 if other is None else self.rest.share(other),
+            other_share=0.0 if other is None else min(net_gain(other) / max(gap_gain, 1e-30), 1.0),
             other_p=1.0 if other is None else rest.p_of(other),
             family=own[0] if own else None,
             better=better,
@@ -195,6 +200,12 @@ class LinkFamilies:
         tangents = self._whole.tangents[:, self._found.fitted.numbers.slices[number]]
         information = tangents.T @ out.without_fixed(tangents)
         return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
+
+
+def _is_near(applied: Applied, evidence: Evidence) -> bool:
+    """Tell whether a family is where an effect acts; one in another joint does not speak against it."""
+    place = evidence.place
+    return place.component is None or applied.target not in JOINTS or place.name == applied.target
 
 
 def _is_of(applied: Applied, evidence: Evidence) -> bool:

@@ -236,7 +236,7 @@ def _reported_in(cause: Cause, judgement: Judged) -> Link:
     return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
 
 
-def _unexplained(largest: Judgement | None, signals: Sequence[Judgement]) -> Unexplained:
+def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -> Unexplained:
     """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")

@@ -1,0 +1,67 @@
+"""On what a gap without a name depends, as the answer states it."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.tell.depends_on import depends_on
+from tests.gap import constructed as c
+
+SIGMA = 1e-4
+EFFECT = c.wave(2.0)
+
+
+def servo(form, runs=2):
+    """Return the judgement of servo traces of A1 with a form (n,) of run number and time, in sigmas."""
+    t = c.motion().time_s
+    traces = [
+        c.trace(
+            SIGMA * form(number, t)[:, None] + c.noise(500, number, SIGMA),
+            number=number,
+            declared_sigma=SIGMA,
+        )
+        for number in range(runs)
+    ]
+    return judge(c.LINK["servo"], traces, [], c.question([EFFECT]))
+
+
+def test_a_step_has_its_run_moment_and_height():
+    found = servo(lambda run, t: 3.0 * ((t > 6.2) | (run > 0)))
+    assert found.verdict == "unexplained"
+    best = next(iter(depends_on(found)))
+    assert (best.link, best.at, best.on, best.form) == ("servo", "A1", "time in the run", "step")
+    assert best.run == "run-1"
+    assert best.at_time_s == pytest.approx(6.2, abs=0.05)
+    assert best.size == pytest.approx(3.0 * SIGMA, rel=0.1)
+    assert best.probability > 0.9
+    assert best.share > 0.9
+    assert best.direction is None
+
+
+def test_a_tone_is_periodic():
+    found = servo(lambda run, t: 2.0 * np.sin(2.0 * np.pi * 5.3 * t))
+    best = next(iter(depends_on(found)))
+    assert (best.at, best.on, best.form, best.unit) == ("A1", "tone", "periodic", "deg")
+    assert best.at_time_s is None
+    assert best.size == pytest.approx(2.0 * SIGMA, rel=0.2)
+
+
+def test_a_step_of_the_tip_has_a_direction():
+    shift, t = np.array([0.9, 0.3, -0.1]), c.motion().time_s
+    values = [shift * (t > 4.0)[:, None] + c.noise(500, 1, 0.01, 3), shift + c.noise(500, 2, 0.01, 3)]
+    traces = [c.trace(each, "mechanics", number, declared_sigma=0.01) for number, each in enumerate(values)]
+    found = judge(c.LINK["mechanics"], traces, [], c.question([]))
+    best = next(iter(depends_on(found)))
+    assert (best.at, best.form, best.unit) == ("tip", "step", "mm")
+    assert best.size == pytest.approx(np.linalg.norm(shift), rel=0.1)
+    assert best.direction == pytest.approx(shift / np.linalg.norm(shift), abs=0.1)
+
+
+def test_noise_depends_on_nothing_that_is_said():
+    assert list(depends_on(servo(lambda run, t: 0.0 * t))) == []
+
+
+def test_what_is_explained_depends_on_nothing_more():
+    found = servo(lambda run, t: 3.0 * EFFECT.form(t))
+    assert found.verdict == "explained"
+    assert list(depends_on(found)) == []

@@ -1,0 +1,205 @@
+"""Families against dense matrices, and on signals whose dependence is known."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.families.admissible import Admissible
+from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
+from gcode2krl.gap.families.functions import free, odd, polynomials, products, smooth, smooth_in_each
+from gcode2krl.gap.families.grid import Grid, Place
+from gcode2krl.gap.families.rows import Rows
+from gcode2krl.gap.families.study import studies
+from gcode2krl.gap.families.view import View
+from gcode2krl.gap.thresholds.families import FamilyThresholds
+from tests.gap import constructed as c
+
+COUNT = 500
+
+
+def view_of(traces, nuisance=(), sigma=1.0):
+    """Return rows, view and grid of traces beside white noise, without any effect in the model."""
+    rows = Rows(c.likelihood(traces, nuisance, sigma))
+    nothing = [np.zeros((*trace.shape[::-1], 0)) for trace in traces]
+    view = View.of(rows, [trace.residual for trace in traces], nothing)
+    return rows, view, Grid(traces, [sigma] * traces[0].shape[1])
+
+
+def best_of(traces, sigma=1.0):
+    rows, view, grid = view_of(traces, sigma=sigma)
+    return studies(rows, [view], grid)[0]
+
+
+def joint_traces(form, runs=3, sigma=1.0, seed=0):
+    """Return servo traces of A1 and A2; ``form`` of the inputs and the number of a run is added to A1."""
+    made = []
+    for number in range(runs):
+        blank = c.trace(np.zeros((COUNT, 2)), number=number)
+        values = c.noise(COUNT, seed + number, sigma, 2)
+        values[:, 0] += form(Admissible(blank), number)
+        made.append(c.trace(values, number=number))
+    return made
+
+
+# Evidence
+
+
+def test_the_evidence_is_that_of_dense_gaussians():
+    one = c.trace(c.noise(60, 1))
+    rows, view, _ = view_of([one], [[c.columns_nuisance("wave", np.sin(one.time_s))]])
+    raw = np.stack([np.ones(60), one.time_s, one.time_s**2], axis=1)[None]
+    columns = rows.of([raw])
+    place = Place("A1", Where.JOINT, [np.ones((1, 60, 1))])
+    found = evidence_of(view, place, Dependence.CONSTANT, [raw], columns, (np.eye(3),), np.ones((1, 2)))
+
+    plain = np.eye(60) + view.nuisance @ view.nuisance.T
+    assert len(rows) == 60
+
+    def log_density(covariance):
+        _, det = np.linalg.slogdet(covariance)
+        return -0.5 * det - 0.5 * view.residual @ np.linalg.solve(covariance, view.residual)
+
+    dense = [log_density(plain + a**2 * columns @ columns.T) - log_density(plain) for a in AMPLITUDES]
+    assert found.unbounded == pytest.approx(log_mean(np.array(dense)), abs=1e-6)
+
+
+def test_the_log_mean_is_that_of_exponentials():
+    values = np.array([[1.0, 2.0], [700.0, 0.0]])
+    assert log_mean(values)[0] == pytest.approx(np.log(np.mean(np.exp(values[0]))))
+    assert log_mean(values)[1] == pytest.approx(700.0 - np.log(2.0))
+
+
+def test_columns_that_explain_nothing_cost_their_numbers():
+    assert np.all(log_evidence(np.array([100.0, 10.0]), np.zeros(2)) < 0.0)
+
+
+def test_nuisance_at_its_bound_leaves_the_rest_to_the_family():
+    """A shift of 30 deviations: unbounded nuisance would take it for a cost, bounded nuisance may not."""
+    one = c.trace(30.0 + c.noise(COUNT, 2))
+    nuisance = [[c.columns_nuisance("zero", np.ones(COUNT))]]
+    rows, view, grid = view_of([one], nuisance)
+    study = studies(rows, [view], grid)[0]
+    constant = next(each for each in study.evidences if each.on is Dependence.CONSTANT)
+    assert not view.is_within
+    assert constant.gain == pytest.approx(view.chi2 - COUNT, rel=0.02)
+    assert constant.nats > 10.0 * constant.unbounded
+
+
+# What a signal depends on
+
+
+def _step(own, run):
+    return 1.0 * (own.since_start_s > 4.3) if run == 1 else float(run > 1) + 0.0 * own.hours
+
+
+@pytest.mark.parametrize(
+    ("on", "form"),
+    [
+        # the motion is a sine: its acceleration is a function of its angle
+        ("own angle|acceleration", lambda own, run: 3.0 * np.sin(40.0 * own.q_rad[:, 0])),
+        ("velocity", lambda own, run: 8.0 * own.rate_rad_s[:, 0]),
+        ("reversals", lambda own, run: 0.7 * np.sign(own.rate_rad_s[:, 0])),
+        ("run to run", lambda own, run: (1.0, -0.8, 0.4)[run] + 0.0 * own.hours),
+        ("step in time", _step),
+        ("tone", lambda own, run: np.sin(2.0 * np.pi * 3.3 * own.since_start_s + run)),
+        ("constant", lambda own, run: 1.0 + 0.0 * own.hours),
+    ],
+)
+def test_the_dependence_of_a_signal_is_found(on, form):
+    study = best_of(joint_traces(form))
+    best = study.evidences[0]
+    assert best.place.name == "A1"
+    assert best.on in [Dependence(each) for each in on.split("|")]
+    assert study.p < 0.01
+
+
+def test_a_step_has_its_moment_and_its_run():
+    best = best_of(joint_traces(_step)).evidences[0]
+    assert best.at[0] == 1
+    assert best.at[1] == pytest.approx(4.3, abs=0.1)
+    assert best.signal[2][-1, 0] == pytest.approx(1.0, abs=0.1)
+    assert np.all(best.signal[0] == 0.0)
+
+
+def test_a_tone_has_its_frequency():
+    tone = best_of(joint_traces(lambda own, run: np.sin(2.0 * np.pi * 3.3 * own.since_start_s)))
+    assert tone.evidences[0].at[1] == pytest.approx(3.3, abs=0.05)
+
+
+def test_noise_depends_on_nothing():
+    """Of twelve draws the largest family has p < 0.05 in one at most but for one in eight times."""
+    p = [best_of(joint_traces(lambda own, run: 0.0, seed=100 * seed)).p for seed in range(12)]
+    assert sum(each < 0.05 for each in p) <= 2
+    top = [
+        best_of(joint_traces(lambda own, run: 0.0, seed=100 * seed)).evidences[0].nats for seed in range(4)
+    ]
+    assert max(top) < 10.0
+
+
+def test_a_shift_of_the_tip_has_its_direction():
+    shift = np.array([0.3, -0.1, 0.2])
+    traces = [c.trace(shift * (run > 0) + c.noise(COUNT, run, 0.02, 3), "mechanics", run) for run in range(3)]
+    study = best_of(traces, sigma=0.02)
+    tip = next(e for e in study.evidences if e.place.name == "tip" and e.on is Dependence.RUN_TO_RUN)
+    assert tip.signal[1][0] == pytest.approx(shift, abs=0.01)
+    assert tip.nats > study.evidences[0].nats - 10.0
+
+
+# Functions
+
+
+def test_smooth_functions_span_a_bend_and_are_shared_by_runs():
+    x = [np.linspace(-1.0, 1.0, 200), np.linspace(0.0, 2.0, 300)]
+    made = smooth(x)
+    assert [each.shape[0] for each in made.columns] == [200, 300]
+    y = np.concatenate([np.tanh(2.0 * each) for each in x])
+    basis = np.concatenate(made.columns)
+    left = y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]
+    assert np.sqrt(np.mean(left**2)) < 0.02
+    assert smooth_in_each(x).width == 2 * made.width
+    assert smooth([np.ones(5)]).width == 0
+
+
+def test_functions_that_do_nothing_are_left_out():
+    made = free([np.stack([np.zeros(9), np.arange(9.0)], axis=1)])
+    assert made.width == 1
+    assert np.mean(made.columns[0] ** 2) == pytest.approx(1.0)
+
+
+def test_odd_functions_are_odd():
+    x = np.linspace(-3.0, 3.0, 31)
+    (columns,) = odd([x])
+    assert columns == pytest.approx(-columns[::-1])
+    assert odd([np.zeros(4)])[0].shape == (4, 0)
+
+
+def test_powers_and_products():
+    (powers,) = polynomials([np.array([[0.0, 2.0], [10.0, 4.0]])], 2)
+    assert powers.tolist() == [[1.0, -1.0, -1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]]
+    (made,) = products([np.array([[2.0, 3.0]])], [np.array([[5.0, 7.0]])])
+    assert made.tolist() == [[10.0, 14.0, 15.0, 21.0]]
+
+
+# Rows
+
+
+def test_blocks_keep_white_noise_white():
+    trace = c.trace(c.noise(3000, 5, 2.0), inputs=c.motion(12.0, 0.004))
+    rows, view, _ = view_of([trace], sigma=2.0)
+    assert len(rows) == 600
+    assert np.var(view.residual) == pytest.approx(1.0, abs=0.15)
+    assert rows.step_s == pytest.approx(0.02)
+
+
+def test_one_component_alone_has_its_own_rows():
+    _, view, _ = view_of([c.trace(c.noise(COUNT, 3, 1.0, 2))])
+    assert view.at(1).residual.tolist() == view.residual[COUNT:].tolist()
+    assert view.at(None) is view
+
+
+def test_amplitudes_reach_from_a_tenth_of_the_noise_to_a_hundred_times_it():
+    limits = FamilyThresholds()
+    assert AMPLITUDES.tolist() == list(limits.amplitudes) == sorted(limits.amplitudes)
+    assert AMPLITUDES[0] <= 0.1
+    assert AMPLITUDES[-1] >= 100.0
+    assert limits.gap_p >= 1.0 / (1.0 + limits.flips)

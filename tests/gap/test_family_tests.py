@@ -1,0 +1,137 @@
+"""A name needs its family: the three tests on effects that are imitated."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.choose.family_tests import FamilyTests, LinkFamilies, net_gain
+from gcode2krl.gap.choose.judgement import judge
+from tests.gap import constructed as c
+
+SIGMA = 1e-4
+T = c.motion().time_s
+
+
+class Drift(c.Added):
+    """A drift that goes on over the runs, as the clock on the wall does."""
+
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.RUN_TIME, Dependence.WALL_CLOCK})
+
+
+class Dragging(c.Added):
+    """A form of the joint's own velocity."""
+
+    where = frozenset({Where.JOINT})
+    depends_on = frozenset({Dependence.VELOCITY})
+
+
+def traces(form, runs=2):
+    """Return servo traces of A1 with a form (n,) of run number and time, in sigmas."""
+    return [
+        c.trace(
+            SIGMA * form(number, T)[:, None] + c.noise(500, number, SIGMA),
+            number=number,
+            declared_sigma=SIGMA,
+        )
+        for number in range(runs)
+    ]
+
+
+def first_tests(form, effect, runs=2):
+    made = traces(form, runs)
+    found = c.examined(made, [effect])
+    assert len(found.causes) == 1
+    return LinkFamilies(found, made).tests[0]
+
+
+def judged(form, effect, runs=2):
+    return judge(c.LINK["servo"], traces(form, runs), [], c.question([effect]))
+
+
+def speed(t):
+    return c.joint_rates(t)[:, 0] / c.joint_rates(t)[:, 0].max()
+
+
+def test_a_right_form_passes_all_three():
+    found = first_tests(lambda run, t: 3.0 * speed(t), Dragging("dragging", speed))
+    assert found.passed
+    assert found.margin > 0.0
+    assert found.form_ratio == pytest.approx(1.0, abs=0.02)
+    assert found.other_share < 0.01
+    assert found.weight == 1.0
+
+
+def test_a_step_is_not_named_for_the_drift_that_imitates_it():
+    """It takes most of the gap on either run, and the step is better by far."""
+    drift = Drift("drift", lambda t: 0.5 + 0.5 * np.tanh(t - 5.0))
+    form = lambda run, t: 6.0 * (t > 5.0)  # noqa: E731
+    found = first_tests(form, drift, runs=1)
+    assert found.better.on is Dependence.RUN_TIME_STEP
+    assert not found.is_best
+    assert found.weight == 0.0
+    result = judged(form, drift, runs=1)
+    assert result.verdict == "unexplained"
+    assert result.applied == ()
+    assert result.rest.worth_naming[0].on is Dependence.RUN_TIME_STEP
+
+
+def test_another_form_of_the_same_kind_is_a_family_without_a_name():
+    """Velocity it is, but not in that form: (b) alone fails."""
+    found = first_tests(
+        lambda run, t: 3.0 * np.tanh(5.0 * speed(t)), Dragging("dragging", lambda t: speed(t) ** 3)
+    )
+    assert not found.form_fits
+    assert found.is_best
+    assert found.family.on is Dependence.VELOCITY
+
+
+def test_another_family_beside_the_effect_forbids_its_name():
+    dragging = Dragging("dragging", speed)
+    found = first_tests(lambda run, t: 3.0 * speed(t) + 1.5 * (t > 5.0), dragging, runs=1)
+    assert not found.is_alone
+    assert found.other_share > 0.1
+    assert found.other_p < 0.05
+
+
+def test_what_is_left_in_another_joint_does_not_speak_against_a_cause():
+    dragging = Dragging("dragging", speed)
+    steps = [0.8 * (T > 5.0), 0.8 + 0.0 * T, 0.8 + 0.0 * T]
+    made = [
+        c.trace(
+            np.stack([3.0 * speed(T), step], axis=1) * SIGMA + c.noise(500, number, SIGMA, 2),
+            number=number,
+            declared_sigma=SIGMA,
+        )
+        for number, step in enumerate(steps)
+    ]
+    result = judge(c.LINK["servo"], made, [], c.question([dragging]))
+    assert [each.effect.name for each in result.applied] == ["dragging"]
+    assert result.verdict == "partly_explained"
+    assert result.rest.worth_naming[0].place.name == "A2"
+
+
+def test_an_effect_that_states_no_family_is_its_own():
+    effect = c.Added("nameless", speed)
+    found = first_tests(lambda run, t: 3.0 * speed(t), effect)
+    assert found.family is None
+    assert found.form_ratio == 1.0
+    assert found.is_best
+
+
+def test_the_weight_falls_with_each_test():
+    good = FamilyTests(20.0, 0.99, 0.0, 1.0, None, None)
+    assert good.weight == 1.0
+    for worse in (
+        FamilyTests(-20.0, 0.99, 0.0, 1.0, None, None),
+        FamilyTests(20.0, 0.7, 0.0, 1.0, None, None),
+        FamilyTests(20.0, 0.99, 0.2, 0.005, None, None),
+    ):
+        assert worse.weight == 0.0
+        assert not worse.passed
+
+
+def test_evidence_within_its_inflation_counts_for_nothing():
+    strong, weak = c.stub(nats=30.0, inflation=2.0), c.stub(nats=30.0, inflation=20.0)
+    assert net_gain(strong) == 60.0
+    assert net_gain(weak) == 0.0
