@@ -8,6 +8,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import input_error
+from gcode2krl.gap.beside.bursts import without_bursts
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.holdout import split
@@ -94,6 +95,7 @@ def _diagnosed(context: Context) -> Gap:
         traces = link.traces(context.pairs, link.base(context))
         if traces:
             explain, held = split(traces, context.explaining)
+            explain, held = without_bursts(explain), without_bursts(held)
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
     surface = judge_surface(PART, context)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.fit.noise import Noise, drawn_noise
+from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, drawn_slow
 from gcode2krl.gap.fit.noise_source import noise_of
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
 
@@ -53,8 +53,44 @@ def test_a_tone_that_an_effect_could_be_is_no_noise():
     tone = np.stack([np.sin(2.0 * np.pi * 9.0 * TIME_S), np.cos(2.0 * np.pi * 9.0 * TIME_S)], axis=1)
     data = 5.0 * SIGMA * tone[:, 0] + noise(COUNT, 7, SIGMA)[:, 0]
     assert learnt([data], tone[None]).sigma == pytest.approx(SIGMA, rel=0.05)
-    # where nothing could be it, it counts: the rms of 5·sin is 5/sqrt(2)
-    assert learnt([data]).sigma == pytest.approx(SIGMA * np.sqrt(1.0 + 12.5), rel=0.05)
+    # where nothing could be it, it is a gap without a name, and no noise either
+    assert learnt([data]).sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize("times", [1.1, 5.0])
+def test_a_steady_tone_is_no_noise_in_one_run_nor_between_repeats(times):
+    """Floor vibration: in each run a phase of its own, so that repeats differ by it."""
+
+    def run(seed):
+        angle = 2.0 * np.pi * 8.3 * TIME_S + seed
+        return times * np.sqrt(2.0) * SIGMA * np.sin(angle) + noise(COUNT, seed, SIGMA)[:, 0]
+
+    assert learnt([run(1)]).sigma == pytest.approx(SIGMA, rel=0.06)
+    assert learnt([run(seed) for seed in (1, 2, 3)]).sigma == pytest.approx(SIGMA, rel=0.06)
+
+
+def test_slow_noise_is_learnt_beside_the_short_and_no_more_than_repeats_differ():
+    slow = Slow(float(np.exp(-0.02 / 0.4)), SIGMA)
+
+    def run(seed):
+        return drawn_slow(slow, COUNT, np.random.default_rng(100 + seed)) + noise(COUNT, seed, SIGMA)[:, 0]
+
+    for found in (learnt([run(1)]), learnt([run(seed) for seed in (1, 2, 3)])):
+        assert found.short_sigma == pytest.approx(SIGMA, rel=0.15)
+        assert np.sqrt(sum(part.sigma**2 for part in found.slow)) == pytest.approx(SIGMA, rel=0.25)
+    # what the runs share is no noise, however it wanders
+    shared = 3.0 * drawn_slow(slow, COUNT, np.random.default_rng(1))
+    found = learnt([shared + noise(COUNT, seed, SIGMA)[:, 0] for seed in (1, 2, 3)])
+    assert found.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_a_statement_is_of_the_short_noise():
+    """A data sheet says nothing of what its instrument does within seconds: the slow part stays."""
+    slow = Slow(float(np.exp(-0.02 / 0.4)), SIGMA)
+    run = drawn_slow(slow, COUNT, np.random.default_rng(3)) + noise(COUNT, 3, SIGMA)[:, 0]
+    stated = learnt([run], declared_sigma=SIGMA)
+    assert stated.short_sigma == pytest.approx(SIGMA, rel=0.15)
+    assert np.sqrt(sum(part.sigma**2 for part in stated.slow)) == pytest.approx(SIGMA, rel=0.3)
 
 
 def test_what_nuisance_could_be_is_no_noise():

@@ -11,6 +11,7 @@ from gcode2krl.gap.beside.decimals import resolution
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.block_means import block_means
+from gcode2krl.gap.fit.lines import without_lines
 from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.slow_noise import SlowPart, slow_parts_of
@@ -23,6 +24,8 @@ _LEAST_RMS = 1e-9
 """So that exact data have a model at all."""
 _EXACT = 1e-12
 """The floor of drawn noise: it has no decimals."""
+_SLOW_DRAWS = 4
+"""Of the slow part, whose lags are taken off the data's."""
 _SAME_MM = 1e-3
 """Repeats of a program have the same path."""
 
@@ -52,7 +55,11 @@ def noise_of(
     slow = [_of_rows(slow_parts_of(each), traces[0]) for each in means]
     generator = np.random.default_rng(0)
     slow_drawn = [
-        np.stack([_drawn(parts, len(trace.time_s), generator) for parts in slow], axis=1) for trace in traces
+        [
+            np.stack([_drawn(parts, len(trace.time_s), generator) for parts in slow], axis=1)
+            for trace in traces
+        ]
+        for _ in range(_SLOW_DRAWS if any(slow) else 0)
     ]
     first = source.noise(residuals, floors, slow, slow_drawn)
     drawn = [
@@ -128,20 +135,19 @@ class _Source:
         values: Sequence[Floats],
         floors: Sequence[float],
         slow: Sequence[tuple[Slow, ...]],
-        slow_drawn: Sequence[Floats],
+        slow_drawn: Sequence[Sequence[Floats]],
     ) -> list[Noise]:
         """Return the model of each component of values (n, k) of all traces, beside the slow parts.
 
-        ``slow_drawn`` (n, k) is noise drawn of these; what is taken of it is taken of theirs in the values.
+        ``slow_drawn`` are draws (n, k) of these for all traces; what is taken of the values is taken of them.
         """
         rests = self._rests(values)
-        drawn = self._rests(slow_drawn) if any(slow) else []
-        return [
-            replace(
-                fit(self._component(rests, j), floor, self._component(drawn, j) if parts else ()), slow=parts
-            )
-            for j, (floor, parts) in enumerate(zip(floors, slow, strict=True))
-        ]
+        drawn = [self._rests(each) for each in slow_drawn]
+        found = []
+        for j, (floor, parts) in enumerate(zip(floors, slow, strict=True)):
+            off = [own for each in drawn for own in self._component(each, j)] if parts else []
+            found.append(replace(fit(self._component(rests, j), floor, off), slow=parts))
+        return found
 
     def _rests(self, values: Sequence[Floats]) -> list[Floats]:
         """Return values (n, k) less all that is or may be structure."""
@@ -151,11 +157,13 @@ class _Source:
         return rests
 
     def _component(self, rests: Sequence[Floats], j: int) -> list[tuple[Floats, Ints]]:
-        """Return one component (n,) of each trace with its segments, that of repeats less their mean."""
+        """Return one component (n,) of each trace with its segments, less tones and repeats' mean."""
         values = [rest[:, j] for rest in rests]
         if self.repeats is None:
-            return [(value, trace.segments) for value, trace in zip(values, self.traces, strict=True)]
-        return [(value, self.traces[0].segments) for value in _differences(values, self.repeats)]
+            own = zip(values, self.traces, strict=True)
+            return [(without_lines(value), trace.segments) for value, trace in own]
+        differences = _differences(values, self.repeats)
+        return [(without_lines(value), self.traces[0].segments) for value in differences]
 
 
 def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:

@@ -16,6 +16,9 @@ from gcode2krl.effects import Applied, Effect, Parameter
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.trace import Trace
 
+_PADDED = 4
+"""Finer than the lines of a spectrum, between which a tone would hide."""
+
 _Key = tuple[float, str, str | None, tuple[tuple[str, float], ...]]
 
 
@@ -129,19 +132,25 @@ def strongest_hz(
 ) -> tuple[float, ...]:
     """Return the frequencies of the highest peaks of the mean power of residuals (n, k), most powerful first.
 
-    Neighbours within 15 % of a higher peak are not taken.
+    Neighbours within 15 % of a higher peak are not taken. Peaks are looked for in a spectrum smoothed over
+    0.3 Hz; where one is, is the centre of its cubed power, which a steady tone has within a bin.
     """
     length = min(len(residual) for residual in residuals)
+    padded = _PADDED * length
     mean = sum(
-        np.abs(np.fft.rfft(rows[:length] - rows[:length].mean(axis=0), axis=0)) ** 2 for rows in residuals
+        np.abs(np.fft.rfft(rows[:length] - rows[:length].mean(axis=0), padded, axis=0)) ** 2
+        for rows in residuals
     )
-    power, hz = np.sum(mean, axis=1), np.fft.rfftfreq(length, step_s)
-    wide = max(1, round(0.3 * length * step_s))
-    power = np.convolve(power, np.ones(wide) / wide, mode="same")
+    power, hz = np.sum(mean, axis=1), np.fft.rfftfreq(padded, step_s)
+    wide = max(1, round(0.3 * padded * step_s))
+    smooth = np.convolve(power, np.ones(wide) / wide, mode="same")
     peaks: list[float] = []
-    for i in np.argsort(-power):
+    for i in np.argsort(-smooth):
         if low <= hz[i] <= high and all(abs(hz[i] / peak - 1.0) > 0.15 for peak in peaks):
-            peaks.append(float(hz[i]))
+            around = slice(max(i - wide, 0), i + wide + 1)
+            weight = power[around] ** 3
+            centre = float(weight @ hz[around] / max(float(weight.sum()), 1e-300))
+            peaks.append(min(max(centre, low), high))
             if len(peaks) == most:
                 break
     return tuple(peaks)

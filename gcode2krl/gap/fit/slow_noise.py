@@ -82,7 +82,7 @@ def slow_parts_of(means: BlockMeans) -> tuple[SlowPart, ...]:
     if not peak.parts or short - peak.cost < _LIMITS.noise_slow_gain:
         return ()
     second = fit.best(basis, others=peak.parts)
-    if peak.cost - second.cost > _LIMITS.noise_slow_gain:
+    if peak.cost - second.cost > _LIMITS.noise_second_gain:
         # of two parts the first is found anew beside the second
         peak = fit.best(basis, others=second.parts[1:], start=second.parts[0])
     return tuple(

@@ -67,6 +67,16 @@ class BesideThresholds:
     stretch_s: float = physics(
         1.0, "longer than an instrument remembers; rows of one stretch stay together in every split"
     )
+    burst_s: float = convention(0.1, "over which the roughness of a signal tells a burst of its instrument")
+    burst_times: float = convention(
+        4.0, "times its usual roughness a signal is in a burst; white noise is not in 300,000 rows"
+    )
+    outlier_deviations: float = convention(
+        8.0, "deviations by which a single row beside two that agree is an outlier, of heavy tails too"
+    )
+    bursts_most: float = convention(
+        0.15, "share of a component's rows up to which bursts are left out: more is how the signal is"
+    )
     frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
     jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
     jump_halves_s: tuple[float, ...] = convention(

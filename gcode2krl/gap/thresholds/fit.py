@@ -24,6 +24,11 @@ class FitThresholds:
         1.4, DEVELOPMENT, "of what run.toml states: what is above it is structure"
     )
 
+    noise_most_lines: int = convention(8, "tones of one signal that are taken off before its noise is learnt")
+    noise_false_lines: float = convention(
+        1e-3, "chance that a line of noise alone counts as a tone, by an exponential distribution of power"
+    )
+
     # Nuisance
     same_form: float = convention(
         0.98, "share of a nuisance's power that an effect spans: both are then one deviation, judged as one"
@@ -38,6 +43,9 @@ class FitThresholds:
     )
     noise_slow_gain: float = convention(
         6.0, "twice the log likelihood that a slow part must bring to be in the model"
+    )
+    noise_second_gain: float = convention(
+        12.0, "the same of a second slow part beside the first, whose size few long waves tell"
     )
     noise_explained: float = calibrated(
         10.5,
