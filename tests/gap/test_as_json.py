@@ -60,6 +60,7 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
         "schema",
         "verdict",
         "gap",
+        "at_part",
         "links",
         "where",
         "causes",
@@ -96,11 +97,12 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
 
 def test_keys_of_some_causes_and_links_are_left_out_and_others_are_null():
     plain_keys = ["effect", "target", "link", "probability", "parameters", "shrink", "rms_after"]
-    assert list(plain(_cause())) == [*plain_keys, "indistinguishable_from"]
+    kind = ["family", "form_fits", "constant"]
+    assert list(plain(_cause())) == [*plain_keys, "indistinguishable_from", *kind]
     slip = plain(_cause(words="the run was at 50 % override"))
-    assert list(slip) == [*plain_keys, "words", "indistinguishable_from"]
+    assert list(slip) == [*plain_keys, "words", "indistinguishable_from", *kind]
     compared = plain(_cause(rivals=(), indistinguishable_from=(EffectAt("mastering", None),)))
-    assert list(compared) == [*plain_keys, "indistinguishable_from", "rivals"]
+    assert list(compared) == [*plain_keys, "indistinguishable_from", "rivals", *kind]
     assert compared["indistinguishable_from"] == [{"effect": "mastering", "target": None}]
     assert (compared["rivals"], compared["shrink"]) == ([], None)
     assert "offset_deg" not in plain(_link())

@@ -28,10 +28,9 @@ def at_part(
     residuals : those of each such link with a signal in time.
     late : the judgement among them that is a gap of timing.
     """
-    named = [applied for judged in gapped for applied in judged.applied]
     sizes = []
     for judged in gapped:
-        if isinstance(judged, Judgement) and named and all(each.effect.is_clock for each in named):
+        if isinstance(judged, Judgement) and _by_clocks_alone(judged):
             sizes.append(_by_clocks(judged))
         elif judged is late and isinstance(judged, Judgement):
             sizes.append(_in_time(judged))
@@ -53,6 +52,11 @@ def at_part_of(slip: Slip) -> AtPart | None:
         noise=None,
         link=slip.link.name,
     )
+
+
+def _by_clocks_alone(judged: Judgement) -> bool:
+    """Tell whether the named causes of a link are clocks: then nothing is off in space."""
+    return bool(judged.applied) and all(each.effect.is_clock for each in judged.applied)
 
 
 def _by_clocks(judged: Judgement) -> AtPart:

@@ -1,6 +1,9 @@
 """The first sentence, in a person's words: how far the part is off, where most of it is, and why."""
 
-from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult
+import math
+from collections.abc import Sequence
+
+from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult, PhaseResult
 from gcode2krl.gap.tell.words import depends, describe, listed, named, rounded
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -46,7 +49,7 @@ def _no_gap(gap: Gap) -> str:
 
 def amount(value: float, unit: str) -> str:
     """Return a size in a unit that a person would use: seconds below 0.1 as milliseconds."""
-    if unit == "s" and value < 0.1:
+    if unit == "s" and value < _LIMITS.in_ms_below_s:
         return f"{rounded(1000.0 * value)} ms"
     return f"{rounded(value)} {unit}"
 
@@ -76,12 +79,20 @@ def _mostly(gap: Gap) -> str:
     if at is not None and at.what == "time":
         return ""
     first = phases[0]
-    times = [phase.share / phase.rms**2 if phase.rms > 0.0 else 0.0 for phase in phases]
-    if first.share * sum(times) < _LIMITS.phase_over_time * times[0]:
+    if first.rms < _LIMITS.phase_over_rest * _rms_of(phases[1:]):
         return ""
     share = next(words for least, words in _SHARES.items() if first.share >= least)
     joint = f" of axis {joints[0].joint[1:]}" if first.phase == "reversal" and joints else ""
     return f", {share} {_PHASES[first.phase]}{joint}"
+
+
+def _rms_of(phases: Sequence[PhaseResult]) -> float:
+    """Return the rms of a gap in several phases together; infinite where there is none to compare with."""
+    if not phases:
+        return math.inf
+    power = sum(phase.share for phase in phases)
+    time = sum(phase.share / phase.rms**2 for phase in phases if phase.rms > 0.0)
+    return math.sqrt(power / time) if time > 0.0 else 0.0
 
 
 def _why(gap: Gap) -> str:
@@ -109,7 +120,7 @@ def _left(gap: Gap) -> str:
     model = f"With {'it' if number == 1 else 'them'} in the model"
     held = " on data not used" if gap.gap.held_out else ""
     at = gap.at_part
-    if at is None or at.rms_after is None or at.what == "time":
+    if at is None or at.rms_after is None or at.noise is None:
         if gap.gap.shrink is None:
             return ""
         return f"{model} {gap.gap.shrink:.0%} of the gap is gone{held}{_rest(gap)}."

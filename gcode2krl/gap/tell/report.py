@@ -56,6 +56,8 @@ def where_words(intervals: Sequence[IntervalResult]) -> str:
     count, held = worst(intervals)
     if len(intervals) == 1:
         return f"this stretch holds {held:.0%} of the gap"
+    if count == 1:
+        return f"the first of {len(intervals)} stretches holds {held:.0%} of the gap"
     which = f"these {count} of {len(intervals)}" if count < len(intervals) else f"these {count}"
     return f"{which} stretches hold {held:.0%} of the gap"
 
@@ -68,8 +70,7 @@ def where_lines(gap: Gap) -> Iterator[str]:
     yield f"{where_words(intervals)}; in them it exceeds the noise"
     for interval in intervals[: worst(intervals)[0]]:
         share = "" if interval.share is None else f", {interval.share:.0%} of the gap"
-        unit = gap.gap.unit if interval.signal == gap.gap.signal else ""
-        yield f"{stretch(interval)}: {number(interval.rms)} {unit}".rstrip() + f" ({interval.what}){share}"
+        yield f"{stretch(interval)}: {number(interval.rms)} {gap.gap.unit} ({interval.what}){share}"
 
 
 def left_lines(gap: Gap) -> Iterator[str]:

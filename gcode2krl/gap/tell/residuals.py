@@ -44,18 +44,19 @@ def residuals_of(judgement: Judgement) -> list[Residual]:
     residuals = []
     for trace, rest, of_run, of_machine in zip(traces, left, own, shared, strict=True):
         doing = trace.sample(with_named) - trace.sample(judgement.usual)
-        shape = doing + smoothed(trace.time_s, rest - of_run - of_machine) if has_rest else doing
+        structured = smoothed(trace.time_s, rest - of_run - of_machine, THRESHOLDS.tell.rest_smooth_s)
+        shape = doing + structured if has_rest else doing
         after = rest - of_run
         residuals.append(Residual(trace=trace, before=after + doing, after=after, shape=shape, noise=noise))
     return residuals
 
 
-def smoothed(time_s: Floats, values: Floats) -> Floats:
-    """Return the mean of values (n,) or (n, k) over 0.1 s, that of fewer samples at the ends."""
+def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.tell.smooth_s) -> Floats:
+    """Return the mean of values (n,) or (n, k) over a time, that of fewer samples at the ends."""
     if values.ndim == 2:
-        return np.stack([smoothed(time_s, column) for column in values.T], axis=1)
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else THRESHOLDS.tell.smooth_s
-    kernel = np.ones(min(max(1, round(THRESHOLDS.tell.smooth_s / step_s)), len(values)))
+        return np.stack([smoothed(time_s, column, over_s) for column in values.T], axis=1)
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else over_s
+    kernel = np.ones(min(max(1, round(over_s / step_s)), len(values)))
     sums: Floats = np.convolve(values, kernel, mode="same")
     return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
 

@@ -25,18 +25,18 @@ def place(
 ) -> Where:
     """Return intervals, direction, phases, joints and band of the gap of one link.
 
-    Intervals are all the times at which the gap, as the rms over 0.1 s, exceeds the noise of the signal: the
-    length of a vector that of the noise's vector, or any joint its own noise. The first holds the largest
-    share of the gap's power.
+    Intervals are all the times at which the gap, as the rms over 0.1 s, exceeds the standard deviation of the
+    noise: the length of a vector that of one of its components, or any joint that of its own. The first
+    holds the largest share of the gap's power.
 
     Parameters
     ----------
     shapes : (n, k) of each trace, what the gap is made of: what the causes do, or what is left, smoothed.
     noise : (k,) standard deviation of each component.
-    applied : the named causes; without any, stretches shorter than 0.1 s are noise and left out.
+    applied : the named causes; without any, stretches shorter than 0.3 s are noise and left out.
     """
     joints = [str(one.target) for one in applied if one.target in JOINTS]
-    least_s = 0.0 if applied else _LIMITS.smooth_s
+    least_s = 0.0 if applied else _LIMITS.rest_smooth_s
     power = sum(float(np.sum(shape**2)) for shape in shapes)
     intervals = [
         interval
@@ -56,15 +56,15 @@ def place(
 def over_noise(trace: Trace, shape: Floats, noise: Floats) -> Floats:
     """Return the size (n,) of a gap (n, k), as the rms over 0.1 s, over that of the noise (k,).
 
-    That of joints is the largest of theirs: one joint's gap is not hidden by the noise of five others.
+    The noise is that of one component. The size of joints is the largest of theirs: one joint's gap is not
+    hidden by the noise of five others.
     """
     if trace.link.of_joints:
         ratios = np.maximum(smoothed(trace.time_s, shape**2), 0.0) / np.maximum(noise, _NO_NOISE) ** 2
         largest: Floats = np.sqrt(ratios.max(axis=1))
         return largest
-    length = max(float(np.sqrt(np.sum(noise**2))), _NO_NOISE)
     size: Floats = np.sqrt(np.maximum(smoothed(trace.time_s, np.sum(shape**2, axis=1)), 0.0))
-    return size / length
+    return size / max(float(np.sqrt(np.mean(noise**2))), _NO_NOISE)
 
 
 def _stretches(trace: Trace, shape: Floats, noise: Floats, least_s: float) -> Iterator[Ints]:
@@ -131,10 +131,9 @@ def _what(phase: Ints, joint: Ints, square: Floats, joints: Sequence[str]) -> st
 
     ``throughout`` where the gap is no larger in it than in the other phases of the stretch.
     """
-    power = np.bincount(phase, weights=square, minlength=len(PHASES)) / max(float(square.sum()), _NO_NOISE)
-    first = int(np.argmax(power))
-    time_share = float(np.mean(phase == first))
-    if power[first] < _LIMITS.one_phase_share and power[first] < _LIMITS.phase_over_time * time_share:
+    first = int(np.argmax(np.bincount(phase, weights=square, minlength=len(PHASES))))
+    there = phase == first
+    if not there.all() and np.mean(square[there]) < _LIMITS.phase_over_rest**2 * np.mean(square[~there]):
         return "throughout"
     name = PHASES[first]
     if name != "reversal":

@@ -29,6 +29,13 @@ _UNITS = (
     "m",
 )
 """Ends of names of parameters that are units, the longer first."""
+_TARGETS = {
+    "tracker": "the tracker",
+    "force": "the force sensor",
+    "controller": "the controller's log",
+    "q_cmd": "the commanded joints",
+    "q_load": "the load encoders",
+}
 _FORMS = {
     "drift": "a drift with {on}",
     "periodic": "periodic in {on}",
@@ -59,7 +66,7 @@ def measured(interval: Interval, unit: str) -> str:
     if abs(math.log10(half)) > 4.0:
         return f"{interval.value:.3g}{unit} ± {half:.2g}"
     first = math.floor(math.log10(half))
-    decimals = max(0, (1 if half / 10.0**first < 2.0 else 0) - first)
+    decimals = max(0, (1 if round(half / 10.0**first, 6) < 2.0 else 0) - first)
     return f"{interval.value:.{decimals}f}{unit} ± {half:.{decimals}f}"
 
 
@@ -75,7 +82,7 @@ def unit_of(name: str) -> tuple[str, str]:
 def named(effect: str, target: str | None) -> str:
     """Return an effect and where it is, ``backlash of A2``."""
     name = effect.replace("_", " ")
-    return name if target is None else f"{name} of {target.replace('_', ' ')}"
+    return name if target is None else f"{name} of {_TARGETS.get(target, target.replace('_', ' '))}"
 
 
 def describe(cause: CauseResult, most: int | None = None) -> str:
@@ -101,7 +108,10 @@ def _numbers(parameters: Mapping[str, Interval]) -> list[str]:
             continue
         name = names.pop(0)
         stem, unit = unit_of(name)
-        value = measured(parameters[name], unit)
+        interval = parameters[name]
+        if unit == "s" and abs(interval.value) < _LIMITS.in_ms_below_s:
+            interval, unit = Interval(*(1000.0 * each for each in interval)), "ms"
+        value = measured(interval, unit)
         numbers.append(value if len(parameters) == 1 or not stem else f"{stem} {value}")
     return numbers
 

@@ -21,6 +21,11 @@ class TellThresholds:
     smooth_s: float = convention(
         0.1, "the size of a gap at a time is its rms over this; labels of the check use it too"
     )
+    rest_smooth_s: float = convention(
+        0.3,
+        "what is left without a cause is averaged over this, and shorter stretches of it are noise: the mean of "
+        "noise with a memory of 45 ms then is a third of it",
+    )
     joint_moves_rad: float = convention(1e-4, "a joint that moves less never reverses")
     joint_least_share: float = convention(0.01, "joints with less of the gap's power are left out")
     band_low: float = convention(0.1, "share of the power below the band of a gap")
@@ -31,14 +36,13 @@ class TellThresholds:
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
     headline_causes: int = convention(3, "causes in the first sentence")
     headline_numbers: int = convention(4, "a cause with more numbers is without them in the first sentence")
-    phase_over_time: float = convention(
-        1.5,
-        "a phase is in the first sentence where its share of the power is this many times that of the time",
+    phase_over_rest: float = convention(
+        1.5, "a phase is where a gap is if its rms there is this many times that of the other phases"
     )
+    in_ms_below_s: float = convention(0.1, "shorter times are written in milliseconds")
     worth_a_word: float = convention(0.1, "a cause without a name is in the first sentence from here on")
     most_of_a_gap: float = convention(0.8, "the report prints the worst stretches until they hold this share")
     form_fits_well: float = convention(
         0.9, "a form that takes a smaller share of what its family takes is said to fit badly"
     )
     constant_least_p: float = convention(0.05, "a size less likely to be one number is said to vary")
-    one_phase_share: float = convention(0.9, "a phase with more of a stretch's power is what goes on there")
