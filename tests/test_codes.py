@@ -21,6 +21,7 @@ NOT_CODES = {
     "kilograms-force",
     "latin-1",
     "make-test",
+    "single-joint",
     "on-tool",
     "pounds-force",
     "steps-post",

@@ -50,11 +50,11 @@ def controller_test_program(cell: Cell, origin_mm: tuple[float, float, float] | 
     NotUnderstoodError
         Where the origin lies above the clearance plane.
     """
-    x0, y0, z0 = _origin(cell, origin_mm)
-    tool = _tool(cell)
+    x0, y0, z0 = origin_of(cell, origin_mm)
+    tool = mounted_tool(cell)
     speeds = _speeds(cell)
     program = _Writer(x0, y0, z0)
-    program.head(tool, min(_SPINDLE_RPM, _most_rpm(cell, tool)))
+    program.head(tool, min(_SPINDLE_RPM, most_rpm(cell, tool)))
     for row, speed in enumerate(speeds):
         _single_lines(program, speed, y_mm=-_ROW_MM * (row + 1), forward=row % 2 == 0)
     _unequal_speeds(program, speeds[0], speeds[-1], y_mm=-_ROW_MM * (len(speeds) + 2))
@@ -195,7 +195,8 @@ def _through_corner(
     program.stop()
 
 
-def _origin(cell: Cell, origin_mm: tuple[float, float, float] | None) -> tuple[float, float, float]:
+def origin_of(cell: Cell, origin_mm: tuple[float, float, float] | None) -> tuple[float, float, float]:
+    """Return where a test program begins in ``$BASE``; errors as for `controller_test_program`."""
     clearance = cell.clearance_z_mm
     if clearance is None:
         raise RefusedError(
@@ -217,7 +218,7 @@ def _origin(cell: Cell, origin_mm: tuple[float, float, float] | None) -> tuple[f
     return x, y, z
 
 
-def _tool(cell: Cell) -> int:
+def mounted_tool(cell: Cell) -> int:
     """Return the tool to call: the mounted one, so that no tool change is needed."""
     number = cell.mounted_tool
     if number is None or number not in cell.tool:
@@ -233,7 +234,8 @@ def _tool(cell: Cell) -> int:
     return number
 
 
-def _most_rpm(cell: Cell, tool: int) -> float:
+def most_rpm(cell: Cell, tool: int) -> float:
+    """Return the largest speed of spindle and tool. Raises where the cell does not state the spindle's."""
     of_tool, most = cell.tool[tool].max_rpm, cell.spindle.max_rpm
     if most is None:
         raise missing("spindle.max_rpm")

@@ -19,6 +19,7 @@ from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.depends_on import depends_on
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
+from gcode2krl.gap.tell.next_run import next_run_of
 from gcode2krl.gap.tell.result import (
     AtPart,
     CauseResult,
@@ -59,6 +60,7 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
+        next_run=next_run_of(context, signals, unexplained.depends_on),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),

@@ -133,3 +133,17 @@ class ChooseThresholds:
 
     # Clocks that are set before the effects are looked at
     clock_most_s: float = convention(0.02, "larger clock errors of single runs are found by other means")
+
+    # The next run
+    settled: float = convention(0.95, "probability from which on a cause without a rival alike is not open")
+    least_open: float = convention(0.05, "probability below which an answer is not worth a run")
+    most_open_pairs: int = convention(4, "pairs that programs are compared for, the most open first")
+    most_log_odds: float = convention(
+        6.9, "log 1000: beyond it no program is better than another, as noise is not exactly as learnt"
+    )
+    nearly_best: float = convention(0.1, "programs within this share of the best mean log odds: the shortest")
+    trial_step_s: float = convention(
+        0.25, "between values of a program that count as independent; noise forgets within it or counts less"
+    )
+    trial_rows: int = convention(400, "values of a program at most, so that long ones do not win by length")
+    next_run_s: float = convention(1.5, "time after which no further program is simulated")

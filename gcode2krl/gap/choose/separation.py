@@ -1,0 +1,179 @@
+"""How far a program would set two answers apart: the T-optimal distance.
+
+One answer is simulated along the program, the other is refitted to it: its numbers may move as far as the
+measured runs allow, and the instruments of the new run have their mismatch. What no number of the other
+answer takes away, over the noise as learnt, is the distance (Atkinson & Fedorov 1975). With a distance of d
+the odds between them after the run are about exp(d²/2).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.effects import Applied, Inputs
+from gcode2krl.effects.mismatch import Mismatch
+from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.beside.simulator import Simulator
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.fit.fitted import Numbers
+from gcode2krl.gap.fit.least_squares import derivative
+from gcode2krl.gap.fit.likelihood import STEP_SHARE, Likelihood
+from gcode2krl.gap.fit.noise import Noise, white
+from gcode2krl.gap.fit.nuisance import nuisance_of
+from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.choose
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Apart:
+    """What sets two answers apart in a program."""
+
+    distance2: float
+    """Squared, in standard deviations."""
+    time_s: float
+    """When they are farthest apart."""
+    component: str
+    first: float
+    """What the first answer shows then, in the report's unit, less what the instrument may be off by."""
+    second: float
+    """The same of the second one, refitted to the first."""
+    unit: str
+    signal: str
+    noise: float
+    """Standard deviation of a value, in the report's unit."""
+
+
+class Bench:
+    """A program that a link would be measured in: signals of answers, and distances between them."""
+
+    def __init__(self, found: Examination, inputs: Inputs, mismatch: Mismatch) -> None:
+        self.found = found
+        self.trace = _trace_of(found.traces[0], inputs)
+        noise = [_with_model(each, self.trace.link.model_rms) for each in found.noise]
+        nuisance = nuisance_of(self.trace, {}, mismatch, Signatures(), frozenset())
+        self.likelihood = Likelihood([self.trace], [nuisance], noise)
+        self._noise = noise
+
+    def shown(self, applied: Sequence[Applied]) -> Floats:
+        """Return what effects change in the signal (n, k)."""
+        return self.trace.sample(applied) - self.trace.nominal if applied else np.zeros(self.trace.shape)
+
+    def apart(
+        self, first: Applied | None, second: Applied | None, information: Floats | None = None
+    ) -> Apart:
+        """Return what sets two answers apart; None is one that does nothing in the program.
+
+        ``information`` (p, p): that of the measured runs on the second answer's numbers, in typical sizes;
+        without it they are free.
+        """
+        one = self.shown(() if first is None else (first,))
+        other = self.shown(() if second is None else (second,))
+        moved = other
+        if second is not None:
+            moved = other + self._refitted(one - other, second, information)
+        rest = self.likelihood.marginal(self.likelihood.whiten([one - moved]))
+        return self._farthest(float(rest @ rest), one, moved)
+
+    def _refitted(self, missing: Floats, second: Applied, information: Floats | None) -> Floats:
+        """Return by how much the second answer moves towards what is missing (n, k), to first order."""
+        numbers = Numbers.of((second,), self.trace)
+        x = numbers.start((second,))
+        if not len(x):
+            return np.zeros_like(missing)
+        tangents = self.likelihood.tangents(numbers, x)[0]  # (k, n, p)
+        columns = np.stack(
+            [
+                self.likelihood.projected(self.likelihood.whiten([tangents[:, :, p].T])[:, None])[:, 0]
+                for p in range(tangents.shape[2])
+            ],
+            axis=1,
+        )
+        wanted = self.likelihood.projected(self.likelihood.whiten([missing])[:, None])[:, 0]
+        known = np.zeros((len(x), len(x))) if information is None else information
+        normal = columns.T @ columns + known + _FREE * np.eye(len(x))
+        step = np.linalg.solve(normal, columns.T @ wanted)
+        moved: Floats = np.einsum("knp,p->nk", tangents, step)
+        return moved
+
+    def _farthest(self, distance2: float, first: Floats, second: Floats) -> Apart:
+        """Return the distance with the place where the answers are farthest apart."""
+        b = self.likelihood.nuisance_of(self.likelihood.whiten([first - second]))
+        taken = self.likelihood.design.effect(0, self.trace, b)
+        off = np.abs(first - second - taken) / np.array([each.sigma for each in self._noise])
+        row, column = (int(at) for at in np.unravel_index(int(np.argmax(off)), off.shape))
+        # of each answer alone the instrument takes its own share, as nobody knows its zero
+        alone = [self._less_instrument(values)[row, column] for values in (first, second)]
+        factor = self.trace.factor
+        return Apart(
+            distance2=distance2,
+            time_s=float(self.trace.time_s[row]),
+            component=self.trace.components[column],
+            first=factor * float(alone[0]),
+            second=factor * float(alone[1]),
+            unit=self.trace.unit,
+            signal=self.trace.signal,
+            noise=factor * self._noise[column].sigma,
+        )
+
+    def _less_instrument(self, values: Floats) -> Floats:
+        b = self.likelihood.nuisance_of(self.likelihood.whiten([values]))
+        rest: Floats = values - self.likelihood.design.effect(0, self.trace, b)
+        return rest
+
+
+_FREE = 1e-9
+"""Keeps a normal matrix regular where a number does nothing."""
+
+
+def information_of(found: Examination, number: int | None, second: Applied) -> Floats | None:
+    """Return what the measured runs say of an answer's numbers (p, p), in typical sizes.
+
+    ``number``: the accepted effect in whose place it stands. Over the temperature of probabilities, as
+    neither noise nor effects are exactly as modelled. None where it cannot be simulated there.
+    """
+    others = found.applied if number is None else found.without(number)
+    likelihood = found.likelihood
+    numbers = Numbers.of((second,), found.traces[0])
+    x = numbers.start((second,))
+    if not len(x):
+        return None
+
+    def model(at: Floats) -> Floats:
+        applied = (*others, *numbers.applied(at))
+        return likelihood.whiten([trace.sample(applied) for trace in likelihood.traces])
+
+    try:
+        slopes = derivative(model, x, model(x), numbers.box.steps(x, STEP_SHARE)) * numbers.box.scale
+    except Gcode2KrlError:
+        return None
+    projected = likelihood.projected(slopes)
+    found_information: Floats = projected.T @ projected / _LIMITS.temperature
+    return found_information
+
+
+def _trace_of(like: Trace, inputs: Inputs) -> Trace:
+    """Return the trace of an instrument along a program, at few stamps that are taken as independent."""
+    last = float(inputs.time_s[-1])
+    count = int(np.clip(last / _LIMITS.trial_step_s, 2, _LIMITS.trial_rows))
+    stamps = np.linspace(float(inputs.time_s[0]), last, count)
+    return replace(
+        like,
+        run="trial",
+        simulator=Simulator(),
+        inputs=inputs,
+        base=(),
+        time_s=stamps,
+        measured=np.zeros((count, len(like.components))),
+        segments=np.array([[0, count]]),
+        plus_late_s=0.0,
+    )
+
+
+def _with_model(noise: Noise, model_rms: float) -> Noise:
+    """Return white noise as large as an instrument's and the model's error together."""
+    return white(float(np.hypot(noise.sigma, model_rms)))
