@@ -77,7 +77,7 @@ def with_effects(
 
     Motion and Joints stay what is commanded, planned anew where an effect does that; Forces are the true
     ones; the deflection is the whole way from the commanded place to the tip; ``added`` holds the columns of
-    the motor side, of what is behind the gears, and of the force sensor.
+    the motor side, of what is behind the gears, of the force sensor, and of a part that gives way.
     """
     if not applied:
         return prediction
@@ -99,7 +99,7 @@ def with_effects(
 
 
 def added_columns(signals: Signals) -> dict[str, Floats]:
-    """Return what the tables of a prediction have no column for: motor side, behind the gears, sensor."""
+    """Return what tables of a prediction have no column for: motor side, behind the gears, sensor, part."""
     columns: dict[str, Floats] = {}
     for signal in ("q_act_rad", "q_load_rad"):
         side = signal.removeprefix("q_").removesuffix("_rad")
@@ -108,6 +108,11 @@ def added_columns(signals: Signals) -> dict[str, Floats]:
     for signal, name in (("force_meas_base_N", "force_meas_N"), ("moment_meas_base_Nmm", "moment_meas_Nmm")):
         for column, values in zip(column_names(name, 3), signals.seen(signal).T, strict=True):
             columns[column] = np.ascontiguousarray(values)
+    if signals.part_shift_mm is not None:
+        shift_mm = signals.seen("part_shift_mm").T
+        columns |= dict(
+            zip(column_names("part_shift_mm", 3), map(np.ascontiguousarray, shift_mm), strict=True)
+        )
     return columns
 
 

@@ -118,6 +118,14 @@ def _joints(inputs: Inputs, applied: Sequence[Applied]) -> tuple[Floats, Floats,
     return q_act, q_load, q_true
 
 
+def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
+    """Return the measured joints (m, 6), the model's where there are none: columns that are NaN."""
+    if measured_rad is None:
+        return model_rad
+    missing = np.isnan(measured_rad).all(axis=0)
+    return np.where(missing, model_rad, measured_rad) if missing.any() else measured_rad
+
+
 def _cut(inputs: Inputs, applied: Sequence[Applied]) -> Load:
     cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
     for one in applied:

@@ -15,6 +15,7 @@ class Where(Enum):
 
     TIP = "tip"
     JOINT = "joint"
+    """Also where no encoder sees it and only the tip shows it, through the Jacobian."""
     FORCE_AXIS = "force axis"
 
 
@@ -32,11 +33,14 @@ class Dependence(Enum):
     RUN_TO_RUN = "run to run"
     WALL_CLOCK = "wall clock"
     OWN_ANGLE = "own angle"
+    """Of the joint where it shows, or of the one that is its target."""
     MOTOR_ANGLE = "motor angle"
     REVERSALS = "reversals"
-    """Direction of motion, with memory."""
+    """Direction of the joint's motion, with memory."""
     OWN_TORQUE = "own torque"
+    """Odd in it, also with memory of it."""
     VELOCITY = "velocity"
+    """How fast the signal itself changes: a joint, the tip, or a force."""
     ACCELERATION = "acceleration"
     FORCE = "force"
     FORCE_BY_PLACE = "force by place"
@@ -46,6 +50,7 @@ class Dependence(Enum):
     PLACE = "place"
     """Pose of the tool."""
     SPINDLE_SPEED = "spindle speed"
+    """Also what follows it with a delay."""
     TEMPERATURE = "temperature"
     TONE = "tone"
     """One frequency, whatever the motion."""

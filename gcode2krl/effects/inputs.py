@@ -91,8 +91,10 @@ class Inputs:
         """(m, 6) torque of the nominal loads about each axis, positive with the angle: what its gear carries.
 
         Cutting load (the measured force where there is one), and weight and inertia of links and payload as
-        far as the cell states their masses.
+        far as the cell states their masses. Zero where the posture is unknown: relative angles.
         """
+        if not self.position_mm.any():
+            return np.zeros_like(self.q_cmd_rad)
         force_N = self.force_base_N if self.load_base_N is None else self.load_base_N
         torque = arm.torque_Nm(self.jacobian, force_N, self.moment_base_Nmm)
         return torque + masses.torque_Nm(self.bodies, self.bodies_push_N, self.axes_mm, self.jacobian)

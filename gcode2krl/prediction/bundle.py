@@ -28,7 +28,7 @@ _MOST_OF_RECORD = 4096
 _IGNORED = re.compile(r"\.DS_Store|Thumbs\.db|desktop\.ini|\..+\.(?:part|old)")
 """Files that do not make a folder foreign: those of desktops, and leftovers of a killed run."""
 _UNITS = ("_mm_s3", "_mm_s2", "_mm_s", "_mm", "_rad_s", "_rad", "_Nmm", "_N")
-_ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)")
+_ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)|part_shift_[xyz]_mm")
 _AXES = {3: "xyz", 4: "xyzw"}
 AnyTable = TypeVar("AnyTable", bound=Table)
 

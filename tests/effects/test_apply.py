@@ -41,6 +41,18 @@ def test_the_motor_side_and_the_sensor_have_columns(part, known):
     np.testing.assert_array_equal(found.forces.force_base_N, part.forces.force_base_N)
 
 
+def test_a_part_that_gives_way_has_columns_that_are_saved(part, known, tmp_path):
+    found = apply(part, known, "fixture_compliance:um_per_N=1/2/0")
+    shift = np.stack([found.added[f"part_shift_{axis}_mm"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(shift, -part.forces.force_base_N * [1e-3, 2e-3, 0.0])
+    np.testing.assert_array_equal(
+        found.deflection.deflection_base_mm,
+        apply(part, known, "force_offset:fz_N=0").deflection.deflection_base_mm,
+    )
+    found.save(tmp_path)
+    np.testing.assert_allclose(Prediction.load(tmp_path).added["part_shift_x_mm"], shift[:, 0], atol=1e-9)
+
+
 def test_correction_is_normal_to_the_feed(part, known):
     found = apply(part, known, "tool_wear:growth_per_m=0.5")
     np.testing.assert_allclose(found.forces.peak_N >= part.forces.peak_N - 1e-9, True)

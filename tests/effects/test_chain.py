@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcode2krl import robot
 from gcode2krl.compliance import deflection_of
-from gcode2krl.effects import Applied, parse, simulate
+from gcode2krl.effects import Applied, arm, drives, forces, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 
 SIGNALS = (
@@ -46,6 +47,36 @@ def _effects(known, cell, skip=()):
         for target in effect.targets(cell):
             if name not in skip:
                 yield effect.at(target), target
+
+
+def test_drives_and_forces_are_those_of_the_whole_chain(milling, known):
+    texts = ("servo_lag:target=A1,tau_s=0.02", "backlash:target=A2,gap_deg=0.02", "tool_wear:growth_per_m=1")
+    clock = "clock:target=q_load,offset_s=0.01"
+    applied = [parse(text, known, milling.cell) for text in (*texts, "force_offset:fz_N=7", clock)]
+    whole = simulate(milling, applied)
+    for part_of, names in (
+        (drives(milling, applied), ("q_cmd_rad", "q_act_rad", "q_load_rad")),
+        (forces(milling, applied), ("force_base_N", "force_meas_base_N", "moment_meas_base_Nmm")),
+    ):
+        for name in names:
+            np.testing.assert_array_equal(part_of.seen(name), whole.seen(name), err_msg=name)
+
+
+def test_a_measured_tip_is_bent_once_and_right(swinging, known):
+    """The tip of measured joints is the same whether an effect makes the chain compute it anew or not."""
+    measured = replace(swinging, q_act_rad=swinging.q_cmd_rad + 1e-4, load_base_N=1.5 * swinging.force_base_N)
+    plain = simulate(measured).tcp_base_mm
+    anew = simulate(measured, [parse("stiffness:target=A2,scale=1", known, measured.cell)])
+    np.testing.assert_allclose(plain, anew.tcp_base_mm, atol=1e-12)
+    bent, _ = arm.bend(
+        measured.q_act_rad,
+        measured.load_base_N,
+        measured.moment_base_Nmm,
+        measured.softness,
+        measured.cell,
+        measured.tool,
+    )
+    np.testing.assert_allclose(plain, robot.forward(measured.q_act_rad, measured.cell)[0] + bent, atol=1e-9)
 
 
 def test_nominal_values_change_nothing(milling, known):

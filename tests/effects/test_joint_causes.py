@@ -106,6 +106,12 @@ def test_weights_are_those_of_links_and_payload(swinging):
     assert abs(still.own_torque_Nm[0, 0]) < abs(still.own_torque_Nm[0, 1]) / 10.0
 
 
+def test_no_torque_is_made_up_where_the_posture_is_unknown(swinging, known):
+    unknown = replace(swinging, position_mm=np.zeros_like(swinging.position_mm))
+    signals = run(unknown, known, "gear_twist:target=A2,deg_per_kNm=0.03")
+    np.testing.assert_array_equal(signals.q_load_rad, signals.q_act_rad)
+
+
 def test_interpolation_has_its_periods_while_the_motor_is_slow(swinging, known):
     slow = replace(
         swinging, q_cmd_rad=np.radians(20.0) + 1e-3 * np.radians(swinging.time_s[:, None] * np.ones(6))

@@ -19,7 +19,7 @@ def moved_by(inputs, known, text):
 
 
 def tilted_tip(q, lengths, tilts):
-    """Eq. 1 of the arm, a turn written out at each axis: {joint: rotation in the frame of the link before}."""
+    """Eq. 1 of the arm, with a turn written out at each axis: {joint: in the frame of the link before}."""
     a1, a2, c1, c2, c3, c4 = lengths
     ways = ([0, 0, 0], [a1, 0, c1], [c2, 0, 0], [c3, 0, -a2], [0, 0, 0], [0, 0, 0])
     axes = ("z", "y", "y", "x", "y", "x")

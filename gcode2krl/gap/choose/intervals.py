@@ -116,7 +116,7 @@ def _mismatch(found: Examination, number: int) -> dict[str, float]:
 def _interval(parameter: Parameter, value: float, drawn: Floats, model: float) -> Interval:
     """Return the interval of draws (d,), an angle's about its value, and of what the model is off by."""
     away = drawn - value
-    model = 0.0 if parameter.role is Role.COUNT else model
+    model = 0.0 if parameter.role in (Role.COUNT, Role.MOMENT) else model
     if parameter.role is Role.PHASE:
         away = (away + np.pi) % (2.0 * np.pi) - np.pi
     low, high = np.quantile(away, _ENDS).tolist()

@@ -1,9 +1,9 @@
 """Moments at which a residual jumps, beside whatever else it does around them.
 
-In a window of 2·h rows about a moment each component is a line and a jump; how surprising the jump is, is the
-log-likelihood ratio N·log(S/(S - g)) of least squares with and without it, N the rows, S the sum of squares
-beside the line and g what the jump takes of it (Quandt 1958, in a moving window). Only the order of moments
-matters here: an effect that begins at one of them is judged on all data.
+In a window of 2·h rows about a moment each component is a cubic and a jump; how surprising the jump is, is
+the log-likelihood ratio N·log(S/(S - g)) of least squares with and without it, N the rows, S the sum of
+squares beside the cubic and g what the jump takes of it (Quandt 1958, in a moving window). Only the order of
+moments matters here: an effect that begins at one of them is judged on all data.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,8 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_H
 
 _LIMITS = THRESHOLDS.beside
+_SMOOTH = 3
+"""Degree of the polynomial that stands for whatever else goes on in a window."""
 _ROUNDING = 1e-12
 """Share of a component's power below which a sum of squares is that of rounding errors."""
 
@@ -55,16 +57,15 @@ def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
 
 def jumps(values: Floats, half: int) -> Floats:
     """Return how surprising a jump before each row of (n,) is; 0 within ``half`` rows of the ends."""
-    rows = np.arange(2 * half) - (half - 0.5)
-    line = rows / np.linalg.norm(rows)
-    jump = np.sign(rows) - line * float(line @ np.sign(rows))
+    rows = (np.arange(2 * half) - (half - 0.5)) / half
+    smooth = np.linalg.qr(np.vander(rows, _SMOOTH + 1))[0]
+    jump = np.sign(rows) - smooth @ (smooth.T @ np.sign(rows))
     jump /= np.linalg.norm(jump)
     values = values - values.mean()
-    level, along, taken = (
-        _moving(values, each) for each in (np.full(2 * half, (2 * half) ** -0.5), line, jump)
-    )
     power = _moving(values**2, np.ones(2 * half))
-    rest = np.maximum(power - level**2 - along**2, _ROUNDING * max(float(power.max()), 1e-300))
+    explained = sum(_moving(values, each) ** 2 for each in smooth.T)
+    taken = _moving(values, jump)
+    rest = np.maximum(power - explained, _ROUNDING * max(float(power.max()), 1e-300))
     share = np.minimum(taken**2 / rest, 1.0 - _ROUNDING)
     clear = np.zeros(len(values))
     clear[half : half + len(share)] = -2.0 * half * np.log1p(-share)

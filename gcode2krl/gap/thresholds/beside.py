@@ -80,7 +80,7 @@ class BesideThresholds:
     frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
     jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
     jump_halves_s: tuple[float, ...] = convention(
-        (0.3, 1.5), "half of the windows in which a jump is looked for: quick motion, and noise"
+        (0.3, 1.0), "half of the windows in which a jump is looked for: quick motion, and noise"
     )
     least_jump: float = convention(
         25.0, "log-likelihood ratio of a jump in its window; noise without memory shows one in 10,000 times"

@@ -120,7 +120,7 @@ def _foot(point: Floats, path: Floats, radius: Floats, corner: Floats) -> _Foot 
 def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
     """Return the tips (m, 3) and how far the model bends them (m, 3)."""
     inputs, table = pair.inputs, pair.run.tracker
-    tip = simulate(inputs, list(base)).tcp_base_mm
+    tip = simulate(inputs, list(base)).tip_on_part_mm
     bent = inputs.deflection_mm
     if table is None or pair.run.head.frames.tracker != "base":
         return tip, bent

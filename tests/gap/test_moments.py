@@ -1,0 +1,75 @@
+"""Change points: a jump is found to a sample beside trends and tones, and nothing where nothing jumps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects import library
+from gcode2krl.gap.fit.moments import jumps, strongest_moments
+from gcode2krl.gap.fit.numbers import free_of
+from gcode2krl.gap.fit.signatures import Signatures, blocks_from
+from gcode2krl.gap.thresholds import THRESHOLDS
+from tests.gap.constructed import trace
+
+STEP = library()["step"]
+
+
+def noisy(seed=1, rows=500):
+    return np.random.default_rng(seed).normal(0.0, 0.02, (rows, 3))
+
+
+def at(row, size, rows=500):
+    return np.where(np.arange(rows) >= row, size, 0.0)[:, None] * np.array([1.0, 0.3, 0.1])
+
+
+def test_a_jump_is_as_surprising_as_least_squares_say():
+    values = noisy()[:, 0] + at(180, 0.2)[:, 0]
+    half, row = 20, 180
+    window = values[row - half : row + half]
+    cubic = np.vander(np.linspace(-1.0, 1.0, 2 * half), 4)
+    both = np.column_stack([cubic, np.arange(2 * half) >= half])
+    left = [np.sum((window - a @ np.linalg.lstsq(a, window, rcond=None)[0]) ** 2) for a in (cubic, both)]
+    found = jumps(values, half)
+    assert found[row] == pytest.approx(2 * half * np.log(left[0] / left[1]), rel=1e-6)
+    assert np.argmax(found) == row
+    assert not found[:half].any()
+
+
+def test_the_clearest_jump_comes_first_beside_a_trend_and_a_tone():
+    t = np.arange(500) * 0.02
+    slow = (0.03 * t + 0.2 * np.sin(2.0 * np.pi * 0.3 * t))[:, None]
+    one = trace(noisy() + slow + at(310, 0.3) + at(120, 0.2), "mechanics")
+    found = strongest_moments([one], 0.0, 1e6)
+    np.testing.assert_allclose(found[:2], [one.time_s[310], one.time_s[120]], atol=1e-9)
+    assert len(found) <= THRESHOLDS.beside.jumps
+
+
+def test_noise_and_slow_motion_have_no_jump():
+    slow = 0.1 * np.sin(2.0 * np.pi * 0.3 * np.arange(500) * 0.02)[:, None]
+    for seed in range(5):
+        assert strongest_moments([trace(noisy(seed) + slow, "mechanics")], 0.0, 1e6) == ()
+
+
+def test_moments_count_from_the_start_of_the_earliest_run():
+    later = trace(noisy() + at(310, 0.3), "mechanics")
+    later = replace(later, inputs=replace(later.inputs, hours=0.5))
+    (found, *_) = strongest_moments([trace(noisy(2), "mechanics"), later], 0.0, 1e6)
+    assert found == pytest.approx(1800.0 + later.time_s[310])
+    assert strongest_moments([later], 0.0, 1000.0) == ()
+
+
+def test_a_short_trace_has_none():
+    assert strongest_moments([trace(noisy(rows=20) + at(10, 1.0, 20), "mechanics")], 0.0, 1e6) == ()
+
+
+def test_blocks_of_a_step_stand_at_the_moments_and_count_what_was_looked_at():
+    blocks = list(blocks_from(STEP.at("tip"), "tip", (4.0, 6.0), 30.0))
+    assert [block.shape["at_s"] for block in blocks] == [4.0, 6.0]
+    assert [block.tried for block in blocks] == [15.0, 15.0]
+    tip = trace(np.zeros((500, 3)), "mechanics")
+    columns = Signatures().columns(blocks[0], tip)
+    np.testing.assert_allclose(columns[0, :, 0], np.where(tip.time_s > 4.0, 0.1, 0.0), atol=0.051)
+    free = free_of(blocks[0].settings(tip)[0], tip)
+    assert free.scale[free.names.index("at_s")] == pytest.approx(2.0)
+    assert list(blocks_from(library()["backlash"], "A1", (4.0,), 30.0)) == []
