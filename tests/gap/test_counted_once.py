@@ -12,7 +12,7 @@ from gcode2krl.gap.choose.set_clocks import with_set_clocks
 from gcode2krl.gap.fit.counted_once import CountedOnce
 from gcode2krl.gap.fit.design import NuisanceDesign
 from gcode2krl.gap.fit.signatures import Signatures, blocks_of
-from tests.gap.constructed import LINK, columns_nuisance, likelihood, motion, noise, question, trace
+from tests.gap.constructed import LINK, columns_nuisance, joints, likelihood, motion, noise, question, trace
 
 CLOCK = library()["clock"]
 SIGMA_RAD = 2e-6
@@ -96,3 +96,17 @@ def test_a_count_of_another_number_is_another_form():
     first = blocks[0].shape["harmonic"]
     gone = once.gone(Applied(swing, "A1", {"amplitude_deg": 0.01, "harmonic": first, "phase": 0.0}))
     assert gone.tolist() == [each.shape["harmonic"] == first for each in blocks]
+
+
+def test_drives_ahead_of_their_command_have_no_negative_lag():
+    """A negative lag is a bound hit; only a clock of the commanded columns explains it."""
+    time_s = motion().time_s
+    one = trace(joints(time_s + 6e-3) - joints(time_s) + noise(500, 4, SIGMA_RAD, 6), "servo")
+    lag = library()["servo_lag"]
+    lags = [block for n in range(1, 7) for block in blocks_of(lag, f"A{n}")]
+    asked = question([])
+    assert not examine(LINK["servo"], [one], replace(asked, blocks=lags)).causes
+    clocks = list(blocks_of(CLOCK, "q_cmd"))
+    (cause,) = examine(LINK["servo"], [one], replace(asked, blocks=[*lags, *clocks])).causes
+    assert (cause.effect.name, cause.target) == ("clock", "q_cmd")
+    assert abs(cause["offset_s"]) == pytest.approx(6e-3, abs=1e-4)

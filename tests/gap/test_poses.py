@@ -11,7 +11,7 @@ from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.beside.links import MECHANICS
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.poses import is_of_poses
-from gcode2krl.gap.fit.pose_noise import pose_noise
+from gcode2krl.gap.fit.pose_noise import noise_of_poses
 from gcode2krl.runs import load_run
 
 COVERS = ("gcode2krl.gap.fit.pose_noise",)
@@ -103,12 +103,12 @@ def test_noise_is_white_and_as_stated_or_what_nothing_explains(tmp_path):
     (trace,) = MECHANICS.traces(log_pairs([run], CELL))
     form = np.random.default_rng(3).standard_normal((3, POSES, 20))
     pushed = replace(trace, measured=trace.measured + form.sum(axis=2).T)
-    for noise in pose_noise([pushed], [form], [[]]):
+    for noise in noise_of_poses([pushed], [form], [[]]):
         assert len(noise.a) == 0
         assert noise.sigma == pytest.approx(SIGMA_MM, rel=0.15)
     many = np.random.default_rng(4).standard_normal((3, POSES, 150))
-    assert pose_noise([pushed], [many], [[]])[0].sigma > 1.0  # too few poses for so many forms
-    assert pose_noise([replace(pushed, declared_sigma=0.5)], [form], [[]])[0].sigma == 0.5
+    assert noise_of_poses([pushed], [many], [[]])[0].sigma > 1.0  # too few poses for so many forms
+    assert noise_of_poses([replace(pushed, declared_sigma=0.5)], [form], [[]])[0].sigma == 0.5
 
 
 def test_a_wrong_mastering_is_found_from_poses(tmp_path):

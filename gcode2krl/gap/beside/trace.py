@@ -93,6 +93,8 @@ class Trace:
     """(s, 2) stretches without a gap."""
     plus_late_s: float = 0.0
     """By how much the samples of ``plus`` are older than their stamps, beyond the table's clock."""
+    clock_set_s: float = 0.0
+    """What was taken off the stamps for the run's own clock."""
     declared_sigma: float | None = None
     in_sensor_frame: bool = False
     """The values are along the sensor's axes, which are those of the flange."""

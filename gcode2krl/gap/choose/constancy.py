@@ -98,6 +98,8 @@ class _Residual:
     time_s: Floats
     component: Floats
     inflation: float
+    set_share: Floats
+    """(runs,) of a clock what was taken off the stamps of each run already, as a share of it."""
 
     @classmethod
     def of(cls, found: Examination, number: int) -> "_Residual":
@@ -116,6 +118,7 @@ class _Residual:
             np.concatenate([np.tile(trace.time_s, trace.shape[1]) for trace in traces]),
             np.concatenate([np.repeat(np.arange(k), n) for n, k in shapes]),
             sensitivity_of(likelihood, found.fitted, number).inflation(),
+            _set_shares(found, number),
         )
 
     def part(self, rows: Bools) -> Part | None:
@@ -132,12 +135,22 @@ class _Residual:
         return Part(share, self.inflation / max(information, 1e-30))
 
 
+def _set_shares(found: Examination, number: int) -> Floats:
+    """Return by which share of a clock each run's stamps (runs,) were moved before it was fitted."""
+    applied = found.applied[number]
+    offset_s = applied[applied.effect.sizes[0].name] if applied.effect.is_clock else 0.0
+    moved_s = np.array([trace.clock_set_s for trace in found.traces])
+    return moved_s / offset_s if offset_s != 0.0 else np.zeros(len(moved_s))
+
+
 def _kept(parts: Sequence[Part | None]) -> list[Part]:
     return [part for part in parts if part is not None]
 
 
 def _by_run(residual: _Residual) -> list[Part]:
-    return _kept([residual.part(residual.run == run) for run in np.unique(residual.run)])
+    parts = [residual.part(residual.run == run) for run in range(len(residual.set_share))]
+    moved = zip(parts, residual.set_share.tolist(), strict=True)
+    return [Part(part.share + share, part.variance) for part, share in moved if part is not None]
 
 
 def _halves(residual: _Residual, run: int) -> list[Part]:

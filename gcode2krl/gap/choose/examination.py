@@ -10,7 +10,7 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.counted_once import counted_once
+from gcode2krl.gap.fit.counted_once import once_among
 from gcode2krl.gap.fit.design import Candidates, Question
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.gram import Gram, SignatureGram
@@ -53,7 +53,7 @@ class LinkData:
         """Return the data with their likelihood under a model of the noise."""
         likelihood = Likelihood(traces, nuisance, noise)
         signatures = likelihood.gram(candidates.signatures)
-        likelihood = likelihood.counting(counted_once(likelihood.design, candidates, signatures))
+        likelihood = likelihood.counting(once_among(likelihood.design, candidates, signatures))
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
 
     @property

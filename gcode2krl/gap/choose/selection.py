@@ -18,7 +18,7 @@ from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.noise_source import noise_of
-from gcode2krl.gap.fit.pose_noise import pose_noise
+from gcode2krl.gap.fit.pose_noise import noise_of_poses
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.sensitivity import sensitivity_of
 from gcode2krl.gap.fit.signatures import Block, Signatures
@@ -41,7 +41,7 @@ def examine(
     candidates = Candidates.of(question.blocks, traces, known)
     nuisance = nuisance_for(traces, question, known)
     still = traces[0].still
-    assumed = noise or (pose_noise if still else noise_of)(traces, candidates.signatures, nuisance)
+    assumed = noise or (noise_of_poses if still else noise_of)(traces, candidates.signatures, nuisance)
     found = _pruned(_selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed)))
     if noise is None and found.causes and not still:
         # what rings or hums looks like noise until its cause is known

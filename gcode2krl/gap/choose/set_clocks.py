@@ -62,8 +62,8 @@ def _clock_of(trace: Trace, nuisance: Sequence[Nuisance]) -> float:
 def _later(trace: Trace, offset_s: float) -> Trace:
     """Return the trace with a clock error taken off: of the load encoders alone, or of the whole table."""
     if trace.link.own_clock:
-        return replace(trace, plus_late_s=offset_s)
-    return replace(trace, time_s=trace.time_s - offset_s)
+        return replace(trace, plus_late_s=offset_s, clock_set_s=offset_s)
+    return replace(trace, time_s=trace.time_s - offset_s, clock_set_s=offset_s)
 
 
 def _coefficient(trace: Trace, clock: Floats, others: Sequence[Floats]) -> float:

@@ -10,6 +10,9 @@
   signals, to first order, times the standard deviation of a uniform draw within its bound; so b has unit
   variance, and its bound is sqrt(3) whatever the unit. b is shared by all runs for what belongs to the
   machine, and each run's own for clocks, frames and zeros.
+  Mismatch is counted once (`counted_once`): a column that has the form of an effect is projected out of N
+  while that effect is in the model, of runs' own columns their mean. θ is then the whole deviation, and that
+  is compared with the bound.
 - e: coloured noise, of each component by itself: x_t = Σ_i a_i·x_{t-1-i} + s·w_t of order 3 with w white
   (`noise`). L⁻¹ is the filter (x_t - Σ_i a_i·x_{t-1-i})/s. It starts anew at each gap of the data: the first
   three rows of a segment are divided by the rms of x alone. (That leaves them correlated among themselves,
@@ -26,7 +29,8 @@ data, nuisance integrated out. b at a bound is held there, and what is beyond is
 **Refit** (`refitting`, `least_squares`). θ of least chi2 by Gauss-Newton; J = ∂(marginal residual)/∂θ by
 differences of the simulation, H = Jᵀ·J the information, all numbers in units of their typical size. Numbers
 of a prior have standard deviation `prior_sizes`; the cost of numbers is log det(I + prior_sizes²·H),
-Laplace's approximation of the evidence (MacKay 1992).
+Laplace's approximation of the evidence (MacKay 1992). Numbers that the data do not give are held
+(`choose.shown_numbers`) and are no part of θ.
 
 **Fast view** (`gram.Gram`). To first order r(θ + δ, c) = r - T·δ - S·c - N·b, T the tangents of the effects
 in the model and S the signatures of a candidate, both whitened. Inner products under the inverse covariance

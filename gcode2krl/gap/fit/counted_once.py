@@ -78,7 +78,7 @@ class CountedOnce:
         return projection
 
 
-def counted_once(
+def once_among(
     design: "NuisanceDesign", candidates: "Candidates", signatures: "SignatureGram"
 ) -> CountedOnce:
     """Return which nuisance of the runs' own has the form of which candidates: what these span of it."""

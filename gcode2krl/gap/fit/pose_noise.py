@@ -14,7 +14,7 @@ _RANK = 1e-6
 """Singular values below this share of the largest add nothing to what columns span."""
 
 
-def pose_noise(
+def noise_of_poses(
     traces: Sequence[Trace], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]]
 ) -> list[Noise]:
     """Return the noise of each component: what ``run.toml`` states, else what no candidate explains.
