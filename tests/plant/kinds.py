@@ -15,6 +15,7 @@ import numpy as np
 from tests.plant import cases, mismatch, plans
 from tests.plant.confounded import PAIRS
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN
+from tests.plant.faults import Fault
 from tests.plant.plans import Options, Plan
 
 KINDS = (
@@ -65,7 +66,17 @@ def plan_of(kind: str, seed: int, effect: str | None = None, form: str | None = 
         raise ValueError(f"no kind {kind!r}; known: {', '.join(KINDS)}")
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     options, more = BUILDERS.get(kind, _plain(kind))(rng, Options(effect=effect, form=form))
-    return plans.draw(seed, options), more
+    plan = plans.draw(seed, options)
+    if options.missing:
+        more["undecided"] = any(_measured_in(fault) in options.missing for fault in plan.faults)
+    return plan, more
+
+
+def _measured_in(fault: Fault) -> str:
+    """Table or column in which an effect is judged, if it is one and no other."""
+    if fault.kind.signal == "joint_load" and fault.target is not None:
+        return f"q{fault.target[1:]}_load_deg"
+    return {"tcp": "tracker", "force": "force", "joint_actual": "controller"}.get(fault.kind.signal, "")
 
 
 def _plain(kind: str):
@@ -123,6 +134,7 @@ def _confounded(rng: np.random.Generator, options: Options) -> tuple[Options, di
     more = {
         "pair": name,
         "answers": [{"effect": e, "target": t} for e, t in pair.answers],
+        "undecided": True,
         "why": pair.why,
         "apart": list(pair.apart),
     }

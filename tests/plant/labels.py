@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 from tests.plant import faults as acting
-from tests.plant import instruments, truth
+from tests.plant import imitation, instruments, truth
 from tests.plant.effects import LIBRARY, SLIPS
 from tests.plant.faults import Fault
 from tests.plant.instruments import Instruments
@@ -70,7 +70,10 @@ def _entries(plan: Plan, sizes: list[float], driven: list[Run], without: list[Ru
             alone = [plan.drive(day, [fault.hooks(size)]) for day in plan.days]
         seen = [instruments.clean(run, plan.how) for run in alone]
         changes = [truth.differences(a, b) for a, b in zip(seen, bare, strict=True)]
-        out.append(_entry(fault, size, changes, plan.how))
+        entry = _entry(fault, size, changes, plan.how)
+        main = entry["main_signal"] or ""
+        entry["stand_ins"] = imitation.stand_ins(changes, bare, plan.days, main, plan.how)
+        out.append(entry)
     return out
 
 

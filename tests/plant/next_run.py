@@ -81,7 +81,7 @@ def _acts(fault: Fault, program: Program) -> bool:
 
 
 def _drive(plan: Plan, day: Day, program: Program, hooks: list[Hooks]) -> Run:
-    hung: list[Hooks] = [{"load": _hang(program)}] if program.weights else []
+    hung: list[Hooks] = [{"load": hang(program)}] if program.weights else []
     return simulate(
         program.way,
         plan.world,
@@ -94,7 +94,7 @@ def _drive(plan: Plan, day: Day, program: Program, hooks: list[Hooks]) -> Run:
     )
 
 
-def _hang(program: Program):
+def hang(program: Program):
     """Known masses on the tool, as forces and moments at the TCP."""
 
     def load(run: Run) -> None:
@@ -102,7 +102,8 @@ def _hang(program: Program):
         axes = arms.pose(arm, np.ascontiguousarray(run.q_load[::SLOW]))[1]
         for weight in program.weights:
             on = (elapsed_s >= weight.from_s) & (elapsed_s < weight.to_s)
-            pull = on[:, None] * np.array([0.0, 0.0, -GRAVITY_m_s2 * weight.kg])
+            down = np.array([0.0, 0.0, -GRAVITY_m_s2 * weight.kg])
+            pull = on[:, None] * (down + run.world.base.axes @ np.asarray(weight.pull_N, float))
             run.force_N = run.force_N + pull
             run.moment_Nmm = run.moment_Nmm + np.cross(axes @ np.asarray(weight.at_mm), pull)
 

@@ -109,6 +109,18 @@ def chains(way: Waypoints, world: World) -> list[Chain]:
     return out
 
 
+def stands(way: Waypoints, links: list[Chain]) -> np.ndarray:
+    """When the hold of each row begins, (n,); of rows passed without a stop it says nothing."""
+    begins, now_s, first, coming = np.zeros(len(way)), 0.0, 0, list(links)
+    for i in np.flatnonzero(way.cdis_mm[1:] <= 0.0) + 1:
+        legs = np.linalg.norm(np.diff(way.position_mm[first : i + 1], axis=0), axis=1)
+        if legs.max() > MATCH:
+            now_s = coming.pop(0).end_s
+        begins[i] = now_s
+        now_s, first = now_s + way.hold_s[i], i
+    return begins
+
+
 def _turned(share: np.ndarray, shape: str) -> np.ndarray:
     """Integral from 0 of the share of the turn that is done, over the corner from 0 to 1."""
     if shape == "quartic":  # another form: the turn begins and ends softly, 3u² - 2u³

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.plant.scene import RAPID_mm_s
-from tests.plant.waypoints import Waypoints
+from tests.plant.waypoints import PROGRAMS, Waypoints
 
 LONG_s = 20.0  # of a longer dwell only the ends are logged
 SHOWN_s = 5.0  # at either end
@@ -24,11 +24,12 @@ class Track:
 
 @dataclass(frozen=True)
 class Weight:
-    """A known mass that hangs on the tool for a while, its centre in the tool frame."""
+    """A known mass that hangs on the tool for a while, its centre in the tool frame, or a known pull."""
 
     from_s: float
     to_s: float
-    kg: float
+    kg: float = 0.0
+    pull_N: tuple[float, float, float] = (0.0, 0.0, 0.0)  # along `$BASE`, as by a rope over a pulley
     at_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
@@ -46,18 +47,22 @@ class Program:
 def program_of(data: dict) -> Program:
     """A program from plain data.
 
-    `name`; `rows` or `track`; optional `spindle` [[from_s, rpm] …] and `weights`
-    [{from_s, to_s, kg, at_mm} …]. A row: `x_mm y_mm z_mm`, optional `a_deg b_deg c_deg` (0), `speed_mm_s`
-    (rapid), `cdis_mm` (0, an exact stop), `hold_s` (0), `cutting` (false); row 0 is where the robot waits.
+    `name`; `rows`, `track` or `repeats` (one of the plant's own programs); optional `spindle`
+    [[from_s, rpm] …] and `weights` [{from_s, to_s, kg, pull_N, at_mm} …]. A row: `x_mm y_mm z_mm`, optional
+    `a_deg b_deg c_deg` (0), `speed_mm_s` (rapid), `cdis_mm` (0, an exact stop), `hold_s` (0), `cutting`
+    (false); row 0 is where the robot waits.
     `track`: `t_s` (n) from 0 and `q_deg` (n, 6). Raises ValueError for what is neither.
     """
-    if ("rows" in data) == ("track" in data):
-        raise ValueError(f"program {data.get('name')!r} needs either 'rows' or 'track'")
+    if sum(key in data for key in ("rows", "track", "repeats")) != 1:
+        raise ValueError(f"program {data.get('name')!r} needs one of 'rows', 'track', 'repeats'")
     spindle = tuple((float(t), float(rpm)) for t, rpm in data.get("spindle", [(0.0, 13000.0)]))
     weights = tuple(Weight(**entry) for entry in data.get("weights", []))
+    way: Waypoints | Track
+    pauses: tuple = ()
     if "rows" in data:
-        way: Waypoints | Track = _rows(data["rows"])
-        pauses: tuple = ()
+        way = _rows(data["rows"])
+    elif "repeats" in data:
+        way = PROGRAMS[data["repeats"]]().waypoints()
     else:
         way, pauses = _track(np.array(data["track"]["t_s"], float), np.array(data["track"]["q_deg"], float))
     return Program(str(data["name"]), way, spindle, weights, pauses)
@@ -76,9 +81,12 @@ def _rows(rows: list[dict]) -> Waypoints:
     turned = np.any(np.diff(turns, axis=0) != 0.0, axis=1)
     if np.any((cdis[1:] > 0.0) & turned) or np.any((cdis[:-1] > 0.0) & turned):
         raise ValueError("a move that turns the tool must begin and end with an exact stop")
+    hold = column("hold_s", 0.0)
+    turning = np.append(False, turned)  # a turn in place takes its hold and is simulated
+    left_out = np.where((hold > LONG_s) & ~turning, hold - 2.0 * SHOWN_s, 0.0)
     cutting = np.array([bool(row.get("cutting", False)) for row in rows])
     speed = column("speed_mm_s", RAPID_mm_s)
-    return Waypoints(place, speed, cdis, column("hold_s", 0.0), cutting, turns)
+    return Waypoints(place, speed, cdis, hold - left_out, cutting, turns, left_out)
 
 
 def _track(t_s: np.ndarray, q_deg: np.ndarray) -> tuple[Track, tuple]:

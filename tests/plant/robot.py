@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from tests.plant import arm as arms
 from tests.plant import chips, memory, path, turning
-from tests.plant.programs import Track
+from tests.plant.programs import SHOWN_s, Track
 from tests.plant.scene import DEGREE, GEAR_RATIO, JOINT_ROW, GRAVITY_m_s2, World
 from tests.plant.waypoints import Waypoints
 
@@ -123,6 +123,10 @@ def _plan(run: Run) -> None:
     run.links = path.chains(run.way, run.believed)
     if not run.links:
         raise ValueError("these waypoints go nowhere; give the joints as a track")
+    if run.way.left_out_s is not None:
+        begins = path.stands(run.way, run.links)
+        long = run.way.left_out_s > 0.0
+        run.pauses = tuple(zip(begins[long] + SHOWN_s, run.way.left_out_s[long], strict=True))
     last_s = run.links[-1].end_s + run.way.hold_s[-1]
     run.t_s = np.arange(0.0, last_s + TAIL_s, STEP_s)
     run.place_mm = path.commanded(run.links, run.t_s, run.believed)

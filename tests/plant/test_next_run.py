@@ -61,6 +61,23 @@ def test_the_middle_of_a_long_dwell_is_not_simulated_but_goes_by():
     assert run.q_cmd[run.elapsed_s > 1802.0, 0] == pytest.approx(5.0 * DEGREE)
 
 
+def test_a_long_hold_of_a_row_goes_by_as_well():
+    there = {"x_mm": 80, "y_mm": 20, "z_mm": 60}
+    rows = [
+        {"x_mm": 0, "y_mm": 0, "z_mm": 60},
+        {**there, "hold_s": 600.0},
+        {"x_mm": 0, "y_mm": 0, "z_mm": 60},
+    ]
+    run = drive({"name": "dwell", "rows": rows})
+    short = drive({"name": "dwell", "rows": [rows[0], {**there, "hold_s": 10.0}, rows[2]]})
+    np.testing.assert_allclose(run.place_mm, short.place_mm)
+    assert run.elapsed_s[-1] - short.elapsed_s[-1] == pytest.approx(590.0)
+    waits = np.linalg.norm(run.place_mm - [80, 20, 60], axis=1) < 1e-6
+    jump = int(np.argmax(np.diff(run.elapsed_s)))
+    assert waits[jump]
+    assert waits[jump + 1]
+
+
 def stationary(tmp_path, effect: str, data: dict, kind: str = "single", after_s: float = 600.0):
     label = kinds.draw_case(kind, 7, tmp_path / "case", effect, "same")
     done = next_run.drive_next(label, data, tmp_path / "next" / "run-4", "../prediction", after_s)
@@ -102,8 +119,17 @@ def test_weights_hang_on_the_sensor_while_they_hang(tmp_path):
     assert np.nanmedian(size[(t > 2.1) | (t < 0.9)]) < 30.0
 
 
+def test_a_rope_pulls_along_the_base():
+    pull = [{"from_s": 0.0, "to_s": 9.0, "pull_N": [0.0, 300.0, 0.0]}]
+    data = {"name": "weights", "rows": turned(0, 0, 0), "weights": pull}
+    program = programs.program_of(data)
+    run = simulate(program.way, WORLD, [{"load": next_run.hang(program)}])
+    np.testing.assert_allclose(run.force_N, np.tile([0.0, 300.0, 0.0], (len(run.force_N), 1)))
+    assert (run.tip_mm - run.place_mm)[:, 1].min() > 0.05
+
+
 def test_what_is_no_program_is_refused():
-    with pytest.raises(ValueError, match="either 'rows' or 'track'"):
+    with pytest.raises(ValueError, match="needs one of"):
         programs.program_of({"name": "x"})
     with pytest.raises(ValueError, match="rising times"):
         programs.program_of({"name": "x", "track": {"t_s": [0, 0], "q_deg": [[0] * 6] * 2}})
@@ -126,3 +152,11 @@ def test_the_command_line_writes_a_run_beside_its_label(tmp_path, capsys):
     assert (tmp_path / "n" / "run-4.label.json").exists()
     assert next_run.main([*arguments, "-o", str(tmp_path / "n" / "run-4")]) == 2
     assert "not empty" in capsys.readouterr().err
+
+
+def test_a_repeat_is_the_same_program_another_day(tmp_path):
+    label, done, folder = stationary(tmp_path, "none", {"name": "repeat", "repeats": "slots"}, "null")
+    assert done["duration_s"] == pytest.approx(17.85, abs=0.1)
+    assert done["effects"] == []
+    assert done["number"] == len(label["runs"])
+    assert len(table(folder, "tracker")) > 1000

@@ -17,6 +17,7 @@ class Waypoints:
     hold_s: np.ndarray
     cutting: np.ndarray  # a feed move
     turns_deg: np.ndarray | None = None  # A, B, C of the tool in `$BASE`, (n, 3); none is upright
+    left_out_s: np.ndarray | None = None  # of each hold: not simulated, 5 s after its begin
 
     def __len__(self) -> int:
         return len(self.position_mm)
