@@ -1,8 +1,8 @@
 """The canned programs of `gcode2krl make-test`: their names, their predictions, and what the plant drives."""
 
 import functools
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,9 @@ import numpy as np
 from gcode2krl import Prediction, load_cell
 
 STEP_s = 0.012
-STANDARD_GRAVITY_m_s2 = 9.80665
 AT_REST_mm_s = 1e-6
 AGAIN = "repeat"
 """Runs a program that is given: the plant does that without a canned one."""
-_SPINDLE = re.compile(r"^S(\d+) M3$|^M5$")
-_DWELL = re.compile(r"^G4 P([\d.]+)$")
 
 
 class NotCannedError(Exception):
@@ -51,48 +48,48 @@ def predicted(name: str, cell_file: Path, folder: Path) -> tuple[Path, dict[str,
     prediction = Prediction.load(place)
     if prediction.motion is None or prediction.joints is None:
         raise NotCannedError(f"the prediction of {name} has no joints")
-    clock = LineClock(draft.lines, prediction)
-    track = {
-        "t_s": prediction.motion.time_s.tolist(),
-        "q_deg": np.degrees(prediction.joints.q_rad).tolist(),
-    }
-    data = {"name": name, "track": track, "spindle": list(clock.spindle())}
-    return place, data | {"weights": list(clock.weights(draft.pulls_N))}
+    motion = prediction.motion
+    begun = moments(draft.states, motion, prediction.toolpath.source_line)
+    track = {"t_s": motion.time_s.tolist(), "q_deg": np.degrees(prediction.joints.q_rad).tolist()}
+    hung = weights(begun, float(motion.time_s[-1]))
+    return place, {"name": name, "track": track, "spindle": spindle(begun), "weights": hung}
 
 
-class LineClock:
-    """When the lines of a program are reached: after the last move before, and the dwells since."""
+@dataclass(frozen=True)
+class Moment:
+    """From a time on: the pull on the tool along ``$BASE`` and the spindle's speed."""
 
-    def __init__(self, lines: Sequence[str], prediction: Prediction):
-        motion = prediction.motion
-        if motion is None:
-            raise NotCannedError("the prediction has no motion")
-        self.lines = list(lines)
-        self.end_s = float(motion.time_s[-1])
-        moving = motion.speed_mm_s > AT_REST_mm_s
-        self._line = prediction.toolpath.source_line[motion.move][moving]
-        self._time_s = motion.time_s[moving]
+    time_s: float
+    pull_N: tuple[float, float, float]
+    rpm: float
 
-    def at(self, line: int) -> float:
-        """Return the time in seconds at which a line, the first being 1, is reached."""
-        before = np.flatnonzero(self._line < line)
-        arrived_s, last = (
-            (float(self._time_s[before[-1]]), int(self._line[before[-1]])) if len(before) else (0.0, 0)
-        )
-        dwells = [_DWELL.match(text) for text in self.lines[last : line - 1]]
-        return min(arrived_s + sum(float(dwell[1]) for dwell in dwells if dwell), self.end_s)
 
-    def spindle(self) -> Iterator[list[float]]:
-        """Yield time and speed of each change of the spindle; it stands at first."""
-        yield [0.0, 0.0]
-        for number, text in enumerate(self.lines, start=1):
-            if found := _SPINDLE.match(text):
-                yield [self.at(number), float(found[1] or 0.0)]
+def moments(states: Iterable[Any], motion: Any, source_line: np.ndarray) -> list[Moment]:
+    """Return when each state of a program begins: a dwell after the last move up to its line.
 
-    def weights(self, pulls_N: Sequence[tuple[int, Sequence[float]]]) -> Iterator[dict[str, float]]:
-        """Yield the weights that hang down; pulls to a side are left out: the plant has none."""
-        times_s = [*(self.at(line + 1) for line, _ in pulls_N), self.end_s]
-        for number, (_, (x_N, y_N, z_N)) in enumerate(pulls_N):
-            if z_N < 0.0 and x_N == y_N == 0.0:
-                from_s, to_s = times_s[number : number + 2]
-                yield {"from_s": from_s, "to_s": to_s, "kg": -z_N / STANDARD_GRAVITY_m_s2}
+    ``source_line``: of each row of the Toolpath that the motion's samples name.
+    """
+    moving = motion.speed_mm_s > AT_REST_mm_s
+    lines, times_s = source_line[motion.move][moving], motion.time_s[moving]
+    found = []
+    for state in states:
+        before = np.flatnonzero(lines <= state.line)
+        arrived_s = float(times_s[before[-1]]) if len(before) else 0.0
+        time_s = min(arrived_s + state.stood_s, float(motion.time_s[-1]))
+        found.append(Moment(time_s, tuple(map(float, state.pull_N)), float(state.rpm)))
+    return found
+
+
+def spindle(found: Sequence[Moment]) -> list[list[float]]:
+    """Return time and speed of the spindle for the plant; it stands at first."""
+    return [[0.0, 0.0], *([each.time_s, each.rpm] for each in found)]
+
+
+def weights(found: Sequence[Moment], end_s: float) -> list[dict[str, Any]]:
+    """Return the pulls on the tool for the plant, each until the next change."""
+    ends_s = [*(each.time_s for each in found[1:]), end_s]
+    return [
+        {"from_s": each.time_s, "to_s": to_s, "pull_N": list(each.pull_N)}
+        for each, to_s in zip(found, ends_s[: len(found)], strict=True)
+        if any(each.pull_N)
+    ]

@@ -8,15 +8,17 @@ from gap_blind_names import named_of
 
 STATED = 0.5
 """Probability from which on a dependence counts as stated."""
-AXES = frozenset({"fx", "fy", "fz"})
+AXES = frozenset({"fx", "fy", "fz", "force"})
 JOINTS = frozenset({"A1", "A2", "A3", "A4", "A5", "A6"})
 TIMING = "timing"
 """``at`` of what moves all joints along the path, and of the links that see it."""
 PLACES = {"tip": {"tip"}, "force": AXES, "part": {"tip", "part"}, "clock": {"tip", TIMING} | AXES | JOINTS}
 """Where, in the words of a label -> ``at``, in those of an answer. A joint is the label's own."""
+STEP_IN_TIME = "step in time"
+"""An answer may tell it as time in the run, in the form of a step."""
 INPUTS = {
     "time_smooth": {"time in the run"},
-    "time_step": {"step in time", "time in the run"},
+    "time_step": {STEP_IN_TIME},
     "time_since_start": {"time since the run's start"},
     "own_torque_memory": {"own torque"},
     "force_memory": {"force"},
@@ -93,7 +95,8 @@ def allowed_by(entry: dict[str, Any]) -> Allowed | None:
 
 def _of_rest(result: dict[str, Any]) -> Iterable[Said]:
     for each in result["unexplained"].get("depends_on") or ():
-        yield Said(each["at"], each["on"], each["form"], each["probability"])
+        is_step = (each["on"], each["form"]) == ("time in the run", "step")
+        yield Said(each["at"], STEP_IN_TIME if is_step else each["on"], each["form"], each["probability"])
 
 
 def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:

@@ -23,6 +23,7 @@ from gap_blind_names import Truth, named_of
 from gap_blind_names import names as says
 from gap_blind_run import answer, made
 from gap_blind_score import judge
+from gap_blind_words import truth_of
 
 from tests.plant.next_run import PLANNED, drive_next
 from tests.plant.programs import Program
@@ -125,8 +126,7 @@ def drive(record: dict[str, Any], folder: Path, places: dict[str, str]) -> dict[
     place = folder / "cases" / f"{case.name}-next"
     shutil.rmtree(place, ignore_errors=True)
     label = made(case, place / "case", places)
-    entry = label["effects"][0]
-    truth = entry["effect"], entry["target"]
+    truth = truth_of(label["effects"][0])
     drives = [_one_way(way, record, label, truth, place / "case", places) for way in WAYS]
     shutil.rmtree(place, ignore_errors=True)
     return {"case": asked, "code": record["code"], "drives": drives}

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from gap_blind_oracle import flat
+from gap_blind_words import flat
 
 NOMINAL = {"scale": 1.0, "factor": 1.0}
 OWN_SIZE = frozenset({"k_s", "acc_cp_m_s2", "cdis_mm", "percent"})
@@ -25,7 +25,7 @@ Said = dict[str, dict[str, float]]
 
 def numbers(entry: dict[str, Any], cause: dict[str, Any]) -> tuple[tuple[float, ...], tuple[bool, ...]]:
     """Return relative errors of the sizes, vectors as one, and whether each interval holds the true value."""
-    true, said = flat(entry["parameters"]), cause["parameters"]
+    true, said = flat(entry), cause["parameters"]
     if entry["effect"] in LINES:
         said = _same_way_round(true, said)
     covered = tuple(_holds(name, true[name], said[name]) for name in said if name in true)

@@ -11,27 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gap_blind_words import flat, truth_of
 
 LINK = {"timing": "PATH", "joint_commanded": "PATH", "joint_actual": "SERVO", "joint_load": "GEAR"}
 LINK |= {"force": "FORCE", "tcp": "MECHANICS"}
 """Signal of the answer -> its link's name in ``gcode2krl.gap.beside.links``."""
-RENAMED = {"kg": "mass_kg", "frame_off_mm": ("x_mm", "y_mm", "z_mm"), "h0_N": ("h0_x_N", "h0_y_N", "h0_z_N")}
-RENAMED |= {"direction": ("direction_x", "direction_y", "direction_z")}
-RENAMED |= {"H_N_rad": tuple(f"H_{row}{column}_N_rad" for row in "xyz" for column in "xyz")}
 TRIALS = (0.25, 0.4, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0)
-
-
-def flat(parameters: dict[str, Any]) -> dict[str, float]:
-    """Return the numbers of a label under the library's names; words are left out."""
-    out: dict[str, float] = {}
-    for key, value in parameters.items():
-        names = RENAMED.get(key, key)
-        if isinstance(value, list):
-            if isinstance(names, tuple):
-                out |= dict(zip(names, np.ravel(value).tolist(), strict=True))
-        elif isinstance(value, int | float):
-            out[names if isinstance(names, str) else names[0]] = float(value)
-    return out
 
 
 def oracle(label: dict, result: dict, folder: Path) -> dict[str, Any] | None:
@@ -79,10 +64,12 @@ def _applied(entry: dict, inputs: Any) -> Any:
     effect = library().get(entry["effect"])
     if effect is None:
         return None
-    target = entry["target"] if entry["target"] in effect.targets(inputs.cell) else None
+    target = truth_of(entry)[1]
     if target not in effect.targets(inputs.cell):
         return None
-    known = flat(entry["parameters"])
+    known = flat(entry)
+    if not set(known) & set(effect.names):
+        return None
     values = effect.nominal(inputs, target) | {name: known[name] for name in effect.names if name in known}
     return Applied(effect, target, values)
 

@@ -80,6 +80,8 @@ def _unknowns(cases: Sequence[Judged]) -> Iterator[Row]:
         yield _low(
             "  of them with the verdict explained", mine, lambda e: bool(e.named) and e.verdict == "explained"
         )
+        apart = [each for each in mine if not each.is_imitated]
+        yield _low("  wrongly named, no simple effect fits as well", apart, lambda e: bool(e.named))
         yield _high("  flagged unknown", mine, lambda e: e.flagged, ">= .95")
         yield from _told(mine)
         yield _median("  place: IoU, effect > noise (median)", mine, lambda e: [e.place.noise])
@@ -106,8 +108,9 @@ def _others(cases: Sequence[Judged]) -> Iterator[Row]:
     yield _low("  something else named", alike, lambda e: e.is_wrongly_named)
     yield _high("  a next run is given", alike, lambda e: e.next_program is not None)
     missing = [each for each in _of(cases, "missing") if each.observable]
-    yield _high("channels missing: declared set", missing, lambda e: e.declared)
-    yield _low("  something else named", missing, lambda e: e.is_wrongly_named)
+    decided = [each for each in missing if not each.is_undecided]
+    yield _high("channels missing, effect still shows: declared set", decided, lambda e: e.declared)
+    yield _low("  all of them: something else named", missing, lambda e: e.is_wrongly_named)
 
 
 def _sureness(cases: Sequence[Judged]) -> Iterator[Row]:

@@ -14,6 +14,7 @@ from gap_blind_names import Truth, covers, declares, is_among, named_of, names, 
 from gap_blind_numbers import numbers
 from gap_blind_places import NOISE, OWN, overlap
 from gap_blind_tests import Tested, tested_of
+from gap_blind_words import truth_of
 
 UNKNOWN = ("unexplained", "partly_explained")
 NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
@@ -43,6 +44,10 @@ class Judged:
     form: str
     ratio: float
     """RMS of the smallest true effect over the noise."""
+    is_imitated: bool = False
+    """A simple effect of the library fits the change to within the noise."""
+    is_undecided: bool = False
+    """What is left of the data cannot say which effect it is."""
     plant_s: float = 0.0
     seconds: float = 0.0
     cpu_s: float = 0.0
@@ -108,7 +113,7 @@ def judge(record: dict[str, Any]) -> Judged:
     """Return the judgement of a record; one without a result counts as wrong."""
     label, case, result = record["label"], record["case"], record.get("result")
     entries = label["effects"]
-    truths = tuple((entry["effect"], entry["target"]) for entry in entries)
+    truths = tuple(truth_of(entry) for entry in entries)
     known = {} if result is None else _answered(case["kind"], entries, truths, record)
     return Judged(
         seed=case["seed"],
@@ -117,6 +122,8 @@ def judge(record: dict[str, Any]) -> Judged:
         subject=" + ".join(sorted(effect for effect, _ in truths)) or _foreign(label),
         form="other" if any(entry["form"] == "other" for entry in entries) else "same",
         ratio=min((entry["ratio"] for entry in entries), default=0.0),
+        is_imitated=any(entry.get("stand_ins") for entry in entries),
+        is_undecided=bool(label.get("undecided")),
         plant_s=record.get("plant_s", 0.0),
         seconds=record.get("diagnosis_s", 0.0),
         cpu_s=record.get("diagnosis_cpu_s", 0.0),
@@ -170,7 +177,7 @@ def _one_effect(kind: str, entry: dict[str, Any], record: dict[str, Any]) -> dic
     if result["verdict"] != "no_gap":
         said = result["where"].get("intervals") or []
         found["place"] = Place(own=overlap(entry, said, OWN), noise=overlap(entry, said, NOISE))
-    truth = entry["effect"], entry["target"]
+    truth = truth_of(entry)
     right = [cause for cause in named_of(result) if names(cause, truth)]
     if right and kind == "single" and entry["form"] == "same":
         found["errors"], found["covered"] = numbers(entry, right[0])

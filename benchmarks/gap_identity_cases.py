@@ -64,7 +64,7 @@ OTHERS = (
     Wanted("null", dropped="controller"),
     Wanted("open", "open:cable_snag"),
     Wanted("open", "open:floor_sways", holdout=1),
-    Wanted("open", "open:collision_step", runs=1),
+    Wanted("open", "open:tool_creeps", runs=1),
     Wanted("pair", "backlash+force_scale", runs=3),
     Wanted("pair", "thermal+friction", runs=3),
     Wanted("pair", "servo_lag+stiffness"),

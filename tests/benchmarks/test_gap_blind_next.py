@@ -91,26 +91,27 @@ def test_a_program_that_make_test_does_not_have(tmp_path):
         canned.predicted("somersault", tmp_path / "cell.toml", tmp_path)
 
 
-def predicted_of(lines, speeds):
-    """A prediction whose sample i moves, or not, on a line of the program."""
-    table = SimpleNamespace(source_line=np.array(sorted({line for line, _ in speeds})))
-    move = np.array([table.source_line.tolist().index(line) for line, _ in speeds])
-    speed = np.array([speed for _, speed in speeds], float)
-    motion = SimpleNamespace(time_s=0.5 * np.arange(len(speeds)), speed_mm_s=speed, move=move)
-    return canned.LineClock(lines, SimpleNamespace(motion=motion, toolpath=table))
+def begun(*states):
+    """A program that moves until 0.5 s on line 1, stands until 5 s, and moves again on line 6."""
+    move = np.array([0, 0, *[0] * 8, 1, 1])
+    speed = np.array([9.0, 9.0, *[0.0] * 8, 9.0, 9.0])
+    motion = SimpleNamespace(time_s=0.5 * np.arange(12), speed_mm_s=speed, move=move)
+    made = [
+        SimpleNamespace(line=line, stood_s=stood, pull_N=pull, rpm=rpm) for line, stood, pull, rpm in states
+    ]
+    return canned.moments(made, motion, np.array([1, 6]))
 
 
-def test_lines_are_reached_after_the_last_move_and_the_dwells_since():
-    lines = ["G0 X1", "G4 P1.5", "S6000 M3", "G4 P2", "M5", "G0 X2"]
-    moving = [(1, 9.0), (1, 9.0), *[(1, 0.0)] * 8, (6, 9.0), (6, 9.0)]
-    clock = predicted_of(lines, moving)
-    assert clock.at(2) == 0.5  # the last sample that moves on line 1
-    assert list(clock.spindle()) == [[0.0, 0.0], [2.0, 6000.0], [4.0, 0.0]]
+def test_states_begin_after_the_last_move_and_the_dwells_since():
+    found = begun((1, 1.5, (0, 0, 0), 6000.0), (5, 3.5, (0, 0, 0), 0.0), (6, 9.0, (0, 0, 0), 900.0))
+    assert canned.spindle(found) == [[0.0, 0.0], [2.0, 6000.0], [4.0, 0.0], [5.5, 900.0]]
 
 
-def test_weights_hang_until_the_next_change_and_pull_down_only():
-    lines = ["G0 X1", "M0", "G4 P2", "M0", "G4 P2", "M0", "G4 P1"]
-    clock = predicted_of(lines, [(1, 9.0), *[(1, 0.0)] * 20])
-    pulls = [(2, (0.0, 0.0, -98.0665)), (4, (200.0, 0.0, 0.0)), (6, (0.0, 0.0, 0.0))]
-    assert list(clock.weights(pulls)) == [{"from_s": 0.0, "to_s": 2.0, "kg": pytest.approx(10.0)}]
-    assert list(clock.weights([])) == []
+def test_pulls_last_until_the_next_change():
+    pulls = ((0.0, 0.0, -200.0), (0.0, 0.0, 0.0), (200.0, 0.0, 0.0))
+    found = begun(*((1, 1.0 + number, pull, 0.0) for number, pull in enumerate(pulls)))
+    assert canned.weights(found, 9.0) == [
+        {"from_s": 1.5, "to_s": 2.5, "pull_N": [0.0, 0.0, -200.0]},
+        {"from_s": 3.5, "to_s": 9.0, "pull_N": [200.0, 0.0, 0.0]},
+    ]
+    assert canned.weights([], 9.0) == []

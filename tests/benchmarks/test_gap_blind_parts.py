@@ -100,6 +100,11 @@ def test_words_of_the_label_and_of_the_answer(on, stated):
     assert told(tip, rest=[depends("tip", stated, "step")]) == (True, True, True)
 
 
+def test_a_drift_is_no_step():
+    tip = effect(depends={"where": "tip", "joints": [], "on": ["time_step"], "form": "step"})
+    assert told(tip, rest=[depends("tip", "time in the run", "drift")]) == (True, False, False)
+
+
 def test_what_the_timing_sees_may_be_told_of_the_timing():
     law = {
         "where": "tip",

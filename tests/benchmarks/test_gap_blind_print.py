@@ -50,8 +50,25 @@ def test_unknowns():
         record([effect(ratio=0.5)], [cause()], kind="open"),
     )
     assert made["outside the library: wrongly named"].figure == "1.000 (<= 1.000, n 1)"
+    assert made["  wrongly named, no simple effect fits as well"].figure == "0.000 (<= 0.950, n 1)"
     assert made["taken out of the library: wrongly named"].figure == "0.000 (<= 0.950, n 1)"
     assert made["family and place of an unknown right"].figure.startswith("0.500 (>= ")
+
+
+def test_what_is_left_without_a_channel():
+    made = figures(
+        record([effect()], [cause()], kind="missing"),
+        record([effect()], [cause("friction")], kind="missing", label={"undecided": True}),
+    )
+    assert made["channels missing, effect still shows: declared set"].figure == "1.000 (>= 0.050, n 1)"
+    assert made["  all of them: something else named"].figure.startswith("0.500")
+
+
+def test_wrong_names_that_the_data_could_have_told():
+    alike = effect("cable_snag", None, stand_ins=[{"effect": "force_offset", "left_over": 0.3}])
+    made = [score.judge(record([each], [cause()], kind="open")) for each in (alike, effect("hard_spot"))]
+    row = next(row for row in rows.metrics(made) if row.metric.startswith("  wrongly named, no simple"))
+    assert row.figure == "1.000 (<= 1.000, n 1)"
 
 
 def test_names_that_are_sure_of_themselves():

@@ -107,3 +107,12 @@ def test_a_few_stored_cases_are_of_all_kinds(tmp_path):
         (tmp_path / "labels" / f"{name}.json").write_text(json.dumps({"name": name}), encoding="utf-8")
     assert set(tool.stored(tmp_path, 3)) == {"null-00001", "open-03001", "single-01001"}
     assert len(tool.stored(tmp_path, 0)) == 5
+
+
+def test_a_case_that_breaks_is_no_answer(tmp_path):
+    command = [sys.executable, str(BENCHMARKS / "gap_thresholds_changed.py")]
+    task = {"setting": ["choose", "named", 0.5], "cases": {"null-00001": [str(tmp_path), []]}}
+    done = subprocess.run(command, input=json.dumps(task), capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)["null-00001"]
+    assert found["result"] is None
+    assert found["error"]

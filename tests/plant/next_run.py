@@ -49,8 +49,9 @@ def drive_next(
     acting = [(f, size, _acts(f, program)) for f, size in zip(plan.faults, sizes, strict=True)]
     run = _drive(plan, day, program, [f.hooks(size) for f, size, acts in acting if acts])
     writing.write_text(folder.parent / "cell.toml", CELL_TOML)
+    how = plan.how if not isinstance(program.way, Track) else replace(plan.how, scan=False)  # nothing is cut
     folders.write_run(
-        folder, day, run, plan.how, {"cell": "../cell.toml", "prediction": prediction} | (keys or {})
+        folder, day, run, how, {"cell": "../cell.toml", "prediction": prediction} | (keys or {})
     )
     return {
         "run": folder.name,
