@@ -49,6 +49,8 @@ class Inputs:
     """(m, 6) measured behind the gear; NaN for joints without an encoder there."""
     load_base_N: Floats | None = None
     """(m, 3) measured force that bends the arm."""
+    torque_Nm: Floats | None = None
+    """(m, 6) logged torque of the drives, or their current in A: what a deviation may depend on."""
     toolpath: Toolpath | None = None
     motion: Motion | None = None
     targets: Targets | None = None

@@ -6,7 +6,15 @@ import pytest
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.families.admissible import Admissible
 from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
-from gcode2krl.gap.families.functions import free, odd, polynomials, products, smooth, smooth_in_each
+from gcode2krl.gap.families.functions import (
+    free,
+    odd,
+    polynomials,
+    products,
+    smooth,
+    smooth_in_each,
+    smooth_sum,
+)
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.rows import Rows
 from gcode2krl.gap.families.study import studies
@@ -158,6 +166,7 @@ def test_smooth_functions_span_a_bend_and_are_shared_by_runs():
     assert np.sqrt(np.mean(left**2)) < 0.02
     assert smooth_in_each(x).width == 2 * made.width
     assert smooth([np.ones(5)]).width == 0
+    assert smooth_sum([np.stack([each, each**2, 0.0 * each], axis=1) for each in x]).width == 2 * made.width
 
 
 def test_functions_that_do_nothing_are_left_out():

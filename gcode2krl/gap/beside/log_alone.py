@@ -6,6 +6,7 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.effects import Inputs
 from gcode2krl.effects.operators import play
@@ -14,7 +15,8 @@ from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.pairing import first_start, hours_since
 from gcode2krl.gap.beside.poses import is_of_poses, pose_pair
-from gcode2krl.runs import Run
+from gcode2krl.runs import Controller, Run
+from gcode2krl.units import MM_PER_M
 
 
 def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:
@@ -72,4 +74,12 @@ def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | N
         force_base_N=load,
         moment_base_Nmm=np.zeros((count, 3)),
         hours=hours,
+        torque_Nm=_torque_Nm(table),
     )
+
+
+def _torque_Nm(table: Controller) -> Floats | None:
+    """Return the logged torque (n, 6) or, in its place, the current; None where there is neither."""
+    if table.torque_Nmm is not None:
+        return np.nan_to_num(table.torque_Nmm / MM_PER_M)
+    return None if table.current_A is None else np.nan_to_num(table.current_A)

@@ -66,9 +66,7 @@ def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]
 
 def _without_causes(found: Examination, every: tuple[Trace, ...], rest: Rest) -> Judgement:
     size = _size(found, every, ())
-    # a model that is met to its own accuracy leaves what no noise explains, and is met all the same
-    is_gap = size.significant or (rest.is_gap and found.link.model_rms == 0.0)
-    verdict = "unexplained" if is_gap else "no_gap"
+    verdict = "unexplained" if _is_gap(found, size, rest) else "no_gap"
     return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
 
 
@@ -154,8 +152,17 @@ def _judgement(
     named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     rest = families.beside(named)
     is_left = left and last.share_left > _LIMITS.unknown_share
-    verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), sizes[0].significant)
+    is_gap = _is_gap(found, sizes[0], rest)
+    verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
     return _of(found, verdict, tuple(causes), last, rest, held_out=held_out)
+
+
+def _is_gap(found: Examination, size: Size, rest: Rest) -> bool:
+    """Tell whether there is a gap: by its size, or by what it depends on.
+
+    A model that is met to its own accuracy leaves what no noise explains, and is met all the same.
+    """
+    return size.significant or (rest.is_gap and found.link.model_rms == 0.0)
 
 
 def _verdict(named: bool, rest: bool, gap: bool) -> str:

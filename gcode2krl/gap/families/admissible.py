@@ -134,12 +134,14 @@ class Admissible:
 
     @cached_property
     def torque_Nm(self) -> Floats:
-        """(n, 6) of the force at the tip, by the arm's statics."""
+        """(n, 6) as logged or, beside a prediction, of the force at the tip by the arm's statics."""
         return self._at(self._torque)
 
     @cached_property
     def _torque(self) -> Floats:
         inputs = self.trace.inputs
+        if inputs.torque_Nm is not None:
+            return inputs.torque_Nm
         return arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm)
 
     def torque_with_memory(self, joint: int) -> Floats:
@@ -157,11 +159,13 @@ class Admissible:
     def reversals(self, joint: int) -> Floats:
         """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.
 
-        Beside them what dies down after each reversal.
+        Beside them what dies down after each reversal, and what grows with the joint's load.
         """
         inputs = self.trace.inputs
         q = np.ascontiguousarray(inputs.q_cmd_rad[:, joint])
         direction, since_s = since_reversal(q, inputs.time_s)
         plays = [(q - play(q, width)) / width for width in _PLAYS_RAD]
         settling = [direction * np.exp(-since_s / tau) for tau in _SETTLES_S]
-        return np.stack([direction, *plays, *settling], axis=1)[self._nearest]
+        load = np.abs(self._torque[:, joint])
+        loaded = direction * load / max(float(load.max(initial=0.0)), 1e-12)
+        return np.stack([direction, *plays, *settling, loaded], axis=1)[self._nearest]

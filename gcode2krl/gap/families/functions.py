@@ -43,6 +43,18 @@ def smooth_in_each(inputs: Sequence[Floats]) -> Functions:
     return _smooth(inputs, [np.full(len(each), i) for i, each in enumerate(inputs)], len(inputs))
 
 
+def smooth_sum(inputs: Sequence[Floats]) -> Functions:
+    """Return functions of each of several inputs (n, c), whose sum a deviation may be."""
+    parts = [smooth([each[:, i] for each in inputs]) for i in range(inputs[0].shape[1])]
+    used = [part for part in parts if part.width]
+    if not used:
+        return smooth([np.zeros(len(each)) for each in inputs])
+    columns = tuple(
+        np.concatenate(each, axis=1) for each in zip(*(part.columns for part in used), strict=True)
+    )
+    return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
+
+
 def _smooth(inputs: Sequence[Floats], groups: Sequence[Floats], count: int) -> Functions:
     low, high = min(map(np.min, inputs)), max(map(np.max, inputs))
     if not high - low > _VARIES * max(abs(low), abs(high)):

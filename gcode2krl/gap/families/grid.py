@@ -18,6 +18,7 @@ from gcode2krl.gap.families.functions import (
     products,
     smooth,
     smooth_in_each,
+    smooth_sum,
 )
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -134,6 +135,8 @@ class Grid:
             yield from self._of_joint(place.joint)
         if any(each.force_N.any() for each in own):
             yield from self._of_force(place)
+        if place.joint is None:
+            yield Dependence.PLACE, smooth_sum([each.position_mm for each in own])
         if place.where is not Where.TIP:
             yield Dependence.PLACE, free(self._pose(place.where is Where.FORCE_AXIS))
 

@@ -18,8 +18,8 @@ from gcode2krl.gap.tell.at_part import at_part, at_part_of
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.depends_on import depends_on
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
-from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.next_run import next_run_of
+from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,
     CauseResult,

@@ -21,7 +21,7 @@ class FamilyThresholds:
         (0.1, 0.4, 1.6, 6.4, 25.6, 102.4), "amplitudes that are tried, in rms of the noise"
     )
     step_s: float = convention(0.5, "between moments at which a step is tried; then a tenth around the best")
-    tone_least_hz: float = convention(0.5, "a slower tone is a drift of a short run")
+    tone_least_hz: float = convention(0.2, "a slower tone is a drift of a short run")
     harmonics: int = physics(4, "of a motor's turn: eccentricity, the two teeth of a wave, and theirs")
 
     # Null
