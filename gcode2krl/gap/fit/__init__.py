@@ -13,10 +13,31 @@
   Mismatch is counted once (`counted_once`): a column that has the form of an effect is projected out of N
   while that effect is in the model, of runs' own columns their mean. θ is then the whole deviation, and that
   is compared with the bound.
-- e: coloured noise, of each component by itself: x_t = Σ_i a_i·x_{t-1-i} + s·w_t of order 3 with w white
-  (`noise`). L⁻¹ is the filter (x_t - Σ_i a_i·x_{t-1-i})/s. It starts anew at each gap of the data: the first
-  three rows of a segment are divided by the rms of x alone. (That leaves them correlated among themselves,
-  and is wrong by three rows in thousands.)
+- e: noise, of each component by itself, the sum of a short and a slow part (`noise`):
+
+      e_t = u_t + Σ_i v_i,t,    u_t = Σ_i a_i·u_{t-1-i} + s·w_t of order 3,    v_i,t = φ_i·v_i,t-1 + noise
+
+  with w white. v are Ornstein-Uhlenbeck processes (Uhlenbeck & Ornstein 1930) that forget within 0.1 to 3 s,
+  none, one or two: two for what a single one does not do, 1/f noise say. L⁻¹ is the Kalman filter of the sum,
+  whose innovations over their deviations are white (`innovations`); it starts at each gap of the data in the
+  stationary state and is exact from the first row on: L is the Cholesky factor of the covariance.
+
+**Where the noise is learnt** (`noise_source`). Rows in a burst of the instrument and outliers are left out
+before (`beside.bursts`).
+
+- Short part: of each run what effects, mismatch and half-second means leave, less its tones (`lines`), by
+  least squares on three lags; the slow part's share of the lags is taken off first. What this takes of the
+  noise itself is found by doing the same to drawn noise (Efron's bootstrap bias).
+- Slow part (`slow_noise`, `block_means`): means over 0.05 s of the whole residual, beside a constant and a
+  trend of each run and mismatch. Signatures, steps, tones, smooth functions of place, angle, rate, reversals
+  and force explain what they explain better than slow noise would; the rest is slow noise, its variance by
+  restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971).
+- Repeats of one program: of both parts only what differs between the runs is noise.
+- `run.toml` states short noise, as data sheets do: it bounds u, and v is at most twice u.
+
+What a slow part can hide: an effect that is no signature, no smooth function, no tone and no step, and as
+irregular as slow noise, is taken for it, up to twice the short noise in runs of different programs and up to
+what repeats differ by.
 
 **Likelihood** (`likelihood.Likelihood`). With r = L⁻¹·(y - f(θ)) and whitened columns N for short,
 
@@ -48,8 +69,8 @@ so one Gram matrix of [r, T, S, N] holds every candidate's
 one stretch of time (`beside.stretches`, one second, all components) are a cluster g with the score u_g =
 Σ_{i in g} J_i·r_i. The sandwich H⁻¹·(Σ_g u_g·u_gᵀ)·H⁻¹ (White 1980) is the covariance of θ without the
 assumption of independent rows; trace(H⁻¹·Σ_g u_g·u_gᵀ)/p, never below 1, is the inflation of a gain: 2·log Λ
-over it is compared with chi2 of p degrees. Stretches must be longer than the memory of e and many more than
-p.
+over it is compared with chi2 of p degrees. Rows are whitened first, the slow part too: stretches of one
+second must be longer than the memory of what the models are off by, not than that of e, and many more than p.
 
 **Assumptions and their range.** Mismatch is linear in b over its bounds (clocks are set first where it is
 not); effects are linear over a fiftieth of their typical size (differences) and, for the fast view, over

@@ -52,7 +52,9 @@ def noise_of(
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
     residuals = [trace.measured - trace.sample(applied) for trace in traces]
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
-    slow = [_of_rows(slow_parts_of(each), traces[0]) for each in means]
+    slow = [
+        _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
+    ]
     generator = np.random.default_rng(0)
     slow_drawn = [
         [

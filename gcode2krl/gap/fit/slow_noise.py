@@ -26,6 +26,10 @@ _RATIOS = tuple(float(x) for x in 10.0 ** np.arange(-1.0, 3.01, 0.25))
 """ρ, the variance of the slow part over that of a block's mean of the short one."""
 _SHORT_KEPT = (0.0, 0.15, 0.33)
 """What a short part may keep from block to block: memories up to 45 ms are not slow."""
+_COARSE = ((1, 2), (1, 6), (3, 3), (3, 8), (5, 5), (5, 10))
+"""Indices of τ and ρ; where no slow part of these does better than a short one, none is looked for."""
+_FLOOR_SHARE = 0.5
+"""Block means that vary by less of the short part's least rms are part of that."""
 _PADDED = 4
 """Finer than the frequencies of a run, between which a tone would hide."""
 _LEAST_CYCLES = 1.5
@@ -71,40 +75,55 @@ class _Peak:
     """σ_w²."""
 
 
-def slow_parts_of(means: BlockMeans) -> tuple[SlowPart, ...]:
-    """Return the slow parts of a component, none where the data need none."""
-    if len(means.values) < _LIMITS.noise_least_rows:
+def slow_parts_of(means: BlockMeans, floor: float = 0.0) -> tuple[SlowPart, ...]:
+    """Return the slow parts of a component, none where the data need none.
+
+    ``floor``: the least rms of its short noise; what moves by less is none.
+    """
+    basis = _basis(means.known)
+    if len(means.values) < _LIMITS.noise_least_rows or _seen(means, basis) <= _FLOOR_SHARE * floor:
         return ()
     fit = _Fit(means)
-    explained, peak = _explained(fit)
-    basis = _basis(explained)
-    short = min(fit.peak(basis, (), kept=kept).cost for kept in _SHORT_KEPT)
-    if not peak.parts or short - peak.cost < _LIMITS.noise_slow_gain:
+    if not any(fit.needs_slow(basis, fit.peak(basis, (part,)), 0.0) for part in _COARSE):
+        return ()
+    peak = fit.best(basis)
+    if not fit.needs_slow(basis, peak):
+        return ()
+    seen = _seen(means, basis)
+    basis, peak = _explained(fit, basis, peak)
+    if not fit.needs_slow(basis, peak):
         return ()
     second = fit.best(basis, others=peak.parts)
     if peak.cost - second.cost > _LIMITS.noise_second_gain:
         # of two parts the first is found anew beside the second
         peak = fit.best(basis, others=second.parts[1:], start=second.parts[0])
+    peak = fit.longest(basis, peak)
+    sigmas = np.sqrt([_RATIOS[ratio] * peak.variance for _, ratio in peak.parts])
+    sigmas *= min(1.0, _LIMITS.noise_most_seen * seen / float(np.linalg.norm(sigmas)))
     return tuple(
-        SlowPart(_TIME_CONSTANTS_S[tau], float(np.sqrt(_RATIOS[ratio] * peak.variance)))
-        for tau, ratio in peak.parts
+        SlowPart(_TIME_CONSTANTS_S[tau], sigma)
+        for (tau, _), sigma in zip(peak.parts, sigmas.tolist(), strict=True)
     )
 
 
-def _explained(fit: "_Fit") -> tuple[Floats, _Peak]:
-    """Return X with all that explains more than slow noise would, and the likelihood beside it."""
-    explained = fit.means.known
-    basis = _basis(explained)
-    peak = fit.best(basis)
-    for _ in range(_LIMITS.noise_most_explained if peak.parts else 0):
+def _seen(means: BlockMeans, basis: Floats) -> float:
+    """Return the rms of the data beside a basis: slow noise is never more, however few its waves."""
+    rest = means.values - basis @ (basis.T @ means.values)
+    return float(np.sqrt(np.mean(rest**2)))
+
+
+def _explained(fit: "_Fit", basis: Floats, peak: _Peak) -> tuple[Floats, _Peak]:
+    """Return a basis with all that explains more than slow noise would, and the likelihood beside it."""
+    for _ in range(_LIMITS.noise_most_explained):
         trials = [_Trial.of(fit, basis, columns, peak) for columns in fit.promising(basis, peak)]
         trial = max(trials, key=lambda each: each.surprise, default=None)
         if trial is None or trial.surprise < _LIMITS.noise_explained:
             break
-        explained = np.column_stack([explained, trial.columns])
-        basis = _basis(explained)
+        basis = _basis(np.column_stack([basis, trial.columns]))
         peak = fit.best(basis, start=_start(trial.peak))
-    return explained, peak
+        if not peak.parts:
+            break
+    return basis, peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +159,7 @@ class _Fit:
         scale = np.sqrt(np.sum(means.candidates**2, axis=0))
         self.usable = np.flatnonzero(scale > _RANK * max(float(scale.max(initial=0.0)), 1e-300))
         self._filters: dict[tuple[tuple[_Part, ...], float], _Filter] = {}
+        self._short: tuple[Floats, float] | None = None
 
     def _filter(self, parts: tuple[_Part, ...], kept: float = 0.0) -> "_Filter":
         """Return the filter of a model whose short part has innovations of unit variance."""
@@ -203,6 +223,29 @@ class _Fit:
                 step //= 2
         none = at()
         return here if here.cost < none.cost else none
+
+    def longest(self, basis: Floats, peak: _Peak) -> _Peak:
+        """Return the longest memory that is as likely as the best one.
+
+        Data of few waves tell σ²/τ and hardly τ; a memory that is taken too short makes the rest a gap.
+        """
+        (tau, ratio), others = peak.parts[0], peak.parts[1:]
+        found = peak
+        for longer in range(tau + 1, len(_TIME_CONSTANTS_S)):
+            grown = 4.0 * np.log10(_TIME_CONSTANTS_S[longer] / _TIME_CONSTANTS_S[tau])
+            at = min(ratio + round(float(grown)), len(_RATIOS) - 1)
+            trial = self.peak(basis, ((longer, at), *others))
+            if trial.cost < peak.cost + _LIMITS.noise_as_likely:
+                found = trial
+        return found
+
+    def needs_slow(self, basis: Floats, peak: _Peak, gain: float = _LIMITS.noise_slow_gain) -> bool:
+        """Tell whether a slow part does better than any short one."""
+        if not peak.parts:
+            return False
+        if self._short is None or self._short[0] is not basis:
+            self._short = basis, min(self.peak(basis, (), kept=kept).cost for kept in _SHORT_KEPT)
+        return self._short[1] - peak.cost >= gain
 
     def promising(self, basis: Floats, peak: _Peak) -> Iterator[Floats]:
         """Yield the candidate and the tone of the largest gain, beside the slow part and without one."""

@@ -47,6 +47,13 @@ class FitThresholds:
     noise_second_gain: float = convention(
         12.0, "the same of a second slow part beside the first, whose size few long waves tell"
     )
+    noise_as_likely: float = convention(
+        2.0,
+        "twice the log likelihood by which a longer memory may be behind the best: one and a half deviations",
+    )
+    noise_most_seen: float = convention(
+        1.25, "times the rms of block means: slow noise is no more, of which trends take a part"
+    )
     noise_explained: float = calibrated(
         10.5,
         DEVELOPMENT,
