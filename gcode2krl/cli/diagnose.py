@@ -90,7 +90,7 @@ def _written(
     if html is None and plot is None:
         return []
     from gcode2krl.gap.tell.html.page import write_page
-    from gcode2krl.gap.tell.pictures import write_pictures
+    from gcode2krl.gap.tell.html.pictures import write_pictures
 
     written = []
     with console.progress("drawing", None):

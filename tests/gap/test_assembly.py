@@ -1,20 +1,23 @@
 """The answer of several links: verdict, size, links and notes, from judgements that are known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gcode2krl.effects import inputs_of
+from gcode2krl.effects import Dependence, inputs_of
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PATH, SERVO
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.judged import Judgement
+from gcode2krl.gap.choose.judged import Cause, Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell import assembly
+from gcode2krl.gap.tell.evidence import Depends
+from gcode2krl.gap.tell.result import DependsOnResult, Unexplained
 from gcode2krl.runs import Run, RunHead
 from tests.gap.synthetic import LIBRARY, applied, prediction
 
@@ -158,3 +161,18 @@ def test_a_run_that_is_of_another_program_gets_an_answer_without_links(tmp_path)
     assert gap.notes == ("angles are relative: no kinematics, no limits, no gravity",)
     assert len(gap.not_examined) == 7
     assert [one.effect.name for one in assembly.answer(context, [_slip()], []).named] == ["override"]
+
+
+def test_the_picture_shows_the_named_cause_else_what_is_left_depends_on():
+    (play,) = applied("backlash:target=A2,gap_deg=0.02")
+    cause = Cause(play, "gear", 0.9, {}, 0.9, 0.1)
+    left = DependsOnResult(link="gear", at="A3", on="own torque", form="loop", probability=0.9, share=0.8)
+    nothing = Unexplained(rms=1.0, significant=True, structure="structured")
+    unnamed = _judgement(GEAR, "unexplained")
+    named = replace(unnamed, causes=(cause,))
+    assert assembly._depends(named, nothing) == Depends("A2", frozenset({Dependence.REVERSALS}))
+    assert assembly._depends(unnamed, nothing) is None
+    found = assembly._depends(unnamed, replace(nothing, depends_on=(left,)))
+    assert found == Depends("A3", frozenset({Dependence.OWN_TORQUE}))
+    other = replace(left, link="force", at="fx")
+    assert assembly._depends(unnamed, replace(nothing, depends_on=(other,))) is None

@@ -1,5 +1,7 @@
 """What every judgement says: named causes, the shrink, what is reported."""
 
+from dataclasses import replace
+
 import pytest
 
 from gcode2krl.gap.beside.links import SERVO
@@ -41,3 +43,11 @@ def test_without_a_gap_no_cause_is_reported():
 
 def test_a_cause_can_be_taken_back():
     assert [each.applied for each in _judged().without(BACKLASH).causes] == [LAG]
+
+
+def test_what_is_told_is_the_size_with_the_named_causes_alone():
+    assert _judged().told is SIZE
+    before = replace(SIZE, after=4.0)
+    unnamed = replace(_judged(causes=CAUSES[1:]), size_with_named=before)
+    assert unnamed.told is before
+    assert unnamed.shrink is None  # a cause without a name takes nothing

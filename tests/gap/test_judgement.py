@@ -86,6 +86,8 @@ def test_a_cause_beside_a_large_rest_is_listed_and_not_named():
     assert cause.probability <= 1.0 - unknown_probability(0.3, True) + 1e-9
     assert named(found) == []
     assert found.verdict == "unexplained"
+    assert found.told.after == found.told.before == found.size.before
+    assert found.shrink is None
 
 
 @pytest.mark.xfail(

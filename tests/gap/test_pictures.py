@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gap.tell.against import Against
-from gcode2krl.gap.tell.pictures import (
+from gcode2krl.gap.tell.html.pictures import (
     draw_dependence,
     draw_path,
     draw_time,
@@ -145,5 +145,7 @@ def test_the_whole_figure_has_its_panels_and_is_a_png():
     figure = run_figure(DRAWN, DRAWN.evidence.runs[0])
     assert len([each for each in figure.axes if each.get_xlabel()]) == 4
     assert picture_bytes(figure).startswith(PNG)
+    alone = run_figure(DRAWN, run_evidence(position_mm=None, against=None))
+    assert len([each for each in alone.axes if each.get_xlabel()]) == 1
     with pytest.raises(ValueError, match="nothing to draw"):
         run_figure(GAP, run_evidence())

@@ -16,7 +16,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")
 _LIMITS = THRESHOLDS.tell
-_NO_NOISE = 1e-300
+_NO_NOISE = float(np.finfo(np.float64).tiny)
 """Keeps a signal without noise from dividing by zero."""
 
 

@@ -23,7 +23,7 @@ class TellThresholds:
     )
     rest_smooth_s: float = convention(
         0.3,
-        "what is left without a cause is averaged over this, and shorter stretches of it are noise: the mean of "
+        "what is left without a cause is averaged over this, and shorter stretches are noise: the mean of "
         "noise with a memory of 45 ms then is a third of it",
     )
     joint_moves_rad: float = convention(1e-4, "a joint that moves less never reverses")

@@ -1,1 +1,1 @@
-"""The answer as one page that needs no network."""
+"""The answer to look at: pictures of the runs, and one page that needs no network."""

@@ -12,7 +12,7 @@ from gcode2krl.files import write_together
 from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
 from gcode2krl.gap.tell.headline import headline, stretch
 from gcode2krl.gap.tell.html.path_svg import Strip, View, points, scale_colours, strip, views
-from gcode2krl.gap.tell.pictures import largest_size, picture_bytes, run_figure
+from gcode2krl.gap.tell.html.pictures import largest_size, picture_bytes, run_figure
 from gcode2krl.gap.tell.report import left_lines, where_words, worst
 from gcode2krl.gap.tell.result import CauseResult, Gap
 from gcode2krl.gap.tell.words import alike, describe, kind, named, next_run, number

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
-from gcode2krl.gap.tell.pictures import PATH_COLOURS, has_causes, largest_size, views_of
+from gcode2krl.gap.tell.html.pictures import PATH_COLOURS, has_causes, largest_size, views_of
 from gcode2krl.gap.tell.residuals import smoothed
 from gcode2krl.gap.tell.result import IntervalResult
 

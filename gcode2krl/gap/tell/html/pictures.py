@@ -53,7 +53,14 @@ def write_pictures(gap: Gap, folder: Path, inputs: Iterable[str | Path] = ()) ->
 def run_figure(gap: Gap, run: RunEvidence) -> Figure:
     """Draw one run: the residual over time, the path coloured by it, and its dependence if one is known."""
     evidence = _of(gap)
+    signal = SIGNALS.get(evidence.signal, evidence.signal)
+    title = f"{run.run}: measured minus predicted, {signal}"
     with look():
+        if run.position_mm is None and run.against is None:
+            figure = Figure(figsize=(11.0, 3.8), layout="constrained")
+            draw_time(figure.add_subplot(), evidence, run, gap.where.intervals)
+            figure.suptitle(title)
+            return figure
         figure = Figure(figsize=(11.0, 7.5), layout="constrained")
         grid = figure.add_gridspec(3, 2, height_ratios=(1.25, 1.0, 0.45), width_ratios=(1.15, 1.0))
         draw_time(figure.add_subplot(grid[0, :]), evidence, run, gap.where.intervals)
@@ -62,9 +69,7 @@ def run_figure(gap: Gap, run: RunEvidence) -> Figure:
             rows = slice(number + 1, number + 2) if len(views) > 1 else slice(1, 3)
             draw_path(figure.add_subplot(grid[rows, 0]), evidence, run, view)
         draw_dependence(figure.add_subplot(grid[1:, 1]), evidence, run)
-        figure.suptitle(
-            f"{run.run}: measured minus predicted, {SIGNALS.get(evidence.signal, evidence.signal)}"
-        )
+        figure.suptitle(title)
     return figure
 
 
