@@ -1,16 +1,18 @@
 """Canned test programs: air moves, each of which separates causes that look alike elsewhere."""
 
-from gcode2krl.canned.catalogue import NAMES, PROGRAMS, CannedProgram
-from gcode2krl.canned.draft import Draft
+from gcode2krl.canned.catalogue import NAMES, PROGRAMS, REPEAT, CannedProgram
+from gcode2krl.canned.draft import Draft, around_minutes
 from gcode2krl.canned.place import Place, place_of
 from gcode2krl.canned.program import draft_of, gcode_of, minutes_of, predicted, targets_of
 
 __all__ = [
     "NAMES",
     "PROGRAMS",
+    "REPEAT",
     "CannedProgram",
     "Draft",
     "Place",
+    "around_minutes",
     "draft_of",
     "gcode_of",
     "minutes_of",

@@ -171,3 +171,4 @@ PROGRAMS = {
     )
 }
 NAMES = tuple(PROGRAMS)
+REPEAT = next(program.name for program in PROGRAMS.values() if program.takes_part)

@@ -35,6 +35,12 @@ class State(NamedTuple):
     rpm: float
 
 
+def around_minutes() -> float:
+    """Return how long gestures and reference points take, without the moves between them."""
+    gesture_s = GESTURE_PAUSE_S * (2.0 + len(GESTURE_MM))
+    return 2.0 * (gesture_s + len(REFERENCES) * REFERENCE_DWELL_S) / S_PER_MIN
+
+
 @dataclass
 class Draft:
     """A program as it grows. Points are relative to its place."""

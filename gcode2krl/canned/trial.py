@@ -15,7 +15,7 @@ from gcode2krl.effects import Inputs, inputs_of
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import S_PER_MIN
 
-_MOST_ROWS = 4000
+_MOST_ROWS = 1500
 """Slow programs are sampled coarsely: nothing fast happens in them."""
 _RAD_S_PER_RPM = 2.0 * np.pi / S_PER_MIN
 

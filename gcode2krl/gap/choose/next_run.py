@@ -7,13 +7,12 @@ with the highest odds, each pair weighted by how open it is, and among nearly eq
 
 import itertools
 import math
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcode2krl.canned import NAMES
+from gcode2krl.canned import NAMES, REPEAT, around_minutes
 from gcode2krl.canned.trial import Trial, trials_of
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.mismatch import Mismatch
@@ -24,8 +23,10 @@ from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import Cause, Judgement
 from gcode2krl.gap.choose.separation import Apart, Bench, information_of
 from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.units import S_PER_MIN
 
 _LIMITS = THRESHOLDS.choose
+_TINY = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class OpenPair:
     first: Answer
     second: Answer
     weight: float
-    """Probability of the one times that of the other; 1 where the data cannot tell them apart."""
+    """Product of their probabilities; the one they share where the data cannot tell them apart."""
     found: Examination
     number: int | None
     """Which accepted effect both would stand in place of."""
@@ -84,6 +85,17 @@ class Parting:
 
 
 @dataclass(frozen=True, eq=False)
+class Again:
+    """A gap of which only one thing can be asked: whether it comes back."""
+
+    rms: float
+    """What is left of it, in the report's unit."""
+    unit: str
+    signal: str
+    odds: float
+
+
+@dataclass(frozen=True, eq=False)
 class Choice:
     """The program to run next."""
 
@@ -91,6 +103,7 @@ class Choice:
     minutes: float
     partings: tuple[Parting, ...]
     """The most open pair first; empty where no answer can be simulated."""
+    again: Again | None = None
 
 
 def choose_next_run(
@@ -98,15 +111,39 @@ def choose_next_run(
 ) -> Choice | None:
     """Return the program with the best expected odds between what is left open.
 
-    None where nothing is left open, or where the cell states too little for a program.
+    None where nothing is left open, or where robot and cell are not known well enough for a program.
     """
+    if not all(pair.known_robot for pair in context.pairs):
+        return None
     pairs = sorted(open_pairs(context.offered, judgements, families), key=lambda pair: -pair.weight)
     pairs = pairs[: _LIMITS.most_open_pairs]
+    runs = [pair.inputs for pair in context.pairs]
     if not pairs:
-        return None
-    inputs = context.pairs[0].inputs
-    choices = _choices(pairs, trials_of(inputs.cell), context.mismatch)
+        return _again(judgements, float(np.ptp(runs[0].time_s)))
+    hours = max(
+        float(run.run_hours[-1]) for run in runs
+    )  # as if it followed at once, as warm as the robot is
+    trials = [replace(trial, inputs=replace(trial.inputs, hours=hours)) for trial in trials_of(runs[0].cell)]
+    choices = _choices(pairs, trials, context.mismatch)
     return best(list(choices))
+
+
+def _again(judgements: Sequence[Judgement], run_s: float) -> Choice | None:
+    """Return the same program once more, where a gap is left and nothing is known of it; else None."""
+    left = [judgement for judgement in judgements if judgement.verdict in ("unexplained", "partly_explained")]
+    if not left:
+        return None
+    judgement = max(left, key=lambda each: each.size.power)
+    size = judgement.size
+    excess = max(size.after - size.floor, 0.0) / max(size.floor, _TINY)
+    log_odds = min(0.5 * _LIMITS.trial_rows * excess, _LIMITS.most_log_odds)
+    again = Again(
+        rms=judgement.factor * max(size.after, 0.0) ** 0.5,
+        unit=judgement.link.unit,
+        signal=judgement.link.signal,
+        odds=math.exp(log_odds),
+    )
+    return Choice(REPEAT, run_s / S_PER_MIN + around_minutes(), (), again)
 
 
 def best(choices: Sequence[Choice]) -> Choice | None:
@@ -137,9 +174,10 @@ def open_pairs(
             for family in families
             if family.link == judgement.link.name and family.probability >= _LIMITS.least_open
         ]
-        for cause in judgement.causes:
+        likely = [cause for cause in judgement.causes if cause.probability >= _LIMITS.least_open]
+        for cause in likely:
             yield from _pairs_of(cause, judgement, of_link)
-        if not judgement.causes:
+        if not likely:
             yield from _between(of_link, judgement)
 
 
@@ -152,7 +190,7 @@ def _pairs_of(cause: Cause, judgement: Judgement, families: Sequence[Answer]) ->
     for rival, probability in compared:
         if rival.alike or (probability >= _LIMITS.least_open and cause.probability < _LIMITS.settled):
             other = Answer(rival.applied.label, probability, rival.applied)
-            weight = 1.0 if rival.alike else cause.probability * probability
+            weight = cause.probability * (1.0 if rival.alike else probability)
             yield OpenPair(own, other, weight, found, number)
     for family in families:
         yield OpenPair(own, family, family.probability, found, number)
@@ -216,8 +254,7 @@ def _is_at(effect: Effect, target: str | None, family: Family) -> bool:
 
 
 def _choices(pairs: Sequence[OpenPair], trials: Sequence[Trial], mismatch: Mismatch) -> Iterator[Choice]:
-    """Yield each program with the odds of every pair; the time for all of them is bounded."""
-    until_s = time.monotonic() + _LIMITS.next_run_s
+    """Yield each program with the odds of every pair that it can show."""
     known = [_informations(pair) for pair in pairs]
     for trial in sorted(trials, key=lambda trial: trial.minutes):
         benches: dict[int, Bench] = {}
@@ -232,8 +269,6 @@ def _choices(pairs: Sequence[OpenPair], trials: Sequence[Trial], mismatch: Misma
                 continue
         if partings:
             yield Choice(trial.name, trial.minutes, tuple(partings))
-        if time.monotonic() > until_s:
-            return
 
 
 def _informations(pair: OpenPair) -> tuple[np.ndarray | None, np.ndarray | None]:

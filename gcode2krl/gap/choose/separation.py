@@ -39,9 +39,11 @@ class Apart:
     """When they are farthest apart."""
     component: str
     first: float
-    """What the first answer shows then, in the report's unit, less what the instrument may be off by."""
+    """What the first answer shows then, in the report's unit."""
     second: float
-    """The same of the second one, refitted to the first."""
+    """The same of the second one, with the numbers that the measured runs give it."""
+    is_change: bool
+    """They are changes since the run's start."""
     unit: str
     signal: str
     noise: float
@@ -77,7 +79,7 @@ class Bench:
         if second is not None:
             moved = other + self._refitted(one - other, second, information)
         rest = self.likelihood.marginal(self.likelihood.whiten([one - moved]))
-        return self._farthest(float(rest @ rest), one, moved)
+        return self._farthest(float(rest @ rest), one, other)
 
     def _refitted(self, missing: Floats, second: Applied, information: Floats | None) -> Floats:
         """Return by how much the second answer moves towards what is missing (n, k), to first order."""
@@ -101,29 +103,27 @@ class Bench:
         return moved
 
     def _farthest(self, distance2: float, first: Floats, second: Floats) -> Apart:
-        """Return the distance with the place where the answers are farthest apart."""
-        b = self.likelihood.nuisance_of(self.likelihood.whiten([first - second]))
-        taken = self.likelihood.design.effect(0, self.trace, b)
-        off = np.abs(first - second - taken) / np.array([each.sigma for each in self._noise])
-        row, column = (int(at) for at in np.unravel_index(int(np.argmax(off)), off.shape))
-        # of each answer alone the instrument takes its own share, as nobody knows its zero
-        alone = [self._less_instrument(values)[row, column] for values in (first, second)]
+        """Return the distance, and what both answers show where they differ most."""
+        sigma = np.array([each.sigma for each in self._noise])
+        off = (first - second) / sigma
+        changed = off - off[0]
+        # an instrument's zero may be anything: a change is told where the answers differ by one
+        is_change = bool(np.abs(changed).max() >= _LIMITS.told_change * np.abs(off).max())
+        which = np.abs(changed if is_change else off)
+        row, column = (int(at) for at in np.unravel_index(int(np.argmax(which)), which.shape))
+        values = [each[row, column] - is_change * each[0, column] for each in (first, second)]
         factor = self.trace.factor
         return Apart(
             distance2=distance2,
             time_s=float(self.trace.time_s[row]),
             component=self.trace.components[column],
-            first=factor * float(alone[0]),
-            second=factor * float(alone[1]),
+            first=factor * float(values[0]),
+            second=factor * float(values[1]),
+            is_change=is_change,
             unit=self.trace.unit,
             signal=self.trace.signal,
-            noise=factor * self._noise[column].sigma,
+            noise=factor * float(sigma[column]),
         )
-
-    def _less_instrument(self, values: Floats) -> Floats:
-        b = self.likelihood.nuisance_of(self.likelihood.whiten([values]))
-        rest: Floats = values - self.likelihood.design.effect(0, self.trace, b)
-        return rest
 
 
 _FREE = 1e-9

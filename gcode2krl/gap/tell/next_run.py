@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.choose.judged import Judgement
-from gcode2krl.gap.choose.next_run import Choice, Family, Parting, choose_next_run
+from gcode2krl.gap.choose.next_run import Again, Choice, Family, Parting, choose_next_run
 from gcode2krl.gap.choose.separation import Apart
 from gcode2krl.gap.tell.result import DependsOnResult, Expectation, NextRun, Separates
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_MIN
 
 _SIGNALS = {
@@ -18,6 +19,10 @@ _SIGNALS = {
 }
 _SEEN = 2.0
 """Standard deviations below which a value is nothing."""
+_AVERAGED = 3.0 / THRESHOLDS.choose.trial_step_s
+"""Independent values at a reference point, which stands for 3 s."""
+_PARTED = 3.0
+"""Odds below which a program does not part two answers: one in four would be told wrongly."""
 _MANY_S = 100.0
 """Times from here on are told in minutes."""
 
@@ -33,6 +38,8 @@ def next_run_of(
 
 def told(choice: Choice) -> NextRun:
     """Return a choice in words."""
+    if choice.again is not None:
+        return _told_again(choice, choice.again)
     return NextRun(
         program=choice.program,
         minutes=round(choice.minutes, 1),
@@ -48,24 +55,42 @@ def told(choice: Choice) -> NextRun:
     )
 
 
+def _told_again(choice: Choice, again: Again) -> NextRun:
+    """Return a repetition in words."""
+    back, once = "it comes back", "it happened once"
+    place = _SIGNALS.get(again.signal, again.signal)
+    return NextRun(
+        program=choice.program,
+        minutes=round(choice.minutes, 1),
+        separates=(Separates(first=back, second=once, odds=float(f"{again.odds:.3g}")),),
+        expect=(
+            Expectation(answer=back, shows=f"{again.rms:.2g} {again.unit} {place} again, at the same places"),
+            Expectation(answer=once, shows="nothing above the noise"),
+        ),
+    )
+
+
 def _expected(partings: Sequence[Parting]) -> Iterator[Expectation]:
     """Yield what each answer shows, by the pair in which the program parts it best from another."""
     told_of: set[str] = set()
     for parting in sorted(partings, key=lambda parting: -parting.odds):
-        apart = parting.apart
-        for answer, value in ((parting.pair.first, apart.first), (parting.pair.second, apart.second)):
-            if answer.label not in told_of:
-                told_of.add(answer.label)
-                yield Expectation(answer=answer.label, shows=shown(apart, value))
+        apart, first, second = parting.apart, parting.pair.first.label, parting.pair.second.label
+        for label, other, value in ((first, second, apart.first), (second, first, apart.second)):
+            if label not in told_of:
+                told_of.add(label)
+                same = f"the same as if {other}: no program parts them"
+                told = same if parting.odds < _PARTED else shown(apart, value)
+                yield Expectation(answer=label, shows=told)
 
 
 def shown(apart: Apart, value: float) -> str:
     """Return what a value at the moment at which two answers are farthest apart looks like."""
     after = _after(apart.time_s)
-    if abs(value) < _SEEN * apart.noise:
+    if abs(value) < _SEEN * apart.noise / _AVERAGED**0.5:
         return f"nothing above the noise after {after}"
     place = _SIGNALS.get(apart.signal, apart.signal)
-    return f"{value:+.2g} {apart.unit} in {apart.component} {place} after {after}"
+    since = " since the start" if apart.is_change else ""
+    return f"{value:+.2g} {apart.unit} in {apart.component} {place} after {after}{since}"
 
 
 def _after(time_s: float) -> str:

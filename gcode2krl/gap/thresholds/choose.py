@@ -142,8 +142,10 @@ class ChooseThresholds:
         6.9, "log 1000: beyond it no program is better than another, as noise is not exactly as learnt"
     )
     nearly_best: float = convention(0.1, "programs within this share of the best mean log odds: the shortest")
+    told_change: float = convention(
+        0.5, "of the largest difference of two answers: from here on their change since the start is told"
+    )
     trial_step_s: float = convention(
         0.25, "between values of a program that count as independent; noise forgets within it or counts less"
     )
     trial_rows: int = convention(400, "values of a program at most, so that long ones do not win by length")
-    next_run_s: float = convention(1.5, "time after which no further program is simulated")
