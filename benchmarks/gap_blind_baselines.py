@@ -129,8 +129,9 @@ def _settings(inputs: Any, dated: bool) -> list:
         if effect.kind == "slip" or (effect.name in ("thermal", "force_drift")) != dated:
             continue
         for target in effect.targets(inputs.cell):
-            for shape in effect.shapes():
-                found += [(effect, target, values) for values in effect.settings(inputs, target, shape)]
+            own = effect.at(target)
+            for shape in own.shapes():
+                found += [(own, target, values) for values in own.settings(inputs, target, shape)]
     return found
 
 

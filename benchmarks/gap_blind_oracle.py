@@ -67,6 +67,7 @@ def _applied(entry: dict, inputs: Any) -> Any:
     target = truth_of(entry)[1]
     if target not in effect.targets(inputs.cell):
         return None
+    effect = effect.at(target)
     known = flat(entry)
     if not set(known) & set(effect.names):
         return None

@@ -51,14 +51,6 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     return _stated(signals, applied)
 
 
-def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
-    """Return the measured joints (m, 6), the model's where there are none: columns that are NaN."""
-    if measured_rad is None:
-        return model_rad
-    missing = np.isnan(measured_rad).all(axis=0)
-    return np.where(missing, model_rad, measured_rad) if missing.any() else measured_rad
-
-
 def commanded(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
     """Return what `simulate` does as far as commanded joints and clocks go; the rest is nominal or zero."""
     return _stated(_nominal(_planned(inputs, applied)), applied)
