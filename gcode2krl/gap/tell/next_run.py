@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from gcode2krl.canned.draft import REFERENCE_DWELL_S
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.choose.next_run import Again, Choice, Family, Parting, choose_next_run
@@ -17,14 +18,7 @@ _SIGNALS = {
     "joint_load": "behind the gear",
     "joint_commanded": "off the commanded path",
 }
-_SEEN = 2.0
-"""Standard deviations below which a value is nothing."""
-_AVERAGED = 3.0 / THRESHOLDS.choose.trial_step_s
-"""Independent values at a reference point, which stands for 3 s."""
-_PARTED = 3.0
-"""Odds below which a program does not part two answers: one in four would be told wrongly."""
-_MANY_S = 100.0
-"""Times from here on are told in minutes."""
+_LIMITS = THRESHOLDS.tell
 
 
 def next_run_of(
@@ -79,19 +73,24 @@ def _expected(partings: Sequence[Parting]) -> Iterator[Expectation]:
             if label not in told_of:
                 told_of.add(label)
                 same = f"the same as if {other}: no program parts them"
-                told = same if parting.odds < _PARTED else shown(apart, value)
+                told = same if parting.odds < _LIMITS.parted_odds else shown(apart, value)
                 yield Expectation(answer=label, shows=told)
 
 
 def shown(apart: Apart, value: float) -> str:
     """Return what a value at the moment at which two answers are farthest apart looks like."""
     after = _after(apart.time_s)
-    if abs(value) < _SEEN * apart.noise / _AVERAGED**0.5:
+    if abs(value) < _LIMITS.seen_sigma * apart.noise / _values_at_a_point() ** 0.5:
         return f"nothing above the noise after {after}"
     place = _SIGNALS.get(apart.signal, apart.signal)
     since = " since the start" if apart.is_change else ""
     return f"{value:+.2g} {apart.unit} in {apart.component} {place} after {after}{since}"
 
 
+def _values_at_a_point() -> float:
+    """Return how many independent values a reference point gives."""
+    return REFERENCE_DWELL_S / THRESHOLDS.choose.trial_step_s
+
+
 def _after(time_s: float) -> str:
-    return f"{time_s:.0f} s" if time_s < _MANY_S else f"{time_s / S_PER_MIN:.0f} min"
+    return f"{time_s:.0f} s" if time_s < _LIMITS.minutes_from_s else f"{time_s / S_PER_MIN:.0f} min"

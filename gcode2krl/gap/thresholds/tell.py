@@ -46,3 +46,8 @@ class TellThresholds:
         0.9, "a form that takes a smaller share of what its family takes is said to fit badly"
     )
     constant_least_p: float = convention(0.05, "a size less likely to be one number is said to vary")
+    seen_sigma: float = convention(
+        2.0, "standard deviations of a mean at a reference point: less is told as nothing"
+    )
+    parted_odds: float = convention(3.0, "expected odds below which a program is said to part nothing")
+    minutes_from_s: float = convention(100.0, "times from here on are told in minutes")

@@ -1,0 +1,26 @@
+"""Whole: causes that one program cannot tell apart, the run that is proposed, and the answer after it."""
+
+import pytest
+
+from gcode2krl.canned import draft_of, place_of, predicted
+from gcode2krl.gap.diagnosis import diagnose
+from tests.gap.synthetic import applied, prediction, runs
+
+
+@pytest.mark.slow
+def test_the_proposed_run_tells_tool_from_base():
+    tool = applied("tool_frame:x_mm=0.3,y_mm=0.2")
+    first = diagnose(prediction(), runs(tool, 3, 5, force=False))
+    assert first.next_run is not None
+    assert "base_frame" in {each.effect for cause in first.causes for each in cause.indistinguishable_from}
+    assert first.next_run.program == "orientation"
+    assert first.next_run.separates[0].odds > 100.0
+
+    cell = prediction().cell
+    draft = draft_of(first.next_run.program, place_of(cell))
+    fine, planned = predicted(draft, cell, 0.003), predicted(draft, cell, 0.012)
+    second = diagnose(planned, runs(tool, 1, 6, base=fine, force=False, normal=False))
+    named = [(cause.effect, cause.is_named) for cause in second.causes]
+    assert named[0] == ("tool_frame", True)
+    alike = {each.effect for cause in second.causes for each in cause.indistinguishable_from}
+    assert "base_frame" not in alike
