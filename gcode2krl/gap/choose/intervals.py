@@ -91,23 +91,24 @@ def _effect_intervals(found: Examination, number: int, draws: Floats) -> dict[st
 
 
 def _between_runs(found: Examination, number: int) -> float:
-    """Return the half-width, as a share, that the spread between runs adds where each has its own mismatch.
+    """Return the half-width, as a share, that the spread between runs adds to a clock.
 
     Student's quantile of the mean over the runs.
     """
-    if not found.likelihood.own_alike(found.applied[number]):
+    applied = found.applied[number]
+    if not applied.effect.is_clock or not found.likelihood.own_alike(applied):
         return 0.0
     spread, runs = spread_between_runs(found, number)
     return float(stats.t.ppf(_ENDS[1], runs - 1) * spread / runs**0.5) if runs > 1 else 0.0
 
 
 def _mismatch(found: Examination, number: int) -> dict[str, float]:
-    """Return the half-widths that the normal mismatch which all runs share adds to an effect of its form.
+    """Return the half-widths that normal mismatch of the same form adds to an effect in a joint.
 
-    The fit counts both as one number.
+    It is nuisance of the covariance at its own small size, which at that of the effect has another shape.
     """
     effect = found.applied[number].effect
-    if found.link.tells_time or not effect.is_nuisance:
+    if not found.link.of_joints or found.link.tells_time or not effect.is_nuisance:
         return {}
     bounds = effect.usual(found.question.mismatch, 1.0)
     return {name: _LIMITS.inside_bound * bound for name, bound in bounds.items()}

@@ -47,11 +47,15 @@ class CountedOnce:
         found: Bools = self._own(applied) | self.alike.get((applied.effect.name, applied.target), none)
         return found
 
-    def kept(self, applied: Iterable[Applied]) -> Floats | None:
-        """Return the projection (m, m) of b onto what is left of it beside effects; None where all is."""
+    def kept(self, applied: Iterable[Applied], clocks: bool = False) -> Floats | None:
+        """Return the projection (m, m) of b onto what is left of it beside effects; None where all is.
+
+        ``clocks``: beside those of them that are clocks.
+        """
         gone = np.zeros(self.design.width, dtype=np.bool_)
         for each in applied if self._possible else ():
-            gone |= self.gone(each)
+            if each.effect.is_clock or not clocks:
+                gone |= self.gone(each)
         return self._projection(gone) if gone.any() else None
 
     def _own(self, applied: Applied) -> Bools:

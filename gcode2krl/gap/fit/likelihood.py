@@ -110,8 +110,13 @@ class Likelihood:
         return np.concatenate([whitened - self._explained(b), b])
 
     def projected(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
-        """Return the marginal residuals (v + m, c) of vectors (v, c) for unbounded nuisance."""
-        kept, normal, projections = self._kept(applied), self._normal, self._projections(whitened)
+        """Return the marginal residuals (v + m, c) of vectors (v, c) for unbounded nuisance.
+
+        Nuisance of the form of an effect stays in, as what the effect's number is unsure by; but that of a
+        clock, which runs show by how they differ.
+        """
+        kept, normal = self.once.kept(applied, clocks=True), self._normal
+        projections = self._projections(whitened)
         if kept is not None:
             normal, projections = _kept_normal(kept, normal), kept @ projections
         b = np.asarray(np.linalg.solve(normal, projections), dtype=np.float64)
