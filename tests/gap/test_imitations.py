@@ -28,7 +28,7 @@ NAMES = {
 def judged(link, effects=(), extra=None, seed=3):
     """Return what a link says of three runs, with the effects that could imitate what was done to them."""
     made = [
-        replace(run, head=replace(run.head, started=START + number * timedelta(minutes=30)))
+        replace(run, head=run.head.model_copy(update={"started": START + number * timedelta(minutes=30)}))
         for number, run in enumerate(runs(list(effects), 3, seed, extra=extra, controller=False))
     ]
     pairs = tuple(pairs_of(refined(), made))
@@ -114,7 +114,10 @@ def test_a_tool_that_is_pulled_out_is_no_frame():
 
     found = judged(MECHANICS, extra=moved(form))
     assert names(found) == []
-    assert next(iter(depends_on(found))).at == "tip"
+    best = next(iter(depends_on(found)))
+    assert best.at in ("tip", "A2")  # A2 moves it up and down too, with one number instead of three
+    assert best.on not in ("place", "constant")
+    assert abs(best.direction[2]) > 0.9
 
 
 @pytest.mark.parametrize(

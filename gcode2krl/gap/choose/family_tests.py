@@ -12,7 +12,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
-from gcode2krl.effects.dependence import Where
+from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination
@@ -119,6 +119,10 @@ class Rest:
         return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 
 
+NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0, 0)
+"""The rest of a link that families are not asked about."""
+
+
 class LinkFamilies:
     """The families of a link: what each says beside all accepted effects, and with each cause taken out."""
 
@@ -211,7 +215,11 @@ def _is_near(applied: Applied, evidence: Evidence) -> bool:
 def _is_of(applied: Applied, evidence: Evidence) -> bool:
     """Tell whether a family is that of an effect at its target."""
     effect, place = applied.effect, evidence.place
-    if evidence.on not in effect.depends_on or place.where not in effect.where:
+    states = evidence.on in effect.depends_on
+    # what depends on the place is constant where the tool hardly moves or turns
+    if evidence.on is Dependence.CONSTANT and Dependence.PLACE in effect.depends_on:
+        states = True
+    if not states or place.where not in effect.where:
         return False
     at_a_joint = place.where is Where.JOINT and applied.target in JOINTS
     return not at_a_joint or place.name in (applied.target, TIMING)

@@ -11,7 +11,7 @@ from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.constancy import constancy_of
 from gcode2krl.gap.choose.examination import Examination
-from gcode2krl.gap.choose.family_tests import LinkFamilies, Rest
+from gcode2krl.gap.choose.family_tests import NOTHING_LEFT, LinkFamilies, Rest
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
@@ -31,9 +31,10 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
     found = examine(link, traces, question, known)
-    families = LinkFamilies(found, (*traces, *held))
+    every = (*traces, *held)
     if not found.causes:
-        return _without_causes(found, (*traces, *held), families.rest)
+        return _without_causes(found, every)
+    families = LinkFamilies(found, every)
     trials = list(_trials(found, held))
     counts = range(len(found.causes) + 1)
     if trials:
@@ -43,7 +44,7 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     whole = _size(found, traces, found.causes)
     judged = _judgement(found, sizes, whole, families, bool(trials))
     with_named = _size_with_named(judged, sizes, trials)
-    return replace(judged, every=(*traces, *held), size_with_named=with_named)
+    return replace(judged, every=every, size_with_named=with_named)
 
 
 def _size_with_named(judged: Judgement, sizes: Sequence[Size], trials: Sequence["_Trial"]) -> Size | None:
@@ -64,8 +65,11 @@ def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]
     return size_of_gap(traces, nuisance, found.noise, causes, found.mismatch)
 
 
-def _without_causes(found: Examination, every: tuple[Trace, ...], rest: Rest) -> Judgement:
+def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
     size = _size(found, every, ())
+    # families say nothing of a model that is met to its own accuracy: what it leaves is no noise
+    is_asked = size.significant or found.link.model_rms == 0.0
+    rest = LinkFamilies(found, every).rest if is_asked else NOTHING_LEFT
     verdict = "unexplained" if _is_gap(found, size, rest) else "no_gap"
     return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
 
