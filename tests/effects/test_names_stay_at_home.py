@@ -17,7 +17,7 @@ NAMES = {
 FILES = [
     *(
         file
-        for room in ("beside", "fit", "choose")
+        for room in ("beside", "fit", "families", "choose")
         for file in sorted((PACKAGE / "gap" / room).rglob("*.py"))
     ),
     PACKAGE / "gap" / "diagnosis.py",

@@ -39,7 +39,9 @@ class FamilyTests:
     form_ratio: float
     """Of what its own family takes, the share that its form takes."""
     other_share: float
-    """Of the gap's power, what the best other family takes beside the refitted effect; 0 where none does."""
+    """Of the gap's power, what the best other family takes beside the refitted effect.
+
+    0 where none does, or where its own family takes more of the same: then its form is another."""
     other_p: float
     """Of an evidence as large as that, if nothing admissible explains the rest."""
     family: Evidence | None
@@ -189,6 +191,8 @@ class LinkFamilies:
         own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
         near = [each for each in rest.evidences if _is_near(applied, each)]
         other = max((each for each in near if not _is_of(applied, each)), key=net_gain, default=None)
+        if other is not None and net_gain(other) <= own_rest:
+            other = None  # its own family takes more of the same: it is of another form, not beside another
         gap_gain = 0.0 if other is None else self._gap_gain(near, other.place.component)
         return FamilyTests(
             margin=float(margin),

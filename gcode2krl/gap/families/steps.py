@@ -16,6 +16,7 @@ _STEP_S = THRESHOLDS.families.step_s
 _MOST = 40
 """Moments that are tried in one run."""
 _FROM_END_S = 1.0
+"""A step nearer to an end of a run is a difference between runs."""
 _FINER = 10
 """So many times closer are those around the best."""
 
@@ -47,7 +48,8 @@ class Steps:
         number, time_s = moment
         trace, reach = self.traces[number], self.every_s[number]
         times = time_s + reach * np.arange(-_FINER + 1, _FINER) / _FINER
-        return [(number, float(t)) for t in times if trace.time_s[0] < t < trace.time_s[-1]]
+        low, high = trace.time_s[0] + _FROM_END_S, trace.time_s[-1] - _FROM_END_S
+        return [(number, float(t)) for t in times if low <= t <= high]
 
     def blocks(self, moments: Sequence[Moment]) -> Floats:
         """Return the columns of moments whitened and in blocks, (v, moments·d)."""
