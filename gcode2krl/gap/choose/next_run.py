@@ -113,7 +113,7 @@ def choose_next_run(
 
     None where nothing is left open, or where robot and cell are not known well enough for a program.
     """
-    if not all(pair.known_robot for pair in context.pairs):
+    if not context.pairs or not all(pair.known_robot for pair in context.pairs):
         return None
     pairs = sorted(open_pairs(context.offered, judgements, families), key=lambda pair: -pair.weight)
     pairs = pairs[: _LIMITS.most_open_pairs]
