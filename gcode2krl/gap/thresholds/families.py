@@ -31,10 +31,12 @@ class FamilyThresholds:
 
     gap_p: float = convention(0.005, "the least p that the flips can tell: a gap whatever its size")
     gap_evidence: float = calibrated(
-        23.0, DEVELOPMENT, "log 1e10, over the inflation: sound runs have families of up to 9 at this p"
+        23.0, DEVELOPMENT, "log 1e10, over the inflation: tones at 1.3 times the noise have 60 and more"
     )
     gap_power: float = calibrated(
-        0.02, DEVELOPMENT, "of the noise: what a family takes of sound runs is below a hundredth"
+        0.02,
+        DEVELOPMENT,
+        "of the noise: sound links have families of up to 80 nats, but of less than a hundredth of its power",
     )
 
     # Names
