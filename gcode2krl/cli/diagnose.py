@@ -89,7 +89,7 @@ def _written(
     """Write the page and the pictures that are asked for; return the files."""
     if html is None and plot is None:
         return []
-    from gcode2krl.gap.tell.html.page import write_page
+    from gcode2krl.gap.tell.html.one_file import write_page
     from gcode2krl.gap.tell.html.pictures import write_pictures
 
     written = []

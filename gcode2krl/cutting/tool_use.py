@@ -12,7 +12,7 @@ from gcode2krl.tables import Forces
 
 STEEP_RAD = np.deg2rad(20.0)
 """Descent above which a mill goes down rather than along: assumed, ramps are flatter."""
-_FLAT_RAD = np.deg2rad(60.0)
+_FLAT_RAD = np.deg2rad(45.0)
 """Descent, and rise, below which a drill goes sideways: assumed."""
 _MET_MM = 0.1
 """Less material below the tool is the rest of an earlier pass."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.against import Against
+from gcode2krl.gap.tell.abscissa import Against
 from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
 from gcode2krl.gap.tell.result import (
     AtPart,

@@ -103,9 +103,8 @@ def test_drives_ahead_of_their_command_have_no_negative_lag():
     time_s = motion().time_s
     whole = trace(joints(time_s + 6e-3) - joints(time_s) + noise(500, 4, SIGMA_RAD, 6), "servo")
     inside = slice(1, -1)  # the model's joints begin and end with the run, in motion
-    one = replace(
-        whole, time_s=time_s[inside], measured=whole.measured[inside], segments=np.array([[0, len(time_s) - 2]])
-    )
+    segments = np.array([[0, len(time_s) - 2]])
+    one = replace(whole, time_s=time_s[inside], measured=whole.measured[inside], segments=segments)
     lag = library()["servo_lag"]
     lags = [block for n in range(1, 7) for block in blocks_of(lag, f"A{n}")]
     asked = question([])

@@ -120,12 +120,16 @@ def test_an_effect_that_states_no_family_is_its_own():
 
 
 def test_the_weight_falls_with_each_test():
-    good = FamilyTests(20.0, 0.99, 0.0, 1.0, None, None)
+    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None)
+    # most of what can be told, a hundredth of the gap
+    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None)
+    assert hidden.passed
+    assert hidden.weight == 1.0
     assert good.weight == 1.0
     for worse in (
-        FamilyTests(-20.0, 0.99, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.7, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.99, 0.2, 0.005, None, None),
+        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None),
+        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None),
+        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None),
     ):
         assert worse.weight == 0.0
         assert not worse.passed

@@ -13,7 +13,7 @@ from gcode2krl.gap.beside.links import FORCE, MECHANICS
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.depends_on import depends_on
+from gcode2krl.gap.tell.dependences import depends_on
 from tests.gap.synthetic import LIBRARY, applied, refined, runs
 
 pytestmark = pytest.mark.slow

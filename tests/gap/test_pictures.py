@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.tell.against import Against
+from gcode2krl.gap.tell.abscissa import Against
 from gcode2krl.gap.tell.html.pictures import (
     draw_dependence,
     draw_path,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.tell.headline import headline
+from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.gap.tell.report import left_lines, text_report, where_words, worst
 from gcode2krl.gap.tell.result import EffectAt, Expectation, NextRun, Separates, Where
 from tests.gap.answered import BACKLASH, GAP, STRETCH, UNEXPLAINED, UNSURE

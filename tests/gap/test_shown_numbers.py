@@ -7,12 +7,11 @@ import pytest
 
 from gcode2krl.effects import Effect, Parameter, Role
 from gcode2krl.gap.choose.intervals import intervals_of
-from gcode2krl.gap.choose.scoring import threshold
-from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.shown_numbers import with_shown_numbers
 from gcode2krl.gap.fit.numbers import free_of
 from gcode2krl.gap.fit.refitting import refit
-from tests.gap.constructed import applied, examined, motion, noise, question, trace
+from gcode2krl.gap.fit.signatures import blocks_at
+from tests.gap.constructed import applied, examined, motion, noise, trace
 
 TIME_S = motion().time_s
 

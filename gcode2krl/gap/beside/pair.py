@@ -129,9 +129,12 @@ def _smooth(values: Floats, rows: int) -> Floats:
     return found
 
 
-def usable_rows(table: Measured, stamps: Floats, inputs: Inputs) -> tuple[Ints, Ints]:
-    """Return the rows (n,) of a table within the prediction's time, and their segments (s, 2)."""
-    first, last = inputs.time_s[0], inputs.time_s[-1]
+def usable_rows(table: Measured, stamps: Floats, inputs: Inputs, ends_s: float = 0.0) -> tuple[Ints, Ints]:
+    """Return the rows (n,) of a table within the model's time, and their segments (s, 2).
+
+    ``ends_s``: so near to its ends a row is left out; a model that begins in motion is not known before.
+    """
+    first, last = inputs.time_s[0] + ends_s, inputs.time_s[-1] - ends_s
     inside = (stamps >= first) & (stamps <= last)
     rows = np.flatnonzero(inside)
     edges = []

@@ -42,6 +42,11 @@ class FamilyTests:
     """Of the gap's power, what the best other family takes beside the refitted effect.
 
     0 where none does, or where its own family takes more of the same: then its form is another."""
+    other_power: float
+    """That family's share of the power of both in the signal.
+
+    Slow noise hides the power of slow effects from chi2, so that a rest of a hundredth of the gap may take
+    most of what can be told of it."""
     other_p: float
     """Of an evidence as large as that, if nothing admissible explains the rest."""
     family: Evidence | None
@@ -62,7 +67,7 @@ class FamilyTests:
     @property
     def is_alone(self) -> bool:
         """Tell whether no other family takes a share worth naming beside it."""
-        return self.other_share < _LIMITS.other_share
+        return self.other_share < _LIMITS.other_share or self.other_power < _LIMITS.other_power
 
     @property
     def passed(self) -> bool:
@@ -79,7 +84,10 @@ class FamilyTests:
         steps = (
             (self.margin + _LIMITS.alike_nats) / _LIMITS.margin_width,
             (self.form_ratio - _LIMITS.form_ratio) / _LIMITS.ratio_width,
-            (_LIMITS.other_share - self.other_share) / _LIMITS.share_width,
+            max(
+                (_LIMITS.other_share - self.other_share) / _LIMITS.share_width,
+                (_LIMITS.other_power - self.other_power) / _LIMITS.share_width,
+            ),
         )
         return float(np.clip(0.5 + min(steps) / 4.0, 0.0, 1.0))
 
@@ -99,6 +107,8 @@ class Rest:
     """Fall of chi2 by all that is known to explain the gap: the power of the gap beyond noise."""
     blocks: int
     """Number of whitened values."""
+    is_sized: bool = False
+    """Its size alone is significant: then families need not prove that there is a rest."""
 
     def share(self, evidence: Evidence) -> float:
         """Return the share of the gap's power that a family takes; 0 where it is not significant."""
@@ -116,7 +126,7 @@ class Rest:
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
         """Return the families that take a share of the gap worth naming, the most probable first."""
-        if self.study.p > _LIMITS.significant_p:
+        if not self.is_sized and self.study.p > _LIMITS.significant_p:
             return ()
         return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 
@@ -198,10 +208,23 @@ class LinkFamilies:
             margin=float(margin),
             form_ratio=form / max(form + own_rest, 1e-30),
             other_share=0.0 if other is None else min(net_gain(other) / max(gap_gain, 1e-30), 1.0),
+            other_power=0.0 if other is None else self._power_share(other, number),
             other_p=1.0 if other is None else rest.p_of(other),
             family=own[0] if own else None,
             better=better,
         )
+
+    def _power_share(self, other: Evidence, number: int) -> float:
+        """Return a family's share of the power that it and an accepted effect have in the signal."""
+        applied, rest = self._found.applied, self._found.without(number)
+        component = other.place.component
+        columns = slice(None) if component is None else [component]
+        own = sum(
+            float(np.sum((trace.sample(applied) - trace.sample(rest))[:, columns] ** 2))
+            for trace in self._rows.traces
+        )
+        power = sum(float(np.sum(signal**2)) for signal in other.signal)
+        return power / max(power + own, 1e-300)
 
     def _cost(self, out: View, number: int) -> float:
         """Return what the numbers of an effect cost as chi2, as in `Fitted.occam`."""

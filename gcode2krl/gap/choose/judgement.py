@@ -70,6 +70,7 @@ def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
     # families say nothing of a model that is met to its own accuracy: what it leaves is no noise
     is_asked = size.significant or found.link.model_rms == 0.0
     rest = LinkFamilies(found, every).rest if is_asked else NOTHING_LEFT
+    rest = replace(rest, is_sized=size.significant)
     verdict = "unexplained" if _is_gap(found, size, rest) else "no_gap"
     return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
 
@@ -154,7 +155,8 @@ def _judgement(
         unknown = max(unknown, 1.0 - _LIMITS.unsupported)
     causes = sorted(_causes(found, sizes, unknown, families, held_out), key=lambda cause: -cause.probability)
     named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
-    rest = families.beside(named)
+    is_sized = left if named else sizes[0].significant
+    rest = replace(families.beside(named), is_sized=is_sized)
     is_left = left and last.share_left > _LIMITS.unknown_share
     is_gap = _is_gap(found, sizes[0], rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)

@@ -19,8 +19,8 @@ G = <B, B> and g = <B, r>,
 the mean of whose exponential over a grid of amplitudes a and length scales is the evidence of the family.
 Nuisance at its bounds is held there: the second term is then half the fall of chi2 with bounded b.
 
-**Steps and tones** (`steps`, `tones`). Their moment or frequency is a number that the data must find: the
-mean of the evidences over all positions pays for the search.
+**Steps and tones** (`steps`, `tone_search`). Their moment or frequency is a number that the data must find:
+the mean of the evidences over all positions pays for the search.
 
 **Null** (`study`). Scores u_g = Σ_{i in g} B_i·r_i over stretches of time g (one second). If nothing
 admissible explains the rest, their signs are arbitrary; the largest evidence over all families with signs

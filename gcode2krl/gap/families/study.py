@@ -10,7 +10,7 @@ from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.rows import Rows
 from gcode2krl.gap.families.steps import Steps, step_evidence
-from gcode2krl.gap.families.tones import angle_tones, tones
+from gcode2krl.gap.families.tone_search import angle_tones, tones
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.thresholds import THRESHOLDS
 

@@ -19,7 +19,7 @@
 
   with w white. v are Ornstein-Uhlenbeck processes (Uhlenbeck & Ornstein 1930) that forget within 0.1 to 3 s,
   none, one or two: two for what a single one does not do, 1/f noise say. L⁻¹ is the Kalman filter of the sum,
-  whose innovations over their deviations are white (`innovations`); it starts at each gap of the data in the
+  whose innovations over their deviations are white (`kalman`); it starts at each gap of the data in the
   stationary state and is exact from the first row on: L is the Cholesky factor of the covariance.
 
 **Where the noise is learnt** (`noise_source`). Rows in a burst of the instrument and outliers are left out
@@ -28,7 +28,7 @@ before (`beside.bursts`).
 - Short part: of each run what effects, mismatch and half-second means leave, less its tones (`lines`), by
   least squares on three lags; the slow part's share of the lags is taken off first. What this takes of the
   noise itself is found by doing the same to drawn noise (Efron's bootstrap bias).
-- Slow part (`slow_noise`, `block_means`): means over 0.05 s of the whole residual, beside a constant and a
+- Slow part (`slow_noise`, `blocks`): means over 0.05 s of the whole residual, beside a constant and a
   trend of each run and mismatch. Signatures, steps, tones, smooth functions of place, angle, rate, reversals
   and force explain what they explain better than slow noise would; the rest is slow noise, its variance by
   restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971).

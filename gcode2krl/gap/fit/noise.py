@@ -3,7 +3,7 @@
     x_t = u_t + v_t,    u_t = Σ_i a_i·u_{t-1-i} + s·w_t,    v_t = φ·v_{t-1} + σ_v·√(1 - φ²)·w'_t
 
 v is an Ornstein-Uhlenbeck process sampled once a row; its time constant τ is -Δt/log φ. The sum is whitened
-by its innovations (`innovations`), begun anew in the stationary state at each gap. Data and signatures go
+by its innovations (`kalman`), begun anew in the stationary state at each gap. Data and signatures go
 through the same filter; raw data are never differenced.
 """
 
@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.fit.innovations import innovation_gains, innovations
+from gcode2krl.gap.fit.kalman import innovation_gains, innovations
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.fit

@@ -10,7 +10,7 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.decimals import resolution
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.block_means import block_means
+from gcode2krl.gap.fit.blocks import block_means
 from gcode2krl.gap.fit.lines import without_lines
 from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance

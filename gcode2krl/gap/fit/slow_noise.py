@@ -4,7 +4,7 @@ One component of all runs, as means over blocks of `noise_block_s`:
 
     y = X·β + v + w,    v Ornstein-Uhlenbeck of time constant τ and variance ρ·σ_w²,    w white
 
-The likelihood is that of the innovations (`innovations`), profiled over β and σ_w. Columns of X are taken of
+The likelihood is that of the innovations (`kalman`), profiled over β and σ_w. Columns of X are taken of
 many candidates and from tones, those of the most surprising likelihood ratio first, each fitted together with
 τ and ρ: a drift, a step or an effect is explained by its own column, of which v would have to imitate each
 value. What is left is the slow part, its variance by restricted likelihood, which allows for the numbers
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.fit.innovations import innovation_gains, innovations
+from gcode2krl.gap.fit.kalman import innovation_gains, innovations
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.fit

@@ -14,11 +14,11 @@ from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.at_part import at_part, at_part_of
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
-from gcode2krl.gap.tell.depends_on import depends_on
+from gcode2krl.gap.tell.dependences import depends_on
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
 from gcode2krl.gap.tell.next_run import next_run_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,

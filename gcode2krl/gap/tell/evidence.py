@@ -11,7 +11,7 @@ from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.judged import Judgement
-from gcode2krl.gap.tell.against import Against, against, knows_place
+from gcode2krl.gap.tell.abscissa import Against, against, knows_place
 from gcode2krl.gap.tell.residuals import Residual, smoothed
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from gcode2krl.gap.tell.headline import headline, stretch
+from gcode2krl.gap.tell.first_sentence import headline, stretch
 from gcode2krl.gap.tell.result import CauseResult, Gap, IntervalResult, LinkResult
 from gcode2krl.gap.tell.words import alike, depends, describe, kind, next_run, number
 from gcode2krl.gap.thresholds import THRESHOLDS

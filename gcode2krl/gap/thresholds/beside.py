@@ -128,6 +128,9 @@ class BesideThresholds:
 
     remembered_plans: int = convention(64, "plans of one prediction that are kept")
     remembered_paths: int = convention(64, "commanded paths that are kept")
+    log_ends_s: float = convention(
+        0.02, "a log alone may begin in motion: late samples of its first 20 ms have no model"
+    )
     clock_difference_s: float = convention(0.004, "span of the finite difference of a signal's clock")
 
     retime_same_length: float = convention(0.02, "lengths that differ by more are other paths")

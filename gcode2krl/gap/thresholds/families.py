@@ -52,6 +52,12 @@ class FamilyThresholds:
         "of the gap's power: what another family may take beside a named cause; right names leave up to "
         "0.03, imitations 0.1 to 0.8",
     )
+    other_power: float = calibrated(
+        0.03,
+        DEVELOPMENT,
+        "of the power in the signal: a step that is called a drift leaves 0.05 to 0.17 of it, and beside the right "
+        "clock of a recorded robot 0.013 are left",
+    )
     alike_nats: float = convention(
         4.6, "log 100: data that favour one of two families by less do not tell them apart"
     )

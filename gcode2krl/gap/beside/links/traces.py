@@ -39,7 +39,7 @@ def joint_trace(
     """
     recorded = np.isfinite(values).all(axis=0) & _moves(table)
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs)
+    rows, segments = usable_rows(table, stamps, pair.inputs, LIMITS.log_ends_s if pair.from_log else 0.0)
     if not recorded.any() or len(rows) == 0:
         return None
     columns = tuple(np.flatnonzero(recorded).tolist())
@@ -87,7 +87,7 @@ def vector_trace(
     ``plus`` is the signal of the model; ``sigma`` is the stated noise.
     """
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs)
+    rows, segments = usable_rows(table, stamps, pair.inputs, LIMITS.log_ends_s if pair.from_log else 0.0)
     trace = Trace(
         link=link,
         run=pair.name,

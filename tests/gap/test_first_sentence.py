@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.tell.headline import amount, headline, stretch
+from gcode2krl.gap.tell.first_sentence import amount, headline, stretch
 from gcode2krl.gap.tell.result import AtPart, JointResult, PhaseResult, Where
 from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, TIP, UNEXPLAINED, UNSURE
 

@@ -9,7 +9,7 @@ from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PART, PATH, SERVO
 from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.at_part import at_part, at_part_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of
 from gcode2krl.gap.tell.residuals import Residual
 from tests.gap.constructed import motion, trace
 from tests.gap.synthetic import applied

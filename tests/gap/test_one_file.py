@@ -7,8 +7,8 @@ import lxml.html
 import pytest
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.tell.headline import headline
-from gcode2krl.gap.tell.html.page import page, write_page
+from gcode2krl.gap.tell.first_sentence import headline
+from gcode2krl.gap.tell.html.one_file import page, write_page
 from gcode2krl.gap.tell.result import (
     Constancy,
     EffectAt,

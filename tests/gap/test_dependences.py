@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.depends_on import depends_on
+from gcode2krl.gap.tell.dependences import depends_on
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

@@ -8,7 +8,7 @@ from gcode2krl.gap.beside.links import FORCE, TIMING, Link
 from gcode2krl.gap.beside.timing import timing_sizes
 from gcode2krl.gap.choose.judged import Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.against import knows_place
+from gcode2krl.gap.tell.abscissa import knows_place
 from gcode2krl.gap.tell.evidence import tip_of
 from gcode2krl.gap.tell.residuals import Residual, rms_length
 from gcode2krl.gap.tell.result import AtPart

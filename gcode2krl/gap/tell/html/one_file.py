@@ -10,7 +10,7 @@ import jinja2
 
 from gcode2krl.files import write_together
 from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
-from gcode2krl.gap.tell.headline import headline, stretch
+from gcode2krl.gap.tell.first_sentence import headline, stretch
 from gcode2krl.gap.tell.html.path_svg import Strip, View, points, scale_colours, strip, views
 from gcode2krl.gap.tell.html.pictures import largest_size, picture_bytes, run_figure
 from gcode2krl.gap.tell.report import left_lines, where_words, worst
