@@ -55,8 +55,8 @@ class FamilyThresholds:
     other_power: float = calibrated(
         0.03,
         DEVELOPMENT,
-        "of the power in the signal: a step that is called a drift leaves 0.05 to 0.17 of it, and beside the right "
-        "clock of a recorded robot 0.013 are left",
+        "of the power in the signal: beside a drift that was a step 0.05 to 0.17 are left, beside the right "
+        "clock of a recorded robot 0.013",
     )
     alike_nats: float = convention(
         4.6, "log 100: data that favour one of two families by less do not tell them apart"

@@ -39,7 +39,7 @@ def joint_trace(
     """
     recorded = np.isfinite(values).all(axis=0) & _moves(table)
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, LIMITS.log_ends_s if pair.from_log else 0.0)
+    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
     if not recorded.any() or len(rows) == 0:
         return None
     columns = tuple(np.flatnonzero(recorded).tolist())
@@ -87,7 +87,7 @@ def vector_trace(
     ``plus`` is the signal of the model; ``sigma`` is the stated noise.
     """
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, LIMITS.log_ends_s if pair.from_log else 0.0)
+    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
     trace = Trace(
         link=link,
         run=pair.name,
@@ -129,3 +129,8 @@ def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
     nearest = np.minimum(np.abs(time_s - jumps[after]), np.abs(time_s - jumps[before]))
     near: Bools = nearest < LIMITS.jump_left_out_s
     return near
+
+
+def _ends_s(pair: Pair) -> float:
+    """Return how near to the ends of its model a row is left out: a log alone may begin in motion."""
+    return LIMITS.log_ends_s if pair.from_log and not pair.still else 0.0
