@@ -133,7 +133,7 @@ def _show(
 ) -> None:
     judged = sorted((judge(record) for record in records), key=lambda each: (each.kind, each.seed))
     if options.json:
-        print("\n".join(json.dumps(asdict(each)) for each in judged))
+        print("\n".join(json.dumps(asdict(each), default=sorted) for each in judged))
         return
     codes = ", ".join(sorted({record["code"] for record in records}))
     what = "scored" if options.seed >= SCORED_FROM else "calibration, not to be quoted"

@@ -13,7 +13,8 @@ from gcode2krl.gap import diagnose
 from tests.plant.cases import make_case
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-cases = import_module("gap_blind_cases")
+blind = import_module("gap_blind_run")
+plans_of = import_module("gap_blind_cases").predictions
 
 pytestmark = pytest.mark.slow
 COLUMNS = {"tracker": ("x_mm", "y_mm", "z_mm"), "force": ("fx_N", "fy_N", "fz_N")}
@@ -21,7 +22,7 @@ COLUMNS = {"tracker": ("x_mm", "y_mm", "z_mm"), "force": ("fx_N", "fy_N", "fz_N"
 
 @pytest.fixture(scope="module")
 def predictions(tmp_path_factory):
-    return Path(next(iter(cases.predictions(tmp_path_factory.mktemp("predictions")).values()))).parent
+    return Path(next(iter(plans_of(tmp_path_factory.mktemp("predictions")).values()))).parent
 
 
 def wandering(time_s, seconds, generator):
@@ -61,7 +62,7 @@ def test_sound_runs_with_slow_noise_have_no_gap(seed, seconds, predictions, tmp_
     case = tmp_path / "case"
     make_case(seed, case, "none", predictions=predictions.as_posix())
     with_slow_noise(case, seconds, seed)
-    runs, plans = cases.loaded(case, sorted(each.name for each in case.glob("run-*")))
+    runs, plans = blind.loaded(case)
     found = diagnose(plans[0], runs)
     assert found.verdict == "no_gap"
     assert found.causes == ()
@@ -72,7 +73,7 @@ def test_an_effect_beside_slow_noise_keeps_its_name(predictions, tmp_path):
     make_case(7101, case, "backlash", "same", predictions=predictions.as_posix())
     with_slow_noise(case, 0.3, 1)
     label = json.loads(case.with_name("case.label.json").read_text())
-    runs, plans = cases.loaded(case, sorted(each.name for each in case.glob("run-*")))
+    runs, plans = blind.loaded(case)
     found = diagnose(plans[0], runs)
     assert found.causes[0].effect == "backlash"
     assert found.causes[0].target == label["effects"][0]["target"]
