@@ -91,3 +91,18 @@ def direction_parameters(source: str) -> tuple[Parameter, ...]:
         )
         for name in DIRECTION
     )
+
+
+def phase_parameter(grid: tuple[float, ...] = ()) -> Parameter:
+    """Return the phase of a sine, any angle in rad."""
+    return Parameter(
+        name="phase",
+        unit="rad",
+        low=-math.pi,
+        high=math.pi,
+        nominal=None,
+        start=0.0,
+        grid=grid,
+        role=Role.PHASE,
+        source="any",
+    )

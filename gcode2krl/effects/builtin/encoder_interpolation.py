@@ -1,19 +1,17 @@
 """The interpolation of a motor's encoder."""
 
-import math
-
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
+from gcode2krl.effects.effect import Applied
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.motor_effect import MotorEffect
+from gcode2krl.effects.parameter import Parameter, Role, phase_parameter
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 
-class EncoderInterpolation(Effect):
+class EncoderInterpolation(MotorEffect):
     """Motor side: amplitude·sin(periods·gear ratio·q + phase) is added, q in rad as commanded.
 
     Its sine and cosine signals are not alike, or not about zero (Heydemann 1981). ``periods`` a turn of the
@@ -51,28 +49,8 @@ class EncoderInterpolation(Effect):
             role=Role.COUNT,
             source="resolvers have 1-4 pole pairs, optical encoders of motors 256-2048 periods a turn",
         ),
-        Parameter(
-            name="phase",
-            unit="rad",
-            low=-math.pi,
-            high=math.pi,
-            nominal=None,
-            start=0.0,
-            role=Role.PHASE,
-            source="any",
-        ),
+        phase_parameter(),
     )
-
-    def targets(self, cell: Cell) -> tuple[Target, ...]:
-        """Return the joints whose gear ratio the cell states."""
-        ratios = cell.robot.drives.gear_ratio
-        return () if ratios is None else tuple(j for j, n in zip(JOINTS, ratios, strict=True) if n != 0.0)
-
-    def why_not(self, cell: Cell, target: Target) -> str:
-        """Say that the gear ratio is missing."""
-        if target not in JOINTS or target in self.targets(cell):
-            return ""
-        return f"the gear ratio of {target} of {cell.robot.model} is not known: state robot.drives.gear_ratio"
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side as the encoder states it."""

@@ -1,14 +1,12 @@
 """A gear's output or its encoder runs out of centre."""
 
-import math
-
 import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter, Role, phase_parameter
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -38,16 +36,7 @@ class JointEccentricity(Effect):
             role=Role.SIZE,
             source="10-50 µm on a radius of 100 mm: 0.006-0.03",
         ),
-        Parameter(
-            name="phase",
-            unit="rad",
-            low=-math.pi,
-            high=math.pi,
-            nominal=None,
-            start=0.0,
-            role=Role.PHASE,
-            source="any",
-        ),
+        phase_parameter(),
     )
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:

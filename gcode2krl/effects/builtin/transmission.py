@@ -5,15 +5,15 @@ import math
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
+from gcode2krl.effects.effect import Applied
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.motor_effect import MotorEffect
+from gcode2krl.effects.parameter import Parameter, Role, phase_parameter
 from gcode2krl.units import RAD_PER_DEG
 
 
-class Transmission(Effect):
+class Transmission(MotorEffect):
     """Behind the gear: amplitude·sin(harmonic·gear ratio·q + phase) is added, q in rad of the motor side.
 
     ``phase`` in rad; harmonic 1 is once a turn of the motor.
@@ -51,29 +51,8 @@ class Transmission(Effect):
             role=Role.COUNT,
             source="once and twice a turn of the motor are the strongest; tooth meshes are higher",
         ),
-        Parameter(
-            name="phase",
-            unit="rad",
-            low=-math.pi,
-            high=math.pi,
-            nominal=None,
-            start=0.0,
-            grid=(0.0, math.pi / 2.0),
-            role=Role.PHASE,
-            source="any",
-        ),
+        phase_parameter(grid=(0.0, math.pi / 2.0)),
     )
-
-    def targets(self, cell: Cell) -> tuple[Target, ...]:
-        """Return the joints whose gear ratio the cell states."""
-        ratios = cell.robot.drives.gear_ratio
-        return () if ratios is None else tuple(j for j, n in zip(JOINTS, ratios, strict=True) if n != 0.0)
-
-    def why_not(self, cell: Cell, target: Target) -> str:
-        """Say that the gear ratio is missing."""
-        if target not in JOINTS or target in self.targets(cell):
-            return ""
-        return f"the gear ratio of {target} of {cell.robot.model} is not known: state robot.drives.gear_ratio"
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gear."""
