@@ -48,7 +48,7 @@ def test_the_whole_report_line_by_line():
         "",
         "next run",
         "  gcode2krl make-test reversals, 4 minutes",
-        "  separates backlash A2 from hysteresis A2, odds 30 to 1",
+        '  tells "backlash A2" from "hysteresis A2", odds 30 to 1',
         "  if backlash A2: the same at any force",
         "",
         "not examined",

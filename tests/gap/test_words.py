@@ -17,6 +17,7 @@ from gcode2krl.gap.tell.words import (
     number,
     rounded,
     unit_of,
+    what_there_is,
 )
 from tests.gap.answered import BACKLASH, STEP
 
@@ -61,7 +62,10 @@ def test_a_value_has_the_digits_that_its_interval_leaves(value, half, text):
         ("offset_s", "offset", "s"),
         ("mm", "", "mm"),
         ("scale", "scale", ""),
-        ("hz", "", "hz"),
+        ("hz", "", "Hz"),
+        ("N_per_deg", "", "N/deg"),
+        ("x_um_per_N", "x", "µm/N"),
+        ("H_xx_N_rad", "H xx", "N/rad"),
     ],
 )
 def test_the_unit_of_a_parameter(name, stem, unit):
@@ -99,6 +103,18 @@ def test_dependences():
     assert depends(replace(loop, size=0.0123, unit="deg")) == "A2, a loop with own torque, 0.012 deg"
     assert depends(replace(loop, form="drift", on="wall clock", size=None)) == "A2, a drift with wall clock"
     assert depends(replace(loop, form="else", size=None)) == "A2, a function of own torque"
+    assert depends(replace(loop, at="fz", size=None)) == "force, a loop with own torque"
+
+
+def test_dependences_within_a_sentence():
+    assert what_there_is(replace(STEP, direction=None)) == (
+        "a step at 11.2 s of run-1 and all later runs at the tip, 0.14 mm"
+    )
+    places = {"A2": "in A2", "fx": "in the force", "timing": "in time"}
+    for at, words in places.items():
+        assert (
+            what_there_is(replace(STEP, at=at, form="drift", size=None)) == f"a drift with {STEP.on} {words}"
+        )
 
 
 def test_the_kind_is_said_and_form_and_constancy_only_where_poor():
@@ -126,12 +142,12 @@ def test_the_next_run_with_what_is_expected_in_either_case():
     )
     assert next_run(run) == [
         "gcode2krl make-test dwell, 32 minutes",
-        "separates thermal from step, odds 31 to 1",
+        'tells "thermal" from "step", odds 31 to 1',
         "if thermal: 0.05 mm after 30 min",
         "if step: nothing",
     ]
     sure = replace(run, minutes=0.9, separates=(replace(run.separates[0], odds=1e9),))
     assert next_run(sure)[:2] == [
         "gcode2krl make-test dwell, a minute",
-        "separates thermal from step, odds over 1000 to 1",
+        'tells "thermal" from "step", odds over 1000 to 1',
     ]

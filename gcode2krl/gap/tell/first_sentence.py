@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult, PhaseResult
-from gcode2krl.gap.tell.words import depends, describe, listed, named, rounded
+from gcode2krl.gap.tell.words import describe, listed, named, rounded, what_there_is
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -101,7 +101,7 @@ def _why(gap: Gap) -> str:
         return listed([describe(cause, _LIMITS.headline_numbers) for cause in causes])
     words = "no effect of the library explains it"
     if gap.unexplained.depends_on:
-        words += f"; it depends on {depends(gap.unexplained.depends_on[0])}"
+        words += f"; it is {what_there_is(gap.unexplained.depends_on[0])}"
     unsure = [cause for cause in gap.causes if cause.probability >= _LIMITS.worth_a_word]
     if unsure:
         words += f"; perhaps {listed([_perhaps(cause) for cause in unsure], 'or')}"
@@ -136,7 +136,7 @@ def _rest(gap: Gap) -> str:
     if not gap.unexplained.significant:
         return ""
     on = gap.unexplained.depends_on
-    return "; more is left than noise explains" + (f": {depends(on[0])}" if on else "")
+    return "; more is left than noise explains" + (f": {what_there_is(on[0])}" if on else "")
 
 
 def stretch(interval: IntervalResult) -> str:

@@ -9,26 +9,11 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
 _AXES = ("x", "y", "z")
-_UNITS = (
-    "mm_per_h",
-    "N_per_h",
-    "per_m",
-    "cm_s2",
-    "m_s2",
-    "deg_per_kNm",
-    "mm",
-    "deg",
-    "rad",
-    "Nm",
-    "kg",
-    "ms",
-    "hz",
-    "N",
-    "s",
-    "h",
-    "m",
-)
-"""Ends of names of parameters that are units, the longer first."""
+_UNITS = {
+    name: name
+    for name in ("mm", "deg", "rad", "mrad", "N", "Nm", "kNm", "kg", "s", "ms", "h", "m", "cm", "K")
+} | {"um": "µm", "hz": "Hz", "s2": "s²", "krpm": "1000/min"}
+"""Words at the end of a parameter's name that are units -> how they are written."""
 _TARGETS = {
     "tracker": "the tracker",
     "force": "the force sensor",
@@ -36,6 +21,7 @@ _TARGETS = {
     "q_cmd": "the commanded joints",
     "q_load": "the load encoders",
 }
+_FORCE_AXES = ("fx", "fy", "fz")
 _FORMS = {
     "drift": "a drift with {on}",
     "periodic": "periodic in {on}",
@@ -71,12 +57,21 @@ def measured(interval: Interval, unit: str) -> str:
 
 
 def unit_of(name: str) -> tuple[str, str]:
-    """Return a parameter's name without its unit, and the unit: ``gap_deg`` is gap, in deg."""
-    for unit in _UNITS:
-        if name == unit or name.endswith(f"_{unit}"):
-            stem = name[: -len(unit)].strip("_").replace("_", " ")
-            return stem, unit.replace("_per_", "/").replace("per_", "1/").replace("_s2", "/s²")
-    return name.replace("_", " "), ""
+    """Return a parameter's name without its unit, and the unit: ``gap_deg`` is gap, in deg.
+
+    Units that follow each other, with or without ``per``, are divided: ``N_per_deg`` is in N/deg.
+    """
+    words = name.split("_")
+    units: list[str] = []
+    while words and len(units) < 2 and words[-1] in _UNITS:
+        units.insert(0, _UNITS[words.pop()])
+        divides = bool(words) and words[-1] == "per"
+        if divides:
+            words.pop()
+        if divides and (not words or words[-1] not in _UNITS):
+            units.insert(0, "1")
+            break
+    return " ".join(words), "/".join(units)
 
 
 def named(effect: str, target: str | None) -> str:
@@ -139,18 +134,35 @@ def alike(effects: Sequence[EffectAt]) -> str:
 
 def depends(found: DependsOnResult) -> str:
     """Return where a gap is and on what it depends: ``tip, a step at 11.2 s of run-1 and all later runs``."""
+    return ", ".join([_place(found), _form(found), *_size(found)])
+
+
+def what_there_is(found: DependsOnResult) -> str:
+    """Return the same within a sentence: ``a step at 11.2 s of run-1 and all later runs at the tip``."""
+    place = _place(found)
+    where = {"tip": "at the tip", "force": "in the force", "timing": "in time"}.get(place, f"in {place}")
+    return ", ".join([f"{_form(found)} {where}", *_size(found)])
+
+
+def _place(found: DependsOnResult) -> str:
+    """Return the place; the direction says more than the axis of a force."""
+    return "force" if found.at in _FORCE_AXES else found.at
+
+
+def _form(found: DependsOnResult) -> str:
     if found.form == "step" and found.at_time_s is not None:
         run = f" of {found.run} and all later runs" if found.run else ""
-        form = f"a step at {found.at_time_s:.1f} s{run}"
-    else:
-        form = _FORMS.get(found.form, "a function of {on}").format(on=found.on)
-    words = [found.at, form]
-    if found.size is not None:
-        size = f"{rounded(found.size)} {found.unit or ''}".rstrip()
-        if found.direction is not None:
-            size += f" along ({', '.join(f'{round(value, 1) + 0.0:.1f}' for value in found.direction)})"
-        words.append(size)
-    return ", ".join(words)
+        return f"a step at {found.at_time_s:.1f} s{run}"
+    return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
+
+
+def _size(found: DependsOnResult) -> list[str]:
+    if found.size is None:
+        return []
+    size = f"{rounded(found.size)} {found.unit or ''}".rstrip()
+    if found.direction is None:
+        return [size]
+    return [f"{size} along ({', '.join(f'{round(value, 1) + 0.0:.1f}' for value in found.direction)})"]
 
 
 def kind(cause: CauseResult) -> str | None:
@@ -172,7 +184,7 @@ def next_run(run: NextRun) -> list[str]:
     lines = [f"gcode2krl make-test {run.program}, {minutes}"]
     for pair in run.separates:
         first, second = pair.first.replace("_", " "), pair.second.replace("_", " ")
-        lines.append(f"separates {first} from {second}, odds {_odds(pair.odds)}")
+        lines.append(f'tells "{first}" from "{second}", odds {_odds(pair.odds)}')
     lines += [f"if {each.answer.replace('_', ' ')}: {each.shows}" for each in run.expect]
     return lines
 
