@@ -3,6 +3,7 @@
 import math
 from typing import Literal, NamedTuple
 
+import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
@@ -23,6 +24,12 @@ _LEAST_OVERLAP = 0.6
 _BAD, _SAME = 0.3, 0.2
 _CORRELATED = 0.98
 _FACTOR_SLACK = 0.1
+_RCOND = 1e-10
+"""Of normal equations: four digits are plenty, and they are solved once for each offset."""
+
+
+_STILL = 1e-12
+"""A smaller share of a signal's power is rounding: it does not move."""
 
 
 class Odd(NamedTuple):
@@ -123,12 +130,8 @@ def best_shift(
     inside = (around >= own_s[0]) & (around <= own_s[-1])
     shifted = at(around, own_s, measured)
     least = max(_LEAST_GRID, int(_LEAST_OVERLAP * min(len(grid), int(np.count_nonzero(inside)))))
-    shares = np.full(2 * most + 1, -1.0)
-    for step in range(2 * most + 1):
-        both = inside[step : step + len(grid)]
-        if np.count_nonzero(both) >= least:
-            chosen = np.flatnonzero(both)[:: max(1, len(grid) // _MOST_COMPARED)]
-            shares[step] = explained(wanted[chosen], shifted[step + chosen])
+    every = max(1, len(grid) // _MOST_COMPARED)
+    shares = _shares(wanted - wanted.mean(axis=0), shifted - shifted.mean(axis=0), inside, every, least)
     best = shares.max()
     if best < 0.0:
         return Shift(0.0, 0.0)
@@ -149,6 +152,60 @@ def _finer(coarse: Shift, grid: Floats, wanted: Floats, own_s: Floats, measured:
     return best
 
 
+def _shares(reference: Floats, measured: Floats, inside: Bools, every: int, least: int) -> Floats:
+    """Return `explained` of reference (n, k) at each row from which it can be laid on measured rows (m, j).
+
+    Of the rows that are ``inside`` (m,) one in ``every`` is taken; -1 where fewer than ``least`` are inside.
+    """
+    enough, products, squares, total = _products(reference, measured, inside, every, least)
+    inverse = np.linalg.pinv(squares, rcond=_RCOND, hermitian=True)
+    parts = np.sum(products * (inverse @ products), axis=(1, 2))
+    moves = total > 0.0
+    shares: Floats = np.where(enough, np.where(moves, parts / np.where(moves, total, 1.0), 0.0), -1.0)
+    return shares
+
+
+@numba.njit(cache=True, nogil=True)
+def _products(
+    reference: Floats, measured: Floats, inside: Bools, every: int, least: int
+) -> tuple[Bools, Floats, Floats, Floats]:
+    """Return for each offset whether rows are enough, and rᵀ·m, rᵀ·r and the sum of m² about their means."""
+    n, k = reference.shape
+    j, offsets = measured.shape[1], len(measured) - n + 1
+    enough = np.zeros(offsets, dtype=np.bool_)
+    products, squares, total = np.zeros((offsets, k, j)), np.zeros((offsets, k, k)), np.zeros(offsets)
+    for step in range(offsets):
+        r, m, seen, count = np.zeros(k), np.zeros(j), 0, 0
+        for t in range(n):
+            if not inside[step + t]:
+                continue
+            seen += 1
+            if (seen - 1) % every != 0:
+                continue
+            count += 1
+            for a in range(k):
+                r[a] += reference[t, a]
+                for b in range(j):
+                    products[step, a, b] += reference[t, a] * measured[step + t, b]
+                for b in range(k):
+                    squares[step, a, b] += reference[t, a] * reference[t, b]
+            for b in range(j):
+                m[b] += measured[step + t, b]
+                total[step] += measured[step + t, b] ** 2
+        enough[step] = seen >= least
+        for a in range(k):
+            for b in range(j):
+                products[step, a, b] -= r[a] * m[b] / max(count, 1)
+            for b in range(k):
+                squares[step, a, b] -= r[a] * r[b] / max(count, 1)
+        power = total[step]
+        for b in range(j):
+            total[step] -= m[b] ** 2 / max(count, 1)
+        if total[step] <= _STILL * power:
+            total[step] = 0.0
+    return enough, products, squares, total
+
+
 def explained(reference: Floats, measured: Floats) -> float:
     """Return the fraction of the variance of ``measured`` (n, k) that an affine map of the other explains."""
     m = measured - measured.mean(axis=0)
@@ -157,8 +214,7 @@ def explained(reference: Floats, measured: Floats) -> float:
         return 0.0
     r = reference - reference.mean(axis=0)
     products = r.T @ m
-    # normal equations: four digits are plenty, and this runs once for each offset
-    return float(np.sum(products * (np.linalg.pinv(r.T @ r, rcond=1e-10, hermitian=True) @ products))) / total
+    return float(np.sum(products * (np.linalg.pinv(r.T @ r, rcond=_RCOND, hermitian=True) @ products))) / total
 
 
 def rotation_between(reference_mm: Floats, measured_mm: Floats) -> tuple[Floats, Floats]:

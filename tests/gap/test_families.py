@@ -5,6 +5,7 @@ import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.families.admissible import Admissible
+from gcode2krl.gap.families.beside import Columns
 from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
 from gcode2krl.gap.families.functions import (
     free,
@@ -58,7 +59,9 @@ def test_the_evidence_is_that_of_dense_gaussians():
     raw = np.stack([np.ones(60), one.time_s, one.time_s**2], axis=1)[None]
     columns = rows.of([raw])
     place = Place("A1", Where.JOINT, [np.ones((1, 60, 1))])
-    found = evidence_of(view, place, Dependence.CONSTANT, [raw], columns, (np.eye(3),), np.ones((1, 2)))
+    found = evidence_of(
+        view, place, Dependence.CONSTANT, [raw], Columns(columns, view.nuisance), (np.eye(3),), np.ones((1, 2))
+    )
 
     plain = np.eye(60) + view.nuisance @ view.nuisance.T
     assert len(rows) == 60

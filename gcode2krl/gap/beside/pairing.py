@@ -28,7 +28,7 @@ def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
             continue
         folder = run.path("prediction")
         named = folder is not None and folder.exists()
-        key = str(folder) if named else ""
+        key = str(folder.resolve()) if named and folder else ""  # runs name it from where they are
         if key not in shared:
             shared[key] = _shared(Prediction.load(folder) if named and folder else prediction)
         inputs, simulator = shared[key]

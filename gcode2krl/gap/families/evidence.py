@@ -8,6 +8,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence
+from gcode2krl.gap.families.beside import Beside, Columns
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.clusters import gain_inflation
@@ -53,19 +54,19 @@ def evidence_of(
     place: Place,
     on: Dependence,
     raw: Sequence[Floats],
-    columns: Floats,
+    columns: Columns,
     roots: Sequence[Floats],
     signs: Floats,
     at: tuple[int, float] | None = None,
     cost: float = 0.0,
 ) -> Evidence | None:
-    """Return the evidence of columns (v, c) with one of some covariances; None where nothing is observable.
+    """Return the evidence of columns with one of some covariances; None where nothing is observable.
 
     ``raw`` (k, n, c) of each trace are the same columns before they were whitened.
     ``signs`` (flips, g) of stretches; ``cost`` of the search for ``at``, in nats.
     """
-    projected = view.without_fixed(columns)
-    gram, score, scores = columns.T @ projected, columns.T @ view.projected, view.scores(projected)
+    beside = Beside(view, columns)
+    gram, score, scores = beside.gram, beside.score, beside.scores
     best: tuple[float, int, Floats, Floats] | None = None
     flips, owns = [], []
     for root in roots:
@@ -84,8 +85,8 @@ def evidence_of(
         return None
     _, top, values, turned = best
     own_weights = turned.T @ score / (values + AMPLITUDES[top] ** -2)
-    left = view.scores(projected, projected @ (turned @ own_weights)) @ turned
-    fit = _bounded(view, columns @ turned, values, top)
+    left = beside.scores_with(turned @ own_weights) @ turned
+    fit = _bounded(beside, turned, values, top)
     inverse = np.diag(1.0 / (values + fit.amplitude**-2))
     return Evidence(
         place=place,
@@ -109,15 +110,17 @@ class _Fit(NamedTuple):
     weights: Floats
 
 
-def _bounded(view: View, basis: Floats, values: Floats, top: int) -> _Fit:
-    """Return the fit of columns (v, c) whose inner products have these eigenvalues (c,).
+def _bounded(beside: Beside, turned: Floats, values: Floats, top: int) -> _Fit:
+    """Return the fit of columns, turned by (c, c'), whose inner products then have these eigenvalues (c',).
 
     The amplitude is searched upwards from that which is best with unbounded nuisance, which explains more.
     """
-    gram, fixed, score = basis.T @ basis, view.fixed_products(basis), basis.T @ view.residual
+    view = beside.view
+    gram, fixed = turned.T @ beside.columns.gram @ turned, turned.T @ beside.fixed
+    score = turned.T @ beside.on_residual
     best = _Fit(-np.inf, 0.0, 1.0, np.zeros(len(values)))
     for a in AMPLITUDES[top:]:
-        chi2, weights = view.bounded_by(a * a * gram, a * fixed, a * score)
+        chi2, weights = view.bounded(a * a * gram, a * fixed, a * score)
         fall = view.chi2 - chi2
         nats = 0.5 * fall - 0.5 * float(np.sum(np.log1p(a * a * values)))
         if nats < best.nats:
@@ -129,7 +132,7 @@ def _bounded(view: View, basis: Floats, values: Floats, top: int) -> _Fit:
 def log_evidence(values: Floats, scores: Floats) -> Floats:
     """Return the log evidence (…, a) of each amplitude from eigenvalues (c,) and scores (…, c) along them."""
     grown = AMPLITUDES[:, None] ** 2 * values
-    fall = (scores[..., None, :] ** 2 * (AMPLITUDES[:, None] ** 2 / (1.0 + grown))).sum(axis=-1)
+    fall = scores**2 @ (AMPLITUDES[:, None] ** 2 / (1.0 + grown)).T
     evidence: Floats = 0.5 * fall - 0.5 * np.log1p(grown).sum(axis=-1)
     return evidence
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numba
 import numpy as np
 from scipy.sparse import csr_array
 
@@ -47,7 +48,7 @@ class Rows:
         """
         used = range(len(self.likelihood.noise)) if component is None else (component,)
         blocks = [
-            self._averaged(number, self.likelihood.noise[j].whiten(own, self.traces[number].segments))
+            self._blocks(number, j, own)
             for number, each in enumerate(columns)
             for j, own in zip(used, each, strict=True)
         ]
@@ -62,18 +63,20 @@ class Rows:
             columns.append(wide)
         return self.of(columns)
 
-    def _averaged(self, number: int, values: Floats) -> Floats:
-        """Return the blocks of values (n, c) of one trace."""
-        starts = self.starts[number]
-        lengths = np.diff(np.append(starts, len(values)))
-        if len(starts) == len(values):
-            return values
-        sums = values[starts]
-        for i in range(1, int(lengths.max())):
-            more = lengths > i
-            sums[more] += values[starts[more] + i]
-        averaged: Floats = sums / np.sqrt(lengths)[:, None]
-        return averaged
+    def _blocks(self, number: int, component: int, values: Floats) -> Floats:
+        """Return the blocks of columns (n, c) of one trace; whitening leaves those without values as they are."""
+        used = values.any(axis=0)
+        if used.all():
+            return self._averaged(number, component, values)
+        blocks = np.zeros((len(self.starts[number]), len(used)))
+        if used.any():
+            blocks[:, used] = self._averaged(number, component, values[:, used])
+        return blocks
+
+    def _averaged(self, number: int, component: int, values: Floats) -> Floats:
+        starts, trace = self.starts[number], self.traces[number]
+        white = self.likelihood.noise[component].whiten(values, trace.segments)
+        return white if len(starts) == len(white) else _sums(white, np.append(starts, len(white)))
 
     def _of_values(self, numbers: Ints) -> Ints:
         """Return the number (v,) of each block's first value."""
@@ -83,6 +86,21 @@ class Rows:
             n, k = trace.shape
             parts.append(own.reshape(k, n)[:, starts].ravel())
         return np.concatenate(parts)
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums(values: Floats, edges: Ints) -> Floats:
+    """Return the sum of values (n, c) between edges, each over the root of their number."""
+    count, columns = len(edges) - 1, values.shape[1]
+    sums = np.zeros((count, columns))
+    for block in range(count):
+        for i in range(edges[block], edges[block + 1]):
+            for c in range(columns):
+                sums[block, c] += values[i, c]
+        root = np.sqrt(edges[block + 1] - edges[block])
+        for c in range(columns):
+            sums[block, c] /= root
+    return sums
 
 
 def _block_starts(trace: Trace) -> Ints:

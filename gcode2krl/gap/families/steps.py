@@ -6,6 +6,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects.dependence import Dependence
+from gcode2krl.gap.families.beside import Beside, Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of, log_evidence, log_mean
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.rows import Rows
@@ -52,44 +53,76 @@ class Steps:
         return [(number, float(t)) for t in times if low <= t <= high]
 
     def blocks(self, moments: Sequence[Moment]) -> Floats:
-        """Return the columns of moments whitened and in blocks, (v, moments·d)."""
-        return self.rows.of(self.columns(moments), self.place.component)
+        """Return the columns of moments whitened and in blocks, (v, moments·d).
+
+        In a run whose moment it is not a step is nothing or all: these two are whitened once.
+        """
+        own = [[i for i, (run, _) in enumerate(moments) if run == n] for n in range(len(self.traces))]
+        nothing = max(map(len, own)) + 1
+        raw, chosen = [], []
+        for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
+            after = np.zeros((len(trace.time_s), nothing + 1))
+            after[:, nothing - 1] = 1.0
+            for at, i in enumerate(own[number]):
+                after[:, at] = trace.time_s >= moments[i][1]
+            at_moment = np.array([nothing - 1 if self._is_later(number, run) else nothing for run, _ in moments])
+            at_moment[own[number]] = np.arange(len(own[number]))
+            raw.append(_lifted(after, unit))
+            chosen.append(at_moment)
+        white = self.rows.of(raw, self.place.component)
+        ends = np.cumsum([len(u) * len(starts) for u, starts in zip(self.place.units, self.rows.starts, strict=True)])
+        parts = zip(np.split(white, ends[:-1]), chosen, strict=True)
+        d = self.place.units[0].shape[2]
+        return np.concatenate(
+            [part.reshape(len(part), -1, d)[:, at].reshape(len(part), -1) for part, at in parts]
+        )
+
+    def _is_later(self, number: int, run: int) -> bool:
+        """Tell whether a trace is of a later run than another."""
+        place_of = np.argsort(self.order)
+        return bool(place_of[number] > place_of[run])
 
     def columns(self, moments: Sequence[Moment]) -> list[Floats]:
         """Return the columns (k, n, moments·d) of each trace."""
-        place_of = np.argsort(self.order)
         found = []
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
             after = np.stack(
                 [
                     trace.time_s >= time
                     if run == number
-                    else np.full(len(trace.time_s), place_of[number] > place_of[run])
+                    else np.full(len(trace.time_s), self._is_later(number, run))
                     for run, time in moments
                 ],
                 axis=1,
             )
-            columns = after[None, :, :, None] * unit[:, :, None, :]
-            found.append(columns.reshape(*unit.shape[:2], -1))
+            found.append(_lifted(after, unit))
         return found
 
 
-def scan(view: View, steps: Steps, columns: Floats, signs: Floats) -> tuple[Floats, Floats]:
+def _lifted(after: Floats, unit: Floats) -> Floats:
+    """Return columns (k, n, moments·d) of what is after each moment (n, moments) at a place (k, n, d)."""
+    columns: Floats = after[None, :, :, None] * unit[:, :, None, :]
+    return columns.reshape(*unit.shape[:2], -1)
+
+
+def scan(view: View, steps: Steps, columns: Columns, signs: Floats) -> tuple[Floats, Floats]:
     """Return the log evidence (moments,) of steps, and its mean over moments (flips,) for random signs.
 
-    ``columns`` (v, moments·d).
+    ``columns`` of all moments, d a moment.
     """
     d = steps.place.units[0].shape[2]
-    projected = view.without_fixed(columns)
-    shape = (len(columns), -1, d)
-    gram = np.einsum("vmi,vmj->mij", columns.reshape(shape), projected.reshape(shape))
+    beside = Beside(view, columns)
+    own = columns.values.reshape(len(columns.values), -1, d)
+    fixed, taken = beside.fixed.reshape(own.shape[1], d, -1), beside.taken.T.reshape(own.shape[1], d, -1)
+    gram = np.einsum("vmi,vmj->mij", own, own) - fixed @ taken.swapaxes(1, 2)
     values, vectors = np.linalg.eigh((gram + gram.swapaxes(1, 2)) / 2.0)
     values = np.maximum(values, 0.0)
-    score = (columns.T @ view.projected).reshape(-1, d)
-    flipped = (signs @ view.scores(projected)).reshape(len(signs), len(gram), d)
-    own = _each(values, np.einsum("mij,mi->mj", vectors, score))
-    random = _each(values, np.einsum("mij,fmi->fmj", vectors, flipped))
-    return own, log_mean(random)
+    score = beside.score.reshape(-1, d)
+    evidence = _each(values, np.einsum("mij,mi->mj", vectors, score))
+    if not len(signs):
+        return evidence, np.zeros(0)
+    flipped = (signs @ beside.scores).reshape(len(signs), len(gram), d)
+    return evidence, log_mean(_each(values, np.einsum("mij,fmi->fmj", vectors, flipped)))
 
 
 def _each(values: Floats, scores: Floats) -> Floats:
@@ -98,15 +131,15 @@ def _each(values: Floats, scores: Floats) -> Floats:
     return np.stack(moments, axis=-1)
 
 
-def step_evidence(view: View, steps: Steps, coarse: Floats, signs: Floats) -> Evidence | None:
-    """Return the evidence of a step at the best moment; ``coarse`` (v, moments·d) are the columns of all."""
-    if coarse.shape[1] == 0:
+def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> Evidence | None:
+    """Return the evidence of a step at the best moment; ``coarse`` are the columns of all."""
+    if len(coarse) == 0:
         return None
     moments = steps.coarse()
     own, flipped = scan(view, steps, coarse, signs)
     finer = steps.finer(moments[int(np.argmax(own))])
     fine = steps.blocks(finer)
-    near, _ = scan(view, steps, fine, signs[:0])
+    near, _ = scan(view, steps, Columns(fine, view.nuisance), signs[:0])
     best = int(np.argmax(near))
     d = steps.place.units[0].shape[2]
     cost = float(np.max(own) - log_mean(own))
@@ -115,7 +148,7 @@ def step_evidence(view: View, steps: Steps, coarse: Floats, signs: Floats) -> Ev
         steps.place,
         Dependence.RUN_TIME_STEP,
         steps.columns(finer[best : best + 1]),
-        fine[:, best * d : (best + 1) * d],
+        Columns(fine[:, best * d : (best + 1) * d], view.nuisance),
         (np.eye(d),),
         signs,
         at=finer[best],

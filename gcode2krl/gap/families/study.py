@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.gap.families.beside import Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.rows import Rows
@@ -38,7 +39,7 @@ def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> lis
     signs = [_signs(view, seed) for view in views]
     for family in grid.families():
         place = family.place
-        columns = rows.of(family.columns, place.component)
+        columns = Columns(rows.of(family.columns, place.component), views[0].at(place.component).nuisance)
         for view, own, sign in zip(views, found, signs, strict=True):
             at = view.at(place.component)
             _add(own, [evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)])
@@ -53,7 +54,7 @@ def _searched(
 ) -> Iterator[list[Evidence | None]]:
     """Yield for each view the families at a place whose moment or frequency the data must find."""
     steps = Steps(rows, place)
-    coarse = steps.blocks(steps.coarse())
+    coarse = Columns(steps.blocks(steps.coarse()), views[0].at(place.component).nuisance)
     for view, sign in zip(views, signs, strict=True):
         at = view.at(place.component)
         yield [

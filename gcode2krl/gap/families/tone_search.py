@@ -7,6 +7,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.families.beside import Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.rows import Rows
@@ -28,14 +29,14 @@ def tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator[Evide
     hz, power, count = _spectrum(rows, view)
     for peak in _peaks(power):
         raw = list(_tone_columns(place, rows.traces, float(hz[peak])))
-        columns = rows.of(raw, place.component)
+        columns = Columns(rows.of(raw, place.component), view.nuisance)
         found = evidence_of(
             view,
             place,
             Dependence.TONE,
             raw,
             columns,
-            (np.eye(columns.shape[1]),),
+            (np.eye(len(columns)),),
             signs,
             at=(-1, float(hz[peak])),
             cost=float(np.log(count)),
@@ -103,7 +104,7 @@ def angle_tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator
         place,
         Dependence.MOTOR_ANGLE,
         raw,
-        rows.of(raw, place.component),
+        Columns(rows.of(raw, place.component), view.nuisance),
         (np.eye(2),),
         signs,
         at=(-1, order),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Floats, Ints
@@ -56,8 +57,8 @@ class View:
         return self._of_component[component]
 
     @cached_property
-    def _fixed(self) -> Floats:
-        """(v, t + m) T and N."""
+    def fixed(self) -> Floats:
+        """(v, t + m) F: T and N."""
         return np.concatenate([self.tangents, self.nuisance], axis=1)
 
     @cached_property
@@ -68,70 +69,75 @@ class View:
 
     @cached_property
     def _normal(self) -> Floats:
-        """(t + m) squared: [T, N]ᵀ·[T, N] with the priors."""
-        normal: Floats = self._fixed.T @ self._fixed + np.diag(self._precision)
+        """(t + m) squared: H = Fᵀ·F with the priors."""
+        normal: Floats = self.fixed.T @ self.fixed + np.diag(self._precision)
         return normal
 
     @cached_property
-    def _cross(self) -> Floats:
-        cross: Floats = self._fixed.T @ self.residual
+    def _factors(self) -> tuple[Floats, Ints]:
+        factors: tuple[Floats, Ints] = lu_factor(self._normal)
+        return factors
+
+    def solved(self, right: Floats) -> Floats:
+        """Return H⁻¹ times right sides (t + m, …)."""
+        return np.asarray(lu_solve(self._factors, right), dtype=np.float64) if len(right) else right
+
+    @cached_property
+    def cross(self) -> Floats:
+        """(t + m,) Fᵀ·r."""
+        cross: Floats = self.fixed.T @ self.residual
         return cross
 
     @cached_property
     def projected(self) -> Floats:
         """(v,) r without what unbounded tangents and nuisance explain."""
-        return self.without_fixed(self.residual[:, None])[:, 0]
+        left: Floats = self.residual - self.fixed @ self.solved(self.cross)
+        return left
 
     def without_fixed(self, columns: Floats) -> Floats:
         """Return columns (v, c) without what tangents and nuisance explain of them."""
-        left: Floats = columns - self._fixed @ np.linalg.solve(self._normal, self._fixed.T @ columns)
+        left: Floats = columns - self.fixed @ self.solved(self.fixed.T @ columns)
         return left
 
-    def scores(self, projected: Floats, explained: Floats | None = None) -> Floats:
-        """Return White's scores (g, c) of projected columns by stretches of time.
+    def by_stretch(self, values: Floats) -> csr_array:
+        """Return what sums columns, times values (v,), over each stretch of time, (g, v)."""
+        at = self.members.indices
+        return csr_array((self.members.data * values[at], at, self.members.indptr), shape=self.members.shape)
 
-        ``explained`` (v,) of the projected residual is taken off it first.
-        """
-        left = self.projected if explained is None else self.projected - explained
-        scores: Floats = self.members @ (projected * left[:, None])
-        return scores
+    @cached_property
+    def fixed_scores(self) -> Floats:
+        """(g, t + m) sums over stretches of F times the projected residual."""
+        sums: Floats = self.by_stretch(self.projected) @ self.fixed
+        return sums
 
     @cached_property
     def is_within(self) -> bool:
         """Tell whether no nuisance would leave its bounds, so that they need not be watched."""
-        b = np.linalg.solve(self._normal, self._cross)[self.tangents.shape[1] :]
+        b = self.solved(self.cross)[self.tangents.shape[1] :]
         return bool(np.all(np.abs(b) < MOST))
 
     @cached_property
     def chi2(self) -> float:
         """Chi2 of the blocks, nuisance within its bounds."""
-        return self.bounded(np.zeros((len(self.residual), 0)))[0]
+        width = self.fixed.shape[1]
+        return self.bounded(np.zeros((0, 0)), np.zeros((0, width)), np.zeros(0))[0]
 
-    def bounded(self, columns: Floats) -> tuple[float, Floats]:
-        """Return chi2 with the weights of columns (v, c) of unit variance at their best, and these (c,).
+    def bounded(self, gram: Floats, fixed: Floats, scores: Floats) -> tuple[float, Floats]:
+        """Return chi2 with the weights of columns B of unit variance at their best, and these (c,).
 
-        Nuisance stays within its bounds.
+        Of the columns Bᵀ·B (c, c), Bᵀ·F (c, t + m) and Bᵀ·r (c,). Nuisance stays within its bounds.
         """
-        return self.bounded_by(columns.T @ columns, columns.T @ self._fixed, columns.T @ self.residual)
-
-    def bounded_by(self, gram: Floats, fixed: Floats, scores: Floats) -> tuple[float, Floats]:
-        """Do as `bounded` from Bᵀ·B (c, c), Bᵀ·[T, N] (c, t + m) and Bᵀ·r (c,)."""
         t, c = self.tangents.shape[1], len(gram)
         free = np.zeros((t + c, t + c))
         free[:t, :t], free[:t, t:] = self._normal[:t, :t], fixed[:, :t].T
         free[t:, :t], free[t:, t:] = fixed[:, :t], gram + np.eye(c)
         right = np.zeros((t + c, 1 + len(self._normal) - t))
-        right[:t, 0], right[:t, 1:] = self._cross[:t], self._normal[:t, t:]
+        right[:t, 0], right[:t, 1:] = self.cross[:t], self._normal[:t, t:]
         right[t:, 0], right[t:, 1:] = scores, fixed[:, t:]
         half = np.linalg.solve(free, right) if t + c else right
         cost = self._normal[t:, t:] - right[:, 1:].T @ half[:, 1:]
-        pull = self._cross[t:] - right[:, 1:].T @ half[:, 0]
+        pull = self.cross[t:] - right[:, 1:].T @ half[:, 0]
         b = boxed(cost, pull)
         left = float(self.residual @ self.residual - right[:, 0] @ half[:, 0])
         chi2 = left - 2.0 * float(b @ pull) + float(b @ cost @ b)
         return chi2, (half[:, 0] - half[:, 1:] @ b)[t:]
-
-    def fixed_products(self, columns: Floats) -> Floats:
-        """Return Bᵀ·[T, N] (c, t + m) of columns (v, c)."""
-        products: Floats = columns.T @ self._fixed
-        return products

@@ -97,19 +97,25 @@ def _filtered(
     out = np.empty((n, columns))
     u = np.zeros((order + 1, columns))
     v = np.zeros((slow, columns))
+    e, first = np.empty(columns), np.empty(columns)
     for segment in range(len(segments)):
         u[:], v[:] = 0.0, 0.0
         for t in range(segments[segment, 0], segments[segment, 1]):
             at = min(t - segments[segment, 0], steady)
             k, weight = gains[at], weights[at]
+            # column after column innermost: loops that the compiler turns into vectors
             for c in range(columns):
-                e = values[t, c] - u[0, c]
-                for i in range(slow):
-                    e -= v[i, c]
-                out[t, c] = e * weight
-                first = u[0, c]
-                for j in range(order):
-                    u[j, c] = a[j] * first + u[j + 1, c] + k[j] * e
-                for i in range(slow):
-                    v[i, c] = poles[i] * v[i, c] + k[order + i] * e
+                e[c] = values[t, c] - u[0, c]
+                first[c] = u[0, c]
+            for i in range(slow):
+                for c in range(columns):
+                    e[c] -= v[i, c]
+            for c in range(columns):
+                out[t, c] = e[c] * weight
+            for j in range(order):
+                for c in range(columns):
+                    u[j, c] = a[j] * first[c] + u[j + 1, c] + k[j] * e[c]
+            for i in range(slow):
+                for c in range(columns):
+                    v[i, c] = poles[i] * v[i, c] + k[order + i] * e[c]
     return out

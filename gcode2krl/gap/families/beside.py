@@ -1,0 +1,74 @@
+"""Columns beside what tangents and nuisance explain of them, by inner products: their rows are never made."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.gap.families.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Whitened columns (v, c) in blocks, and the nuisance N (v, m) that all views of these rows share."""
+
+    values: Floats
+    nuisance: Floats
+
+    def __len__(self) -> int:
+        return int(self.values.shape[1])
+
+    @cached_property
+    def gram(self) -> Floats:
+        """(c, c) Bᵀ·B."""
+        gram: Floats = self.values.T @ self.values
+        return gram
+
+    @cached_property
+    def on_nuisance(self) -> Floats:
+        """(c, m) Bᵀ·N."""
+        products: Floats = self.values.T @ self.nuisance
+        return products
+
+
+class Beside:
+    """Columns beside the tangents and the nuisance F = [T, N] of a view: P = B - F·H⁻¹·Fᵀ·B."""
+
+    def __init__(self, view: View, columns: Columns) -> None:
+        self.view, self.columns = view, columns
+        self.fixed: Floats = np.concatenate(
+            [columns.values.T @ view.tangents, columns.on_nuisance], axis=1
+        )
+        """(c, t + m) Bᵀ·F."""
+        self.taken = view.solved(self.fixed.T)
+        """(t + m, c) H⁻¹·Fᵀ·B."""
+        self.on_residual: Floats = columns.values.T @ view.residual
+        """(c,) Bᵀ·r."""
+
+    @property
+    def gram(self) -> Floats:
+        """(c, c) Bᵀ·P."""
+        gram: Floats = self.columns.gram - self.fixed @ self.taken
+        return gram
+
+    @property
+    def score(self) -> Floats:
+        """(c,) Pᵀ·r."""
+        score: Floats = self.on_residual - self.taken.T @ self.view.cross
+        return score
+
+    @property
+    def scores(self) -> Floats:
+        """White's scores (g, c) of P by stretches of time."""
+        view = self.view
+        scores: Floats = view.by_stretch(view.projected) @ self.columns.values - view.fixed_scores @ self.taken
+        return scores
+
+    def scores_with(self, weights: Floats) -> Floats:
+        """Return White's scores (g, c) with P times weights (c,) taken off the residual."""
+        view = self.view
+        explained = self.columns.values @ weights - view.fixed @ (self.taken @ weights)
+        by_stretch = view.by_stretch(view.projected - explained)
+        scores: Floats = by_stretch @ self.columns.values - (by_stretch @ view.fixed) @ self.taken
+        return scores
