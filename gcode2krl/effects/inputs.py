@@ -51,6 +51,8 @@ class Inputs:
     """(m, 3) measured force that bends the arm."""
     torque_Nm: Floats | None = None
     """(m, 6) logged torque of the drives, or their current in A: what a deviation may depend on."""
+    temperature_C: Floats | None = None
+    """(m, c) logged temperatures of the cell, the ambient last: what a deviation may depend on."""
     toolpath: Toolpath | None = None
     motion: Motion | None = None
     targets: Targets | None = None
@@ -229,6 +231,8 @@ class Inputs:
             q_act_rad=self._at(self.q_act_rad, motion.time_s),
             q_load_rad=self._at(self.q_load_rad, motion.time_s),
             load_base_N=self._at(self.load_base_N, motion.time_s),
+            torque_Nm=self._at(self.torque_Nm, motion.time_s),
+            temperature_C=self._at(self.temperature_C, motion.time_s),
         )
 
     def _at(self, values: Floats | None, time_s: Floats) -> Floats | None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.families.admissible import Admissible
+from gcode2krl.gap.beside.admissible import Admissible
 from gcode2krl.gap.families.beside import Columns
 from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
 from gcode2krl.gap.families.functions import (

@@ -131,3 +131,19 @@ def test_runs_of_different_paths_are_no_repeats():
     other = trace(noise(COUNT, 14, SIGMA), number=1, inputs=elsewhere)
     (found,) = noise_of([one, other], [no_signatures()] * 2, [[]] * 2)
     assert found.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_runs_that_move_otherwise_are_no_repeats_whatever_their_tips():
+    """With relative angles no tip is known; what three programs have in common is no repeat of one."""
+    seconds = 0.02 * COUNT
+    still = replace(motion(seconds), position_mm=np.zeros((COUNT, 3)))
+    does = drawn_slow(Slow(0.9, 2.0 * SIGMA), COUNT, np.random.default_rng(9))
+    residuals = [coloured(run) + does for run in range(3)]
+
+    def sigma(stretch):
+        moved = [replace(still, q_cmd_rad=(1.0 + stretch * run) * still.q_cmd_rad) for run in range(3)]
+        runs = [trace(r[:, None], number=i, inputs=moved[i]) for i, r in enumerate(residuals)]
+        return noise_of(runs, [no_signatures()] * 3, [[]] * 3)[0].sigma
+
+    assert sigma(0.0) < 1.1 * COLOURED.sigma
+    assert sigma(0.2) > 1.5 * COLOURED.sigma

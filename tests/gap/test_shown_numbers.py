@@ -134,3 +134,19 @@ def test_held_numbers_cost_little_chi2_and_given_ones_stay_free():
     told = found_in(settled(2.0), Settling(0.2, 20.0))
     given = refit(told.likelihood, told.applied)
     assert with_shown_numbers(replace(told, fitted=refit(told.likelihood, ())), given) is given
+
+
+def test_a_minor_number_that_one_run_alone_shows_is_not_stated():
+    """A bend in one run of three is no number of the machine, however well that run shows it."""
+    bend = np.sin(0.7 * np.pi * TIME_S)[:, None]
+
+    def held(sizes):
+        runs = [
+            trace(settled(2.0) + size * bend + noise(500, 3 + run, 0.1), number=run)
+            for run, size in enumerate(sizes)
+        ]
+        (cause,) = examined(runs, [Settling(0.2, 20.0, minor=True)], 0.1).causes
+        return cause.held
+
+    assert held((0.5, 0.5, 0.5)) == frozenset()
+    assert held((0.2, 0.0, -0.1)) == {"bend"}

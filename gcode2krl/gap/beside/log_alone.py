@@ -15,6 +15,7 @@ from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.pairing import first_start, hours_since
 from gcode2krl.gap.beside.poses import is_of_poses, pose_pair
+from gcode2krl.gap.beside.temperature import temperature_at
 from gcode2krl.runs import Controller, Run
 from gcode2krl.units import MM_PER_M
 
@@ -75,6 +76,7 @@ def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | N
         moment_base_Nmm=np.zeros((count, 3)),
         hours=hours,
         torque_Nm=_torque_Nm(table),
+        temperature_C=temperature_at(table, table.time_s),
     )
 
 

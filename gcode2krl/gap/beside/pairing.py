@@ -10,6 +10,7 @@ from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.planning import remembered_plan
 from gcode2krl.gap.beside.poses import is_of_poses, pose_pair
 from gcode2krl.gap.beside.simulator import Simulator
+from gcode2krl.gap.beside.temperature import temperature_at
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Run
 from gcode2krl.units import S_PER_H
@@ -32,12 +33,9 @@ def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
         if key not in shared:
             shared[key] = _shared(Prediction.load(folder) if named and folder else prediction)
         inputs, simulator = shared[key]
-        yield Pair(
-            run=run,
-            number=number,
-            inputs=replace(inputs, hours=hours_since(first, run)),
-            simulator=simulator,
-        )
+        temperature_C = temperature_at(run.controller, inputs.time_s)
+        own = replace(inputs, hours=hours_since(first, run), temperature_C=temperature_C)
+        yield Pair(run=run, number=number, inputs=own, simulator=simulator)
 
 
 def _shared(prediction: Prediction) -> tuple[Inputs, Simulator]:

@@ -6,6 +6,7 @@ from gcode2krl import robot
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Inputs
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.temperature import temperature_at
 from gcode2krl.runs import Run
 
 
@@ -38,5 +39,6 @@ def pose_pair(run: Run, number: int, cell: Cell, hours: float, known_robot: bool
         force_base_N=np.zeros((count, 3)),
         moment_base_Nmm=np.zeros((count, 3)),
         hours=hours,
+        temperature_C=temperature_at(table, table.time_s),
     )
     return Pair(run=run, number=number, inputs=inputs, from_log=True, known_robot=known_robot, still=True)

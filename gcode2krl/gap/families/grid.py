@@ -8,8 +8,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.beside.admissible import Admissible
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.families.admissible import Admissible
 from gcode2krl.gap.families.functions import (
     Functions,
     free,
@@ -129,6 +129,8 @@ class Grid:
         own = self.inputs
         yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in own])
         yield from self._of_time()
+        if any(each.temperature_C.any() for each in own):
+            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in own])
         yield from self._of_motion(place)
         yield Dependence.TRAVEL, smooth([each.travel_mm for each in own])
         if place.joint is not None:
@@ -181,7 +183,9 @@ class Grid:
         if any(each.torque_Nm[:, joint].any() for each in own):
             loops = [each.torque_with_memory(joint) for each in own]
             single = odd([each.torque_Nm[:, joint] for each in own])
-            joined = [np.concatenate(pair, axis=1) for pair in zip(single, loops, strict=True)]
+            # the weight of the links is part of the first; the force alone is what bends the arm
+            loads = odd([each.load_torque_Nm[:, joint] for each in own])
+            joined = [np.concatenate(each, axis=1) for each in zip(single, loops, loads, strict=True)]
             yield Dependence.OWN_TORQUE, free(joined)
 
     def _of_force(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
@@ -220,7 +224,7 @@ class Grid:
         for each in self.inputs:
             tool.append(np.moveaxis(each.tool_axes[:, at], 1, 0) * sigma)
             arm_.append(np.moveaxis(each.jacobian[:, at], 1, 0))
-            bends.append(arm_[-1] * each.torque_Nm)
+            bends.append(arm_[-1] * each.load_torque_Nm)
         with_arm = [columns, tool, _scaled(arm_, sigma)]
         yield Family(place, Dependence.PLACE, *_joined(with_arm))
         if any(each.any() for each in bends):

@@ -1,14 +1,14 @@
 """Means over blocks of time of what was measured and of what may explain it: the data of the slow noise."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.effects.operators import since_reversal
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.fit.explaining import explaining
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.slow_noise import BlockMeans
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -18,10 +18,6 @@ _FULL = 0.6
 """Of the usual rows of a block: one with fewer is left out."""
 _STEP_SPACING_S, _MOST_STEPS = 0.25, 60
 """Between the times at which a run may have a step, and how many of a run are tried."""
-_PLACE_WAVES, _ANGLE_WAVES = 4, 3
-"""Half waves over the range of a coordinate or of a joint."""
-_STILL = 1e-9
-"""A coordinate of less range does not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +58,7 @@ def block_means(
     """
     blocks = [_Blocks.of(trace) for trace in traces]
     numbers = [each.numbers[each.kept] for each in blocks]
-    smooth = _shared_inputs(traces, numbers)
+    inputs = explaining(traces)
     made = []
     for j in range(traces[0].shape[1]):
         y = [each.means(rows[:, j]) for each, rows in zip(blocks, residuals, strict=True)]
@@ -72,6 +68,7 @@ def block_means(
             for each, own, trace in zip(blocks, nuisance, traces, strict=True)
         ]
         known = _stacked([*zip(map(_trend, numbers), usual, strict=True)], nuisance)
+        smooth = [each.means(own[j]) for each, own in zip(blocks, inputs, strict=True)]
         made.append(_component(y, numbers, known, signed, smooth, repeats))
     return made
 
@@ -171,48 +168,3 @@ def _steps(numbers: Ints) -> Floats:
     count = int(min(_MOST_STEPS, seconds / _STEP_SPACING_S))
     at = np.linspace(numbers[0], numbers[-1], count + 2)[1:-1]
     return (numbers[:, None] >= at).astype(np.float64)
-
-
-def _shared_inputs(traces: Sequence[Trace], numbers: Sequence[Ints]) -> list[Floats]:
-    """Return smooth functions (b, c) of what a run shows: place, angles, their rates and reversals, force."""
-    runs = [np.column_stack(list(_inputs(trace, own))) for trace, own in zip(traces, numbers, strict=True)]
-    low = np.min([run.min(axis=0) for run in runs], axis=0)
-    high = np.max([run.max(axis=0) for run in runs], axis=0)
-    waved = [_PLACE_WAVES] * 3 + [_ANGLE_WAVES] * 6
-    moving = high - low > _STILL
-    return [
-        np.column_stack(
-            [
-                run[:, moving],
-                *(
-                    np.cos(np.pi * wave * (run[:, i] - low[i]) / (high[i] - low[i]))
-                    for i, most in enumerate(waved)
-                    if moving[i]
-                    for wave in range(1, most + 1)
-                ),
-            ]
-        )
-        for run in runs
-    ]
-
-
-def _inputs(trace: Trace, numbers: Ints) -> Iterator[Floats]:
-    """Yield what a run shows at the middle of its blocks: place (3), angles (6), then the others."""
-    inputs = trace.inputs
-    t = inputs.time_s[0] + (numbers + 0.5) * _LIMITS.noise_block_s
-    rates = np.gradient(inputs.q_cmd_rad, inputs.time_s, axis=0)
-    directions = np.stack([since_reversal(q, inputs.time_s)[0] for q in inputs.q_cmd_rad.T], axis=1)
-    speed = np.linalg.norm(np.gradient(inputs.position_mm, inputs.time_s, axis=0), axis=1)
-    force = inputs.force_base_N
-    for table in (
-        inputs.position_mm,
-        inputs.q_cmd_rad,
-        rates,
-        np.abs(rates),
-        directions,
-        speed[:, None],
-        force,
-        np.linalg.norm(force, axis=1)[:, None],
-    ):
-        for column in table.T:
-            yield np.interp(t, inputs.time_s, column)

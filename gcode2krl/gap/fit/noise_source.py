@@ -27,7 +27,8 @@ _EXACT = 1e-12
 _SLOW_DRAWS = 4
 """Of the slow part, whose lags are taken off the data's."""
 _SAME_MM = 1e-3
-"""Repeats of a program have the same path."""
+_SAME_RAD = 1e-3
+"""Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
 
 
 def noise_of(
@@ -177,10 +178,12 @@ def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
 
 
 def _is_repeat(trace: Trace, first: Trace) -> bool:
-    same = len(trace.inputs) == len(first.inputs) and np.allclose(
-        trace.inputs.position_mm, first.inputs.position_mm, atol=_SAME_MM
-    )
-    return same and trace.shape[1] == first.shape[1]
+    one, other = trace.inputs, first.inputs
+    if len(one) != len(other) or trace.shape[1] != first.shape[1]:
+        return False
+    # with relative angles every tip is zero, and the joints tell the programs apart
+    tips = np.allclose(one.position_mm, other.position_mm, atol=_SAME_MM)
+    return tips and np.allclose(one.q_cmd_rad, other.q_cmd_rad, atol=_SAME_RAD)
 
 
 def _differences(values: Sequence[Floats], rows: Sequence[Ints]) -> Floats:

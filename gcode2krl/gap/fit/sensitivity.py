@@ -47,7 +47,12 @@ class Sensitivity:
         if len(names) < groups or power[-1] <= 0.0:
             return math.inf
         group = np.minimum((groups * (power - power[0] / 2.0) / power[-1]).astype(int), groups - 1)[at]
-        return sum(self._held_out_gain(before, group == number) for number in range(groups))
+        return self.gain_of_left_out(before, group)
+
+    def gain_of_left_out(self, before: Floats, group: Ints) -> float:
+        """Return the fall of chi2 from the residual ``before``, groups (v,) of values left out in turn."""
+        before = before[: len(self.residual)]
+        return sum(self._held_out_gain(before, group == number) for number in np.unique(group))
 
     def _held_out_gain(self, before: Floats, held: Bools) -> float:
         """Return the fall of chi2 on held rows, with the numbers fitted to the others."""

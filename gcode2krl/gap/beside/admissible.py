@@ -1,4 +1,8 @@
-"""Admissible inputs: what a deviation of a link can be a function of, at the rows of a trace."""
+"""Admissible inputs: what a deviation of a link can be a function of, at the rows of a trace.
+
+Families are made of them (`gap.families`), and what is learnt as noise is cleaned of them
+(`gap.fit.explaining`): one list, so that nothing that a family could tell is taken for noise.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -97,6 +101,11 @@ class Admissible:
         """(n, 3) the force that bends the arm: the measured one where the model has it."""
         return self._at(self._force_N)
 
+    @property
+    def presses(self) -> bool:
+        """Tell whether there is a force at the tip at all."""
+        return bool(self._force_N.any())
+
     @cached_property
     def spindle(self) -> Floats:
         """(n, c) spindle speed, and the same with lags as a spindle warms up, from rest at the start."""
@@ -110,6 +119,12 @@ class Admissible:
     def _force_N(self) -> Floats:
         inputs = self.trace.inputs
         return inputs.force_base_N if inputs.load_base_N is None else inputs.load_base_N
+
+    @cached_property
+    def temperature_C(self) -> Floats:
+        """(n, c) of the places that were logged, the ambient last; (n, 0) without any."""
+        logged = self.trace.inputs.temperature_C
+        return np.zeros((len(self.trace.time_s), 0)) if logged is None else self._at(logged)
 
     # Joints
 
@@ -134,15 +149,19 @@ class Admissible:
 
     @cached_property
     def torque_Nm(self) -> Floats:
-        """(n, 6) as logged or, beside a prediction, of the force at the tip by the arm's statics."""
+        """(n, 6) as logged or, beside a prediction, of all nominal loads: what the gears carry."""
         return self._at(self._torque)
+
+    @cached_property
+    def load_torque_Nm(self) -> Floats:
+        """(n, 6) of the force at the tip alone, by the arm's statics: what bends the arm beside its cut."""
+        inputs = self.trace.inputs
+        return self._at(arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm))
 
     @cached_property
     def _torque(self) -> Floats:
         inputs = self.trace.inputs
-        if inputs.torque_Nm is not None:
-            return inputs.torque_Nm
-        return arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm)
+        return inputs.own_torque_Nm if inputs.torque_Nm is None else inputs.torque_Nm
 
     def torque_with_memory(self, joint: int) -> Floats:
         """Return what play operators leave of a joint's torque (n, c)."""
@@ -155,6 +174,13 @@ class Admissible:
     def jacobian(self) -> Floats:
         """(n, 3, 6) by how much the tip moves with each joint, mm/rad."""
         return self.trace.inputs.jacobian[self._nearest, :3]
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(n, 6) of the joints' motion, ±1 with memory."""
+        inputs = self.trace.inputs
+        found = [since_reversal(np.ascontiguousarray(q), inputs.time_s)[0] for q in inputs.q_cmd_rad.T]
+        return np.stack(found, axis=1)[self._nearest]
 
     def reversals(self, joint: int) -> Floats:
         """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.
