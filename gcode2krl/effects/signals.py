@@ -79,6 +79,17 @@ class Signals:
             t_s = self.clocks.get(name, Clock()).true_time(t_s)
         return t_s
 
+    def table_time(self, signal: str, t_s: Floats) -> Floats:
+        """Return the same by the clock of the signal's table alone."""
+        for name in CLOCKS_OF.get(signal, ())[:1]:
+            t_s = self.clocks.get(name, Clock()).true_time(t_s)
+        return t_s
+
+    def own_late_s(self, signal: str, t_s: Floats) -> Floats:
+        """Return by how much a signal's own clock is wrong, beside that of its table."""
+        late: Floats = self.true_time(signal, t_s) - self.table_time(signal, t_s)
+        return late
+
     def seen(self, signal: str, t_s: Floats | None = None) -> Floats:
         """Return a signal as its table shows it at the stamps ``t_s``; ends are held."""
         stamps = self.time_s if t_s is None else t_s

@@ -124,6 +124,15 @@ def test_interpolation_has_its_periods_while_the_motor_is_slow(swinging, known):
     assert np.abs(error).max() > 3.8e-4
 
 
+def test_the_joint_does_nothing_of_what_its_encoder_misreads(swinging, known):
+    signals = run(swinging, known, "encoder_interpolation:target=A2,amplitude_deg=0.004,periods=1")
+    assert np.abs(signals.q_act_rad - swinging.q_cmd_rad).max() > np.radians(0.003)
+    np.testing.assert_allclose(signals.q_load_rad, swinging.q_cmd_rad, atol=1e-12)
+    read = replace(swinging, q_act_rad=signals.q_act_rad)  # as a log has it
+    signals = run(read, known, "encoder_interpolation:target=A2,amplitude_deg=0.004,periods=1")
+    np.testing.assert_allclose(signals.q_load_rad, swinging.q_cmd_rad, atol=1e-12)
+
+
 def test_nothing_is_left_of_periods_faster_than_samples(swinging, known):
     signals = run(swinging, known, "encoder_interpolation:target=A2,amplitude_deg=0.0004,periods=1024")
     error = (signals.q_act_rad - swinging.q_cmd_rad)[:, 1] / DEG

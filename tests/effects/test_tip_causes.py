@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
-from gcode2krl.effects import parse, simulate
+from gcode2krl.effects import Applied, parse, simulate
 
 
 def run(inputs, known, text, **more):
@@ -182,7 +182,24 @@ def test_a_cable_pulls_with_the_travel_of_its_joint(swinging, known):
     np.testing.assert_allclose(along[:, 1], -0.6 * travel, atol=1e-9)
     np.testing.assert_allclose(along[:, [0, 2]], 0.0, atol=1e-9)
     assert not pull[0].any()
-    np.testing.assert_array_equal(signals.tcp_base_mm, simulate(swinging).tcp_base_mm)
+
+
+def test_what_pulls_at_the_tool_bends_the_arm(swinging, known):
+    """Left out, the bend of 60 N of cable was named as an axis that is not parallel."""
+    signals = run(swinging, known, "cable_pull:target=A1,N_per_deg=2,direction=0/-1/0")
+    pull = signals.force_meas_base_N - swinging.force_base_N
+    pulled = simulate(replace(swinging, load_base_N=swinging.force_base_N + pull))
+    np.testing.assert_allclose(signals.tcp_base_mm, pulled.tcp_base_mm, atol=1e-9)
+    bend = np.linalg.norm(signals.tcp_base_mm - simulate(swinging).tcp_base_mm, axis=1)
+    assert bend[0] < 1e-9
+    assert bend.max() > 0.005
+
+
+def test_later_links_take_over_a_cable_and_no_error_of_the_sensor(known):
+    cable, zero = known["cable_pull"], known["force_offset"]
+    pulls = Applied(cable, "A1", {})
+    assert cable.learned(pulls, "force") is pulls
+    assert zero.learned(Applied(zero, None, {}), "force") is None
 
 
 def test_axes_are_where_the_kinematics_have_them(swinging):

@@ -113,3 +113,40 @@ def test_drives_ahead_of_their_command_have_no_negative_lag():
     (cause,) = examine(LINK["servo"], [one], replace(asked, blocks=[*lags, *clocks])).causes
     assert (cause.effect.name, cause.target) == ("clock", "q_cmd")
     assert abs(cause["offset_s"]) == pytest.approx(6e-3, abs=1e-4)
+
+
+def _late_commands(offset_s):
+    """Return the servos of a run whose logged commands are late, and what is asked of them."""
+    nominal = trace(np.zeros((500, 6)), "servo")
+    late = Applied(CLOCK, "q_cmd", {"offset_s": offset_s, "skew": 0.0})
+    shown = nominal.sample([late]) + noise(500, 8, SIGMA_RAD, 6)
+    inside = slice(2, -2)  # before and behind the model's joints are held
+    one = replace(
+        nominal,
+        time_s=nominal.time_s[inside],
+        measured=shown[inside],
+        segments=np.array([[0, 496]]),
+    )
+    asked = replace(question([CLOCK], "q_cmd"), library={"servo_lag": library()["servo_lag"]})
+    return one, asked
+
+
+def test_the_usual_lag_of_all_six_servos_is_a_clock():
+    """0.5 ms in each is no clock; 0.5 ms in all of them together took as much off a clock of 12 ms."""
+    one, asked = _late_commands(12e-3)
+    found = examine(LINK["servo"], [one], asked)
+    (cause,) = found.causes
+    assert cause["offset_s"] == pytest.approx(12e-3, abs=2e-5)
+    lags = found.likelihood.design.names(0)
+    kept = found.likelihood.once.kept([cause])
+    of_servos = np.array([name.startswith("servo_lag") for name in lags])
+    alike = kept[np.ix_(of_servos, of_servos)]
+    assert np.linalg.matrix_rank(alike, tol=1e-6) == of_servos.sum() - 1  # one sum goes, no column alone
+    assert (np.diag(alike) > 0.1).all()
+
+
+def test_what_lags_together_may_add_is_allowed_on_top_of_the_bound_of_a_clock():
+    one, asked = _late_commands(2.5e-3)
+    assert not examine(LINK["servo"], [one], asked).causes  # 2 ms of a clock and 0.5 ms of lag
+    one, asked = _late_commands(3.2e-3)
+    assert examine(LINK["servo"], [one], asked).causes

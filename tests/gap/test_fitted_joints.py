@@ -61,3 +61,19 @@ def test_play_behind_the_gear_stays_in():
     found = fitted(trace(shape + 0.003, "gear"), [play])
     np.testing.assert_allclose(found, shape, atol=1e-7)
     assert np.abs(shape).max() == pytest.approx(np.radians(0.01))
+
+
+def test_rows_that_were_left_out_have_a_model_too():
+    """A line across the rows of a burst, where a joint turned about, was 0.1 degrees off."""
+    whole = trace(noise(500, 1, SIGMA), number=0)
+    change = 0.01 * EFFECT.form(INPUTS.time_s)[:, None]
+    kept = np.abs(INPUTS.time_s - 1.0) > 0.1
+    segments = np.array([[0, np.argmin(kept)], [np.argmin(kept), kept.sum()]])
+    cut = replace(
+        whole, time_s=whole.time_s[kept], measured=(whole.measured + change)[kept], segments=segments
+    )
+    known = [white(SIGMA)]
+    found = fitted_signal(
+        cut, stub(applied=(applied(EFFECT, 0.01),), noise=known, question=question([])), INPUTS.time_s
+    )
+    np.testing.assert_allclose(found, change, atol=1e-12)

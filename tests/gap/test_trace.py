@@ -90,3 +90,12 @@ def test_it_says_what_its_link_is():
     assert (gear.signal, gear.unit, gear.shape) == ("joint_load", "deg", (500, 2))
     tip = trace(np.zeros((500, 3)), "mechanics")
     assert (tip.signal, tip.unit) == ("tcp", "mm")
+
+
+def test_late_commands_show_in_the_drives():
+    """The model begins at the commands as they were stamped: the drives are then ahead of these."""
+    nominal = trace(np.zeros((500, 6)), "servo")
+    late = nominal.sample([Applied(library()["clock"], "q_cmd", {"offset_s": 0.012, "skew": 0.0})])
+    ahead = replace(nominal, plus_late_s=-0.012).nominal
+    np.testing.assert_allclose(late, ahead, atol=1e-12)
+    assert np.abs(late).max() > 1e-3

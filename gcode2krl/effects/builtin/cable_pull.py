@@ -14,8 +14,9 @@ from gcode2krl.units import DEG_PER_RAD
 class CablePull(Effect):
     """The sensor shows N_per_deg·(angle - angle at the run's start) more, along its own axes.
 
-    A cable that is slack at the start and is stretched, or pushed, with the travel of one joint. It bends the
-    arm too, by some µm, which is not in it; `hose_pack` goes with the turn of the tool instead.
+    A cable that is slack at the start and is stretched, or pushed, with the travel of one joint. Its pull is
+    a load and bends the arm too, by some hundredths of a millimetre. `hose_pack` goes with the turn of the
+    tool instead.
     """
 
     name = "cable_pull"
@@ -42,12 +43,25 @@ class CablePull(Effect):
         *direction_parameters("any"),
     )
 
+    def learned(self, applied: Applied, link: str) -> Applied:
+        """Return the effect as it is: what pulls at the end effector bends the arm."""
+        return applied
+
+    def load(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
+        """Return the load that bends the arm."""
+        return _with_pull(load, inputs, applied)
+
     def sensor(self, load: Load, inputs: Inputs, applied: Applied) -> Load:
         """Return what the sensor states."""
-        if applied["N_per_deg"] == 0.0:
-            return load
-        pull_N = applied["N_per_deg"] * travelled_deg(inputs, applied.joint)[:, None] * applied.unit_vector()
-        return load[0] + (inputs.sensor_rotation @ pull_N[:, :, None])[:, :, 0], load[1]
+        return _with_pull(load, inputs, applied)
+
+
+def _with_pull(load: Load, inputs: Inputs, applied: Applied) -> Load:
+    """Return a load with the pull at the tool."""
+    if applied["N_per_deg"] == 0.0:
+        return load
+    pull_N = applied["N_per_deg"] * travelled_deg(inputs, applied.joint)[:, None] * applied.unit_vector()
+    return load[0] + (inputs.sensor_rotation @ pull_N[:, :, None])[:, :, 0], load[1]
 
 
 def travelled_deg(inputs: Inputs, joint: int) -> Floats:

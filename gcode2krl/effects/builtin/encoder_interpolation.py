@@ -17,11 +17,13 @@ class EncoderInterpolation(MotorEffect):
     Its sine and cosine signals are not alike, or not about zero (Heydemann 1981). ``periods`` a turn of the
     motor; one error a period, twice that for signals of unlike size. Between two samples the motor may pass
     whole periods: each value is the mean over its sample, which leaves nothing of an error that is faster.
+    The encoder alone is wrong: behind the gear the joint does nothing of it.
     """
 
     name = "encoder_interpolation"
     family = "joint"
     links = frozenset({"servo"})
+    is_misread = True
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.MOTOR_ANGLE})
     parameters = (
@@ -44,7 +46,7 @@ class EncoderInterpolation(MotorEffect):
             high=4096.0,
             nominal=None,
             start=512.0,
-            grid=(3.0, 256.0, 512.0, 1024.0),
+            grid=(1.0, 2.0, 3.0, 4.0, 256.0, 512.0, 1024.0),
             minimum=0.0,
             role=Role.COUNT,
             source="resolvers have 1-4 pole pairs, optical encoders of motors 256-2048 periods a turn",
@@ -54,14 +56,23 @@ class EncoderInterpolation(MotorEffect):
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side as the encoder states it."""
-        ratios = inputs.cell.robot.drives.gear_ratio
-        if ratios is None or applied["amplitude_deg"] == 0.0:
-            return q_act_rad
-        q = np.array(q_act_rad)
-        turn = applied["periods"] * ratios[applied.joint] * inputs.q_cmd_rad[:, applied.joint]
-        error = np.sin(turn + applied["phase"]) * np.sinc(_passed(turn) / RAD_PER_REV)
-        q[:, applied.joint] += applied["amplitude_deg"] * RAD_PER_DEG * error
-        return q
+        return q_act_rad + _error_rad(inputs, applied)
+
+    def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the joints less what only the encoder says."""
+        return q_load_rad - _error_rad(inputs, applied)
+
+
+def _error_rad(inputs: Inputs, applied: Applied) -> Floats:
+    """Return the error of the reading (m, 6)."""
+    ratios = inputs.cell.robot.drives.gear_ratio
+    error = np.zeros_like(inputs.q_cmd_rad)
+    if ratios is None or applied["amplitude_deg"] == 0.0:
+        return error
+    turn = applied["periods"] * ratios[applied.joint] * inputs.q_cmd_rad[:, applied.joint]
+    seen = np.sin(turn + applied["phase"]) * np.sinc(_passed(turn) / RAD_PER_REV)
+    error[:, applied.joint] = applied["amplitude_deg"] * RAD_PER_DEG * seen
+    return error
 
 
 def _passed(turn: Floats) -> Floats:

@@ -167,10 +167,13 @@ class Trace:
 
     def _at(self, signals: Signals, stamps: Floats) -> Floats:
         times = signals.true_time(self.plus, stamps - self.plus_late_s)
+        if self.minus is not None:
+            # the inputs are this signal as it was stamped: a clock of its own shows in the other one
+            times = times - signals.own_late_s(self.minus, stamps)
         if self.minus is None:
             values = interpolate(signals, self.plus, times)
         else:
-            other = signals.true_time(self.minus, stamps)
+            other = signals.table_time(self.minus, stamps)
             if np.array_equal(times, other):
                 apart = values_of(signals, self.plus) - values_of(signals, self.minus)
                 values = linear(times, signals.time_s, apart)

@@ -40,8 +40,8 @@ class FittedVerdict(Verdict, Protocol):
     def every(self) -> tuple[Trace, ...]:
         """Return all traces of the link, held-out ones included."""
 
-    def fitted(self, trace: Trace) -> Floats:
-        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
+    def fitted(self, trace: Trace, stamps_s: Floats) -> Floats:
+        """Return what the fitted model says of a trace's run at some stamps (n,), as (n, k)."""
 
 
 def is_lost(judged: Verdict | None) -> bool:

@@ -53,7 +53,9 @@ class LinkData:
         """Return the data with their likelihood under a model of the noise."""
         likelihood = Likelihood(traces, nuisance, noise)
         signatures = likelihood.gram(candidates.signatures)
-        likelihood = likelihood.counting(once_among(likelihood.design, candidates, signatures))
+        bounded = {block.key for block in candidates.blocks if block.effect.usual(question.mismatch, 1.0)}
+        once = once_among(likelihood.design, candidates, signatures, bounded)
+        likelihood = likelihood.counting(once)
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
 
     @property

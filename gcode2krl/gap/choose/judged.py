@@ -90,6 +90,9 @@ class Judgement(Judged):
     rest: Rest | None = None
     """On what depends what is left beside the named causes; None where it was not asked."""
 
-    def fitted(self, trace: Trace) -> Floats:
-        """Return what the fitted model says of a trace (n, k), without what only its instrument shows."""
-        return fitted_signal(trace, self.examination)
+    def fitted(self, trace: Trace, stamps_s: Floats) -> Floats:
+        """Return what the fitted model says of a trace's run at some stamps (n,), as (n, k).
+
+        Without what only its instrument shows.
+        """
+        return fitted_signal(trace, self.examination, stamps_s)

@@ -21,6 +21,7 @@ def within_mismatch(found: Examination, number: int) -> bool:
         return _time_off_s(found, applied) <= question.mismatch.clock_s
     nominal = applied.effect.nominal(trace.inputs, applied.target)
     deviation = found.fitted.deviations(number)
+    limits = _with_others(found, applied, limits)
     return all(
         abs(applied.values[name] - nominal[name])
         <= _LIMITS.mismatch_slack * limits.get(name, 0.0)
@@ -28,6 +29,15 @@ def within_mismatch(found: Examination, number: int) -> bool:
         for name in applied.effect.names
         if not applied.effect.parameter(name).is_shape
     )
+
+
+def _with_others(found: Examination, applied: Applied, limits: dict[str, float]) -> dict[str, float]:
+    """Return the bounds; usual sizes of others that together have its form add to that of the first size."""
+    size, inputs = applied.effect.sizes[0].name, found.traces[0].inputs
+    typical = applied.effect.start(inputs, applied.target)[size]
+    typical -= applied.effect.nominal(inputs, applied.target)[size]
+    more = abs(typical) * found.likelihood.once.allowed_sizes(applied)
+    return {**limits, size: limits.get(size, 0.0) + more}
 
 
 def _time_off_s(found: Examination, applied: Applied) -> float:

@@ -11,8 +11,9 @@
   variance, and its bound is sqrt(3) whatever the unit. b is shared by all runs for what belongs to the
   machine, and each run's own for clocks, frames and zeros.
   Mismatch is counted once (`counted_once`): a column that has the form of an effect is projected out of N
-  while that effect is in the model, of runs' own columns their mean. θ is then the whole deviation, and that
-  is compared with the bound.
+  while that effect is in the model, of runs' own columns their mean, of shared columns that have the form
+  only together (the same lag of all servos is a clock) that sum. θ is then the whole deviation, and that is
+  compared with the bound.
 - e: noise, of each component by itself, the sum of a short and a slow part (`noise`):
 
       e_t = u_t + Σ_i v_i,t,    u_t = Σ_i a_i·u_{t-1-i} + s·w_t of order 3,    v_i,t = φ_i·v_i,t-1 + noise

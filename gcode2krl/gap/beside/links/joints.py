@@ -99,8 +99,13 @@ class _DriveLink(Link):
         """Return the joints and their clocks: a tip need not be computed."""
         return drives(trace.inputs, applied)
 
+    def base(self, context: Context) -> tuple[Applied, ...]:
+        """Return slips, and what the motors' encoders were found to misread."""
+        return (*context.slips, *(each for each in context.learned if each.effect.is_misread))
+
     def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Let later links start from the fitted model, where it holds: encoders' noise stays out of them."""
+        context = context.with_learned(each for each in judged.applied if each.effect.is_misread)
         if is_lost(judged):
             return context
         return context.with_pairs(_with_fitted(pair, judged) for pair in context.pairs)
@@ -128,7 +133,8 @@ class ServoLink(_DriveLink):
 
     def learn(self, context: Context, judged: FittedVerdict) -> Context:
         """Take the clock off the controller's table too, where only its commanded columns have it."""
-        return super().learn(_with_free_controller(context, judged), judged)
+        # what is fitted belongs to rows, whatever their stamps become
+        return _with_free_controller(super().learn(context, judged), judged)
 
 
 class GearLink(_DriveLink):
@@ -166,10 +172,11 @@ def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
     trace = next((trace for trace in judged.every if trace.run_number == pair.number), None)
     if trace is None or table is None:
         return pair
-    model, stamps = judged.fitted(trace), pair.stamps(table)
+    stamps = pair.stamps(table)
     joints_rad = np.zeros((len(stamps), 6))
-    for column, values in zip(trace.columns, model.T, strict=True):
-        joints_rad[:, column] = np.interp(stamps, trace.time_s, values)
+    joints_rad[:, list(trace.columns)] = judged.fitted(
+        trace, np.clip(stamps, trace.time_s[0], trace.time_s[-1])
+    )
     return replace(pair, fitted={**pair.fitted, trace.plus: joints_rad})
 
 
