@@ -9,6 +9,7 @@ mix.
 
 import argparse
 import json
+import math
 import os
 import sys
 import tempfile
@@ -23,8 +24,8 @@ if __name__ == "__main__":  # a case runs on one core; must be set before numpy 
         os.environ.setdefault(_name, "1")
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from gap_blind_cases import KINDS, SCORED_FROM, Case, full_counts, mixed, plan, scaled
-from gap_blind_next import next_records
+from gap_blind_cases import KINDS, SCORED_FROM, Case, full_counts, in_turn, mixed, plan, scaled
+from gap_blind_next import Asked, next_records
 from gap_blind_print import failures, report
 from gap_blind_run import How, fingerprint
 from gap_blind_score import judge
@@ -45,8 +46,14 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
         "--seed", type=int, default=1, help=f"first seed; below {SCORED_FROM} nothing is scored"
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes, one thread each")
+    parser.add_argument(
+        "--minutes", type=float, default=math.inf, help="begin no case after so long; a later call goes on"
+    )
     parser.add_argument("--scheduler", help="tcp://... of a Dask cluster, instead of processes")
     parser.add_argument("--next", type=int, default=0, metavar="M", help="drive the next run of M cases")
+    parser.add_argument(
+        "--next-beside", type=int, default=3, metavar="N", help="other programs too on every N-th of these"
+    )
     parser.add_argument("--resume", type=Path, help="folder that keeps predictions and records, and goes on")
     parser.add_argument("--keep", action="store_true", help="keep the runs of the cases in that folder")
     parser.add_argument("--no-oracle", action="store_true")
@@ -98,7 +105,7 @@ def main(given: Sequence[str] | None = None) -> int:
         except NoClusterError as error:
             say(str(error))
             return 2
-        _show(records, driven, options, time.perf_counter() - start)
+        _show(records, driven, options, len(cases), time.perf_counter() - start)
         failures(records, folder)
     return 0
 
@@ -107,17 +114,20 @@ def _records(
     cases: Sequence[Case], folder: Path, options: argparse.Namespace
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Return the records of all cases, those already there included, and those of the next runs."""
+    until_s = time.monotonic() + 60.0 * options.minutes
     how = How(not options.no_oracle, options.baselines, options.keep, fingerprint())
     there = [done(case, folder, None if options.only_report else how.code) for case in cases]
     records = [record for record in there if record is not None]
     if not options.only_report:
-        left = [case for case, record in zip(cases, there, strict=True) if record is None]
+        left = in_turn([case for case, record in zip(cases, there, strict=True) if record is None])
         say(f"{len(cases)} cases, {len(records)} already there")
-        for i, record in enumerate(fresh_records(left, folder, how, options.jobs, options.scheduler)):
+        fresh = fresh_records(left, folder, how, options.jobs, options.scheduler, until_s)
+        for i, record in enumerate(fresh):
             store(record, folder)
             records.append(record)
             _tell(record, f"{i + 1}/{len(left)}")
-    driven = next_records(records, folder, how.code, options.next, options.only_report, options.jobs)
+    asked = Asked(options.next, options.next_beside, options.jobs, until_s, options.only_report)
+    driven = next_records(records, folder, how.code, asked)
     return records, driven
 
 
@@ -129,7 +139,11 @@ def _tell(record: dict[str, Any], count: str) -> None:
 
 
 def _show(
-    records: list[dict[str, Any]], driven: list[dict[str, Any]], options: argparse.Namespace, took_s: float
+    records: list[dict[str, Any]],
+    driven: list[dict[str, Any]],
+    options: argparse.Namespace,
+    planned: int,
+    took_s: float,
 ) -> None:
     judged = sorted((judge(record) for record in records), key=lambda each: (each.kind, each.seed))
     if options.json:
@@ -139,7 +153,8 @@ def _show(
     what = "scored" if options.seed >= SCORED_FROM else "calibration, not to be quoted"
     part = "" if options.scale == 1.0 else f", the first {options.scale:g} of each kind"
     title = (
-        f"{len(judged)} cases from seed {options.seed} ({what}{part}), code {codes}, {took_s / 60.0:.1f} min"
+        f"{len(judged)} of {planned} cases from seed {options.seed} ({what}{part}), code {codes}, "
+        f"{took_s / 60.0:.1f} min in this call"
     )
     print(report(judged, driven, title))
 

@@ -6,6 +6,7 @@ development and calibration; what is scored starts there.
 """
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
@@ -29,7 +30,7 @@ KINDS = ("null", "single", "slip", "open", "pair", "deleted", *NULLS[1:], "confo
 """The n-th kind has the n-th block of seeds."""
 MIXED = {"null": 0.12, "single": 0.40, "slip": 0.06, "open": 0.12, "pair": 0.07, "deleted": 0.08}
 MIXED |= {"null_foreign_noise": 0.05, "null_foreign_mismatch": 0.04, "confounded": 0.03, "missing": 0.03}
-FULL = {"null": 300, "null_foreign_noise": 100, "null_foreign_mismatch": 100, "single": 600, "pair": 200}
+FULL = {"null": 300, "null_foreign_noise": 100, "null_foreign_mismatch": 100, "single": 600, "pair": 220}
 FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60}
 DELETED_EACH = 10
 """Cases of each effect with that effect taken out of the library."""
@@ -86,6 +87,17 @@ def mixed(count: int) -> dict[str, int]:
     counts = {kind: round(share * count) for kind, share in MIXED.items()}
     counts["single"] += count - sum(counts.values())
     return counts
+
+
+def in_turn(cases: Sequence[Case]) -> list[Case]:
+    """Return the cases with their kinds mixed, so that a check that is cut short has some of each."""
+    of_kind = Counter(case.kind for case in cases)
+    seen: Counter[str] = Counter()
+    shares = []
+    for case in cases:
+        seen[case.kind] += 1
+        shares.append(seen[case.kind] / of_kind[case.kind])
+    return [case for _, case in sorted(zip(shares, cases, strict=True), key=lambda pair: pair[0])]
 
 
 def scaled(counts: dict[str, int], scale: float) -> dict[str, int]:

@@ -7,10 +7,10 @@ program drawn at random and the first program once more.
 
 import contextlib
 import json
-import multiprocessing
+import math
 import shutil
+import time
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,9 @@ from gap_blind_names import names as says
 from gap_blind_run import answer, made
 from gap_blind_score import judge
 from gap_blind_words import truth_of
+from gap_blind_workers import in_processes
 
+from tests.plant.confounded import SAME
 from tests.plant.next_run import PLANNED, drive_next
 from tests.plant.programs import Program
 from tests.plant.waypoints import PROGRAMS
@@ -46,6 +48,20 @@ class Drive:
     program: str | None
     skipped: str | None
     settled: bool
+    cpu_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How many cases get a further run, and how."""
+
+    most: int
+    beside: int = 3
+    """The other programs are driven on every so many of them; 0: never."""
+    jobs: int = 1
+    until_s: float = math.inf
+    """Of `time.monotonic`: no case begins later."""
+    only_stored: bool = False
 
 
 def is_left_open(record: dict[str, Any]) -> bool:
@@ -58,25 +74,39 @@ def is_left_open(record: dict[str, Any]) -> bool:
 
 
 def is_settled(result: dict[str, Any], truth: Truth) -> bool:
-    """Tell whether an answer names the true cause alone, told from all others."""
+    """Tell whether an answer names the true cause alone, told from all that any motion can part."""
     named = named_of(result)
-    return len(named) == 1 and says(named[0], truth) and not named[0].get("indistinguishable_from")
+    if len(named) != 1:
+        return False
+    said = [named[0], *(named[0].get("indistinguishable_from") or ())]
+    allowed = (truth, *SAME.get(truth, ()))
+    return any(says(each, truth) for each in said) and all(
+        any(says(each, one) for one in allowed) for each in said
+    )
 
 
 def next_records(
-    records: Iterable[dict[str, Any]], folder: Path, code: str, most: int, only_stored: bool, jobs: int = 1
+    records: Iterable[dict[str, Any]], folder: Path, code: str, asked: Asked
 ) -> list[dict[str, Any]]:
     """Return a record of the further runs of each case that is left open, at most so many of them."""
+    most, only_stored = asked.most, asked.only_stored
     open_ones = [record for record in records if is_left_open(record)]
-    chosen = sorted(open_ones, key=lambda record: KINDS.index(record["case"]["kind"]))[:most]
+    order = {kind: number for number, kind in enumerate(KINDS)}
+    chosen = sorted(open_ones, key=lambda each: (order[each["case"]["kind"]], each["case"]["seed"]))[:most]
     there = {name_of(record): _stored(record, folder, None if only_stored else code) for record in chosen}
     left = [] if only_stored else [record for record in chosen if there[name_of(record)] is None]
-    for made_now in _driven(left, folder, code, jobs):
+    ways = {name_of(record): ways_of(i, asked.beside) for i, record in enumerate(chosen)}
+    for made_now in _driven(left, folder, code, ways, asked):
         file = _file(made_now, folder)
         file.parent.mkdir(exist_ok=True)
         file.write_text(json.dumps(made_now), encoding="utf-8")
         there[name_of(made_now)] = made_now
     return [record for record in there.values() if record is not None]
+
+
+def ways_of(number: int, beside: int) -> tuple[str, ...]:
+    """Return the ways of the n-th case: all of them on every so many."""
+    return WAYS if beside and number % beside == 0 else (ASKED,)
 
 
 def name_of(record: dict[str, Any]) -> str:
@@ -97,19 +127,26 @@ def _stored(record: dict[str, Any], folder: Path, code: str | None) -> dict[str,
 
 
 def _driven(
-    records: Sequence[dict[str, Any]], folder: Path, code: str, jobs: int
+    records: Sequence[dict[str, Any]], folder: Path, code: str, ways: dict[str, tuple[str, ...]], asked: Asked
 ) -> Iterator[dict[str, Any]]:
     if not records:
         return
     places = predictions(folder / "predictions" / code)
-    for name in names():  # once, before the processes start
+    for name in _wanted(records, ways):  # once, before the processes start
         try_predicted(name, places)
-    if jobs <= 1 or len(records) <= 1:
-        yield from (drive(record, folder, places) for record in records)
-        return
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        count = len(records)
-        yield from pool.map(drive, records, [folder] * count, [places] * count)
+    each = ((record, folder, places, ways[name_of(record)]) for record in records)
+    yield from in_processes(drive, each, asked.jobs, asked.until_s)
+
+
+def _wanted(records: Sequence[dict[str, Any]], ways: dict[str, tuple[str, ...]]) -> list[str]:
+    """Return the canned programs that some case is to drive."""
+    programs = {
+        chosen_program(way, record, truth_of(record["label"]["effects"][0]))[0]
+        for record in records
+        for way in ways[name_of(record)]
+        if way != REPEAT
+    }
+    return sorted(name for name in programs if name is not None and name in names())
 
 
 def try_predicted(name: str, places: dict[str, str]) -> None:
@@ -119,7 +156,9 @@ def try_predicted(name: str, places: dict[str, str]) -> None:
         predicted(name, home / "cell.toml", home)
 
 
-def drive(record: dict[str, Any], folder: Path, places: dict[str, str]) -> dict[str, Any]:
+def drive(
+    record: dict[str, Any], folder: Path, places: dict[str, str], ways: Sequence[str] = WAYS
+) -> dict[str, Any]:
     """Make a case again and return what the answer is after one more run, in each way."""
     asked = record["case"]
     case = Case(asked["seed"], asked["kind"], asked["effect"], asked["form"], tuple(asked["without"]))
@@ -127,7 +166,7 @@ def drive(record: dict[str, Any], folder: Path, places: dict[str, str]) -> dict[
     shutil.rmtree(place, ignore_errors=True)
     label = made(case, place / "case", places)
     truth = truth_of(label["effects"][0])
-    drives = [_one_way(way, record, label, truth, place / "case", places) for way in WAYS]
+    drives = [_one_way(way, record, label, truth, place / "case", places) for way in ways]
     shutil.rmtree(place, ignore_errors=True)
     return {"case": asked, "code": record["code"], "drives": drives}
 
@@ -144,17 +183,25 @@ def _one_way(
     found: dict[str, Any] = {"way": way, "program": name, "skipped": skipped, "settled": False}
     if name is None:
         return found
-    number = len(label["runs"]) + 1
+    own, number = time.process_time(), len(label["runs"]) + 1
     run = case / f"run-{number}"
     try:
         _drive(name, way, label, run, places)
-        found["settled"] = is_settled(answer(case), truth)
+        after = answer(case, record["case"]["without"])
+        found["settled"] = is_settled(after, truth)
+        found["named"] = [f"{each['effect']} {each['target']}" for each in named_of(after)]
+        found["left"] = [
+            f"{one['effect']} {one['target']}"
+            for each in named_of(after)
+            for one in each.get("indistinguishable_from") or ()
+        ]
     except NotCannedError as error:
         found["skipped"] = str(error)
     except Exception as error:  # counts as not settled, and is shown
         found["error"] = repr(error)
     finally:
         shutil.rmtree(run, ignore_errors=True)
+    found["cpu_s"] = time.process_time() - own
     return found
 
 
@@ -192,7 +239,27 @@ def _drive(name: str, way: str, label: dict[str, Any], run: Path, places: dict[s
 def drives_of(records: Iterable[dict[str, Any]]) -> list[Drive]:
     """Return all further runs of these records."""
     keys = ("way", "program", "skipped", "settled")
-    return [Drive(*(drive[key] for key in keys)) for record in records for drive in record["drives"]]
+    return [
+        Drive(*(drive[key] for key in keys), cpu_s=drive.get("cpu_s", 0.0))
+        for record in records
+        for drive in record["drives"]
+    ]
+
+
+def cost(records: Sequence[dict[str, Any]]) -> str:
+    """Return what a further run costs, and how often each program asked for settled it."""
+    drives = [each for each in drives_of(records) if each.skipped is None]
+    programs = sorted({str(each.program) for each in drives if each.way == ASKED})
+    told = []
+    for name in programs:
+        mine = [each for each in drives if each.way == ASKED and each.program == name]
+        own_s = sum(each.cpu_s for each in mine) / len(mine)
+        told.append(f"{name} {sum(each.settled for each in mine)}/{len(mine)} ({own_s:.0f} s)")
+    whole_s = sum(each.cpu_s for each in drives)
+    return (
+        f"Processor seconds: {whole_s:.0f} for {len(drives)} runs of {len(records)} cases. Programs asked for, "
+        f"settled of how many, seconds each: {', '.join(told) or 'none'}."
+    )
 
 
 def rows(records: Sequence[dict[str, Any]]) -> list[tuple[str, str, str, str]]:

@@ -30,6 +30,8 @@ EVERYWHERE = frozenset(
 """Effects that act all the time: their place in time is not scored."""
 OWN, NOISE = "where", "above_noise"
 """Label: where the effect, smoothed, exceeds its own RMS; and where it exceeds the noise."""
+ALMOST = 0.99
+"""Intervals that are all alike are all the worst."""
 
 Span = dict[str, Any]
 """``run``, ``t_start_s``, ``t_end_s``; of an answer also ``signal``."""
@@ -52,6 +54,16 @@ def overlap(entry: dict[str, Any], intervals: Sequence[Span], definition: str = 
         a, b = _inside(middle, one), _inside(middle, two)
         both, either = both + float(width[a & b].sum()), either + float(width[a | b].sum())
     return both / either if either > 0.0 else 0.0
+
+
+def worst_of(intervals: Sequence[Span]) -> list[Span]:
+    """Return the intervals whose RMS is at least that of all of them together; all where none states one."""
+    if not all("rms" in each for each in intervals) or not intervals:
+        return list(intervals)
+    rms = np.array([each["rms"] for each in intervals])
+    length = np.array([each["t_end_s"] - each["t_start_s"] for each in intervals])
+    together = np.sqrt(np.sum(rms**2 * length) / max(float(length.sum()), 1e-9))
+    return [each for each, own in zip(intervals, rms, strict=True) if own >= ALMOST * together]
 
 
 def _spans(intervals: Iterable[Span], run: str) -> list[tuple[float, float]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from gap_blind_cases import full_counts, not_simulated
 from gap_blind_figures import Rate, grouped, rate, smallest_seen
+from gap_blind_next import cost as next_cost
 from gap_blind_next import rows as next_rows
 from gap_blind_rows import metrics
 from gap_blind_score import Judged
@@ -21,6 +22,9 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
     """Return all tables as text; ``driven``: the records of the next runs."""
     rows = [(row.metric, row.figure, row.worst, row.aim) for row in metrics(cases)]
     parts = [title, table(("metric", "figure (95 % bound)", "worst", "aim"), rows)]
+    if foreign := [each for each in cases if not each.truths and each.foreign]:
+        parts += ["False alarms by what is foreign (a case counts for each noise that it has):"]
+        parts += [_by_foreign(foreign)]
     single = [each for each in cases if each.kind in ("single", "slip")]
     if single:
         parts += ["By effect, the worst first (single effects and slips):", _by_effect(single)]
@@ -41,8 +45,21 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
     if driven:
         parts += [f"Ambiguity gone after one more run, {len(driven)} cases that were left open:"]
         parts += [table(("one more run", "settled (95 % bound)", "skipped", "aim"), next_rows(driven))]
+        parts += [next_cost(driven)]
     parts.append(_time(cases))
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _by_foreign(cases: Sequence[Judged]) -> str:
+    """Return the false alarms of each kind of noise, of each channel, and of each law of mismatch."""
+    every = [(name, each) for each in cases for name in each.foreign]
+    rows = []
+    for name, mine in grouped(every, lambda pair: pair[0]).items():
+        found = rate(each.alarms for _, each in mine)
+        answers = Counter(each.answer for _, each in mine if each.alarms)
+        told = ", ".join(f"{answer} {times}" for answer, times in answers.most_common(3))
+        rows.append((-found.value, (str(name), f"{_count(found)} (<= {found.upper:.3f})", told)))
+    return table(("what", "alarms", "answers"), [row for _, row in sorted(rows, key=lambda each: each[0])])
 
 
 def _by_effect(cases: Sequence[Judged]) -> str:
@@ -142,7 +159,8 @@ def _time(cases: Sequence[Judged]) -> str:
         np.array([value for each in cases if (value := getattr(each, name)) > 0.0] or [0.0])
         for name in ("seconds", "cpu_s", "plant_s")
     )
-    whole_h = sum(full_counts().values()) * (own.mean() + plant.mean()) / 2.0 / 3600.0
+    parts = [_mean(getattr(each, name) for each in cases) for name in ("plant_cpu_s", "beside_cpu_s")]
+    whole_h = sum(full_counts().values()) * (own.mean() + sum(parts)) / 2.0 / 3600.0
     costs = {
         name: np.mean([e.cpu_s for e in mine]) for name, mine in grouped(cases, lambda e: e.subject).items()
     }
@@ -152,6 +170,8 @@ def _time(cases: Sequence[Judged]) -> str:
         f"Seconds a case: diagnosis median {np.median(wall):.2f}, worst {wall.max():.2f} (processor "
         f"{np.median(own):.2f}, mean {own.mean():.2f}, worst {own.max():.2f}); plant median "
         f"{np.median(plant):.2f}, worst {plant.max():.2f}.",
+        f"Processor seconds of a case, mean: plant {parts[0]:.2f}, diagnosis {own.mean():.2f}, oracle and "
+        f"simple methods {parts[1]:.2f}: {_share(sum(parts), own.mean())} of a case is not the diagnosis.",
         f"At this rate the full check of {sum(full_counts().values())} cases takes {whole_h:.1f} h on two "
         "cores, without the next runs.",
         f"The slowest, processor seconds a case: {', '.join(f'{name} {costs[name]:.0f}' for name in slow)}.",
@@ -171,6 +191,15 @@ def failures(records: Iterable[dict], folder: Path) -> None:
         if record["error"]
     )
     (folder / "failures.txt").write_text(text, encoding="utf-8")
+
+
+def _mean(values: Iterable[float]) -> float:
+    known = list(values)
+    return sum(known) / len(known) if known else 0.0
+
+
+def _share(beside_s: float, own_s: float) -> str:
+    return f"{100.0 * beside_s / max(beside_s + own_s, 1e-9):.0f} %"
 
 
 def _count(one: Rate) -> str:

@@ -33,6 +33,7 @@ def _nothing(cases: Sequence[Judged]) -> Iterator[Row]:
     yield _low("false alarms, usual noise", _of(cases, "null"), _alarms, "<= 1 %")
     yield _low("false alarms, foreign noise", _of(cases, "null_foreign_noise"), _alarms, "<= 3 %")
     yield _low("false alarms, foreign mismatch", _of(cases, "null_foreign_mismatch"), _alarms)
+    yield _low("  all effect-free cases", _of(cases, *NULLS), _alarms)
     yield _low("  any of them with a named cause", _of(cases, *NULLS), lambda e: bool(e.named))
 
 
@@ -59,8 +60,8 @@ def _one_effect(cases: Sequence[Judged]) -> Iterator[Row]:
 
 def _numbers(cases: Sequence[Judged], shrink_aim: str) -> Iterator[Row]:
     yield _median("  shrink over that of an oracle (median)", cases, lambda e: [e.shrink], shrink_aim)
-    yield _median("  place: IoU, effect > its own RMS (median)", cases, lambda e: [e.place.own], ">= .85")
-    yield _median("  place: IoU, effect > noise (median)", cases, lambda e: [e.place.noise], ">= .85")
+    yield _median("  place: IoU of the worst stretches (median)", cases, lambda e: [e.place.own], ">= .85")
+    yield _median("  place: IoU of all stretches (median)", cases, lambda e: [e.place.noise], ">= .85")
     if errors := [error for each in cases for error in each.errors]:
         yield _median("  parameter error (median)", cases, lambda e: e.errors, "5 %", high=False)
         within = rate(error <= TOLERANCE for error in errors)
@@ -84,7 +85,7 @@ def _unknowns(cases: Sequence[Judged]) -> Iterator[Row]:
         yield _low("  wrongly named, no simple effect fits as well", apart, lambda e: bool(e.named))
         yield _high("  flagged unknown", mine, lambda e: e.flagged, ">= .95")
         yield from _told(mine)
-        yield _median("  place: IoU, effect > noise (median)", mine, lambda e: [e.place.noise])
+        yield _median("  place: IoU of all stretches (median)", mine, lambda e: [e.place.noise])
     every = [each for each in _of(cases, *UNKNOWN_KINDS) if each.observable]
     yield from _told(every, "family and place of an unknown right", ">= .80")
 

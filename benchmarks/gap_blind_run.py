@@ -56,12 +56,15 @@ def run_case(case: Case, folder: Path, how: How, predictions: dict[str, str]) ->
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     record: dict[str, Any] = {"case": asdict(case), "code": how.code, "error": None, "result": None}
-    start = time.perf_counter()
+    start, own = time.perf_counter(), time.process_time()
     record["label"] = made(case, place / "case", predictions)
     record["plant_s"] = time.perf_counter() - start
+    record["plant_cpu_s"] = time.process_time() - own
     try:
         _diagnose(case, place / "case", record)
+        own = time.process_time()
         _beside(case, place / "case", how, record, predictions)
+        record["beside_cpu_s"] = time.process_time() - own
     except Exception:  # the check goes on, and shows it
         record["error"] = traceback.format_exc()
     if not how.keep:

@@ -12,7 +12,7 @@ from gap_blind_depends import Told, told
 from gap_blind_depends import probabilities as depends_probabilities
 from gap_blind_names import Truth, covers, declares, is_among, named_of, names, text
 from gap_blind_numbers import numbers
-from gap_blind_places import NOISE, OWN, overlap
+from gap_blind_places import NOISE, OWN, overlap, worst_of
 from gap_blind_tests import Tested, tested_of
 from gap_blind_words import truth_of
 
@@ -51,6 +51,11 @@ class Judged:
     plant_s: float = 0.0
     seconds: float = 0.0
     cpu_s: float = 0.0
+    plant_cpu_s: float = 0.0
+    beside_cpu_s: float = 0.0
+    """Oracle and simple methods."""
+    foreign: tuple[str, ...] = ()
+    """Each kind of noise, or the law of the mismatch, that the usual cases do not have."""
     failed: bool = True
     """An exception instead of an answer."""
     verdict: str = "failed"
@@ -119,7 +124,7 @@ def judge(record: dict[str, Any]) -> Judged:
         seed=case["seed"],
         kind=case["kind"],
         truths=truths,
-        subject=" + ".join(sorted(effect for effect, _ in truths)) or _foreign(label),
+        subject=" + ".join(sorted(effect for effect, _ in truths)) or " + ".join(_foreign(label)) or "usual",
         form="other" if any(entry["form"] == "other" for entry in entries) else "same",
         ratio=min((entry["ratio"] for entry in entries), default=0.0),
         is_imitated=any(entry.get("stand_ins") for entry in entries),
@@ -127,19 +132,21 @@ def judge(record: dict[str, Any]) -> Judged:
         plant_s=record.get("plant_s", 0.0),
         seconds=record.get("diagnosis_s", 0.0),
         cpu_s=record.get("diagnosis_cpu_s", 0.0),
+        plant_cpu_s=record.get("plant_cpu_s", 0.0),
+        beside_cpu_s=record.get("beside_cpu_s", 0.0),
+        foreign=_foreign(label),
         failed=record.get("error") is not None,
         baselines=_baselines(record, truths),
         **known,
     )
 
 
-def _foreign(label: dict[str, Any]) -> str:
-    """Return what is foreign about an effect-free case: kinds of noise, or the law of its mismatch."""
-    noise = " + ".join(
-        sorted({f"{each['channel']} {each['kind']}" for each in label.get("foreign_noise") or ()})
-    )
+def _foreign(label: dict[str, Any]) -> tuple[str, ...]:
+    """Return what is foreign about a case: channel and kind of each noise, or the law of its mismatch."""
+    noise = sorted({f"{each['channel']} {each['kind']}" for each in label.get("foreign_noise") or ()})
     law = label.get("mismatch_law") or {"shape": "uniform"}
-    return noise or ("usual" if law["shape"] == "uniform" else f"{law['scale']:g} x {law['shape']}")
+    wide = [] if law["shape"] == "uniform" else [f"{law['scale']:g} x {law['shape']}"]
+    return (*noise, *wide)
 
 
 def _answered(
@@ -176,7 +183,7 @@ def _one_effect(kind: str, entry: dict[str, Any], record: dict[str, Any]) -> dic
     }
     if result["verdict"] != "no_gap":
         said = result["where"].get("intervals") or []
-        found["place"] = Place(own=overlap(entry, said, OWN), noise=overlap(entry, said, NOISE))
+        found["place"] = Place(own=overlap(entry, worst_of(said), OWN), noise=overlap(entry, said, NOISE))
     truth = truth_of(entry)
     right = [cause for cause in named_of(result) if names(cause, truth)]
     if right and kind == "single" and entry["form"] == "same":

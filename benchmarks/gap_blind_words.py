@@ -3,7 +3,6 @@
 The plant and the library are written apart and count some things otherwise.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,6 @@ SPELT_OUT = {
 """Vector of a label -> its elements in the library."""
 RENAMED = {"kg": "mass_kg"}
 CONVERTED: dict[str, dict[str, tuple[tuple[str, ...], float]]] = {
-    "axis_parallelism": {"b_deg": (("mrad",), 1000.0 * math.pi / 180.0)},
     "cutter_bending": {"mm_per_kN": (("um_per_N",), 1.0)},
     "encoder_interpolation": {"lines": (("periods",), 1.0)},
     "fixture_compliance": {"mm_per_kN": (("x_um_per_N", "y_um_per_N", "z_um_per_N"), 1.0)},
@@ -33,13 +31,11 @@ CONVERTED: dict[str, dict[str, tuple[tuple[str, ...], float]]] = {
     },
 }
 """Effect -> parameter of its label -> names in the library, and the factor to its unit."""
-TARGETS = {"axis_parallelism": "A3"}
-"""Where the plant knows one place only and does not name it."""
 
 
 def truth_of(entry: dict[str, Any]) -> Truth:
     """Return effect and target of an entry of a label."""
-    return entry["effect"], entry["target"] or TARGETS.get(entry["effect"])
+    return entry["effect"], entry["target"]
 
 
 def flat(entry: dict[str, Any]) -> dict[str, float]:

@@ -1,18 +1,22 @@
 """Many cases at once: on processes of this machine, or on a Dask cluster; each record is stored when made."""
 
 import functools
+import itertools
 import json
+import math
 import multiprocessing
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gap_blind_cases import Case, predictions
 from gap_blind_run import How, fingerprint, run_case
 
+Result = TypeVar("Result")
 NO_DASK = (
     "gap_blind: --scheduler needs Dask, which is not installed: python -m pip install distributed. Without "
     "--scheduler the cases run on processes of this machine"
@@ -45,20 +49,40 @@ def store(record: dict[str, Any], folder: Path) -> None:
 
 
 def fresh_records(
-    cases: Sequence[Case], folder: Path, how: How, jobs: int, scheduler: str | None
+    cases: Sequence[Case],
+    folder: Path,
+    how: How,
+    jobs: int,
+    scheduler: str | None,
+    until_s: float = math.inf,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the record of each case as soon as it is made."""
+    """Yield the record of each case as soon as it is made.
+
+    ``until_s``: of `time.monotonic`; no case begins later (on a cluster all of them are made).
+    """
     if scheduler is not None:
         yield from _on_cluster(cases, how, scheduler)
-    elif jobs <= 1 or len(cases) <= 1:
+    elif cases:
         places = predictions(folder / "predictions" / how.code)
-        yield from (run_case(case, folder, how, places) for case in cases)
-    else:
-        places = predictions(folder / "predictions" / how.code)
-        fresh = multiprocessing.get_context("spawn")  # so that the threads of numpy stay at one
-        with ProcessPoolExecutor(jobs, mp_context=fresh) as pool:
-            waiting = [pool.submit(run_case, case, folder, how, places) for case in cases]
-            yield from (each.result() for each in as_completed(waiting))
+        asked = ((case, folder, how, places) for case in cases)
+        yield from in_processes(run_case, asked, jobs, until_s)
+
+
+def in_processes(
+    work: Callable[..., Result], asked: Iterable[tuple[Any, ...]], jobs: int, until_s: float = math.inf
+) -> Iterator[Result]:
+    """Yield what a function returns for each tuple of arguments, as it comes; none begins after a time."""
+    timely = itertools.takewhile(lambda _: time.monotonic() < until_s, asked)
+    if jobs <= 1:
+        yield from (work(*each) for each in timely)
+        return
+    fresh = multiprocessing.get_context("spawn")  # so that the threads of numpy stay at one
+    with ProcessPoolExecutor(jobs, mp_context=fresh) as pool:
+        under_way = {pool.submit(work, *each) for each in itertools.islice(timely, jobs)}
+        while under_way:
+            finished, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            under_way |= {pool.submit(work, *each) for each in itertools.islice(timely, len(finished))}
+            yield from (each.result() for each in finished)
 
 
 def _on_cluster(cases: Sequence[Case], how: How, scheduler: str) -> Iterator[dict[str, Any]]:

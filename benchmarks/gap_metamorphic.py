@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from gap_blind_cases import Case, predictions
 from gap_blind_cases import plan as planned
 from gap_blind_channels import CHANNELS, shows_without, without
-from gap_blind_figures import grouped
+from gap_blind_figures import grouped, rate
 from gap_blind_print import table
 from gap_blind_run import answer, drawn, driven, fingerprint
 from gap_blind_score import Judged, judge
@@ -141,6 +141,14 @@ def report(found: Sequence[Change], cases: int) -> str:
             for each in worse
         ]
         parts += [table(("case", "truth (x noise)", "channel", "", "answer then"), lines)]
+    for added, what in ((False, "taken away"), (True, "added")):
+        mine = [each for each in found if each.added == added]
+        lost, wrong = (rate(each.fate in fates for each in mine) for fates in (WORSE, (WRONG,)))
+        if mine:
+            parts += [
+                f"A channel {what}, {lost.of} right answers: worse {lost.value:.3f} (<= {lost.upper:.3f}), "
+                f"a wrong name {wrong.value:.3f} (<= {wrong.upper:.3f})"
+            ]
     parts += [f"{len(worse)} of {len(found)} right answers became worse"]
     return "\n\n".join(parts)
 

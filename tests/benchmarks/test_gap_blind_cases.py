@@ -47,7 +47,7 @@ def test_the_whole_check_has_what_was_promised():
     assert nulls >= 500
     assert counts["null_foreign_noise"] >= nulls / 5
     assert counts["null_foreign_mismatch"] >= nulls / 5
-    assert (counts["single"], counts["pair"], counts["open"]) == (600, 200, 500)
+    assert (counts["single"], counts["pair"], counts["open"]) == (600, 220, 500)
     planned = cases.plan(1, counts)
     deleted = Counter(case.without for case in planned if case.kind == "deleted")
     assert set(deleted) == {(name,) for name in cases.simulated()}
@@ -78,6 +78,30 @@ def test_what_the_library_has_is_not_outside_it(monkeypatch):
     monkeypatch.setattr(cases, "UNKNOWN", {"backlash": None, "cable_snag": None})
     asked = {case.effect for case in cases.plan(1, {"open": 4})}
     assert asked == {"open:cable_snag"}
+
+
+def test_a_check_that_is_cut_short_has_some_of_each_kind():
+    counts = {"null": 6, "single": 12, "pair": 3}
+    planned = cases.plan(1, counts)
+    mixed = cases.in_turn(planned)
+    assert sorted(mixed, key=planned.index) == planned
+    for cut in (7, 14, 21):
+        had = Counter(case.kind for case in mixed[:cut])
+        assert had == {kind: count * cut // 21 for kind, count in counts.items()}
+
+
+def test_no_case_begins_after_its_time(monkeypatch):
+    now = iter(range(100))
+    monkeypatch.setattr(workers.time, "monotonic", lambda: next(now))
+    asked = [(number,) for number in range(10)]
+    assert list(workers.in_processes(lambda number: number, asked, 1, 4.0)) == [0, 1, 2, 3]
+    assert list(workers.in_processes(lambda number: number, asked, 1)) == list(range(10))
+
+
+def test_processes_return_everything_and_stop_in_time():
+    asked = [(number,) for number in range(-6, 0)]
+    assert sorted(workers.in_processes(abs, asked, 2)) == [1, 2, 3, 4, 5, 6]
+    assert list(workers.in_processes(abs, asked, 2, 0.0)) == []
 
 
 def test_a_mixed_check_has_as_many_as_asked():
@@ -115,7 +139,7 @@ def test_reports_take_records_of_any_code(tmp_path, capsys):
     workers.store(record, tmp_path)
     assert blind.main(["--null", "2", "--resume", str(tmp_path), "--only-report"]) == 0
     out = capsys.readouterr().out
-    assert "1 cases from seed 1 (calibration, not to be quoted), code old" in out
+    assert "1 of 2 cases from seed 1 (calibration, not to be quoted), code old" in out
     assert "| false alarms, usual noise" in out
     assert blind.main(["--null", "2", "--resume", str(tmp_path), "--only-report", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["exact"]

@@ -81,9 +81,32 @@ def test_stored_runs_are_not_driven_again(tmp_path):
     stored = {"case": made["case"], "code": "a", "drives": []}
     (tmp_path / "next").mkdir()
     (tmp_path / "next" / "single-00001.json").write_text(json.dumps(stored), encoding="utf-8")
-    assert following.next_records([made], tmp_path, "a", 5, only_stored=False) == [stored]
-    assert following.next_records([made], tmp_path, "b", 5, only_stored=True) == [stored]
-    assert following.next_records([made], tmp_path, "a", 0, only_stored=False) == []
+    assert following.next_records([made], tmp_path, "a", following.Asked(5)) == [stored]
+    assert following.next_records([made], tmp_path, "b", following.Asked(5, only_stored=True)) == [stored]
+    assert following.next_records([made], tmp_path, "a", following.Asked(0)) == []
+
+
+def test_other_programs_are_driven_beside_some():
+    assert [len(following.ways_of(number, 3)) for number in range(5)] == [3, 1, 1, 3, 1]
+    assert following.ways_of(1, 3) == (following.ASKED,)
+    assert following.ways_of(0, 0) == (following.ASKED,)
+
+
+def test_what_no_motion_can_part_may_stay_in_the_set():
+    truth = ("mastering", "A6")
+    alike = ("tool_frame", None)
+    assert following.is_settled(answer([cause(*truth, alike=[alike])]), truth)
+    assert following.is_settled(answer([cause(*alike, alike=[truth])]), truth)
+    assert not following.is_settled(answer([cause(*alike)]), truth)
+    assert not following.is_settled(answer([cause(*truth, alike=[alike, ("base_frame", None)])]), truth)
+    assert not following.is_settled(answer([cause(*alike, alike=[truth])]), alike)  # only the one way round
+
+
+def test_what_the_runs_cost_is_told():
+    drive = {"way": following.ASKED, "program": "circle", "settled": True, "skipped": None, "cpu_s": 12.0}
+    told = following.cost([{"drives": [drive, drive | {"settled": False, "cpu_s": 20.0}]}])
+    assert "circle 1/2 (16 s)" in told
+    assert told.startswith("Processor seconds: 32 for 2 runs")
 
 
 def test_a_program_that_make_test_does_not_have(tmp_path):

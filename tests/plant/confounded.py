@@ -17,6 +17,20 @@ class Pair:
     apart: tuple[str, ...]  # canned programs that part them
 
 
+SAME: dict[tuple[str, str | None], tuple[tuple[str, str | None], ...]] = {
+    ("mastering", "A1"): (("base_frame", None),),
+    ("mastering", "A6"): (("tool_frame", None),),
+    ("link_length", "c1"): (("base_frame", None),),
+    ("link_length", "c4"): (("tool_frame", None),),
+    ("axis_parallelism", "A6"): (("tool_frame", None),),
+    ("tracker_drift", None): (("thermal", None),),
+}
+"""Truth -> what can do the same to every motion of the robot, so that no program parts the two.
+
+A turn or a lift in front of all joints is one of the base, one behind all joints is one of the tool; a
+tracker that creeps sees what it would see of a robot that creeps the other way.
+"""
+
 PAIRS = {
     "a1_or_base": Pair(
         "mastering@A1",
@@ -77,12 +91,6 @@ PAIRS = {
         (("tracker_drift", None), ("thermal", None)),
         "a straight creep over hours is the beginning of any warming",
         ("dwell",),
-    ),
-    "cutter_or_fixture": Pair(
-        "cutter_bending",
-        (("cutter_bending", None), ("fixture_compliance", None)),
-        "a fixture as soft in x as in y moves the tip against it as a soft shank does",
-        ("weights",),
     ),
     "refraction_or_base": Pair(
         "tracker_refraction",

@@ -106,15 +106,16 @@ def size_for(fault: Fault, ratio: float, luck: float, drive, without: list[Run],
     low, high = fault.kind.sizes
     if fault.kind in SLIPS.values():
         return float(low * (high / low) ** luck)
-    if fault.kind.signal == "scan":
-        return float(np.clip(2.0 * ratio * how.scan_mm, low, high))
     every = list(range(len(without)))
     rows = every if fault.kind.all_runs else [every[-1] if fault.kind.hours else 0]
 
     def found(size: float) -> float:
+        runs = [drive(i, size) for i in rows]
+        if fault.kind.signal == "scan":
+            return truth.scan_size(runs, [without[i] for i in rows], how)["ratio"]
         changes = [
-            truth.differences(instruments.clean(drive(i, size), how), instruments.clean(without[i], how))
-            for i in rows
+            truth.differences(instruments.clean(run, how), instruments.clean(without[i], how))
+            for i, run in zip(rows, runs, strict=True)
         ]
         return ratio_of(fault.kind, truth.sizes(changes, how))
 

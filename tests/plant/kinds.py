@@ -16,7 +16,7 @@ from tests.plant import cases, mismatch, plans
 from tests.plant.confounded import PAIRS
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN
 from tests.plant.faults import Fault
-from tests.plant.plans import Options, Plan
+from tests.plant.plans import WITHOUT_SCAN, Options, Plan
 
 KINDS = (
     "null",
@@ -99,7 +99,7 @@ SHELVES = {
     "null_foreign_mismatch": lambda: ["none"],
     "single": lambda: sorted(LIBRARY),
     "deleted": lambda: sorted(LIBRARY),
-    "missing": lambda: sorted(set(LIBRARY) - {"tool_diameter"}),
+    "missing": lambda: WITHOUT_SCAN,
     "open": lambda: [f"open:{name}" for name in sorted(UNKNOWN)],
     "slip": lambda: sorted(SLIPS),
 }
@@ -116,7 +116,7 @@ def _foreign_mismatch(rng: np.random.Generator, options: Options) -> tuple[Optio
 
 
 def _double(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
-    pair = "+".join(rng.choice(sorted(set(LIBRARY) - {"tool_diameter"}), 2, replace=False))
+    pair = "+".join(rng.choice(WITHOUT_SCAN, 2, replace=False))
     return replace(options, effect=options.effect or pair, ratios=CLEAR), {}
 
 

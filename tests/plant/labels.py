@@ -10,7 +10,7 @@ from tests.plant.instruments import Instruments
 from tests.plant.plans import Plan
 from tests.plant.robot import Run
 
-MANY_JOINTS = {"wrist_coupling": ("A5", "A6"), "axis_parallelism": ("A2", "A3")}
+MANY_JOINTS = {"wrist_coupling": ("A5", "A6")}
 SCHEMA = "plant/label/2"
 
 
@@ -70,24 +70,24 @@ def _entries(plan: Plan, sizes: list[float], driven: list[Run], without: list[Ru
             alone = [plan.drive(day, [fault.hooks(size)]) for day in plan.days]
         seen = [instruments.clean(run, plan.how) for run in alone]
         changes = [truth.differences(a, b) for a, b in zip(seen, bare, strict=True)]
-        entry = _entry(fault, size, changes, plan.how)
+        sized = truth.sizes(changes, plan.how)
+        if fault.kind.signal == "scan":
+            sized["scan"] = truth.scan_size(alone, without, plan.how)
+        entry = _entry(fault, size, changes, sized, plan.how)
         main = entry["main_signal"] or ""
         entry["stand_ins"] = imitation.stand_ins(changes, bare, plan.days, main, plan.how)
         out.append(entry)
     return out
 
 
-def _entry(fault: Fault, size: float, changes: list[dict], how: Instruments) -> dict:
-    sized = truth.sizes(changes, how)
-    if fault.kind.signal == "scan":
-        main, main_ratio = "scan", 0.5 * size / how.scan_mm
-    else:
-        main = fault.kind.signal
-        if main not in sized:
-            main = acting.clearest(sized) if sized else None
-        main_ratio = sized[main]["ratio"] if main else 0.0
-    where = truth.places(changes, main) if main in sized else []
-    above = truth.above_noise(changes, main, how) if main in sized else []
+def _entry(fault: Fault, size: float, changes: list[dict], sized: dict[str, dict], how: Instruments) -> dict:
+    main = fault.kind.signal
+    if main not in sized:
+        main = acting.clearest(sized) if sized else None
+    main_ratio = sized[main]["ratio"] if main else 0.0
+    timed = main in sized and main != "scan"  # a scan has no times
+    where = truth.places(changes, main) if timed else []
+    above = truth.above_noise(changes, main, how) if timed else []
     values, depends = fault.values(size), fault.depends
     entry = {
         "effect": fault.kind.name,

@@ -1,7 +1,8 @@
 """Normal mismatch, which is never a cause: its bounds, and the laws by which a case draws it.
 
-The usual law is even between the bounds. A foreign law has another shape, bounds up to twice as wide, and
-joints that err together (one batch of gears, one wrong datum): a Gaussian copula with one common factor.
+The usual law is even between the bounds. A foreign law has another shape, bounds half as wide again or twice
+as wide, and joints that err together (one batch of gears, one wrong datum): a Gaussian copula with one common
+factor.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ BOUNDS = {  # between plus and minus (or zero and) the bound
 }
 CLOCKS = ("tracker", "force", "controller", "q_load")
 SHAPES = ("clipped_normal", "bimodal", "beta")
-SCALES = (1.0, 1.5, 2.0)
+SCALES = (1.5, 2.0)
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ USUAL = Law()
 
 
 def foreign(rng: np.random.Generator) -> Law:
-    """Another distribution, perhaps wider, with joints that err together."""
+    """Another distribution, wider bounds, with joints that err together."""
     return Law(str(rng.choice(SHAPES)), float(rng.choice(SCALES)), float(rng.uniform(0.3, 0.9)))
 
 

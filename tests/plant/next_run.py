@@ -15,11 +15,13 @@ import numpy as np
 from tests.plant import arm as arms
 from tests.plant import folders, instruments, kinds, mismatch, truth, writing
 from tests.plant.faults import Fault
+from tests.plant.instruments import Instruments
 from tests.plant.plans import Day, Plan
 from tests.plant.programs import Program, Track, program_of
 from tests.plant.robot import SLOW, Hooks, Run, simulate
 from tests.plant.scene import CELL_TOML, GRAVITY_m_s2
 
+LONG_s, SLOW_Hz = 60.0, 50.0
 PLANNED = ("advance_stop", "corner", "override", "other_program", "velocity_rule")  # in the motion's law
 
 
@@ -49,7 +51,7 @@ def drive_next(
     acting = [(f, size, _acts(f, program)) for f, size in zip(plan.faults, sizes, strict=True)]
     run = _drive(plan, day, program, [f.hooks(size) for f, size, acts in acting if acts])
     writing.write_text(folder.parent / "cell.toml", CELL_TOML)
-    how = plan.how if not isinstance(program.way, Track) else replace(plan.how, scan=False)  # nothing is cut
+    how = _instruments(plan, program, float(run.t_s[-1]))
     folders.write_run(
         folder, day, run, how, {"cell": "../cell.toml", "prediction": prediction} | (keys or {})
     )
@@ -62,6 +64,20 @@ def drive_next(
         "duration_s": float(run.elapsed_s[-1]),
         "effects": _changes(plan, day, program, run, acting),
     }
+
+
+def _instruments(plan: Plan, program: Program, length_s: float) -> Instruments:
+    """The case's instruments; a long program is logged more slowly, and on one in the air nothing is cut."""
+    how = plan.how if not isinstance(program.way, Track) else replace(plan.how, scan=False)
+    if length_s <= LONG_s:
+        return how
+    slow_s = max(how.controller_s, 1.0 / SLOW_Hz)
+    return replace(
+        how,
+        tracker_hz=min(how.tracker_hz, SLOW_Hz),
+        force_hz=min(how.force_hz, SLOW_Hz),
+        controller_s=round(slow_s / how.controller_s) * how.controller_s,
+    )
 
 
 def _day(plan: Plan, seed: int, number: int, after_s: float, name: str) -> Day:

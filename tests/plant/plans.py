@@ -14,6 +14,8 @@ from tests.plant.robot import Mismatch, Run, simulate
 from tests.plant.scene import World
 from tests.plant.waypoints import CUTTING, PROGRAMS
 
+WITHOUT_SCAN = sorted(name for name, kind in LIBRARY.items() if kind.signal != "scan")
+
 
 @dataclass(frozen=True)
 class Options:
@@ -83,7 +85,7 @@ def draw_effect(rng: np.random.Generator) -> str:
     if share < 0.40:
         return str(rng.choice(sorted(SLIPS)))
     if share < 0.50:
-        return "+".join(rng.choice(sorted(set(LIBRARY) - {"tool_diameter"}), 2, replace=False))
+        return "+".join(rng.choice(WITHOUT_SCAN, 2, replace=False))
     return str(rng.choice(sorted(LIBRARY)))
 
 

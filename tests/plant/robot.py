@@ -232,6 +232,7 @@ def _structure(run: Run) -> None:
     place, axes = arms.pose(arm, q_true)
     run.tip_mm = to_base(run.world, place + fast(run, run.bending_mm))
     run.tip_axes = run.world.base.axes.T @ axes
+    run.part_mm = np.zeros((len(run.slow_s), 3))  # how far the part stands aside where it is cut
 
 
 def joint_torques(run: Run) -> np.ndarray:

@@ -54,7 +54,6 @@ def test_a_moved_base_does_the_same(name):
     [
         ("arm_or_linked_arm", "stiffness@linked_arm"),
         ("linked_arm_or_arm", "stiffness@arm"),
-        ("cutter_or_fixture", "fixture_compliance"),
     ],
 )
 def test_another_spring_does_nearly_the_same(name, other):

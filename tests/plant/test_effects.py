@@ -57,6 +57,8 @@ def test_every_form_of_every_effect_shows_and_tells_its_parameters(kind, build, 
     for table in (table for run in tables for table in run.values()):
         assert all(np.isfinite(column).all() for column in table.values())
     sized = truth.sizes([truth.differences(run, untouched) for run in tables], EVERYTHING)
+    if kind.signal == "scan":
+        sized["scan"] = truth.scan_size(runs, [driven({}) for _ in runs], EVERYTHING)
     kind.depends_of(build.__name__, target)
     assert max(entry["ratio"] for entry in sized.values()) > 0.02
     if kind.signal in sized:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.plant import arm
-from tests.plant.effects import LIBRARY, readings, steps, structure, surroundings
-from tests.plant.robot import SLOW, Run, fast, joint_torques, joints_for, to_root
+from tests.plant import masses, surface
+from tests.plant.effects import LIBRARY, readings, steps, surroundings
+from tests.plant.robot import SLOW, Run, fast, joint_torques, to_root
 from tests.plant.scene import DEGREE, GEAR_RATIO
 from tests.plant.short import WORLD, driven, form, only
 
@@ -79,54 +79,80 @@ def test_a_shank_bends_as_a_cantilever(plain):
     assert give == pytest.approx(0.5 / 1000.0)
 
 
-def test_a_fixture_gives_way_along_its_axes(plain):
+def test_a_fixture_gives_way_and_only_the_part_shows_it(plain):
+    """The force on the part is the reaction of that on the tool; the cut is as far off the other way."""
+    for build in (LIBRARY["fixture_compliance"].same, *LIBRARY["fixture_compliance"].others):
+        _, hooks = form(build, 2.0)
+        np.testing.assert_array_equal(driven(hooks).tip_mm, plain.tip_mm)
     values, run = only("fixture_compliance", 2.0)
     expected = plain.force_N * np.array(values["mm_per_kN"]) / 1000.0
-    np.testing.assert_allclose(run.tip_mm - plain.tip_mm, fast(run, expected), atol=1e-9)
+    np.testing.assert_allclose(run.part_mm, -expected, atol=1e-12)
+    with_it, without = (surface.surface(each, np.random.default_rng(3)) for each in (run, plain))
+    np.testing.assert_array_equal(with_it.rows, without.rows)
+    assert len(without.rows) > 100
+    np.testing.assert_allclose(
+        with_it.points_mm - without.points_mm, expected[without.rows], atol=1e-9
+    )  # the tool's force pushes tool and part apart, as a soft shank would bend
     assert max(values["mm_per_kN"]) <= 2.0
+
+
+def test_a_scan_is_judged_along_the_normals(plain):
+    """A larger mill leaves floors where they were and walls further out by half of the difference."""
+    _, hooks = form(LIBRARY["tool_diameter"].same, 0.2)
+    run = driven(hooks)
+    sign = np.sign(run.world.cutter.diameter_mm - plain.world.cutter.diameter_mm)
+    change, both = surface.change_mm(run, plain), surface.surface(plain, np.random.default_rng(0))
+    off = np.where(np.abs(change) > 0.05, -0.1 * sign, 0.0)
+    np.testing.assert_allclose(change, off, atol=5e-3)  # the arm bends a little otherwise
+    assert np.count_nonzero(off) == pytest.approx(np.count_nonzero(both.sides), abs=4)
+    assert 0.9 * len(both.rows) < len(change) <= len(both.rows)
 
 
 def test_a_pedestal_tilts_about_its_foot(plain):
     """Work of unit loads: the way along a force is the compliance times the square of its moment."""
-    size = 0.05
-    values, run = only("pedestal_compliance", size)
+    size = 0.5
+    _, hooks = form(LIBRARY["pedestal_compliance"].same, size)
+
+    def without_cut(run: Run) -> None:
+        kept = run.force_N, run.moment_Nmm
+        run.force_N, run.moment_Nmm = 0.0 * run.force_N, 0.0 * run.moment_Nmm
+        hooks["tip"](run)
+        run.force_N, run.moment_Nmm = kept
+
+    run, still = driven(hooks), driven({"tip": without_cut})
     k = int(np.argmax(np.linalg.norm(plain.force_N, axis=1)))
-    force, soft = plain.force_N[k], np.array(values["deg_per_kNm"]) * DEGREE / 1e6
-    lever = to_root(WORLD, plain.tip_mm)[SLOW * k] - structure.FOOT_mm
-    moment = np.cross(lever, force)
-    own = plain.moment_Nmm[k]
-    work = np.dot(soft * (moment + own), moment)
-    assert np.dot((run.tip_mm - plain.tip_mm)[SLOW * k], force) == pytest.approx(work, rel=1e-6)
+    force, soft = plain.force_N[k], size / 1e9
+    moment = np.cross(to_root(WORLD, plain.tip_mm)[SLOW * k], force)
+    work = np.dot(soft * (moment + plain.moment_Nmm[k]), moment)
+    assert np.dot((run.tip_mm - still.tip_mm)[SLOW * k], force) == pytest.approx(work, rel=1e-6)
 
 
-def test_a_crooked_elbow_turns_the_forearm_and_nothing_before_it():
-    body = arm.reference_pose(WORLD)
-    tilt = 0.3 * DEGREE
-    c, s = np.cos(tilt), np.sin(tilt)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    bent = arm.crooked(body, arm.ELBOW, turn)
-    np.testing.assert_array_equal(bent.screws[:2], body.screws[:2])
-    np.testing.assert_allclose(bent.screws[2], turn @ body.screws[2])
-    assert np.degrees(np.arccos(bent.screws[1] @ bent.screws[2])) == pytest.approx(0.3)
-    q = joints_for(WORLD, np.array([[50.0, 20.0, 10.0]]))
-    # the same by hand: link 2 carries a turned frame in which A3 ... A6 move as ever
-    rest = q.copy()
-    rest[:, :2] = 0.0
-    front = q.copy()
-    front[:, 2:] = 0.0
-    elbow = body.points_mm[2]
-    inner = arm.pose(body, rest)[0][0]
-    there = turn @ (inner - elbow) + elbow
-    place, axes = arm.pose(body, front)
-    along = axes[0] @ body.tcp_axes.T  # motion of link 2 from its reference pose
-    expected = place[0] + along @ (there - body.tcp_mm)
-    np.testing.assert_allclose(arm.pose(bent, q)[0][0], expected, atol=1e-9)
+STANDS = -20  # a slow sample after the last move
 
 
-def test_axes_that_are_parallel_after_all_change_nothing(plain):
-    for build in (LIBRARY["axis_parallelism"].same, *LIBRARY["axis_parallelism"].others):
-        run = driven(form(build, 1e-12)[1])
-        assert np.abs(run.tip_mm - plain.tip_mm).max() < 1e-8
+def test_a_foot_carries_the_arm_and_the_load(plain):
+    """The moment about the foot of an arm that stands is that of its masses' weights by hand."""
+    place, pull = (each[STANDS] for each in masses.pulls(plain))
+    np.testing.assert_allclose(pull[:, 2], -9.80665 * np.append(masses.LINK_kg, masses.LOAD_kg), rtol=1e-6)
+    lift = -plain.q_act[SLOW * STANDS, 1]  # the upper arm's slope
+    swing = -plain.q_act[SLOW * STANDS, 0]
+    out, up = 350.0 + 575.0 * np.cos(lift), 675.0 + 575.0 * np.sin(lift)
+    np.testing.assert_allclose(place[1], [out * np.cos(swing), out * np.sin(swing), up], atol=1e-9)
+    moment = masses.moment_about(plain, np.zeros(3))[STANDS]
+    np.testing.assert_allclose(moment[1], np.sum(place[:, 0] * -pull[:, 2]), rtol=1e-6)
+
+
+def test_joint_moments_are_the_work_of_the_weights(plain):
+    """Virtual work: a joint's moment is the weights' work for a small turn, by differences."""
+    body, q = plain.body(), np.ascontiguousarray(plain.q_act[::SLOW][STANDS : STANDS + 1])
+    kg, step = np.append(masses.LINK_kg, masses.LOAD_kg), 1e-6
+    centres = masses.reference_centres(plain, body)
+    for j in range(6):
+        turned = q.copy()
+        turned[0, j] += step
+        lift = masses.carried(body, turned, centres)[0, :, 2] - masses.carried(body, q, centres)[0, :, 2]
+        expected = -9.80665 * float(kg @ lift) / step
+        assert masses.joint_moments(plain)[STANDS, j] == pytest.approx(expected, rel=1e-4, abs=5.0)
 
 
 # readings ---------------------------------------------------------------------------------------------------
@@ -136,7 +162,9 @@ def test_twist_is_read_and_moves_nothing(plain):
     _, run = only("gear_twist", 0.4, "A2")
     torque_kNm = joint_torques(plain)[::1, 1] / 1e6
     read = (run.q_load - plain.q_load)[::SLOW, 1] / DEGREE
-    np.testing.assert_allclose(read, 0.4 * torque_kNm, atol=1e-12)
+    carried_kNm = masses.joint_moments(plain)[:, 1] / 1e6
+    np.testing.assert_allclose(read, 0.4 * (torque_kNm + carried_kNm), atol=1e-12)
+    assert carried_kNm.min() > 1.0  # an arm of this size weighs kN·m about A2
     np.testing.assert_array_equal(run.tip_mm, plain.tip_mm)
 
 
@@ -154,11 +182,11 @@ def test_interpolation_errs_once_a_line(plain):
     np.testing.assert_array_equal(run.tip_mm, plain.tip_mm)
 
 
-def test_an_eccentric_wheel_errs_once_a_turn_and_not_at_its_mark(plain):
+def test_an_eccentric_wheel_errs_once_a_turn(plain):
     values, run = only("joint_eccentricity", 0.1, "A1")
     q, phase = plain.q_act[:, 0], values["phase"]
     np.testing.assert_allclose(
-        (run.q_load - plain.q_load)[:, 0] / DEGREE, 0.1 * (np.sin(q + phase) - np.sin(phase)), atol=1e-12
+        (run.q_load - plain.q_load)[:, 0] / DEGREE, 0.1 * np.sin(q + phase), atol=1e-12
     )
 
 
@@ -192,9 +220,9 @@ def test_a_tracker_creeps_with_the_hours(plain):
     np.testing.assert_allclose(run.tip_mm - plain.tip_mm, expected, atol=1e-9)
 
 
-def test_a_beam_bends_with_the_square_of_its_length(plain):
+def test_a_beam_bends_with_the_square_of_its_level_length(plain):
     values, run = only("tracker_refraction", 0.1)
-    length = np.linalg.norm(plain.tip_mm - values["stand_mm"], axis=1)
+    length = np.linalg.norm((plain.tip_mm - values["stand_mm"])[:, :2], axis=1)
     moved = run.tip_mm - plain.tip_mm
     np.testing.assert_allclose(moved[:, 2], 0.1 * (length / 2000.0) ** 2, atol=1e-9)
 
@@ -202,9 +230,13 @@ def test_a_beam_bends_with_the_square_of_its_length(plain):
 def test_a_cable_pulls_nothing_at_the_start_and_with_the_travel(plain):
     values, run = only("cable_pull", 3.0, "A1")
     travel = (plain.q_load[::SLOW, 0] - plain.q_load[0, 0]) / DEGREE
-    pull = run.force_N - plain.force_N
-    np.testing.assert_allclose(pull, 3.0 * travel[:, None] * np.array(values["direction"]), atol=1e-9)
-    assert np.abs(pull[0]).max() == 0.0
+    expected = 3.0 * travel[:, None] * np.array(values["direction"])
+    np.testing.assert_allclose(run.sensed_N - plain.sensed_N, expected, atol=1e-9)
+    np.testing.assert_array_equal(run.tip_mm, plain.tip_mm)  # a cable of the sensor's own bends no arm
+    assert np.abs(expected[0]).max() == 0.0
+    drum = driven(form(surroundings.cable_pull_at_the_tool, 3.0, 1, "A1")[1])
+    np.testing.assert_allclose(drum.force_N - plain.force_N, expected, atol=1e-9)
+    assert np.abs(drum.tip_mm - plain.tip_mm).max() > 0.0
     loop = driven(form(surroundings.cable_pull_that_rubs, 3.0, 1, "A1")[1]).force_N - plain.force_N
     along = loop @ np.array(values["direction"])
     up = (np.gradient(travel) > 1e-4) & (np.abs(travel - np.median(travel)) < 0.3)

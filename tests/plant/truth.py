@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from tests.plant import surface
 from tests.plant.instruments import Instruments
+from tests.plant.robot import Run
 
 SMOOTH_s = 0.1
 APART_s = 0.2
@@ -66,6 +68,14 @@ def sizes(per_run: list[dict], how: Instruments) -> dict[str, dict]:
         if name in ("tcp", "force"):
             out[name]["constant_share"] = _constant_share(change)
     return out
+
+
+def scan_size(acted: list[Run], bare: list[Run], how: Instruments) -> dict[str, float]:
+    """RMS of the change of the finished surfaces along their normals, and its ratio to a scan's noise."""
+    pairs = zip(acted, bare, strict=True)
+    change = np.concatenate([surface.change_mm(one, two) for one, two in pairs])
+    rms = float(np.sqrt(np.mean(change**2))) if len(change) else 0.0
+    return {"rms": rms, "ratio": rms / how.scan_mm}
 
 
 def _constant_share(change: np.ndarray) -> float:

@@ -73,7 +73,7 @@ def runout(draw: Draw):
             offsets = size * np.cos(2.0 * np.pi * np.arange(teeth) / teeth + phase)
             run.world = run.world.cutting(runout_mm=offsets)
 
-        return numbers(runout_mm=size), {"world": world}
+        return numbers(runout_mm=size, angle_deg=float(np.degrees(phase))), {"world": world}
 
     return None, at
 

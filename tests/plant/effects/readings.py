@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from tests.plant import memory
+from tests.plant import masses, memory
 from tests.plant.effects.depends import joint as joint_
 from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, STEP_s, fast, joint_torques
-from tests.plant.scene import DEGREE, GEAR_RATIO, GRAVITY_m_s2
+from tests.plant.scene import DEGREE, GEAR_RATIO
 
 GEAR = ("gear",)
 LINES = (2, 3, 4)  # pole pairs of a resolver on the motor
@@ -17,19 +17,24 @@ def _reads(run: Run, j: int, slow_rad: np.ndarray) -> None:
     run.q_load[:, j] += fast(run, slow_rad[:, None])[:, 0]
 
 
-TWIST = joint_("smooth", "own_torque", "force", links=GEAR)
+TWIST = joint_("smooth", "own_torque", "force", "acceleration", links=GEAR)
 
 
 @declare(
     LIBRARY, "joint", 1e-4, 3.0, signal="joint_load", needs=("cut", "q_load"), all_runs=True, depends=TWIST
 )
 def gear_twist(draw: Draw):
-    """The encoder behind the gear sees it twist, `size` in deg per kN·m of the joint's torque."""
+    """The encoder behind the gear sees it twist, `size` in deg per kN·m of the joint's torque.
+
+    The torque is that of the cut, of the arm's weight and of its inertia. The arm stands where its springs
+    let it stand: that the encoder sees a part of it moves nothing.
+    """
     name, j = draw.joint()
 
     def at(size):
         def sense(run: Run):
-            _reads(run, j, size * DEGREE * joint_torques(run)[:, j] / 1e6)
+            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
+            _reads(run, j, size * DEGREE * torque / 1e6)
 
         return numbers(deg_per_kNm=size), {"sense": sense}
 
@@ -46,7 +51,7 @@ def stiffening(torque: np.ndarray, knee: float) -> np.ndarray:
 
 @other_form("gear_twist")
 def gear_twist_that_stiffens(draw: Draw):
-    """A cubic spring: soft about zero torque, stiffer beyond."""
+    """A cubic spring under the cut, beside a weight that hangs straight on: soft at first, then stiffer."""
     name, j = draw.joint()
     knee_Nm = draw.log_uniform(100.0, 400.0) if j < 3 else draw.log_uniform(20.0, 80.0)
 
@@ -60,31 +65,17 @@ def gear_twist_that_stiffens(draw: Draw):
     return name, at
 
 
-def arm_torque_Nm(run: Run, j: int) -> np.ndarray:
-    """Torque of the arm's weight about a joint, less its first value; rough masses at half reach."""
-    q = run.q_load[::SLOW]
-    if j == 1:
-        torque = 1500.0 * np.cos(q[:, 1]) + 700.0 * np.cos(q[:, 1] + q[:, 2])
-    elif j == 2:
-        torque = 700.0 * np.cos(q[:, 1] + q[:, 2])
-    elif j == 4:
-        torque = 12.0 * GRAVITY_m_s2 * np.sin(q[:, 4])
-    else:
-        torque = np.zeros(len(q))
-    return torque - torque[0]
-
-
 @other_form("gear_twist")
-def gear_twist_with_weight(draw: Draw):
-    """Also of the weight that the joint carries, which changes with the pose; the rest lags a little."""
+def gear_twist_that_lags(draw: Draw):
+    """Rubber between gear and link: it gives way a little later than it is loaded."""
     name, j = draw.joint()
     tau_s = draw.log_uniform(0.005, 0.03)
 
     def at(size):
         def sense(run: Run):
-            torque = joint_torques(run)[:, j] / 1000.0 + arm_torque_Nm(run, j)
+            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
             late = memory.lag(torque, np.full(len(torque), tau_s), SLOW * STEP_s)
-            _reads(run, j, size * DEGREE * late / 1000.0)
+            _reads(run, j, size * DEGREE * late / 1e6)
 
         return numbers(deg_per_kNm=size, tau_s=tau_s), {"sense": sense}
 
@@ -134,13 +125,13 @@ ECCENTRIC = joint_("smooth", "own_angle")
 
 @declare(LIBRARY, "joint", 5e-4, 1.0, signal="tcp", all_runs=True, depends=ECCENTRIC)
 def joint_eccentricity(draw: Draw):
-    """The gear's last wheel does not run true: an error once a turn of the joint, none at its mark."""
+    """The gear's last wheel does not run true: an error once a turn of the joint."""
     name, j = draw.joint()
     phase = draw.uniform(0.0, 2.0 * np.pi)
 
     def at(size):
         def gear(run: Run):
-            run.q_load[:, j] += size * DEGREE * (np.sin(run.q_act[:, j] + phase) - np.sin(phase))
+            run.q_load[:, j] += size * DEGREE * np.sin(run.q_act[:, j] + phase)
 
         return numbers(amplitude_deg=size, phase=phase), {"gear": gear}
 
@@ -149,7 +140,7 @@ def joint_eccentricity(draw: Draw):
 
 @other_form("joint_eccentricity")
 def joint_eccentricity_of_two(draw: Draw):
-    """Once and twice a turn: eccentric and oval."""
+    """Once and twice a turn, eccentric and oval, and none at the mark at which it was mastered."""
     name, j = draw.joint()
     share, one, two = draw.uniform(0.3, 0.7), *draw.rng.uniform(0.0, 2.0 * np.pi, 2)
 

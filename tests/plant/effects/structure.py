@@ -4,17 +4,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.plant import arm as arms
-from tests.plant import memory
+from tests.plant import masses, memory
+from tests.plant.effects.depends import Depends
 from tests.plant.effects.depends import tip as tip_
 from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, fast, to_root
-from tests.plant.scene import DEGREE
+from tests.plant.scene import JOINTS
 
 BY_FORCE = tip_("smooth", "force")
 SHANK_mm = 16.0
 CARBIDE_N_mm2 = 600e3
 CORE = 0.7  # share of the full section's moment of area that flutes leave
-FOOT_mm = np.array([0.0, 0.0, -600.0])  # of the pedestal, in the robot's root
+ROOT_mm = np.zeros(3)  # the robot's own foot
+FOOT_mm = np.array([0.0, 0.0, -600.0])  # of a pedestal under it
+SEATS = ("A3", "A3", "A2", "A4", "A5", "A6")
 
 
 def free_length_mm(mm_per_kN: float) -> float:
@@ -64,82 +67,94 @@ def cutter_in_a_loose_holder(draw: Draw):
     return None, at
 
 
-@declare(LIBRARY, "compliance", 0.01, 10.0, signal="tcp", needs=("cut",), all_runs=True, depends=BY_FORCE)
+YIELDS = Depends("part", ("force", "force_by_place"), "smooth", ("part",))
+
+
+def _yields(run: Run, slow_mm: np.ndarray) -> None:
+    """The part stands aside by so much where it is cut, and is back when it is scanned; the tip stays."""
+    run.part_mm = run.part_mm + slow_mm
+
+
+@declare(
+    LIBRARY, "compliance", 0.01, 10.0, signal="scan", needs=("cut", "scan"), all_runs=True, depends=YIELDS
+)
 def fixture_compliance(draw: Draw):
-    """The fixture, with the tracker's reference on it, gives way under the reaction of the cut."""
+    """The fixture gives way under the force on the part, which is the reaction of that on the tool."""
     soft = draw.rng.uniform([0.3, 0.3, 0.05], [1.0, 1.0, 0.4])
 
     def at(size):
         def tip(run: Run):
-            along = run.force_N @ run.world.base.axes
-            run.tip_mm = run.tip_mm + fast(run, size / 1000.0 * soft * along)
+            _yields(run, -size / 1000.0 * soft * (run.force_N @ run.world.base.axes))
 
         return numbers(mm_per_kN=size * soft), {"tip": tip}
 
     return None, at
 
 
-@other_form("fixture_compliance", tip_("loop", "force_memory", "force"))
+@other_form(
+    "fixture_compliance", Depends("part", ("force_memory", "force", "force_by_place"), "loop", ("part",))
+)
 def fixture_that_rubs(draw: Draw):
     """Half of the way is held by friction under the clamps: a loop over the force."""
     soft, grip_N = draw.rng.uniform([0.3, 0.3, 0.05], [1.0, 1.0, 0.4]), draw.uniform(40.0, 120.0)
 
     def at(size):
         def tip(run: Run):
-            along = run.force_N @ run.world.base.axes
+            along = -run.force_N @ run.world.base.axes
             grip = np.full(len(along), grip_N)
             held = np.stack([memory.play(along[:, k].copy(), grip, 0.0) for k in range(3)], axis=1)
             held -= held[0]
-            run.tip_mm = run.tip_mm + fast(run, size / 1000.0 * soft * (0.5 * along + 0.5 * held))
+            _yields(run, size / 1000.0 * soft * (0.5 * along + 0.5 * held))
 
         return numbers(mm_per_kN=size * soft, grip_N=grip_N), {"tip": tip}
 
     return None, at
 
 
-def _tilted(run: Run, moment_Nmm: np.ndarray, rad_per_Nmm: np.ndarray) -> np.ndarray:
-    """Way of the tip, in `$BASE`, when the pedestal tilts about its foot under a moment."""
+def _tilted(run: Run, moment_Nmm: np.ndarray, rad_per_Nmm, foot_mm: np.ndarray) -> np.ndarray:
+    """Way of the tip, in `$BASE`, when what is under the robot tilts about a foot under a moment."""
     place = to_root(run.world, run.tip_mm)[::SLOW]
-    return np.cross(rad_per_Nmm * moment_Nmm, place - FOOT_mm) @ run.world.base.axes
+    return np.cross(rad_per_Nmm * moment_Nmm, place - foot_mm) @ run.world.base.axes
 
 
-def _about_foot(run: Run) -> np.ndarray:
-    """Moment of the cut about the pedestal's foot, N·mm."""
+def _cut_about(run: Run, foot_mm: np.ndarray) -> np.ndarray:
+    """Moment of the cut about a foot, N·mm."""
     place = to_root(run.world, run.tip_mm)[::SLOW]
-    return np.cross(place - FOOT_mm, run.force_N) + run.moment_Nmm
+    return np.cross(place - foot_mm, run.force_N) + run.moment_Nmm
 
 
-@declare(LIBRARY, "compliance", 1e-4, 0.3, signal="tcp", needs=("cut",), all_runs=True, depends=BY_FORCE)
+TILTS = tip_("smooth", "force_by_place", "force", "acceleration", "place")
+
+
+@declare(LIBRARY, "compliance", 1e-3, 5.0, signal="tcp", needs=("cut",), all_runs=True, depends=TILTS)
 def pedestal_compliance(draw: Draw):
-    """`size` in deg per kN·m about x and y at the foot, 600 mm under the robot; stiff about z."""
-    even = draw.uniform(0.6, 1.0)
+    """The robot tilts about its foot, `size` in mrad per kN·m: of the cut, of weight and of inertia."""
 
     def at(size):
-        soft = size * DEGREE / 1e6 * np.array([1.0, even, 0.0])
-
         def tip(run: Run):
-            run.tip_mm = run.tip_mm + fast(run, _tilted(run, _about_foot(run), soft))
+            moment = _cut_about(run, ROOT_mm) + masses.moment_about(run, ROOT_mm)
+            run.tip_mm = run.tip_mm + fast(run, _tilted(run, moment, size / 1e9, ROOT_mm))
 
-        return numbers(deg_per_kNm=[size, size * even, 0.0], foot_mm=FOOT_mm), {"tip": tip}
+        return numbers(mrad_per_kNm=size), {"tip": tip}
 
     return None, at
 
 
-@other_form("pedestal_compliance", tip_("smooth", "force", "place"))
-def pedestal_under_the_arm(draw: Draw):
-    """It also gives way under the arm's own weight as the arm reaches out and turns."""
-    even, arm_N = draw.uniform(0.6, 1.0), draw.uniform(3000.0, 8000.0)
+@other_form("pedestal_compliance", tip_("smooth", "force", "force_by_place"))
+def pedestal_that_also_shifts(draw: Draw):
+    """A frame 600 mm high: softer about one axis than the other; it also shears; the cut alone counts."""
+    even, shears = draw.uniform(0.6, 1.0), draw.uniform(0.1, 0.5)
 
     def at(size):
-        soft = size * DEGREE / 1e6 * np.array([1.0, even, 0.0])
+        soft = size / 1e9 * np.array([1.0, even, 0.0])
 
         def tip(run: Run):
-            middle = 0.5 * to_root(run.world, run.tip_mm)[::SLOW]  # of the arm's mass, on half of the way
-            weight = np.cross(middle, np.array([0.0, 0.0, -arm_N]))
-            weight -= np.cross(0.5 * run.world.base.origin_mm, np.array([0.0, 0.0, -arm_N]))
-            run.tip_mm = run.tip_mm + fast(run, _tilted(run, _about_foot(run) + weight, soft))
+            give = size * shears / 1000.0 * np.array([1.0, 1.0, 0.0])  # mm per N; a moment of 1 m lever is 1
+            shift = (give * run.force_N) @ run.world.base.axes
+            tilt = _tilted(run, _cut_about(run, FOOT_mm), soft, FOOT_mm)
+            run.tip_mm = run.tip_mm + fast(run, tilt + shift)
 
-        return numbers(deg_per_kNm=[size, size * even, 0.0], arm_N=arm_N), {"tip": tip}
+        return numbers(mrad_per_kNm=size, even=even, mm_per_kN=size * shears), {"tip": tip}
 
     return None, at
 
@@ -147,34 +162,44 @@ def pedestal_under_the_arm(draw: Draw):
 BY_ANGLE = tip_("smooth", "own_angle", "place", "constant")
 
 
-@declare(LIBRARY, "geometry", 5e-4, 0.3, signal="tcp", all_runs=True, depends=BY_ANGLE)
+@declare(LIBRARY, "geometry", 0.01, 5.0, signal="tcp", all_runs=True, depends=BY_ANGLE)
 def axis_parallelism(draw: Draw):
-    """A3 is not parallel to A2: all behind it is turned about the link's y (Hayati and Mirmirani 1985)."""
-    sign = draw.sign()
+    """An axis stands askew in its seat by `size` mrad: it and all that it carries is turned.
+
+    Turned about (axis before) x (axis); A3 is parallel to A2, so about (upper arm) x (axis), up where the arm
+    lies forward: the angle beta of Hayati and Mirmirani 1985 but for its sign.
+    """
+    name, sign = draw.target(SEATS), draw.sign()
 
     def at(size):
-        turn = Rotation.from_rotvec(-sign * size * DEGREE * arms.Z).as_matrix()
-
         def world(run: Run):
-            run.reshape.append(lambda arm: arms.crooked(arm, arms.ELBOW, turn))
+            run.reshape.append(lambda arm: _askew(arm, name, sign * size / 1000.0))
 
-        return numbers(b_deg=sign * size), {"world": world}
+        return numbers(mrad=sign * size), {"world": world}
 
-    return None, at
+    return name, at
+
+
+def _askew(arm: arms.Arm, name: str, angle_rad: float, twist_rad: float = 0.0) -> arms.Arm:
+    """The arm with an axis turned in its seat, and twisted about a line at right angles to that."""
+    j = JOINTS.index(name)
+    axis = arm.screws[j]
+    before = arms.X if j == arms.ELBOW else arm.screws[j - 1]
+    line = np.cross(before, axis)
+    vector = angle_rad * line + twist_rad * np.cross(axis, line)
+    return arms.crooked(arm, j, Rotation.from_rotvec(vector).as_matrix())
 
 
 @other_form("axis_parallelism")
 def axis_skew(draw: Draw):
-    """Tilted about the link's y and twisted about its x."""
-    sign, twist = draw.sign(), draw.uniform(0.4, 1.0) * draw.sign()
+    """Askew in both directions."""
+    name, sign, twist = draw.target(SEATS), draw.sign(), draw.uniform(0.4, 1.0) * draw.sign()
 
     def at(size):
-        vector = size * DEGREE * np.array([twist, 0.0, -sign])
-        turn = Rotation.from_rotvec(vector).as_matrix()
-
         def world(run: Run):
-            run.reshape.append(lambda arm: arms.crooked(arm, arms.ELBOW, turn))
+            both = (sign * size / 1000.0, twist * size / 1000.0)
+            run.reshape.append(lambda arm: _askew(arm, name, *both))
 
-        return numbers(b_deg=sign * size, a_deg=twist * size), {"world": world}
+        return numbers(mrad=sign * size, twist_mrad=twist * size), {"world": world}
 
-    return None, at
+    return name, at

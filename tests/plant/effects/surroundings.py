@@ -111,15 +111,18 @@ STAND_mm = np.array([[-2200.0, -1800.0, -200.0], [-1200.0, 1800.0, 900.0]])
 
 
 def _beam(run: Run, stand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions of the beam and its length over 2 m, (n, 1)."""
+    """Directions of the beam, and how far it reaches over the floor in units of 2 m, (n, 1).
+
+    A ray that climbs crosses the layers of air aslant: its sag is that of its level part.
+    """
     beam = run.tip_mm - stand
-    reach = np.linalg.norm(beam, axis=1, keepdims=True)
-    return beam / reach, reach / 2000.0
+    level = np.linalg.norm(beam[:, :2], axis=1, keepdims=True)
+    return beam / np.linalg.norm(beam, axis=1, keepdims=True), level / 2000.0
 
 
 @declare(LIBRARY, "sensor", 0.004, 2.0, signal="tcp", all_runs=True, depends=AIR)
 def tracker_refraction(draw: Draw):
-    """Warm air above cold bends the beam upwards by `size` mm at 2 m, with the square of its length.
+    """Warm air above cold bends the beam upwards by `size` mm at 2 m, with the square of its level length.
 
     Rays bend towards the denser air: sag = grad(n)·L²/2, grad(n) = -0.93e-6 per kelvin times the gradient.
     """
@@ -154,22 +157,42 @@ def tracker_refraction_that_wanders(draw: Draw):
     return None, at
 
 
+READ = force_("smooth", "travel", "own_angle")
 PULL = force_("smooth", "travel", "own_angle", links=("force", "mechanics"))
 
 
+def _travel_deg(run: Run, j: int) -> np.ndarray:
+    """Travel of a joint since the start at the slow samples."""
+    return (run.q_load[::SLOW, j] - run.q_load[0, j]) / DEGREE
+
+
 def _pulling(j: int, way: np.ndarray, law) -> dict:
-    """A force on the tool by the travel of a joint since the start, `law(travel in deg)` in N."""
+    """A force on the tool by the travel of a joint, `law(travel in deg)` in N; it bends the arm."""
 
     def load(run: Run):
-        travel = (run.q_load[::SLOW, j] - run.q_load[0, j]) / DEGREE
-        run.force_N = run.force_N + law(travel)[:, None] * way
+        run.force_N = run.force_N + law(_travel_deg(run, j))[:, None] * way
 
     return {"load": load}
 
 
-@declare(LIBRARY, "force", 0.02, 60.0, signal="force", all_runs=True, depends=PULL)
+@declare(LIBRARY, "force", 0.02, 60.0, signal="force", all_runs=True, depends=READ)
 def cable_pull(draw: Draw):
-    """A cable drum or hose pulls at the tool with the travel of a joint, `size` in N per degree."""
+    """The sensor's own cable pulls with the travel of a joint, `size` in N per degree along its axes."""
+    name, j = draw.joint()
+    way = draw.direction()
+
+    def at(size):
+        def sense(run: Run):
+            run.sensed_N = run.sensed_N + size * _travel_deg(run, j)[:, None] * way
+
+        return numbers(N_per_deg=size, direction=way), {"sense": sense}
+
+    return name, at
+
+
+@other_form("cable_pull", PULL)
+def cable_pull_at_the_tool(draw: Draw):
+    """A drum pulls at the tool along a line that stays in the hall, and bends the arm too."""
     name, j = draw.joint()
     way = draw.direction()
 
@@ -195,7 +218,7 @@ def cable_pull_that_rubs(draw: Draw):
     return name, at
 
 
-@other_form("cable_pull")
+@other_form("cable_pull", PULL)
 def cable_pull_that_tightens(draw: Draw):
     """A bow that straightens: the further, the harder."""
     name, j = draw.joint()
