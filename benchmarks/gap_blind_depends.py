@@ -81,6 +81,11 @@ def probabilities(entry: dict[str, Any], result: dict[str, Any]) -> list[tuple[f
     return [(each.probability, _compared(each, allowed).family) for each in _of_rest(result)]
 
 
+def says_family(cause: dict[str, Any], allowed: Allowed) -> bool:
+    """Tell whether a cause's own family is the right one at the right place."""
+    return any(_compared(each, allowed).family for each in _of_causes([cause]))
+
+
 def allowed_by(entry: dict[str, Any]) -> Allowed | None:
     """Return what the label of an effect allows, in the words of an answer."""
     depends = entry.get("depends")

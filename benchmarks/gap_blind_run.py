@@ -44,7 +44,7 @@ def fingerprint() -> str:
     """Return a digest of the code that a record depends on, tests apart."""
     digest = hashlib.sha256()
     for room in CODE:
-        for file in sorted((ROOT / room).rglob("*.py")):
+        for file in sorted((*(ROOT / room).rglob("*.py"), *(ROOT / room).rglob("*.json"))):
             if not file.name.startswith("test_"):
                 digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

@@ -50,10 +50,19 @@ def tested_of(result: dict[str, Any], truths: Sequence[Truth]) -> tuple[Tested, 
 def failed_tests(cause: dict[str, Any], result: dict[str, Any]) -> frozenset[str]:
     """Return the names of the tests that a cause failed; of one that was not named always at least one."""
     stated = cause.get("tests")
-    failed = _stated(stated) if stated else _read(cause, result)
+    failed = _stated(stated) if _says_passed(stated) else _read(cause, result)
     if not failed and cause["probability"] < NAMED:
         failed = {UNDECIDED}
     return frozenset(failed)
+
+
+def _says_passed(tests: Any) -> bool:
+    """Tell whether tests say what was passed; plain numbers are what a probability is made of."""
+    return bool(tests) and not (isinstance(tests, dict) and any(_is_number(each) for each in tests.values()))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _stated(tests: Any) -> set[str]:

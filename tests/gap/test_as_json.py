@@ -97,7 +97,7 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
 
 def test_keys_of_some_causes_and_links_are_left_out_and_others_are_null():
     plain_keys = ["effect", "target", "link", "probability", "parameters", "shrink", "rms_after"]
-    kind = ["family", "form_fits", "constant"]
+    kind = ["family", "family_probability", "form_fits", "constant", "tests"]
     assert list(plain(_cause())) == [*plain_keys, "indistinguishable_from", *kind]
     slip = plain(_cause(words="the run was at 50 % override"))
     assert list(slip) == [*plain_keys, "words", "indistinguishable_from", *kind]

@@ -18,7 +18,7 @@ JUDGEMENT = SimpleNamespace(link=GEAR, factor=10.0)
 
 
 def _rival(text, alike):
-    return SimpleNamespace(applied=applied(text)[0], alike=alike)
+    return SimpleNamespace(applied=applied(text)[0], alike=alike, behind_nats=1.0 if alike else 20.0)
 
 
 def _cause(rivals=(), rms_after=0.5):
@@ -39,9 +39,9 @@ def test_a_cause_has_the_unit_of_the_report_and_the_link_it_is_reported_in():
 def test_rivals_are_alike_or_have_a_probability():
     alike = [(_rival(f"mastering:target=A{n},offset_deg=1", True), 0.1) for n in range(1, 7)]
     found = cause_of(_cause([*alike, (_rival("base_frame:x_mm=1", False), 0.2)]), JUDGEMENT, "gear")
-    assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}") for n in range(1, 6))
+    assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}", 1.0) for n in range(1, 6))
     assert len(found.indistinguishable_from) == THRESHOLDS.tell.most_alike
-    assert found.rivals == (RivalResult("base_frame", None, 0.2),)
+    assert found.rivals == (RivalResult("base_frame", None, 0.2, 20.0),)
 
 
 def _slip(text, before=1.0, after=0.1, **more):

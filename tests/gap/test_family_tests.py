@@ -59,7 +59,6 @@ def test_a_right_form_passes_all_three():
     assert found.margin > 0.0
     assert found.form_ratio == pytest.approx(1.0, abs=0.02)
     assert found.other_share < 0.01
-    assert found.weight == 1.0
 
 
 def test_a_step_is_not_named_for_the_drift_that_imitates_it():
@@ -69,7 +68,6 @@ def test_a_step_is_not_named_for_the_drift_that_imitates_it():
     found = first_tests(form, drift, runs=1)
     assert found.better.on is Dependence.RUN_TIME_STEP
     assert not found.is_best
-    assert found.weight == 0.0
     result = judged(form, drift, runs=1)
     assert result.verdict == "unexplained"
     assert result.applied == ()
@@ -119,19 +117,17 @@ def test_an_effect_that_states_no_family_is_its_own():
     assert found.is_best
 
 
-def test_the_weight_falls_with_each_test():
+def test_each_test_alone_forbids_the_name():
     good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None)
     # most of what can be told, a hundredth of the gap
     hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None)
     assert hidden.passed
-    assert hidden.weight == 1.0
-    assert good.weight == 1.0
+    assert good.passed
     for worse in (
         FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None),
         FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None),
         FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None),
     ):
-        assert worse.weight == 0.0
         assert not worse.passed
 
 

@@ -74,23 +74,6 @@ class FamilyTests:
         """Tell whether the cause may be named."""
         return self.is_best and self.form_fits and self.is_alone
 
-    @property
-    def weight(self) -> float:
-        """Return what the probability of the cause is multiplied by, 0 to 1.
-
-        The least of three ramps, each a half at the limit of its test and 0 and 1 two widths before and
-        beyond it: monotone in every number. It is no probability yet; a calibrated table takes its place.
-        """
-        steps = (
-            (self.margin + _LIMITS.alike_nats) / _LIMITS.margin_width,
-            (self.form_ratio - _LIMITS.form_ratio) / _LIMITS.ratio_width,
-            max(
-                (_LIMITS.other_share - self.other_share) / _LIMITS.share_width,
-                (_LIMITS.other_power - self.other_power) / _LIMITS.share_width,
-            ),
-        )
-        return float(np.clip(0.5 + min(steps) / 4.0, 0.0, 1.0))
-
 
 def net_gain(evidence: Evidence) -> float:
     """Return twice the evidence: the gain minus what its numbers cost; 0 where it is not significant."""
@@ -157,6 +140,8 @@ class LinkFamilies:
             for number, out, study in zip(numbers, outs, self._outs, strict=True)
         )
         """Of each cause, in the order of `Examination.cause_numbers`."""
+        self.gap_p = tuple(study.p for study in self._outs)
+        """Of each cause: p of the best family's evidence with the cause taken out."""
 
     def beside(self, named: Collection[int]) -> Rest:
         """Return on what depends what is left beside the named causes alone, by their numbers."""
@@ -199,7 +184,7 @@ class LinkFamilies:
             margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
         rest = self.rest.study
         own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
-        near = [each for each in rest.evidences if _is_near(applied, each)]
+        near = [each for each in rest.evidences if is_near(applied, each)]
         other = max((each for each in near if not _is_of(applied, each)), key=net_gain, default=None)
         if other is not None and net_gain(other) <= own_rest:
             other = None  # its own family takes more of the same: it is of another form, not beside another
@@ -233,7 +218,7 @@ class LinkFamilies:
         return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
 
 
-def _is_near(applied: Applied, evidence: Evidence) -> bool:
+def is_near(applied: Applied, evidence: Evidence) -> bool:
     """Tell whether a family is where an effect acts; one in another joint does not speak against it."""
     place = evidence.place
     return place.component is None or applied.target not in JOINTS or place.name == applied.target

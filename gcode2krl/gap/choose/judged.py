@@ -7,9 +7,11 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.calibrated import probabilities_table
 from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
+from gcode2krl.gap.choose.features import Features
 from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.intervals import Interval
@@ -36,6 +38,12 @@ class Cause:
     constant: Constancy | None = None
     tests: FamilyTests | None = None
     """What families say of it; None where they were not asked."""
+    features: Features | None = None
+    """The results of all tests; None where none was made."""
+    family_probability: float | None = None
+    """That place and family are right; None where they were not asked."""
+    unknown_probability: float | None = None
+    """That the library lacks what is at work; None where that was not asked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +64,15 @@ class Judged:
     def told(self) -> Size:
         """Return the size that the answer states: a cause without a name takes nothing of the gap."""
         return self.size if self.size_with_named is None else self.size_with_named
+
+    @property
+    def unknown(self) -> float | None:
+        """Return the probability that the library lacks what is at work; None without a gap, or not asked."""
+        if self.verdict == "no_gap":
+            return None
+        if not self.causes:
+            return probabilities_table().unknown_without_cause
+        return max(self.causes, key=lambda cause: cause.probability).unknown_probability
 
     @property
     def applied(self) -> tuple[Applied, ...]:

@@ -9,13 +9,15 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.choose.calibrated import probabilities_table
 from gcode2krl.gap.choose.constancy import constancy_of
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.family_tests import NOTHING_LEFT, LinkFamilies, Rest
+from gcode2krl.gap.choose.features import HeldOut, features_of
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
-from gcode2krl.gap.choose.rivals import probabilities, rivals_of, unknown_probability
+from gcode2krl.gap.choose.rivals import rival_probabilities, rivals_of
 from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
 from gcode2krl.gap.fit.design import Question, nuisance_for
@@ -23,6 +25,8 @@ from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
+_LEAST_REST = 1e-6
+"""Of the gap: nobody takes a share of less."""
 
 
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
@@ -42,7 +46,7 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     else:
         sizes = [_size(found, traces, found.causes[:count]) for count in counts]
     whole = _size(found, traces, found.causes)
-    judged = _judgement(found, sizes, whole, families, bool(trials))
+    judged = _judgement(found, sizes, whole, families, trials)
     with_named = _size_with_named(judged, sizes, trials)
     return replace(judged, every=every, size_with_named=with_named)
 
@@ -141,7 +145,11 @@ def _trials(found: Examination, held: Sequence[Trace]) -> Iterator[_Trial]:
 
 
 def _judgement(
-    found: Examination, sizes: Sequence[Size], whole: Size, families: LinkFamilies, held_out: bool
+    found: Examination,
+    sizes: Sequence[Size],
+    whole: Size,
+    families: LinkFamilies,
+    trials: Sequence[_Trial],
 ) -> Judgement:
     """Return the judgement from the sizes of the gap with the first 0, 1, 2 … causes.
 
@@ -150,17 +158,15 @@ def _judgement(
     last = sizes[-1]
     # what is left on held-out data alone is what few runs do not settle of a cause's numbers
     left = last.significant and whole.significant
-    unknown = unknown_probability(last.share_left, left)
-    if len(found.causes) > _LIMITS.most_together:
-        unknown = max(unknown, 1.0 - _LIMITS.unsupported)
-    causes = sorted(_causes(found, sizes, unknown, families, held_out), key=lambda cause: -cause.probability)
+    every = replace(families.rest, is_sized=left)
+    causes = sorted(_causes(found, sizes, families, every, trials), key=lambda cause: -cause.probability)
     named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = left if named else sizes[0].significant
     rest = replace(families.beside(named), is_sized=is_sized)
-    is_left = left and last.share_left > _LIMITS.unknown_share
+    is_left = left and last.share_left >= THRESHOLDS.families.other_share
     is_gap = _is_gap(found, sizes[0], rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
-    return _of(found, verdict, tuple(causes), last, rest, held_out=held_out)
+    return _of(found, verdict, tuple(causes), last, rest, held_out=bool(trials))
 
 
 def _is_gap(found: Examination, size: Size, rest: Rest) -> bool:
@@ -178,44 +184,75 @@ def _verdict(named: bool, rest: bool, gap: bool) -> str:
 
 
 def _causes(
-    found: Examination, sizes: Sequence[Size], unknown: float, families: LinkFamilies, held_out: bool
+    found: Examination,
+    sizes: Sequence[Size],
+    families: LinkFamilies,
+    every: Rest,
+    trials: Sequence[_Trial],
 ) -> Iterator[Cause]:
-    """Yield the causes in the order in which they were accepted."""
+    """Yield the causes in the order in which they were accepted; ``every`` is what all of them leave."""
     intervals = intervals_of(found)
     for order, number in enumerate(found.cause_numbers):
-        rivals = rivals_of(found, number)
-        probability, others = probabilities(rivals, found.surprises[number], found.level, unknown)
-        shrink = max(0.0, sizes[order + 1].shrink - sizes[order].shrink)
-        if held_out and shrink < _least_shrink(found, sizes, order):
-            probability *= _LIMITS.unsupported
-        tests = families.tests[order]
+        tests, constant, rivals = families.tests[order], constancy_of(found, number), rivals_of(found, number)
+        features = features_of(
+            found,
+            number,
+            tests=tests,
+            rest=every,
+            gap_p=families.gap_p[order],
+            constant=constant,
+            parameters=intervals[number],
+            rivals=rivals,
+            held_out=_held_out(found, order, sizes, every, trials),
+        )
+        table = probabilities_table()
+        probability = table.name(features)
         yield Cause(
             applied=found.applied[number],
             link=found.link.name,
-            probability=probability * tests.weight,
+            probability=probability,
             parameters=intervals[number],
-            shrink=shrink if held_out else None,
+            shrink=max(0.0, sizes[order + 1].shrink - sizes[order].shrink) if trials else None,
             rms_after=sizes[order + 1].after ** 0.5,
-            rivals=tuple(zip(rivals, others, strict=True)),
-            constant=constancy_of(found, number),
+            rivals=tuple(zip(rivals, rival_probabilities(rivals, probability), strict=True)),
+            constant=constant,
             tests=tests,
+            features=features,
+            family_probability=table.family(features),
+            unknown_probability=table.unknown(features),
         )
 
 
-def _least_shrink(found: Examination, sizes: Sequence[Size], order: int) -> float:
-    """Return the share of the held-out gap that a cause must take to be named."""
-    least = _LIMITS.prune_share if _acts_where_others_do(found, order) else 0.0
-    return max(least, _LIMITS.least_share_of_rest * (1.0 - sizes[order].shrink))
+def _held_out(
+    found: Examination, order: int, sizes: Sequence[Size], every: Rest, trials: Sequence[_Trial]
+) -> HeldOut:
+    """Return what held-out data say of a cause, by its place in the order of acceptance."""
+    number = found.cause_numbers[order]
+    share_left = sizes[-1].share_left if every.is_sized else 0.0
+    if not trials:
+        return HeldOut(None, None, None, None, share_left)
+    before, after = sizes[order].shrink, sizes[order + 1].shrink
+    gone = max(0.0, after - before)
+    applied = found.applied[number]
+    folds = [trial for trial in trials if trial.chosen is not found]
+    agreeing = sum((applied.effect.name, applied.target) in trial.chosen.accepted_keys for trial in folds)
+    return HeldOut(
+        agreeing / len(folds) if folds else None,
+        gone / max(1.0 - before, _LEAST_REST),
+        gone if _acts_where_others_do(found, number) else 1.0,
+        sizes[-1].shrink,
+        share_left,
+    )
 
 
-def _acts_where_others_do(found: Examination, order: int) -> bool:
+def _acts_where_others_do(found: Examination, number: int) -> bool:
     """Tell whether a cause acts where those before it do: in the same joints, say.
 
-    Only there can it be what is left of their form. True of the first one.
+    Only there can it be what is left of their form. False of the first one.
     """
-    if order == 0:
-        return True
-    *before, number = found.cause_numbers[: order + 1]
+    before = [other for other in found.cause_numbers if other < number]
     rows = found.rows_changed(number)
+    if not before or not rows.any():
+        return False
     others = np.any([found.rows_changed(other) for other in before], axis=0)
-    return float(np.mean(others[rows])) > _LIMITS.together_share if rows.any() else True
+    return float(np.mean(others[rows])) > _LIMITS.together_share

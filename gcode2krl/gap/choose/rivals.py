@@ -1,4 +1,4 @@
-"""How probable each cause is: against no effect, its rivals, and something that the library does not have."""
+"""Other effects in place of a cause: how much worse each is, and which the data cannot tell from it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.effects import Applied
 from gcode2krl.gap.choose.examination import Examination, Key
+from gcode2krl.gap.choose.probability_table import declared_nats
 from gcode2krl.gap.choose.scoring import Score, scores
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.sensitivity import sensitivity_of
@@ -15,8 +16,6 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 _LIMITS = THRESHOLDS.choose
 _STEPS = 6
 """Half of a whole refit: a rival begins at its best linear fit."""
-_MOST_WORSE = -30.0
-"""A rival that is better than its cause by more than this has all the weight anyway."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +28,14 @@ class Rival:
     chi2_difference: float
 
     @property
+    def behind_nats(self) -> float:
+        """Return by how much the rival is worse, in nats; the smaller of both differences."""
+        return 0.5 * min(self.cost_difference, self.chi2_difference)
+
+    @property
     def alike(self) -> bool:
-        """Tell whether the data cannot tell the rival from the cause, by chi2 or with the numbers' cost."""
-        return min(self.cost_difference, self.chi2_difference) < _LIMITS.alike_chi2
+        """Tell whether the data cannot tell the rival from the cause: it belongs to the declared set."""
+        return self.behind_nats < declared_nats()
 
 
 def rivals_of(found: Examination, number: int) -> list[Rival]:
@@ -68,28 +72,14 @@ def _ranked(found: Examination, number: int) -> list[Score]:
     return sorted((score for score in scores(gram, columns) if score.within), key=lambda score: -score.gain)
 
 
-def unknown_probability(share_left: float, significant: bool) -> float:
-    """Return how probable it is that something outside the library is at work, from what is left."""
-    least = _LIMITS.least_unknown
-    if not significant:
-        return least
-    beyond = (share_left - _LIMITS.unknown_share) / _LIMITS.unknown_width
-    return float(np.clip(1.0 / (1.0 + np.exp(-beyond)), least, 1.0 - least))
+def rival_probabilities(rivals: Sequence[Rival], own: float) -> list[float]:
+    """Return the probability of each rival of a cause that has the probability ``own``.
 
-
-def probabilities(
-    rivals: Sequence[Rival], surprise: float, level: float, unknown: float
-) -> tuple[float, list[float]]:
-    """Return the probability of a cause and of each rival, given how surprising the cause is without it.
-
-    Rivals that the data cannot tell from the cause share its probability: theirs is the same one.
+    Rivals that the data cannot tell from the cause share its probability: theirs is the same one. Of what it
+    leaves the others have their shares by evidence, over the temperature as no model is exact.
     """
-    costs = np.maximum([0.0, *(rival.cost_difference for rival in rivals)], _MOST_WORSE)
-    weights = np.exp(-costs / (2.0 * _LIMITS.temperature))
-    none = 0.5 * float(np.exp(-max(surprise - level, 0.0)))
-    shares = weights / weights.sum() * (1.0 - unknown) * (1.0 - none)
-    alike = [0, *(i for i, rival in enumerate(rivals, start=1) if rival.alike)]
-    together = float(np.sum(shares[alike]))
-    return together, [
-        together if rival.alike else float(share) for rival, share in zip(rivals, shares[1:], strict=True)
-    ]
+    costs = np.maximum([rival.cost_difference for rival in rivals], 0.0)
+    apart = np.array([not rival.alike for rival in rivals], dtype=bool)
+    weights = np.where(apart, np.exp(-costs / (2.0 * _LIMITS.temperature)), 0.0)
+    shares = (1.0 - own) * weights / (1.0 + weights.sum())
+    return [own if rival.alike else float(share) for rival, share in zip(rivals, shares, strict=True)]

@@ -10,7 +10,7 @@ from gcode2krl.errors import Issue
 from gcode2krl.gap.choose.intervals import Interval
 
 SCHEMA = "gcode2krl/gap/1"
-_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals"})
+_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 

@@ -252,6 +252,7 @@ def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -
         significant=significant,
         structure="structured" if significant else "white",
         depends_on=tuple(families),
+        probability=largest.unknown,
     )
 
 

@@ -11,8 +11,8 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 def cause_of(cause: Cause, judgement: Judged, link: str) -> CauseResult:
     """Return a cause of a judged link; ``link`` is the name of that which it is reported in."""
     compared = cause.rivals or ()
-    alike = [rival.applied for rival, _ in compared if rival.alike]
-    others = [(rival.applied, probability) for rival, probability in compared if not rival.alike]
+    alike = [rival for rival, _ in compared if rival.alike]
+    others = [each for each in compared if not each[0].alike]
     return CauseResult(
         effect=cause.applied.effect.name,
         target=cause.applied.target,
@@ -23,15 +23,21 @@ def cause_of(cause: Cause, judgement: Judged, link: str) -> CauseResult:
         rms_after=None if cause.rms_after is None else judgement.factor * cause.rms_after,
         constant=cause.constant,
         indistinguishable_from=tuple(
-            EffectAt(applied.effect.name, applied.target) for applied in alike[: THRESHOLDS.tell.most_alike]
+            EffectAt(rival.applied.effect.name, rival.applied.target, rival.behind_nats)
+            for rival in alike[: THRESHOLDS.tell.most_alike]
         ),
         rivals=None
         if cause.rivals is None
         else tuple(
-            RivalResult(applied.effect.name, applied.target, probability) for applied, probability in others
+            RivalResult(
+                rival.applied.effect.name, rival.applied.target, probability, behind_nats=rival.behind_nats
+            )
+            for rival, probability in others
         ),
         family=_family(cause),
         form_fits=None if cause.tests is None else cause.tests.form_ratio,
+        family_probability=cause.family_probability,
+        tests=None if cause.features is None else cause.features.as_dict(),
     )
 
 

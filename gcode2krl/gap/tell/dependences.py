@@ -6,6 +6,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.choose.calibrated import probabilities_table
+from gcode2krl.gap.choose.features import FamilyFeatures, family_features
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.tell.result import DependsOnResult
@@ -33,26 +35,20 @@ def depends_on(judgement: Judgement) -> Iterator[DependsOnResult]:
     rest = judgement.rest
     if rest is None or judgement.verdict in ("no_gap", "explained") or not rest.worth_naming:
         return
-    evidences = rest.study.evidences
-    for evidence, probability in zip(evidences, _probabilities(evidences), strict=True):
-        if probability >= _LIMITS.least_probability:
-            yield _result(judgement, evidence, probability, rest.share(evidence))
+    features = [(each, family_features(rest, each)) for each in rest.study.evidences]
+    table = probabilities_table()
+    probabilities = [table.dependence(each) for _, each in features]
+    # one family is the right one
+    scale = max(sum(probabilities), 1.0)
+    told = zip(features, probabilities, strict=True)
+    for (evidence, each), probability in sorted(told, key=lambda entry: -entry[1]):
+        if probability / scale >= _LIMITS.least_probability:
+            yield _result(judgement, evidence, probability / scale, each)
 
 
-def _probabilities(evidences: tuple[Evidence, ...]) -> list[float]:
-    """Return the probability of each family: evidences over the best one's inflation, and what none is.
-
-    Like differences of chi2 they are divided by the temperature: no model is exact.
-    """
-    scale = evidences[0].inflation * THRESHOLDS.choose.temperature
-    nats = np.array([0.0, *(each.nats for each in evidences)]) / scale
-    weights = np.exp(nats - nats.max())
-    weights *= (1.0 - THRESHOLDS.choose.least_unknown) / weights.sum()
-    probabilities: list[float] = weights[1:].tolist()
-    return probabilities
-
-
-def _result(judgement: Judgement, evidence: Evidence, probability: float, share: float) -> DependsOnResult:
+def _result(
+    judgement: Judgement, evidence: Evidence, probability: float, features: FamilyFeatures
+) -> DependsOnResult:
     signals = evidence.signal
     is_step = evidence.on is Dependence.RUN_TIME_STEP
     largest = _largest(signals)
@@ -66,7 +62,8 @@ def _result(judgement: Judgement, evidence: Evidence, probability: float, share:
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
         probability=probability,
-        share=share,
+        share=features.share,
+        tests=features.as_dict(),
         at_time_s=None if moment is None else moment[1],
         run=None if moment is None else judgement.every[moment[0]].run,
         size=judgement.factor * float(np.linalg.norm(largest)),

@@ -127,6 +127,8 @@ class EffectAt:
 
     effect: str
     target: str | None
+    behind_nats: float | None = None
+    """By how much it is worse than the cause that it stands beside; None where that was not compared."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,8 @@ class RivalResult:
     effect: str
     target: str | None
     probability: float
+    behind_nats: float | None = None
+    """By how much it is worse than the cause."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +164,8 @@ class DependsOnResult:
     unit: str | None = None
     direction: tuple[float, ...] | None = None
     """Unit vector in ``$BASE`` of what moves the tip or is a force."""
+    tests: Mapping[str, float | None] | None = None
+    """Name -> number: what its probability is made of (`choose.features.FamilyFeatures`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,9 +217,13 @@ class CauseResult:
     """None where no other effect was compared with it."""
     family: str | None = None
     """Where and on what it depends, ``A2, reversals``."""
+    family_probability: float | None = None
+    """That place and family are right; at least that of the name."""
     form_fits: float | None = None
     """The gain of its form over that of the best function of what it depends on."""
     constant: Constancy | None = None
+    tests: Mapping[str, float | None] | None = None
+    """Name -> number: what its probability is made of (`choose.features.Features`); None where not tested."""
 
     @property
     def is_named(self) -> bool:
@@ -231,6 +241,8 @@ class Unexplained:
     """structured, white or unknown."""
     depends_on: tuple[DependsOnResult, ...] = ()
     """The most probable first; empty where nothing significant is left."""
+    probability: float | None = None
+    """That the library lacks what is at work in the largest gap; None without a gap."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -98,27 +98,12 @@ class ChooseThresholds:
         0.7, DEVELOPMENT, "the same of a rival that is not proportional to its size"
     )
     rival_gain: float = calibrated(15.0, DEVELOPMENT, "a rival within this gain of the cause is refitted")
-    unknown_share: float = calibrated(
-        0.15, DEVELOPMENT, "of the structured gap: a larger rest is more than the form of an effect is off by"
-    )
-    unknown_width: float = calibrated(
-        0.03, DEVELOPMENT, "of the step from certainly known to unknown at `unknown_share`"
-    )
-    least_unknown: float = convention(0.02, "probability that is always left to what the library lacks")
+    least_unknown: float = convention(0.02, "no probability is nearer to 0 or 1: nothing is certain")
 
     # Naming
     named: float = convention(0.5, "probability from which on a cause is named")
-    most_together: int = calibrated(
-        2, DEVELOPMENT, "more effects in one link at once imitate something that the library lacks"
-    )
-    least_share_of_rest: float = calibrated(
-        0.4, DEVELOPMENT, "of what the causes above it leave on held-out data: less does not name a cause"
-    )
     together_share: float = convention(
         0.5, "of an effect's data: from here on it acts where the effects before it do"
-    )
-    unsupported: float = calibrated(
-        0.4, DEVELOPMENT, "multiplies the probability of a cause that held-out data do not support"
     )
 
     # Intervals, as half-widths of 90 %

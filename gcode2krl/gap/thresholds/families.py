@@ -61,9 +61,6 @@ class FamilyThresholds:
     alike_nats: float = convention(
         4.6, "log 100: data that favour one of two families by less do not tell them apart"
     )
-    margin_width: float = convention(2.0, "nats of the step from named to not at `alike_nats`")
-    ratio_width: float = convention(0.01, "of the step from named to not at `form_ratio`")
-    share_width: float = convention(0.005, "of the step from named to not at `other_share`")
 
     # The answer
     least_probability: float = convention(0.05, "a less probable family is not listed")
