@@ -257,8 +257,8 @@ def cost(records: Sequence[dict[str, Any]]) -> str:
         told.append(f"{name} {sum(each.settled for each in mine)}/{len(mine)} ({own_s:.0f} s)")
     whole_s = sum(each.cpu_s for each in drives)
     return (
-        f"Processor seconds: {whole_s:.0f} for {len(drives)} runs of {len(records)} cases. Programs asked for, "
-        f"settled of how many, seconds each: {', '.join(told) or 'none'}."
+        f"Processor seconds: {whole_s:.0f} for {len(drives)} runs of {len(records)} cases. Of each program "
+        f"asked for how many settled it, and seconds: {', '.join(told) or 'none'}."
     )
 
 

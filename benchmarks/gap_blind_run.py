@@ -21,6 +21,8 @@ CODE = ("gcode2krl/effects", "gcode2krl/gap", "gcode2krl/runs", "gcode2krl/predi
 """What a record depends on: folders below the checkout."""
 PLANT_KINDS = {"pair": "double"}
 """Kinds that the plant has under another name."""
+CLEAR = ("open", "deleted", "missing")
+"""Kinds of which only what shows is scored, so that it is asked for."""
 LARGEST_RATIO = 4.0
 """The plant's effects are at most so many times as large as the noise."""
 NOT_PREDICTED = ("other_program",)
@@ -76,7 +78,7 @@ def drawn(case: Case) -> tuple[Plan, dict[str, Any]]:
     """Return the plant's plan of a case, and what its label says beside it."""
     kind = PLANT_KINDS.get(case.kind, case.kind)
     plan, more = plan_of(kind, case.seed, case.effect, case.form)
-    if case.kind == "deleted":  # 0.25 ... 4 times the noise become 1 ... 4: only what shows is scored
+    if case.kind in CLEAR:  # 0.25 ... 4 times the noise become 1 ... 4
         plan = replace(plan, ratio=(LARGEST_RATIO * plan.ratio) ** 0.5)
     made_with = {"kind": kind, "seed": case.seed, "effect": case.effect, "form": case.form}
     return plan, {"kind": case.kind, "made_with": made_with, **more}

@@ -1,15 +1,16 @@
 """Which thresholds decide a name, and what the check says when each is halved and doubled.
 
 ``list`` prints all thresholds of the diagnosis with kind, seeds and reason; ``make FOLDER`` stores
-calibration cases; ``screen FOLDER`` halves and doubles every threshold on a few of them and ranks the
-thresholds by how many answers change; ``table FOLDER`` prints the figures of all stored cases for the ten
-that matter most. Each setting is a process of its own, in which the thresholds are replaced before the
-diagnosis is loaded.
+calibration cases, ``take FOLDER --check OTHER`` those that a check has kept, with their answers;
+``screen FOLDER`` halves and doubles every calibrated threshold on a few of them and ranks the thresholds by
+how many answers change; ``table FOLDER`` prints the figures of all stored cases for the ten that matter most.
+Each setting is a process of its own, in which the thresholds are replaced before the diagnosis is loaded.
 """
 
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -38,10 +39,12 @@ ENVIRONMENT = dict.fromkeys(
 
 def arguments(given: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gap_thresholds.py", description=__doc__.split("\n")[0])
-    parser.add_argument("what", choices=("list", "make", "screen", "table"))
+    parser.add_argument("what", choices=("list", "make", "take", "screen", "table"))
     parser.add_argument("folder", type=Path, nargs="?", help="stored cases and answers")
     parser.add_argument("--cases", type=int, default=0, help="make: how many; else: only the first ones")
     parser.add_argument("--seed", type=int, default=1, help="make: first seed, of calibration cases")
+    parser.add_argument("--check", type=Path, help="take: folder of gap_blind.py --keep --resume")
+    parser.add_argument("--kind", default="calibrated", help="screen: of this kind alone; empty: all")
     parser.add_argument("--names", default="", help="room.name, joined by commas: these thresholds alone")
     parser.add_argument("--jobs", type=int, default=2, help="processes, one thread each")
     return parser.parse_args(given)
@@ -85,6 +88,51 @@ def make(folder: Path, count: int, seed: int) -> None:
     say(f"{len(cases)} cases in {folder}")
 
 
+def take(folder: Path, check: Path, count: int) -> None:
+    """Store cases of a check that kept their runs, and its answers where this code gave them.
+
+    Raises ValueError where it kept none, or where they are scored ones.
+    """
+    answers: dict[str, Any] = {}
+    code = fingerprint()
+    records = [
+        json.loads(file.read_text(encoding="utf-8")) for file in sorted((check / "results").glob("*.json"))
+    ]
+    kept = [each for each in records if (check / "cases" / _name(each) / "case").exists()]
+    if not kept:
+        raise ValueError(f"{check}: no kept runs; make them with gap_blind.py --keep --resume {check}")
+    if scored := [_name(each) for each in kept if each["case"]["seed"] >= SCORED_FROM]:
+        raise ValueError(f"{scored[0]}: scored cases set no thresholds")
+    for record in _mixed(kept)[: count or None]:
+        name, case = _name(record), record["case"]
+        shutil.copytree(check / "cases" / name / "case", folder / "cases" / name, dirs_exist_ok=True)
+        label = {"case": {key: case[key] for key in ("seed", "kind", "without")}, "label": record["label"]}
+        _label_file(folder, name).parent.mkdir(exist_ok=True)
+        _label_file(folder, name).write_text(json.dumps(label), encoding="utf-8")
+        if record["code"] == code:
+            answers[name] = {key: record[key] for key in ("result", "error")} | {
+                "cpu_s": record.get("diagnosis_cpu_s", 0.0)
+            }
+    if answers:
+        _keep(folder, BASE, code, answers)
+    say(f"{len(list((folder / 'labels').glob('*.json')))} cases in {folder}, {len(answers)} with answers")
+
+
+def _name(record: dict[str, Any]) -> str:
+    return f"{record['case']['kind']}-{record['case']['seed']:05d}"
+
+
+def _mixed(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the records with their kinds in turn."""
+    turn: dict[str, int] = {}
+    order = []
+    for record in records:
+        kind = record["case"]["kind"]
+        turn[kind] = turn.get(kind, 0) + 1
+        order.append(turn[kind])
+    return [record for _, record in sorted(zip(order, records, strict=True), key=lambda pair: pair[0])]
+
+
 def _label_file(folder: Path, name: str) -> Path:
     return folder / "labels" / f"{name}.json"
 
@@ -105,16 +153,33 @@ def stored(folder: Path, most: int) -> dict[str, dict[str, Any]]:
 
 def judgements(folder: Path, cases: dict[str, dict[str, Any]], setting: Setting) -> dict[str, Judged]:
     """Return the judgement of each case under a setting; answers that this code gave already are kept."""
-    file = folder / "answers" / f"{setting}.json"
+    file = _answers_file(folder, setting)
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     code = fingerprint()
     answers = kept.get("answers", {}) if kept.get("code") == code else {}
     wanted = {name: case for name, case in cases.items() if name not in answers}
     if wanted:
         answers |= _asked(folder, wanted, setting)
-        file.parent.mkdir(exist_ok=True)
-        file.write_text(json.dumps({"code": code, "answers": answers}), encoding="utf-8")
+        _keep(folder, setting, code, answers)
     return {name: judge({**case, **answers[name]}) for name, case in cases.items()}
+
+
+def _answers_file(folder: Path, setting: Setting) -> Path:
+    return folder / "answers" / f"{setting}.json"
+
+
+def _keep(folder: Path, setting: Setting, code: str, answers: dict[str, Any]) -> None:
+    file = _answers_file(folder, setting)
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(json.dumps({"code": code, "answers": answers}), encoding="utf-8")
+
+
+def told_cost(folder: Path, cases: Sequence[str], count: int) -> str:
+    """Return what so many settings will take, by the stored answers of the thresholds as they are."""
+    answers = json.loads(_answers_file(folder, BASE).read_text(encoding="utf-8"))["answers"]
+    own_s = sum(answers[name].get("cpu_s", 0.0) for name in cases)
+    whole_min = count * own_s / 60.0
+    return f"{count} settings of {len(cases)} cases, {own_s:.0f} s each: {whole_min:.0f} min of a core"
 
 
 def _asked(folder: Path, cases: dict[str, dict[str, Any]], setting: Setting) -> dict[str, Any]:
@@ -135,13 +200,15 @@ def _asked(folder: Path, cases: dict[str, dict[str, Any]], setting: Setting) -> 
     return answers
 
 
-def settings(names: Sequence[str]) -> list[Setting]:
-    """Return half and twice of each threshold that is a number; of these names alone where any are given."""
+def settings(names: Sequence[str], kind: str = "") -> list[Setting]:
+    """Return half and twice of each threshold that is a number; of these names or this kind if given."""
     found = [
         Setting(each.room, each.name, factor)
         for each in thresholds()
         for factor in FACTORS
-        if (not names or f"{each.room}.{each.name}" in names) and Setting.applies(each.value, factor)
+        if (not names or f"{each.room}.{each.name}" in names)
+        and kind in ("", each.kind.value)
+        and Setting.applies(each.value, factor)
     ]
     if names and (unknown := set(names) - {f"{each.room}.{each.name}" for each in found}):
         raise ValueError(f"no threshold that is a number: {', '.join(sorted(unknown))}")
@@ -167,12 +234,14 @@ def changed(before: dict[str, Judged], after: dict[str, Judged]) -> int:
 # figures ----------------------------------------------------------------------------------------------------
 
 
-def screen(folder: Path, most: int, names: Sequence[str], jobs: int) -> list[str]:
+def screen(folder: Path, most: int, names: Sequence[str], jobs: int, kind: str = "") -> list[str]:
     """Rank the thresholds by how many answers change, keep and return the order."""
     cases = stored(folder, most)
     base = judgements(folder, cases, BASE)
     counts: dict[str, int] = {}
-    for setting, judged in compared(folder, cases, settings(names), jobs):
+    asked = settings(names, kind)
+    say(told_cost(folder, list(cases), len(asked)))
+    for setting, judged in compared(folder, cases, asked, jobs):
         key = f"{setting.room}.{setting.name}"
         counts[key] = counts.get(key, 0) + changed(base, judged)
     order = sorted(counts, key=lambda key: -counts[key])
@@ -187,6 +256,7 @@ def print_table(folder: Path, most: int, names: Sequence[str], jobs: int) -> Non
     base = judgements(folder, cases, BASE)
     head = ("threshold", "value", "", "false alarms", "declared", "wrong name", "flagged", "pairs", "changed")
     rows = [("as it is", "", "", *_figures(base), "")]
+    say(told_cost(folder, list(cases), len(settings(names))))
     values = {f"{each.room}.{each.name}": each.value for each in thresholds()}
     for setting, judged in compared(folder, cases, settings(names), jobs):
         key, count = f"{setting.room}.{setting.name}", changed(base, judged)
@@ -225,8 +295,12 @@ def main(given: Sequence[str] | None = None) -> int:
     try:
         if options.what == "make":
             make(options.folder, options.cases or 40, options.seed)
+        elif options.what == "take":
+            if options.check is None:
+                raise ValueError("take needs --check FOLDER")
+            take(options.folder, options.check, options.cases)
         elif options.what == "screen":
-            screen(options.folder, options.cases, names, options.jobs)
+            screen(options.folder, options.cases, names, options.jobs, "" if names else options.kind)
         else:
             order = options.folder / "order.json"
             if not names and not order.exists():

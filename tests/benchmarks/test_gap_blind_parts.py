@@ -38,6 +38,18 @@ def test_overlap_by_either_definition():
     told = [{"run": "run-1", "signal": "tcp", "t_start_s": 1.0, "t_end_s": 3.0}]
     assert places.overlap(wide, told, places.OWN) == pytest.approx(1.0)
     assert places.overlap(wide, told, places.NOISE) == pytest.approx(0.5)
+
+
+def test_the_worst_stretches_are_those_above_all_together():
+    def stretch(start, rms):
+        return {"run": "run-1", "signal": "tcp", "t_start_s": start, "t_end_s": start + 1.0, "rms": rms}
+
+    told = [stretch(0.0, 3.0), stretch(2.0, 1.0), stretch(4.0, 1.0)]  # together 1.91
+    assert places.worst_of(told) == told[:1]
+    assert places.worst_of([stretch(0.0, 2.0), stretch(2.0, 2.0)]) == [stretch(0.0, 2.0), stretch(2.0, 2.0)]
+    bare = [{key: value for key, value in each.items() if key != "rms"} for each in told]
+    assert places.worst_of(bare) == bare
+    assert places.worst_of([]) == []
     assert places.overlap(effect(above_noise=[]), told, places.NOISE) is None
     assert places.overlap(effect("base_frame"), told) is None  # acts everywhere
 

@@ -26,6 +26,28 @@ def test_false_alarms_by_what_is_foreign():
     assert foreign.figure.startswith("0.500 (<= ")
     assert foreign.worst == "tracker random_walk 1/1"
     assert made["  any of them with a named cause"].figure.startswith("0.250")
+    assert made["  all effect-free cases"].figure.startswith("0.500 (<= ")
+
+
+def test_each_kind_of_noise_and_each_law_has_a_line():
+    noise = [{"channel": "tracker", "kind": "pink"}, {"channel": "force", "kind": "hum"}]
+    wide = {"mismatch_law": {"shape": "beta", "scale": 1.5}}
+    records = [
+        record(kind="null_foreign_noise", verdict="unexplained", label={"foreign_noise": noise}),
+        record(kind="null_foreign_noise", label={"foreign_noise": noise[:1]}),
+        record(kind="null_foreign_mismatch", causes=[cause()], label=wide),
+        record(kind="null"),
+    ]
+    told = tables.report([score.judge(each) for each in records], [], "four cases")
+    assert "| tracker pink | 1/2 (<= 0.975) | unexplained 1" in told
+    assert "| force hum    | 1/1 (<= 1.000) | unexplained 1" in told
+    assert "| 1.5 x beta   | 1/1 (<= 1.000) | backlash A2 1" in told
+
+
+def test_what_a_case_costs_beside_the_diagnosis():
+    timed = record(kind="null") | {"diagnosis_cpu_s": 6.0, "plant_cpu_s": 1.0, "beside_cpu_s": 1.0}
+    told = tables.report([score.judge(timed)], [], "one case")
+    assert "mean: plant 1.00, diagnosis 6.00, oracle and simple methods 1.00: 25 % of a case" in told
 
 
 def test_forms_stand_apart_and_small_effects_do_not_count():

@@ -101,6 +101,46 @@ def test_stored_answers_of_this_code_are_not_asked_again(tmp_path, monkeypatch):
     assert asked == ["null-00001", "null-00001"]
 
 
+def test_cases_of_a_check_are_taken_with_their_answers(tmp_path, monkeypatch, capsys):
+    check, folder = tmp_path / "check", tmp_path / "thresholds"
+    monkeypatch.setattr(tool, "fingerprint", lambda: "this code")
+    monkeypatch.setattr(tool, "_asked", lambda *_: pytest.fail("asked again"))
+    with pytest.raises(ValueError, match="--keep"):
+        tool.take(folder, check, 0)
+    for kind, seed, code in (("null", 1, "this code"), ("null", 2, "this code"), ("open", 3001, "other")):
+        made = record(kind=kind) | {"code": code, "diagnosis_cpu_s": 6.0}
+        made["case"] |= {"seed": seed, "without": []}
+        (check / "results").mkdir(parents=True, exist_ok=True)
+        file = check / "results" / f"{kind}-{seed:05d}.json"
+        file.write_text(json.dumps(made), encoding="utf-8")
+        (check / "cases" / file.stem / "case" / "run-1").mkdir(parents=True)
+    assert tool.main(["take", str(folder), "--check", str(check), "--cases", "2"]) == 0
+    assert "2 cases" in capsys.readouterr().err
+    assert set(tool.stored(folder, 0)) == {"null-00001", "open-03001"}  # kinds in turn
+    assert (folder / "cases" / "open-03001" / "run-1").is_dir()
+    null = {"null-00001": tool.stored(folder, 0)["null-00001"]}
+    assert tool.judgements(folder, null, changed.BASE)["null-00001"].exact  # the check's own answer
+    assert tool.told_cost(folder, ["null-00001"], 20) == "20 settings of 1 cases, 6 s each: 2 min of a core"
+    assert tool.main(["take", str(folder)]) == 2
+
+
+def test_scored_cases_are_not_taken(tmp_path):
+    made = record(kind="null") | {"code": "a"}
+    made["case"] |= {"seed": 30000, "without": []}
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "null-30000.json").write_text(json.dumps(made), encoding="utf-8")
+    (tmp_path / "cases" / "null-30000" / "case").mkdir(parents=True)
+    with pytest.raises(ValueError, match="scored cases set no thresholds"):
+        tool.take(tmp_path / "thresholds", tmp_path, 0)
+
+
+def test_the_screen_is_of_one_kind():
+    every, calibrated = tool.settings([]), tool.settings([], "calibrated")
+    assert 10 < len(calibrated) < len(every)
+    kinds = {(each.room, each.name): each.kind.value for each in changed.thresholds()}
+    assert {kinds[each.room, each.name] for each in calibrated} == {"calibrated"}
+
+
 def test_a_few_stored_cases_are_of_all_kinds(tmp_path):
     (tmp_path / "labels").mkdir()
     for name in ("null-00001", "null-00002", "open-03001", "single-01001", "single-01002"):

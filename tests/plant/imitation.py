@@ -19,7 +19,9 @@ CLOSE = 1.0  # times the noise; what is left over of a stand-in is at most this
 def stand_ins(
     changes: list[dict], bare: list[dict], days: tuple[Day, ...], main: str, how: Instruments
 ) -> list[dict]:
-    """Stand-ins with what they leave over, the best first; of effects that tracker or force sensor see."""
+    """Stand-ins with what they leave over, the best first, where tracker, force sensor or motor see it."""
+    if main == "joint_actual":
+        return _close({"servo_lag": _lagging(changes, bare)}, main, how)
     if main not in ("tcp", "force"):
         return []
     table = "tracker" if main == "tcp" else "force"
@@ -39,6 +41,24 @@ def stand_ins(
             "force_offset": _left(change, _along(np.ones(len(change)))),
             "force_drift": _left(change, _along(hours)),
         }
+    return _close(fits, main, how)
+
+
+def _lagging(changes: list[dict], bare: list[dict]) -> float:
+    """RMS that a lag of one joint leaves, at the joint that changes most."""
+    change = np.concatenate([run["joint_actual"][1] for run in changes])
+    change = change - change.mean(axis=0)
+    j = int(np.argmax(np.mean(change**2, axis=0)))
+    rates = []
+    for run, change_of_run in zip(bare, changes, strict=True):
+        t, n = run["controller"]["t_s"], len(change_of_run["joint_actual"][0])
+        rates.append(np.gradient(run["controller"][f"q{j + 1}_cmd_deg"], t)[:n])
+    rate = np.concatenate(rates)
+    return _left(change[:, j], np.stack([rate, np.ones(len(rate))], axis=1))
+
+
+def _close(fits: dict[str, float], main: str, how: Instruments) -> list[dict]:
+    """Those that leave no more than the noise."""
     noise = truth.noise_of(main, how)
     out = [{"effect": name, "left_over": float(rms / noise)} for name, rms in fits.items()]
     return sorted((s for s in out if s["left_over"] <= CLOSE), key=lambda s: s["left_over"])
@@ -50,6 +70,12 @@ def _of_places(change, place, hours, since) -> dict[str, float]:
         "tool_frame": _left(change, _along(np.ones(len(change)))),
         "tracker_drift": _left(change, _along(hours)),
         "thermal": min(_left(change, _along(-np.expm1(-hours / t))) for t in TIMES_h),
+        "tool_frame and thermal": min(
+            _left(
+                change, np.concatenate([_along(np.ones(len(change))), _along(-np.expm1(-hours / t))], axis=2)
+            )
+            for t in TIMES_h
+        ),
         "spindle_growth": min(_left(change, _along(-np.expm1(-since / t))[:, :, 2:]) for t in TIMES_s),
     }
 

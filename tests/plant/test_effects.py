@@ -21,6 +21,7 @@ FORMS = [
 ]
 NO_MATTER_OF_DEGREE = {  # a stop, a skew, another curve or window is there or is not
     "advance_stop",
+    "advance_stop_anywhere",
     "advance_crawl",
     "clock",
     "corner_of_fourth_degree",

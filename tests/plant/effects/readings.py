@@ -120,7 +120,7 @@ def encoder_lissajous(draw: Draw):
     return name, at
 
 
-ECCENTRIC = joint_("smooth", "own_angle")
+ECCENTRIC = joint_("smooth", "own_angle", "constant")
 
 
 @declare(LIBRARY, "joint", 5e-4, 1.0, signal="tcp", all_runs=True, depends=ECCENTRIC)

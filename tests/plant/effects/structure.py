@@ -123,7 +123,7 @@ def _cut_about(run: Run, foot_mm: np.ndarray) -> np.ndarray:
     return np.cross(place - foot_mm, run.force_N) + run.moment_Nmm
 
 
-TILTS = tip_("smooth", "force_by_place", "force", "acceleration", "place")
+TILTS = tip_("smooth", "force_by_place", "force", "acceleration", "place", "constant")
 
 
 @declare(LIBRARY, "compliance", 1e-3, 5.0, signal="tcp", needs=("cut",), all_runs=True, depends=TILTS)

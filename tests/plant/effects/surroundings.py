@@ -157,8 +157,8 @@ def tracker_refraction_that_wanders(draw: Draw):
     return None, at
 
 
-READ = force_("smooth", "travel", "own_angle")
-PULL = force_("smooth", "travel", "own_angle", links=("force", "mechanics"))
+READ = force_("smooth", "travel", "own_angle", "place")
+PULL = force_("smooth", "travel", "own_angle", "place", links=("force", "mechanics"))
 
 
 def _travel_deg(run: Run, j: int) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Clocks, the time law, corners, unexpected stops, the servo's lag."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -102,20 +103,39 @@ def blended_rows(run: Run, count: int, seed: int) -> np.ndarray:
     return rows[np.sort(pick)]
 
 
-@declare(LIBRARY, "timing", 0.02, 0.5, signal="tcp")
-def advance_stop(draw: Draw):
-    count, seed = int(draw.rng.integers(1, 4)), int(draw.rng.integers(1 << 30))
+def spread_rows(run: Run, count: int) -> np.ndarray:
+    """Rows of the waypoints that are passed without a stop: the middle one of each of so many equal parts."""
+    rows = np.flatnonzero(run.way.cdis_mm > 0.0)
+    return rows[((np.arange(count) + 0.5) * len(rows) / count).astype(int)]
+
+
+def _stopping(count: int, rows_of) -> Callable:
+    """Exact stops at the rows that `rows_of(run)` gives."""
 
     def at(size):
         def world(run: Run):
-            rows = blended_rows(run, count, seed)
+            rows = rows_of(run)
             cdis, hold = run.way.cdis_mm.copy(), run.way.hold_s.copy()
             cdis[rows], hold[rows] = 0.0, size
             run.way = replace(run.way, cdis_mm=cdis, hold_s=hold)
 
         return numbers(count=count, hold_s=size), {"world": world}
 
-    return None, at
+    return at
+
+
+@declare(LIBRARY, "timing", 0.02, 0.5, signal="tcp")
+def advance_stop(draw: Draw):
+    """The advance run stops every so many corners, as a command between them makes it do."""
+    count = int(draw.rng.integers(1, 4))
+    return None, _stopping(count, lambda run: spread_rows(run, count))
+
+
+@other_form("advance_stop")
+def advance_stop_anywhere(draw: Draw):
+    """At corners that nothing foretells: the interpreter was busy."""
+    count, seed = int(draw.rng.integers(1, 4)), int(draw.rng.integers(1 << 30))
+    return None, _stopping(count, lambda run: blended_rows(run, count, seed))
 
 
 @other_form("advance_stop")

@@ -14,7 +14,7 @@ from tests.plant.robot import Run, STEP_s
     UNKNOWN,
     "joint",
     1e-3,
-    100.0,
+    3.0,
     signal="tcp",
     all_runs=True,
     depends=joint_("periodic", "acceleration", "tone"),

@@ -11,7 +11,7 @@ from tests.plant.effects.registry import UNKNOWN, Draw, declare, numbers
 from tests.plant.robot import Run
 
 
-@declare(UNKNOWN, "geometry", 0.001, 5.0, signal="tcp", all_runs=True, depends=tip_("smooth", "time_smooth"))
+@declare(UNKNOWN, "geometry", 0.001, 1.0, signal="tcp", all_runs=True, depends=tip_("smooth", "time_smooth"))
 def crane_passes(draw: Draw):
     number, at_s, width_s = int(draw.rng.integers(3)), draw.uniform(4.0, 9.0), draw.uniform(0.8, 2.5)
     way = draw.direction() * np.array([0.5, 0.5, 1.0])

@@ -14,7 +14,7 @@ from tests.plant.robot import Run
     UNKNOWN,
     "geometry",
     0.001,
-    3.0,
+    1.0,
     signal="tcp",
     all_runs=True,
     depends=tip_("periodic", "tone", "time_smooth"),

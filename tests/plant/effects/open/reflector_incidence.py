@@ -17,7 +17,7 @@ from tests.plant.scene import euler
     UNKNOWN,
     "sensor",
     0.002,
-    20.0,
+    0.5,
     signal="tcp",
     all_runs=True,
     depends=tip_("smooth", "place"),

@@ -15,7 +15,7 @@ from tests.plant.robot import Run
     UNKNOWN,
     "sensor",
     1e-4,
-    100.0,
+    10.0,
     signal="force",
     needs=("cut",),
     all_runs=True,

@@ -16,7 +16,7 @@ from tests.plant.robot import Run
     UNKNOWN,
     "geometry",
     0.001,
-    3.0,
+    0.5,
     signal="tcp",
     all_runs=True,
     depends=tip_("drift", "time_since_start", "spindle_speed", "time_smooth"),

@@ -17,7 +17,7 @@ MIDDLE_mm = np.array([80.0, 0.0])
     UNKNOWN,
     "part",
     0.001,
-    5.0,
+    1.0,
     signal="scan",
     needs=("cut", "scan"),
     all_runs=True,

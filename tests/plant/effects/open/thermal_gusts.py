@@ -13,7 +13,7 @@ from tests.plant.robot import Run, STEP_s
 
 
 @declare(
-    UNKNOWN, "sensor", 0.001, 3.0, signal="tcp", all_runs=True, depends=tip_("smooth", "time_smooth", "noise")
+    UNKNOWN, "sensor", 0.001, 0.5, signal="tcp", all_runs=True, depends=tip_("smooth", "time_smooth", "noise")
 )
 def thermal_gusts(draw: Draw):
     seed, memory_s, lasts_s = int(draw.rng.integers(1 << 30)), draw.uniform(0.3, 1.0), draw.uniform(1.0, 2.5)

@@ -17,7 +17,7 @@ RUN_Ns = 2000.0  # impulse of one run of these programs
     UNKNOWN,
     "geometry",
     0.001,
-    5.0,
+    0.5,
     signal="tcp",
     needs=("cut",),
     all_runs=True,
