@@ -21,7 +21,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
 from gap_blind_figures import rate
-from gap_calibrate_fit import Scores, conformal_nats, covered, fitted, left_out, scores_of, stated
+from gap_calibrate_fit import (
+    Scores,
+    calibrated,
+    conformal_nats,
+    covered,
+    left_out,
+    scores_of,
+    stated,
+    unseen_scores,
+)
 from gap_calibrate_made_up import write_made_up
 from gap_calibrate_rows import (
     Behind,
@@ -68,7 +77,7 @@ def main(given: Sequence[str] | None = None) -> int:
     try:
         with tempfile.TemporaryDirectory() as scratch:
             records = records_of(write_made_up(Path(scratch)) if options.made_up else options.folder)
-        table = calibrated(records)
+        table = table_of(records)
     except RecordsError as error:
         print(f"gap_calibrate: {error}", file=sys.stderr)
         return 2
@@ -78,7 +87,7 @@ def main(given: Sequence[str] | None = None) -> int:
     return 0
 
 
-def calibrated(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def table_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the table of some records, and print what it is worth."""
     behind = list(behind_of(records))
     alike_nats = _conformal(behind)
@@ -87,8 +96,9 @@ def calibrated(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     of_head = {head: list(each) for head, each in of_head.items()}
     if not all(of_head.values()):
         raise RecordsError("no record has a cause, or none a family of a rest: make more cases")
-    heads = {head: fitted(of_head[head], head) for head in HEADS}
-    unseen = {head: left_out(of_head[head], head) for head in HEADS}
+    raw = {head: unseen_scores(of_head[head], head) for head in HEADS}
+    heads = {head: calibrated(of_head[head], head, raw[head]) for head in HEADS}
+    unseen = {head: left_out(of_head[head], head, raw[head]) for head in HEADS}
     scores = _print_scores(of_head, heads, unseen)
     _print_ablation(rows, scores[NAME])
     worst = _left_out_effects(rows, unseen[NAME])
@@ -160,7 +170,7 @@ def _print_ablation(rows: Sequence[Row], whole: Scores) -> None:
     )
     print(f"| none {whole}")
     lines = [
-        (scores_of(rows, left_out(rows, NAME, number), NAME), term)
+        (scores_of(rows, left_out(rows, NAME, unseen_scores(rows, NAME, number)), NAME), term)
         for number, term in enumerate(terms_of(NAME))
     ]
     for scores, term in sorted(lines, key=lambda line: -line[0].log):

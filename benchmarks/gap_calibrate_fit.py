@@ -3,21 +3,22 @@
 The weights w >= 0 and the bias b are the most probable ones under a prior of conditional means (Bedrick,
 Christensen & Johnson 1996): as if a few cases had been seen in which one test alone is as bad as can be. It
 speaks for tests that hardly ever fail in the cases there are, and becomes small beside some hundred of them.
+Scores are then stretched so that they are right of effects that the model was not fitted to.
 Effect-free cases and those whose cause the library lacks count together as much as all others.
 """
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gap_calibrate_rows import OUTSIDE, Behind, Row
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.calibrated import MOST_UNNAMED, NAME, UNKNOWN, Head, terms_of
+from gcode2krl.gap.choose.calibrated import MOST_UNNAMED, NAME, UNKNOWN, Head, probability_of, terms_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-ALL_BEST, ALL_BEST_CASES = 0.97, 6.0
+ALL_BEST, ALL_BEST_CASES = 0.97, 10.0
 """Prior: how probable what is asked for is where every test is at its best, and what that counts as."""
 ONE_WORST = {
     "surprise": 0.3,
@@ -44,10 +45,14 @@ ONE_WORST = {
     "chance": 0.3,
 }
 """Prior: the same where one test is at its worst and all others at their best."""
-PRIOR_CASES = 0.5
+PRIOR_CASES = 1.0
 """What each of these counts as."""
 _SPREAD = 10.0
 """Standard deviation of a weight in a flat prior, which keeps the search finite."""
+_STRETCH = np.array([0.2, 0.5])
+"""Standard deviations of slope and shift before any scores were seen: few rows hardly move them."""
+_LEAST_SLOPE = 0.5
+"""However wrong some unseen effects are, all tests keep half of their say."""
 COVERAGE = 0.95
 _BINS = 10
 Weigh = Callable[[Sequence[Row]], Floats]
@@ -71,27 +76,46 @@ def missing_of(rows: Sequence[Row], terms: int) -> tuple[float, ...]:
 
 def fitted(rows: Sequence[Row], head: str, without: int | None = None) -> Head:
     """Return the model of one probability; ``without`` is a term that is left out."""
-    from scipy import special
-    from scipy.optimize import minimize
-
     terms, falls = list(terms_of(head)), head == UNKNOWN
     missing = missing_of(rows, len(terms))
     prior_u, prior_y, prior_weight = _prior(terms)
     u = np.vstack([_filled(rows, missing), prior_u])
-    x = np.column_stack([np.ones(len(u)), u])
-    y = np.concatenate([[row.right[head] != falls for row in rows], prior_y])
-    weight = np.concatenate([weights_of(rows), prior_weight])
+    best = _logistic(
+        np.column_stack([np.ones(len(u)), u]),
+        np.concatenate([_good(rows, head), prior_y]),
+        np.concatenate([weights_of(rows), prior_weight]),
+        centre=np.zeros(len(terms) + 1),
+        spread=np.array([np.inf, *[_SPREAD] * len(terms)]),
+        bounds=[(None, None), *((0.0, 0.0 if term == without else None) for term in range(len(terms)))],
+    )
+    return Head(round(float(best[0]), 4), tuple(np.round(best[1:], 4).tolist()), missing, falls)
+
+
+def _good(rows: Sequence[Row], head: str) -> Floats:
+    """Return of each row (n,) whether better tests speak for what it was."""
+    return np.array([row.right[head] != (head == UNKNOWN) for row in rows], dtype=float)
+
+
+def _logistic(
+    x: Floats,
+    y: Floats,
+    weight: Floats,
+    *,
+    centre: Floats,
+    spread: Floats,
+    bounds: Sequence[tuple[float | None, float | None]],
+) -> Floats:
+    """Return the coefficients (p,) of a logistic model, normal about ``centre`` before the rows were seen."""
+    from scipy import special
+    from scipy.optimize import minimize
 
     def cost(b: Floats) -> tuple[float, Floats]:
-        score = x @ b
-        loss = float(weight @ (np.logaddexp(0.0, score) - y * score))
-        slope: Floats = x.T @ (weight * (special.expit(score) - y))
-        flat = np.array([0.0, *b[1:]]) / _SPREAD**2
-        return loss + 0.5 * float(flat @ b), slope + flat
+        score, away = x @ b, (b - centre) / spread**2
+        loss = float(weight @ (np.logaddexp(0.0, score) - y * score)) + 0.5 * float(away @ (b - centre))
+        return loss, x.T @ (weight * (special.expit(score) - y)) + away
 
-    bounds = [(None, None), *((0.0, 0.0) if term == without else (0.0, None) for term in range(len(terms)))]
-    best = minimize(cost, np.zeros(x.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B").x
-    return Head(round(float(best[0]), 4), tuple(np.round(best[1:], 4).tolist()), missing, falls)
+    best: Floats = minimize(cost, centre, jac=True, bounds=bounds, method="L-BFGS-B").x
+    return best
 
 
 def _prior(terms: Sequence[str]) -> tuple[Floats, Floats, Floats]:
@@ -107,15 +131,59 @@ def _filled(rows: Sequence[Row], missing: Sequence[float]) -> Floats:
     ).reshape(len(rows), len(missing))
 
 
-def left_out(rows: Sequence[Row], head: str, without: int | None = None) -> Floats:
-    """Return the probability (n,) of each row by a model of the rows that share no true effect with it."""
-    p = np.full(len(rows), np.nan)
+def unseen_scores(rows: Sequence[Row], head: str, without: int | None = None) -> Floats:
+    """Return the score (n,) of each row by a model of the rows that share no true effect with it."""
+    scores = np.zeros(len(rows))
     for group in {row.group for row in rows}:
-        others = [row for row in rows if not row.group & group]
-        model = fitted(others, head, without)
+        model = fitted([row for row in rows if not row.group & group], head, without)
         for i, row in enumerate(rows):
             if row.group == group:
-                p[i] = stated(model.probability(row.u), row, head)
+                scores[i] = model.score(row.u)
+    return scores
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """slope·score + shift: what makes scores of unseen effects right (Platt 1999); monotone, two numbers."""
+
+    slope: float
+    shift: float
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], scores: Floats, head: str) -> "Stretch":
+        """Return the stretch of scores (n,) that were made without each row's effects; 1 and 0 for none."""
+        found = _logistic(
+            np.column_stack([scores, np.ones(len(rows))]),
+            _good(rows, head),
+            weights_of(rows),
+            centre=np.array([1.0, 0.0]),
+            spread=_STRETCH,
+            bounds=[(_LEAST_SLOPE, None), (None, None)],
+        )
+        return cls(*found.tolist())
+
+    def stretched(self, model: Head) -> Head:
+        """Return a model whose scores are stretched."""
+        weights = tuple(round(self.slope * weight, 4) for weight in model.weights)
+        return replace(model, bias=round(self.slope * model.bias + self.shift, 4), weights=weights)
+
+
+def calibrated(rows: Sequence[Row], head: str, scores: Floats) -> Head:
+    """Return the model of all rows, stretched by their scores when their effects are left out."""
+    return Stretch.of(rows, scores, head).stretched(fitted(rows, head))
+
+
+def left_out(rows: Sequence[Row], head: str, scores: Floats) -> Floats:
+    """Return the probability (n,) of each row from its unseen score, stretched by those of other effects."""
+    p = np.zeros(len(rows))
+    for group in {row.group for row in rows}:
+        others = np.array([not row.group & group for row in rows])
+        kept = [row for row, other in zip(rows, others, strict=True) if other]
+        stretch = Stretch.of(kept, scores[others], head)
+        for i, row in enumerate(rows):
+            if row.group == group:
+                good = probability_of(stretch.slope * float(scores[i]) + stretch.shift)
+                p[i] = stated(1.0 - good if head == UNKNOWN else good, row, head)
     return p
 
 
@@ -146,9 +214,7 @@ class Scores:
 
 def scores_of(rows: Sequence[Row], p: Floats, head: str) -> Scores:
     """Return the scores of probabilities (n,); the expected calibration error in ten bins."""
-    known = np.isfinite(p)
-    right = np.array([row.right[head] for row in rows], dtype=bool)[known]
-    weight, p = weights_of(rows)[known], p[known]
+    right, weight = np.array([row.right[head] for row in rows], dtype=bool), weights_of(rows)
     place = np.minimum((p * _BINS).astype(int), _BINS - 1)
     off = [abs(float(weight[place == b] @ (p - right)[place == b])) for b in np.unique(place)]
     sure, named = p >= 0.9, p >= THRESHOLDS.choose.named

@@ -168,6 +168,16 @@ def test_tests_are_read_from_the_contract_where_none_are_stated():
     assert fates([cause(probability=0.2)])[0].failed == {tests.UNDECIDED}
 
 
+def test_tests_that_are_plain_numbers_say_nothing_of_passing():
+    """They are what a probability is made of: zero is no failure."""
+    numbers = {"margin": 12.0, "other_share": 0.0, "conditions_failed": 0, "fold_agreement": None}
+    wrong = cause("friction", probability=0.2, form_fits=0.5, tests=numbers)
+    assert fates([wrong], truths=())[0].failed == {"form"}
+    assert fates([cause("friction", probability=0.2, tests=numbers)], truths=())[0].failed == {
+        tests.UNDECIDED
+    }
+
+
 def test_a_right_cause_that_is_not_there_is_lost_too():
     assert fates([], verdict="no_gap")[0].failed == {tests.NO_GAP}
     wrong, right = fates([cause("friction")])

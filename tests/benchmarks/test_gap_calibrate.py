@@ -82,9 +82,29 @@ def test_a_left_out_effect_teaches_nothing_about_itself():
     rows = [row("form", 0.0, False, "a")] * 40 + [row("form", 1.0, True, "a")] * 40
     rows += [row("constant", 0.0, False, "b")] * 40 + [row("constant", 1.0, True, "b")] * 40
     own = [fit.fitted(rows, NAME).probability(each.u) for each in rows]
-    unseen = fit.left_out(rows, NAME)
+    scores = fit.unseen_scores(rows, NAME)
+    unseen = fit.left_out(rows, NAME, scores)
     assert unseen[0] > own[0]
     assert unseen[80] > own[80]
+    assert len(set(scores[:40])) == 1
+
+
+def test_scores_that_are_too_sure_of_unseen_effects_are_stretched():
+    """Of a score of ±2 three in four are right: odds of 3, a slope of log 3 / 2."""
+    rows = [row("form", 1.0, i % 4 > 0, f"e{i // 20}") for i in range(400)]
+    rows += [row("form", 0.0, i % 4 == 0, f"e{i // 20}") for i in range(400)]
+    scores = np.repeat([2.0, -2.0], 400)
+    stretch = fit.Stretch.of(rows, scores, NAME)
+    assert stretch.slope == pytest.approx(math.log(3.0) / 2.0, rel=0.05)
+    assert stretch.shift == pytest.approx(0.0, abs=0.05)
+    assert fit.left_out(rows, NAME, scores)[[0, 400]] == pytest.approx([0.75, 0.25], abs=0.02)
+    model = fit.fitted(rows, NAME)
+    u = rows[0].u
+    assert stretch.stretched(model).score(u) == pytest.approx(
+        stretch.slope * model.score(u) + stretch.shift, abs=0.01
+    )
+    few = fit.Stretch.of([], np.zeros(0), NAME)
+    assert (few.slope, few.shift) == (1.0, 0.0)
 
 
 def test_foreign_cases_count_as_much_as_all_others():

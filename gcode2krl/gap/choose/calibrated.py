@@ -114,15 +114,24 @@ class Head:
     """What a term counts where its test could not be made: its mean over the calibration cases."""
     falls: bool = False
 
+    def score(self, u: Sequence[float | None]) -> float:
+        """Return bias + Σ weight·u."""
+        known = [m if each is None else each for each, m in zip(u, self.missing, strict=True)]
+        return self.bias + sum(w * each for w, each in zip(self.weights, known, strict=True))
+
     def probability(self, u: Sequence[float | None]) -> float:
         """Return the probability, clipped."""
-        known = [m if each is None else each for each, m in zip(u, self.missing, strict=True)]
-        score = self.bias + sum(w * each for w, each in zip(self.weights, known, strict=True))
-        return clipped(1.0 / (1.0 + math.exp(score if self.falls else -score)))
+        score = self.score(u)
+        return probability_of(-score if self.falls else score)
+
+
+def probability_of(score: float) -> float:
+    """Return 1 / (1 + exp(-score)), within what the diagnosis states: nothing is certain."""
+    return clipped(0.5 * (1.0 + math.tanh(0.5 * score)))
 
 
 def clipped(probability: float) -> float:
-    """Return a probability within what the diagnosis states: nothing is certain."""
+    """Return a probability within its limits."""
     return min(max(probability, _LIMITS.least_unknown), 1.0 - _LIMITS.least_unknown)
 
 

@@ -159,7 +159,9 @@ def features_of(
         causes=len(found.causes),
         links_missing=len(found.question.upstream),
         gap_p=gap_p,
-        conditions_failed=[tests.is_best, tests.form_fits, tests.is_alone].count(False),
+        conditions_failed=max(
+            [tests.is_best, tests.form_fits, tests.is_alone].count(False), int(not tests.passed)
+        ),
     )
 
 
