@@ -12,6 +12,7 @@ from gcode2krl.gap.beside.bursts import without_bursts
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.holdout import split
+from gcode2krl.gap.beside.hum import without_hum
 from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
@@ -95,7 +96,7 @@ def _diagnosed(context: Context) -> Gap:
         traces = link.traces(context.pairs, link.base(context))
         if traces:
             explain, held = split(traces, context.explaining)
-            explain, held = without_bursts(explain), without_bursts(held)
+            explain, held = (without_hum(without_bursts(each)) for each in (explain, held))
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
     surface = judge_surface(PART, context)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gcode2krl.effects import Effect, Parameter, Role
 from gcode2krl.gap.choose.examination import Examination, LinkData
 from gcode2krl.gap.choose.ranking import ranked, shortlist
 from gcode2krl.gap.choose.scoring import threshold
@@ -57,3 +58,23 @@ def test_the_shortlist_leaves_out_what_is_far_behind():
     assert names(found, shortlist(found, scores, COUNT)) == ["wave_3"]
     close = examination(1.9, 2.0, 0.0)
     assert names(close, shortlist(close, scores_of(close), COUNT)) == ["wave_3", "wave_2"]
+
+
+class Tone(Effect):
+    """A tone at a frequency that is searched."""
+
+    name, family, links = "tone", "joint", frozenset({"servo"})
+    parameters = (
+        Parameter("size_rad", "rad", -9.0, 9.0, nominal=0.0, start=1.0, source="a test", linear=True),
+        Parameter("hz", "Hz", 1.0, 21.0, None, start=5.0, source="a test", role=Role.FREQUENCY),
+    )
+
+
+def test_what_is_searched_is_judged_by_its_scatter_after_the_refit(monkeypatch):
+    """A frequency a little off leaves as much, where a tone is strongest, as scatter would."""
+    monkeypatch.setattr("gcode2krl.gap.fit.gram.Gram.inflation", lambda gram, columns: 1e3)
+    found = examination(0.5, 0.0, 0.0)
+    assert scores_of(found) == []
+    for effect in WAVES:
+        monkeypatch.setattr(type(effect), "frequency", Tone.parameters[1], raising=False)
+    assert names(found, scores_of(found)) == ["wave_2"]

@@ -122,7 +122,6 @@ def test_sizes_called_phase_hz_and_harmonic_are_fitted_as_sizes(folder):
         assert value.high - value.low < 0.3 * abs(truth), name
 
 
-@pytest.mark.xfail(strict=True, reason="stretches left out in turn do not see what dies away in a second")
 def test_a_phase_and_a_frequency_are_found_by_their_roles(folder):
     gap = _gap(folder, "mechanics", None, TONE, force=False)
     cause = gap.causes[0]

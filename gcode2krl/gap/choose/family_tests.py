@@ -143,6 +143,11 @@ class LinkFamilies:
         self.gap_p = tuple(study.p for study in self._outs)
         """Of each cause: p of the best family's evidence with the cause taken out."""
 
+    @property
+    def traces(self) -> Sequence[Trace]:
+        """Return the traces that it is of."""
+        return self._rows.traces
+
     def beside(self, named: Collection[int]) -> Rest:
         """Return on what depends what is left beside the named causes alone, by their numbers."""
         unnamed = tuple(number for number in self._found.cause_numbers if number not in named)

@@ -20,6 +20,7 @@ from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
 from gcode2krl.gap.choose.rivals import rival_probabilities, rivals_of
 from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
+from gcode2krl.gap.choose.wander import is_wander
 from gcode2krl.gap.fit.design import Question, nuisance_for
 from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -75,7 +76,8 @@ def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
     is_asked = size.significant or found.link.model_rms == 0.0
     rest = LinkFamilies(found, every).rest if is_asked else NOTHING_LEFT
     rest = replace(rest, is_sized=size.significant)
-    verdict = "unexplained" if _is_gap(found, size, rest) else "no_gap"
+    is_gap = _is_gap(found, size, rest) and not is_wander(found, every, rest)
+    verdict = "unexplained" if is_gap else "no_gap"
     return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
 
 
@@ -165,6 +167,8 @@ def _judgement(
     rest = replace(families.beside(named), is_sized=is_sized)
     is_left = left and last.share_left >= THRESHOLDS.families.other_share
     is_gap = _is_gap(found, sizes[0], rest)
+    if not named and is_gap:
+        is_gap = not is_wander(found, families.traces, rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
     return _of(found, verdict, tuple(causes), last, rest, held_out=bool(trials))
 

@@ -32,9 +32,11 @@ def _is_finding(found: Examination, score: Score) -> bool:
 
 
 def _inflation(found: Examination, gram: Gram, score: Score) -> float:
-    # a signature holds for small effects only: the gain of a large one is judged after its refit
+    # a signature holds for small effects only, and one at a frequency or moment that is searched is as far
+    # off as the search is coarse, where the effect is strongest: such gains are judged after the refit
     effect = found.data.candidates.block(score.column).effect
-    small = score.gain < found.data.times and effect.is_linear
+    is_exact = effect.is_linear and effect.frequency is None and effect.moment is None
+    small = score.gain < found.data.times and is_exact
     return gram.inflation(score.column.index) if small else 1.0
 
 

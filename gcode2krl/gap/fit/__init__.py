@@ -24,17 +24,19 @@
   stationary state and is exact from the first row on: L is the Cholesky factor of the covariance.
 
 **Where the noise is learnt** (`noise_source`). Rows in a burst of the instrument and outliers are left out
-before (`beside.bursts`).
+before (`beside.bursts`), hum of the mains is taken off (`beside.hum`).
 
 - Short part: of each run what effects, mismatch and half-second means leave, less its tones (`lines`), by
   least squares on three lags; the slow part's share of the lags is taken off first. What this takes of the
   noise itself is found by doing the same to drawn noise (Efron's bootstrap bias).
 - Slow part (`slow_noise`, `blocks`): means over 0.05 s of the whole residual, beside a constant and a
-  trend of each run and mismatch. Signatures, steps, tones, smooth functions of place, angle, rate, reversals
-  and force explain what they explain better than slow noise would; the rest is slow noise, its variance by
-  restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971).
+  trend of each run and mismatch. Signatures, steps, tones, and functions of the inputs that families are made
+  of (`explaining`) explain what they explain better than slow noise would; the rest is slow noise, its
+  variance by restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971). The axes
+  of one instrument wander alike: what is learnt on one holds for the others as far as they are seen to move.
 - Repeats of one program: of both parts only what differs between the runs is noise.
-- `run.toml` states short noise, as data sheets do: it bounds u, and v is at most twice u.
+- `run.toml` states short noise, as data sheets do: u has 0.9 to 2.5 times as much, and v is at most twice u.
+  What wanders more slowly, each run in its own way, is told from a gap by `choose.wander`.
 
 What a slow part can hide: an effect that is no signature, no smooth function, no tone and no step, and as
 irregular as slow noise, is taken for it, up to twice the short noise in runs of different programs and up to

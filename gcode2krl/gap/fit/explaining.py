@@ -16,6 +16,7 @@ _PLACE_WAVES, _ANGLE_WAVES = 4, 3
 """Half waves over the range of a coordinate or of a joint."""
 _BENDS = (3.0, 10.0)
 """How soon an odd function of a torque is full, as shares of its range."""
+_SETTLES_S = (1.0, 3.0, 10.0)
 _STILL = 1e-9
 """A coordinate of less range does not move."""
 
@@ -23,36 +24,38 @@ _STILL = 1e-9
 def explaining(traces: Sequence[Trace]) -> list[list[Floats]]:
     """Return columns (n, c) of each component of each trace, alike in all traces."""
     inputs = [Admissible(trace) for trace in traces]
-    shared = [np.column_stack([*_of_all(each)]) for each in inputs]
-    shared = [
-        np.column_stack([own, *parts])
-        for own, *parts in zip(
-            shared,
-            _waves([each.position_mm for each in inputs], _PLACE_WAVES),
-            _waves([each.q_rad for each in inputs], _ANGLE_WAVES),
-            strict=True,
-        )
+    parts = [
+        [np.column_stack([*_of_motion(each)]) for each in inputs],
+        _waves([each.position_mm for each in inputs], _PLACE_WAVES),
+        _waves([each.q_rad for each in inputs], _ANGLE_WAVES),
     ]
+    if any(each.presses for each in inputs):
+        parts.append([np.column_stack([*_of_force(each)]) for each in inputs])
+    if len({each.temperature_C.shape[1] for each in inputs}) == 1:
+        parts.append([each.temperature_C for each in inputs])
+    shared = [np.column_stack(own) for own in zip(*parts, strict=True)]
     return [
         [np.column_stack([common, *_of_component(each, j)]) for j in range(each.trace.shape[1])]
         for each, common in zip(inputs, shared, strict=True)
     ]
 
 
-def _of_all(inputs: Admissible) -> Iterator[Floats]:
-    """Yield what any component may follow: place, angles, rates and reversals, process, temperatures."""
+def _of_motion(inputs: Admissible) -> Iterator[Floats]:
+    """Yield what any component may follow: place, angles, their rates and reversals, spindle, the start."""
     rates, velocity = inputs.rate_rad_s, inputs.velocity_mm_s
-    force, position = inputs.force_N, inputs.position_mm
-    yield from (position, inputs.q_rad, rates, np.abs(rates), inputs.acceleration_rad_s2)
+    yield from (inputs.position_mm, inputs.q_rad, rates, np.abs(rates), inputs.acceleration_rad_s2)
     yield from (inputs.directions, velocity, inputs.acceleration_mm_s2)
-    yield np.linalg.norm(velocity, axis=1)
-    if inputs.presses:
-        size, at = np.linalg.norm(force, axis=1), position - position.mean(axis=0)
-        yield from (force, size)
-        yield (force[:, :, None] * at[:, None, :]).reshape(len(force), -1)
-        yield force * inputs.cut_m[:, None]
-        yield inputs.cut_m
-    yield from (inputs.travel_mm, inputs.spindle, inputs.temperature_C)
+    yield from (np.linalg.norm(velocity, axis=1), inputs.travel_mm, inputs.spindle)
+    # what settles after each start, alike in all runs
+    yield np.exp(-inputs.since_start_s[:, None] / np.array(_SETTLES_S))
+
+
+def _of_force(inputs: Admissible) -> Iterator[Floats]:
+    """Yield the force, the same by place, and what grows with the metres cut."""
+    force, position = inputs.force_N, inputs.position_mm
+    yield from (force, np.linalg.norm(force, axis=1))
+    yield (force[:, :, None] * position[:, None, :]).reshape(len(force), -1)
+    yield from (force * inputs.cut_m[:, None], inputs.cut_m)
 
 
 def _of_component(inputs: Admissible, component: int) -> Iterator[Floats]:

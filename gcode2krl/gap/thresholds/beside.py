@@ -77,6 +77,13 @@ class BesideThresholds:
     bursts_most: float = convention(
         0.15, "share of a component's rows up to which bursts are left out: more is how the signal is"
     )
+    hum_least_rows: int = convention(500, "fewer rows tell no line of a spectrum from its surroundings")
+    hum_wander_hz: float = physics(0.1, "a grid keeps its frequency to 20 mHz, its fifth multiple to 0.1")
+    hum_around_hz: float = convention(2.0, "beside a line of the mains the level of the noise is looked for")
+    hum_beside_hz: float = convention(
+        1.0, "a spindle whose speed, or a multiple of it, is as near to the mains hides its hum"
+    )
+    hum_false: float = convention(1e-3, "chance that noise alone counts as a line of the mains")
     frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
     jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
     jump_halves_s: tuple[float, ...] = convention(

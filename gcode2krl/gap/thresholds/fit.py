@@ -20,8 +20,9 @@ class FitThresholds:
         0.5, DEVELOPMENT, "without repeats everything slower may be structure and is no noise"
     )
     noise_least_stated: float = convention(0.9, "of what run.toml states: noise is never taken to be less")
-    noise_most_stated: float = calibrated(
-        1.4, DEVELOPMENT, "of what run.toml states: what is above it is structure"
+    noise_most_stated: float = convention(
+        2.5,
+        "times what run.toml states: a data sheet states the best; heavy tails of twice that come beside it",
     )
 
     noise_most_lines: int = convention(8, "tones of one signal that are taken off before its noise is learnt")
@@ -40,6 +41,9 @@ class FitThresholds:
     )
     noise_most_slow: float = convention(
         2.0, "times the short part's rms: an instrument that wanders by more is a finding, not noise"
+    )
+    noise_wander_share: float = convention(
+        0.2, "of the run that moves most, which each run moves at least: what one run does alone is an event"
     )
     noise_slow_gain: float = convention(
         6.0, "twice the log likelihood that a slow part must bring to be in the model"

@@ -1,0 +1,57 @@
+"""What each run has in its own way over time is noise while it is small; what runs share is not."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gcode2krl.gap.choose.family_tests import LinkFamilies
+from gcode2krl.gap.choose.wander import is_wander
+from tests.gap.constructed import examined, motion, noise, trace, wave
+
+COUNT, RUNS = 1000, 3
+TIME_S = motion(20.0).time_s
+
+
+def swing(run):
+    """Return a slow swing (n,) of rms one, of a period and phase of the run's own."""
+    return np.sqrt(2.0) * np.sin(2.0 * np.pi * (0.05 + 0.02 * run) * TIME_S + 2.0 * run)
+
+
+def judged(forms):
+    traces = [
+        trace(noise(COUNT, 30 + run) + form[:, None], number=run, inputs=motion(20.0))
+        for run, form in enumerate(forms)
+    ]
+    found = examined(traces, [wave(9.0)], 1.0)
+    rest = LinkFamilies(found, traces).rest
+    return rest, is_wander(found, traces, replace(rest, is_sized=True))
+
+
+def test_a_swing_of_each_runs_own_is_wander():
+    rest, wanders = judged([swing(run) for run in range(RUNS)])
+    assert rest.is_gap
+    assert wanders
+
+
+def test_more_than_twice_the_short_noise_is_a_finding():
+    assert not judged([3.0 * swing(run) for run in range(RUNS)])[1]
+
+
+def test_what_is_alike_in_all_runs_is_no_wander():
+    assert not judged([swing(0)] * RUNS)[1]
+
+
+def test_what_else_is_there_is_not_hidden_by_wander():
+    follows = 1.5 * np.sign(np.gradient(motion(20.0).q_cmd_rad[:, 0]))
+    assert not judged([swing(run) + follows for run in range(RUNS)])[1]
+
+
+def test_of_a_single_run_nobody_can_tell():
+    assert not judged([swing(0)])[1]
+
+
+def test_what_happens_in_one_run_alone_is_an_event():
+    slipped = [1.4 * np.tanh(TIME_S - 10.0) * (run == 1) for run in range(RUNS)]
+    rest, wanders = judged(slipped)
+    assert rest.is_gap
+    assert not wanders
