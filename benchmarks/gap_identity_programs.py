@@ -45,7 +45,7 @@ load:mass_kg=30,dx_mm=0,dy_mm=0,dz_mm=0
 mastering:target=A2,offset_deg=0.02
 nonlinear_stiffness:target=A2,soft_deg=0.01,torque_Nm=100
 override:percent=50
-pedestal_compliance:mrad_per_kNm=0.02
+pedestal_compliance:x_mrad_per_kNm=0.02,y_mrad_per_kNm=0.02,foot_mm=0
 rsi_on:gain=1,delay_s=0.1
 runout:runout_mm=0.02,angle_deg=30
 servo_lag:target=A2,tau_s=0.01

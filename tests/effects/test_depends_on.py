@@ -69,6 +69,8 @@ def deviation(effect, target, inputs):
     if Where.FORCE_AXIS in effect.where and force.any():
         return np.einsum("nji,nj->ni", inputs.sensor_rotation, force), joint_of(target)
     stages = [nominal.q_cmd_rad, signals.q_act_rad, signals.q_load_rad, signals.q_true_rad]
+    if effect.is_misread:
+        return stages[1] - stages[0], joint_of(target)
     moved = (
         signals.q_true_rad - nominal.q_true_rad
         if signals.q_true_rad is not stages[0]

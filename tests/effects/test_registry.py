@@ -54,7 +54,7 @@ TABLE = {
     "axis_parallelism": ("mrad",),
     "spindle_growth": ("um_per_krpm", "time_constant_s"),
     "cutter_bending": ("um_per_N",),
-    "pedestal_compliance": ("mrad_per_kNm",),
+    "pedestal_compliance": ("x_mrad_per_kNm", "y_mrad_per_kNm", "foot_mm", "own_weight"),
     "cable_pull": ("N_per_deg", "direction"),
     "tracker_drift": ("mm_per_h", "direction"),
     "tracker_refraction": ("K_per_m", "tracker_x_m", "tracker_y_m"),

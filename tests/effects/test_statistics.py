@@ -46,7 +46,11 @@ def test_roles_of_the_library_are_stated_once():
             ("encoder_interpolation", "phase"),
             ("joint_eccentricity", "phase"),
         },
-        Role.COUNT: {("transmission", "harmonic"), ("encoder_interpolation", "periods")},
+        Role.COUNT: {
+            ("transmission", "harmonic"),
+            ("encoder_interpolation", "periods"),
+            ("pedestal_compliance", "own_weight"),
+        },
         Role.MOMENT: {("step", "at_s")},
         Role.FREQUENCY: {("vibration", "hz")},
     }

@@ -101,23 +101,27 @@ def test_a_yielding_part_shows_in_the_part_alone(swinging, known):
     np.testing.assert_array_equal(simulate(swinging).tip_on_part_mm, simulate(swinging).tcp_base_mm)
 
 
-def test_a_pedestal_tilts_by_the_moment_about_its_foot(swinging, known):
-    moved = moved_by(swinging, known, "pedestal_compliance:mrad_per_kNm=0.05")
-    foot = np.linalg.inv(swinging.cell.base_matrix())[:3, 3]
+@pytest.mark.parametrize(("foot_mm", "own_weight"), [(0.0, 1.0), (600.0, 1.0), (600.0, 0.0)])
+def test_a_pedestal_tilts_by_the_moment_about_its_foot(swinging, known, foot_mm, own_weight):
+    soft = f"x_mrad_per_kNm=0.05,y_mrad_per_kNm=0.03,foot_mm={foot_mm},own_weight={own_weight}"
+    moved = moved_by(swinging, known, f"pedestal_compliance:{soft}")
+    root = np.linalg.inv(swinging.cell.base_matrix())
+    foot = root[:3, 3] - foot_mm * root[:3, 2]
     lever, force = swinging.position_mm - foot, swinging.force_base_N
     moment = np.cross(lever, force) + swinging.moment_base_Nmm
     arms = swinging.bodies.centre_mm - foot
-    moment += np.cross(arms, swinging.bodies_push_N).sum(axis=1)
-    turn = Rotation.from_rotvec(0.05e-3 / 1e6 * moment * [1.0, 1.0, 0.0])
+    moment += own_weight * np.cross(arms, swinging.bodies_push_N).sum(axis=1)
+    softness = root[:3, :3] @ np.diag([0.05e-9, 0.03e-9, 0.0]) @ root[:3, :3].T
+    turn = Rotation.from_rotvec(moment @ softness)
     np.testing.assert_allclose(moved, turn.apply(lever) - lever, atol=1e-4)
-    assert np.ptp(moved, axis=0).max() > 0.01
+    assert np.ptp(moved, axis=0).max() > 0.001
 
 
 def test_weight_does_not_turn_a_pedestal_about_the_vertical(swinging, known):
     pushed = replace(swinging, force_base_N=np.zeros_like(swinging.force_base_N))
     pushed = replace(pushed, moment_base_Nmm=np.tile([0.0, 0.0, 1e6], (len(swinging), 1)))
     free = replace(pushed, moment_base_Nmm=np.zeros_like(swinging.force_base_N))
-    text = "pedestal_compliance:mrad_per_kNm=0.05"
+    text = "pedestal_compliance:x_mrad_per_kNm=0.05,y_mrad_per_kNm=0.05,foot_mm=0"
     np.testing.assert_allclose(moved_by(pushed, known, text), moved_by(free, known, text), atol=1e-9)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gcode2krl.gap.beside.verdict import is_lost
 from gcode2krl.gap.choose.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
@@ -54,6 +55,17 @@ def test_one_effect_is_explained_and_gone_on_runs_held_out():
     assert interval.low < 2.0 * SIGMA < interval.high
     # 2² / 2 of a sine and the noise itself
     assert found.size.before == pytest.approx(3.0 * SIGMA**2, rel=0.15)
+
+
+def test_a_gap_is_not_explained_beside_a_significant_rest():
+    """It is a 500th of the gap and a third of the noise: who reads `explained` would look no further."""
+    found = judged([20.0 * SINE + 0.8 * STEPS] * 3)
+    assert named(found) == ["wave_2"]
+    assert found.told.significant
+    assert found.told.share_left < 0.01
+    assert found.verdict == "partly_explained"
+    assert not is_lost(found)  # later links go by the model, which holds but for that
+    assert judged([20.0 * SINE] * 3).verdict == "explained"
 
 
 def test_two_effects_share_the_shrink_by_their_power():

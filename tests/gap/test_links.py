@@ -166,7 +166,8 @@ def test_timing_is_of_the_path_and_has_no_trace_of_its_own():
     [("unexplained", True), ("partly_explained", True), ("explained", False), ("no_gap", False)],
 )
 def test_a_model_is_lost_where_its_gap_has_no_name(verdict, lost):
-    assert is_lost(stub(verdict=verdict)) is lost
+    assert is_lost(stub(verdict=verdict, nearly_all=False)) is lost
+    assert not is_lost(stub(verdict=verdict, nearly_all=True))
     assert not is_lost(None)
 
 
@@ -174,7 +175,7 @@ def test_clocks_of_instruments_are_known_worse_where_the_plans_times_are():
     link = Link()
 
     def clocks(path_verdict):
-        judged = None if path_verdict is None else stub(verdict=path_verdict)
+        judged = None if path_verdict is None else stub(verdict=path_verdict, nearly_all=False)
         return link.clocks(stub(timing=judged))
 
     assert [clocks(v) for v in (None, "no_gap", "explained", "unexplained")] == [1, 1, 2, 4]

@@ -10,7 +10,7 @@ from gcode2krl.gap.fit.moments import jumps, strongest_moments
 from gcode2krl.gap.fit.numbers import free_of
 from gcode2krl.gap.fit.signatures import Signatures, blocks_from
 from gcode2krl.gap.thresholds import THRESHOLDS
-from tests.gap.constructed import trace
+from tests.gap.constructed import stub, trace
 
 STEP = library()["step"]
 
@@ -73,3 +73,14 @@ def test_blocks_of_a_step_stand_at_the_moments_and_count_what_was_looked_at():
     free = free_of(blocks[0].settings(tip)[0], tip)
     assert free.scale[free.names.index("at_s")] == pytest.approx(2.0)
     assert list(blocks_from(library()["backlash"], "A1", (4.0,), 30.0)) == []
+
+
+def test_a_usual_clock_at_corners_is_no_jump():
+    """A joint that stops and starts is off by 2 ms of its speed: ten deviations, in every sound run."""
+    speed = np.where(np.arange(500) // 90 % 2 == 0, 1.0, -0.6)[:, None] * [0.2, 0.15, 0.1]
+    time_s = np.arange(500) * 0.02
+    late = stub(inputs=stub(hours=0.0), time_s=time_s, clock_rate=speed, residual=noisy() + speed)
+    assert strongest_moments([late], 0.0, 1e6) == ()
+    late.residual = late.residual + at(310, 0.2)
+    found = strongest_moments([late], 0.0, 1e6)
+    assert found[0] == pytest.approx(time_s[310])

@@ -26,6 +26,10 @@ class Verdict(Protocol):
         """Return no_gap, explained, partly_explained or unexplained."""
 
     @property
+    def nearly_all(self) -> bool:
+        """Tell whether what is left is more than noise, but a small share of the gap."""
+
+    @property
     def applied(self) -> tuple[Applied, ...]:
         """Return the named causes."""
 
@@ -46,4 +50,6 @@ class FittedVerdict(Verdict, Protocol):
 
 def is_lost(judged: Verdict | None) -> bool:
     """Tell whether the model of a link does not hold, not even with the causes that were named."""
-    return judged is not None and judged.verdict in ("unexplained", "partly_explained")
+    if judged is None or judged.nearly_all:
+        return False
+    return judged.verdict in ("unexplained", "partly_explained")

@@ -57,6 +57,8 @@ class Judged:
     held_out: bool
     factor: float
     """From the inner unit to that of the report."""
+    nearly_all: bool = False
+    """What is left of the gap is more than noise, but a small share of it."""
     size_with_named: Size | None = None
     """The size with the named causes alone in the model; None where that is ``size``."""
 

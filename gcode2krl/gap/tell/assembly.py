@@ -246,7 +246,8 @@ def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -
         result for judgement in sorted(signals, key=_weight, reverse=True) for result in depends_on(judgement)
     ]
     size = largest.told
-    significant = bool(size.significant) or any(each.link == largest.link.name for each in families)
+    left = bool(size.significant) and largest.verdict != "explained"
+    significant = left or any(each.link == largest.link.name for each in families)
     return Unexplained(
         rms=largest.factor * max(size.after, 0.0) ** 0.5,
         significant=significant,

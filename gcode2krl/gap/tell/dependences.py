@@ -33,7 +33,9 @@ _TIP = "tip"
 def depends_on(judgement: Judgement) -> Iterator[DependsOnResult]:
     """Yield on what the gap of a link without a name, or beside named causes, may depend; best first."""
     rest = judgement.rest
-    if rest is None or judgement.verdict in ("no_gap", "explained") or not rest.worth_naming:
+    if rest is None or judgement.verdict in ("no_gap", "explained"):
+        return
+    if not (rest.worth_naming or rest.is_gap):
         return
     features = [(each, family_features(rest, each)) for each in rest.study.evidences]
     table = probabilities_table()
