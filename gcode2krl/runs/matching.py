@@ -214,7 +214,9 @@ def explained(reference: Floats, measured: Floats) -> float:
         return 0.0
     r = reference - reference.mean(axis=0)
     products = r.T @ m
-    return float(np.sum(products * (np.linalg.pinv(r.T @ r, rcond=_RCOND, hermitian=True) @ products))) / total
+    return (
+        float(np.sum(products * (np.linalg.pinv(r.T @ r, rcond=_RCOND, hermitian=True) @ products))) / total
+    )
 
 
 def rotation_between(reference_mm: Floats, measured_mm: Floats) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.beside.admissible import Admissible
-from gcode2krl.gap.families.beside import Columns
+from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
 from gcode2krl.gap.families.functions import (
     free,
@@ -60,7 +60,13 @@ def test_the_evidence_is_that_of_dense_gaussians():
     columns = rows.of([raw])
     place = Place("A1", Where.JOINT, [np.ones((1, 60, 1))])
     found = evidence_of(
-        view, place, Dependence.CONSTANT, [raw], Columns(columns, view.nuisance), (np.eye(3),), np.ones((1, 2))
+        view,
+        place,
+        Dependence.CONSTANT,
+        [raw],
+        Columns(columns, view.nuisance),
+        (np.eye(3),),
+        np.ones((1, 2)),
     )
 
     plain = np.eye(60) + view.nuisance @ view.nuisance.T

@@ -24,7 +24,14 @@ def dated(*texts, **more):
 @pytest.mark.parametrize(
     ("text", "target", "at_s", "size", "value"),
     [
-        ("step:target=tip,at_s=1806,size_mm=0.15,direction=0/0/1", "tip", 1806.0, "size_mm", 0.15),
+        pytest.param(
+            "step:target=tip,at_s=1806,size_mm=0.15,direction=0/0/1",
+            "tip",
+            1806.0,
+            "size_mm",
+            0.15,
+            marks=pytest.mark.slow,
+        ),
         ("step:target=A2,at_s=7.5,size_deg=0.01", "A2", 7.5, "size_deg", 0.01),
     ],
 )

@@ -1,5 +1,6 @@
 """What the sections of a cell file are made of: kinds of values, places, and the error of a missing key."""
 
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -60,8 +61,14 @@ class Place(Section):
 
     def matrix(self) -> Floats:
         """Return the homogeneous transform (4, 4)."""
-        abc = np.array([self.a_deg, self.b_deg, self.c_deg]) * RAD_PER_DEG
-        return fr.transform([self.x_mm, self.y_mm, self.z_mm], fr.rotation_from_abc(abc))
+        return _transform(self.x_mm, self.y_mm, self.z_mm, self.a_deg, self.b_deg, self.c_deg).copy()
+
+
+@lru_cache(maxsize=64)
+def _transform(x_mm: float, y_mm: float, z_mm: float, a_deg: float, b_deg: float, c_deg: float) -> Floats:
+    """Return the transform (4, 4) of a place: the few of a cell are asked for thousands of times."""
+    rotation = fr.rotation_from_abc(np.array([a_deg, b_deg, c_deg]) * RAD_PER_DEG)
+    return fr.transform([x_mm, y_mm, z_mm], rotation)
 
 
 class Frame(Place):

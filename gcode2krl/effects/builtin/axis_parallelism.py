@@ -51,8 +51,10 @@ class AxisParallelism(Effect):
         if applied["mrad"] == 0.0:
             return tcp_mm
         lever_mm = tcp_mm - inputs.axes_mm[:, applied.joint]
-        turned: Floats = (_turn(inputs, applied) @ lever_mm[:, :, None])[:, :, 0]
-        return tcp_mm + turned - lever_mm
+        line, angle_rad = _line(inputs, applied), applied["mrad"] * RAD_PER_MRAD
+        across_mm = np.cross(line, lever_mm)
+        moved: Floats = np.sin(angle_rad) * across_mm + (1.0 - np.cos(angle_rad)) * np.cross(line, across_mm)
+        return tcp_mm + moved  # Rodrigues
 
     def orientation(self, rotation: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the rotations of the tilted tool."""
@@ -61,13 +63,18 @@ class AxisParallelism(Effect):
 
 def _turn(inputs: Inputs, applied: Applied) -> Floats:
     """Return the rotations (m, 3, 3) in ``$BASE`` of what the axis carries."""
+    return rotation_of(applied["mrad"] * RAD_PER_MRAD * _line(inputs, applied))
+
+
+def _line(inputs: Inputs, applied: Applied) -> Floats:
+    """Return unit vectors (m, 3) in ``$BASE`` about which the axis is tilted."""
     axes = np.swapaxes(inputs.jacobian[:, 3:], 1, 2)
     before = axes[:, applied.joint - 1]
     if applied.target == _PARALLEL:
         before = inputs.axes_mm[:, applied.joint] - inputs.axes_mm[:, applied.joint - 1]
-    line = np.cross(before, axes[:, applied.joint])
+    line: Floats = np.cross(before, axes[:, applied.joint])
     line /= np.linalg.norm(line, axis=1, keepdims=True)
-    return rotation_of(applied["mrad"] * RAD_PER_MRAD * line)
+    return line
 
 
 EFFECT = AxisParallelism()

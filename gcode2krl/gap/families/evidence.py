@@ -8,7 +8,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.families.beside import Beside, Columns
+from gcode2krl.gap.families.columns import Beside, Columns
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.clusters import gain_inflation

@@ -127,10 +127,7 @@ class Grid:
 
     def _functions(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
         own = self.inputs
-        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in own])
-        yield from self._of_time()
-        if any(each.temperature_C.any() for each in own):
-            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in own])
+        yield from self._of_time
         yield from self._of_motion(place)
         yield Dependence.TRAVEL, smooth([each.travel_mm for each in own])
         if place.joint is not None:
@@ -142,8 +139,14 @@ class Grid:
         if place.where is not Where.TIP:
             yield Dependence.PLACE, free(self._pose(place.where is Where.FORCE_AXIS))
 
-    def _of_time(self) -> Iterator[tuple[Dependence, Functions]]:
+    @cached_property
+    def _of_time(self) -> list[tuple[Dependence, Functions]]:
+        """The same at every place."""
+        return list(self._functions_of_time())
+
+    def _functions_of_time(self) -> Iterator[tuple[Dependence, Functions]]:
         own, count = self.inputs, len(self.inputs)
+        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in own])
         yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in own])
         if count > 1:
             runs = [np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(own)]
@@ -153,6 +156,8 @@ class Grid:
         yield Dependence.RUN_START, smooth([each.since_start_s for each in own])
         if any(each.spindle.any() for each in own):
             yield Dependence.SPINDLE_SPEED, free([each.spindle for each in own])
+        if any(each.temperature_C.any() for each in own):
+            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in own])
 
     def _of_motion(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
         own = self.inputs

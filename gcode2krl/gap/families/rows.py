@@ -64,8 +64,8 @@ class Rows:
         return self.of(columns)
 
     def _blocks(self, number: int, component: int, values: Floats) -> Floats:
-        """Return the blocks of columns (n, c) of one trace; whitening leaves those without values as they are."""
-        used = values.any(axis=0)
+        """Return the blocks of columns (n, c) of one trace; what is zero stays zero."""
+        used = np.asarray(values.any(axis=0))
         if used.all():
             return self._averaged(number, component, values)
         blocks = np.zeros((len(self.starts[number]), len(used)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.families.beside import Beside, Columns
+from gcode2krl.gap.families.columns import Beside, Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of, log_evidence, log_mean
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.rows import Rows
@@ -57,22 +57,28 @@ class Steps:
 
         In a run whose moment it is not a step is nothing or all: these two are whitened once.
         """
-        own = [[i for i, (run, _) in enumerate(moments) if run == n] for n in range(len(self.traces))]
-        nothing = max(map(len, own)) + 1
+        width = max(sum(run == n for run, _ in moments) for n in range(len(self.traces)))
         raw, chosen = [], []
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
-            after = np.zeros((len(trace.time_s), nothing + 1))
-            after[:, nothing - 1] = 1.0
-            for at, i in enumerate(own[number]):
-                after[:, at] = trace.time_s >= moments[i][1]
-            at_moment = np.array([nothing - 1 if self._is_later(number, run) else nothing for run, _ in moments])
-            at_moment[own[number]] = np.arange(len(own[number]))
+            after = np.zeros((len(trace.time_s), width + 2))
+            after[:, width] = 1.0
+            own = [i for i, (run, _) in enumerate(moments) if run == number]
+            for column, i in enumerate(own):
+                after[:, column] = trace.time_s >= moments[i][1]
+            at = np.array(
+                [width if self._is_later(number, run) else width + 1 for run, _ in moments], dtype=int
+            )
+            at[own] = np.arange(len(own))
             raw.append(_lifted(after, unit))
-            chosen.append(at_moment)
-        white = self.rows.of(raw, self.place.component)
-        ends = np.cumsum([len(u) * len(starts) for u, starts in zip(self.place.units, self.rows.starts, strict=True)])
-        parts = zip(np.split(white, ends[:-1]), chosen, strict=True)
+            chosen.append(at)
+        return self._of_moments(self.rows.of(raw, self.place.component), chosen)
+
+    def _of_moments(self, white: Floats, chosen: Sequence[Ints]) -> Floats:
+        """Return the columns (v, moments·d) that moments have in each trace, of those whitened."""
         d = self.place.units[0].shape[2]
+        counts = zip(self.place.units, self.rows.starts, strict=True)
+        ends = np.cumsum([len(unit) * len(starts) for unit, starts in counts])
+        parts = zip(np.split(white, ends[:-1]), chosen, strict=True)
         return np.concatenate(
             [part.reshape(len(part), -1, d)[:, at].reshape(len(part), -1) for part, at in parts]
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.families.beside import Columns
+from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.rows import Rows

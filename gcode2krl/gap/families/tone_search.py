@@ -7,7 +7,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.families.beside import Columns
+from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.rows import Rows

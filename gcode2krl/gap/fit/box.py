@@ -6,6 +6,7 @@ Gram matrix.
 """
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from gcode2krl.arrays import Bools, Floats
 
@@ -27,7 +28,9 @@ def boxed(a: Floats, right: Floats, most: float = MOST) -> Floats:
     """
     scale = 1.0 / np.sqrt(np.diag(a))  # so that columns of any unit are of one size
     fit = _Fit(a * np.outer(scale, scale), right * scale, most / scale)
-    b = fit.descended(fit.guessed())
+    b = _solved(fit.a, fit.right)
+    if np.any(np.abs(b) >= fit.most):
+        b = fit.descended(fit.guessed(b))
     # exactly at the bound: callers ask which numbers are there
     return np.where(np.abs(b) >= fit.most, np.copysign(most, b), np.clip(b * scale, -most, most))
 
@@ -41,19 +44,21 @@ class _Fit:
 
     def free_fit(self, b: Floats, held: Bools) -> Floats:
         """Return b with the numbers that are not held at their best beside those that are."""
-        free, fitted = ~held, b.copy()
-        rest = self.right[free] - self.a[np.ix_(free, held)] @ b[held]
-        fitted[free] = _solved(self.a[np.ix_(free, free)], rest)
+        free, fitted = np.flatnonzero(~held), b.copy()
+        rows = self.a[free]
+        fitted[free] = _solved(rows[:, free], self.right[free] - rows[:, held] @ b[held])
         return fitted
 
     def pulled_back(self, b: Floats, held: Bools) -> Bools:
         """Return which of the held numbers (m,) would make the fit better within their bounds."""
         return held & ((self.right - self.a @ b) * np.sign(b) < -self._noise)
 
-    def guessed(self) -> Floats:
-        """Return b where all numbers beyond their bounds are held there, and all pulled back are let go."""
+    def guessed(self, b: Floats) -> Floats:
+        """Return b where all numbers beyond their bounds are held there, and all pulled back are let go.
+
+        It begins at the fit without bounds.
+        """
         held = np.zeros(len(self.most), dtype=bool)
-        b = _solved(self.a, self.right)
         for _ in range(_GUESSES):
             beyond = np.abs(b) > self.most
             b = np.clip(b, -self.most, self.most)
@@ -93,7 +98,12 @@ class _Fit:
 
 
 def _solved(a: Floats, right: Floats) -> Floats:
-    """Return a⁻¹·right; of columns that are equal to the last bit, shares of equal size."""
+    """Return a⁻¹·right by Cholesky; of columns that are equal to the last bit, shares of equal size."""
+    if not len(right):
+        return right
+    _, solved, failed = dposv(a, right)
+    if not failed:
+        return np.asarray(solved, dtype=float)
     try:
         return np.asarray(np.linalg.solve(a, right), dtype=float)
     except np.linalg.LinAlgError:

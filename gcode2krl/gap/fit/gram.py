@@ -119,6 +119,12 @@ class Gram:
         return self._free_fit[2]
 
     @cached_property
+    def _given(self) -> tuple[Floats, Ints]:
+        """(1 + m) squared: the Gram matrix of [r, N], and where these columns are."""
+        here = np.r_[0, np.arange(self._kept, len(self.total))]
+        return self.total[np.ix_(here, here)], here
+
+    @cached_property
     def _held(self) -> Floats:
         """Nuisance (m,) that stands at its bounds without any signature; 0 for the rest of it."""
         b = self._free_fit[1]
@@ -129,11 +135,10 @@ class Gram:
 
         The free ones have a normal prior about 0 of this precision, whose cost is part of chi2.
         """
-        total, kept = self.total, self._kept
-        here = np.r_[0, np.arange(kept, len(total))]
-        gram, cross = total[np.ix_(here, here)], total[np.ix_(free, here)]
-        half = solve(total[np.ix_(free, free)] + np.diag(precision), cross)
-        gram = gram - cross.T @ half
+        rows, (given, here) = self.total[free], self._given
+        cross = rows[:, here]
+        half = solve(rows[:, free] + np.diag(precision), cross)
+        gram = given - cross.T @ half
         cost = gram[1:, 1:] + np.eye(len(here) - 1)
         b = boxed(cost, gram[1:, 0])
         chi2 = float(gram[0, 0] - 2.0 * b @ gram[1:, 0] + b @ cost @ b)

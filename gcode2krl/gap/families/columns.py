@@ -37,9 +37,7 @@ class Beside:
 
     def __init__(self, view: View, columns: Columns) -> None:
         self.view, self.columns = view, columns
-        self.fixed: Floats = np.concatenate(
-            [columns.values.T @ view.tangents, columns.on_nuisance], axis=1
-        )
+        self.fixed: Floats = np.concatenate([columns.values.T @ view.tangents, columns.on_nuisance], axis=1)
         """(c, t + m) Bᵀ·F."""
         self.taken = view.solved(self.fixed.T)
         """(t + m, c) H⁻¹·Fᵀ·B."""
@@ -62,7 +60,9 @@ class Beside:
     def scores(self) -> Floats:
         """White's scores (g, c) of P by stretches of time."""
         view = self.view
-        scores: Floats = view.by_stretch(view.projected) @ self.columns.values - view.fixed_scores @ self.taken
+        scores: Floats = (
+            view.by_stretch(view.projected) @ self.columns.values - view.fixed_scores @ self.taken
+        )
         return scores
 
     def scores_with(self, weights: Floats) -> Floats:
