@@ -1,8 +1,8 @@
 """Wander of an instrument: what each run has in its own way over time, within what noise may be.
 
-Random walks, 1/f noise and the zero of an amplifier are smooth in time, or nearly so, in all runs and alike in
-no two. Where time in each run says clearly more of a rest than any other input, moves the signal by no more
-than slow noise may (`noise_most_slow`), and leaves nothing significant once it is taken off, it is noise of a
+Random walks, 1/f noise and the zero of an amplifier are smooth in time, or nearly so, in all runs and alike
+in no two. Where time in each run says clearly more of a rest than any other input, moves the signal by no
+more than slow noise may (`noise_most_slow`), and leaves nothing significant once taken off, it is noise of a
 long memory. What happens in one run alone is an event.
 """
 
