@@ -110,7 +110,7 @@ class Effect:
     is_clock: bool = False
     """It is the clock of a table, or of some of its columns: the target says which."""
     is_misread: bool = False
-    """The encoders of the motors state what the joints do not do: links behind them must know of it."""
+    """Encoders state what the tip does not do: links behind them must know of it."""
     own_model: bool = False
     """The controller moves by a model of the robot other than the cell's: joints differ, the tip does not."""
     where: frozenset[Where] = frozenset()

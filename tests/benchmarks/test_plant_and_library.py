@@ -103,20 +103,7 @@ def of_library(inputs, effects, grid):
     return {"tcp": tip, "force": force, "servo": act - cmd, "gear": load - act, "part": part}
 
 
-APART = {
-    "gear_twist": "the library's twist moves the tip as well, beside the same spring in the stiffness",
-    "encoder_interpolation": "the library's load encoder and tip follow a reading of the motor that is wrong",
-}
-"""Effects that the two understand otherwise, and how."""
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.xfail(reason=APART[name], strict=True) if name in APART else ())
-        for name in cases.simulated()
-    ],
-)
+@pytest.mark.parametrize("name", cases.simulated())
 def test_the_same_effect_does_the_same(name, nominal):
     """Sign, size and axes of the plant's form are those of the library with the label's numbers."""
     inputs, bare = nominal

@@ -70,7 +70,8 @@ def deviation(effect, target, inputs):
         return np.einsum("nji,nj->ni", inputs.sensor_rotation, force), joint_of(target)
     stages = [nominal.q_cmd_rad, signals.q_act_rad, signals.q_load_rad, signals.q_true_rad]
     if effect.is_misread:
-        return stages[1] - stages[0], joint_of(target)
+        motor, gear = stages[1] - stages[0], stages[2] - stages[1]
+        return motor if motor.any() else gear, joint_of(target)
     moved = (
         signals.q_true_rad - nominal.q_true_rad
         if signals.q_true_rad is not stages[0]

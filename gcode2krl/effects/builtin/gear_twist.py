@@ -14,13 +14,14 @@ class GearTwist(Effect):
     """Behind the gear: deg_per_kNm·(own torque) is added, positive with the angle.
 
     Own torque: `Inputs.own_torque_Nm`, that of the cutting load, and of weight and inertia as far as the cell
-    states masses. An encoder behind the gear sees the twist; without one the tip does. The stiffness of the
-    cell does not know of such encoders and bends the arm by the cutting load all the same.
+    states masses. An encoder behind the gear sees the twist. The tip follows the stiffness of the cell, which
+    has the spring of the gear in it whether an encoder sees it or not.
     """
 
     name = "gear_twist"
     family = "joint"
     links = frozenset({"gear"})
+    is_misread = True
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
@@ -40,13 +41,21 @@ class GearTwist(Effect):
     )
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
-        """Return what is behind the gear."""
-        if applied["deg_per_kNm"] == 0.0:
-            return q_load_rad
-        q = np.array(q_load_rad)
-        twist_rad_Nm = applied["deg_per_kNm"] * RAD_PER_DEG / N_PER_KN
-        q[:, applied.joint] += twist_rad_Nm * inputs.own_torque_Nm[:, applied.joint]
-        return q
+        """Return what an encoder behind the gear sees."""
+        return q_load_rad + _twist_rad(inputs, applied)
+
+    def joints(self, q_true_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
+        """Return the joints without the twist, which the stiffness of the cell adds."""
+        return q_true_rad - _twist_rad(inputs, applied)
+
+
+def _twist_rad(inputs: Inputs, applied: Applied) -> Floats:
+    """Return by how much (m, 6) the gears twist."""
+    twist = np.zeros_like(inputs.q_cmd_rad)
+    if applied["deg_per_kNm"] != 0.0:
+        per_Nm = applied["deg_per_kNm"] * RAD_PER_DEG / N_PER_KN
+        twist[:, applied.joint] = per_Nm * inputs.own_torque_Nm[:, applied.joint]
+    return twist
 
 
 EFFECT = GearTwist()

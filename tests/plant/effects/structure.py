@@ -135,7 +135,8 @@ def pedestal_compliance(draw: Draw):
             moment = _cut_about(run, ROOT_mm) + masses.moment_about(run, ROOT_mm)
             run.tip_mm = run.tip_mm + fast(run, _tilted(run, moment, size / 1e9, ROOT_mm))
 
-        return numbers(mrad_per_kNm=size), {"tip": tip}
+        both = numbers(x_mrad_per_kNm=size, y_mrad_per_kNm=size)
+        return both | numbers(foot_mm=0.0, own_weight=1.0), {"tip": tip}
 
     return None, at
 
@@ -154,7 +155,8 @@ def pedestal_that_also_shifts(draw: Draw):
             tilt = _tilted(run, _cut_about(run, FOOT_mm), soft, FOOT_mm)
             run.tip_mm = run.tip_mm + fast(run, tilt + shift)
 
-        return numbers(mrad_per_kNm=size, even=even, mm_per_kN=size * shears), {"tip": tip}
+        both = numbers(x_mrad_per_kNm=size, y_mrad_per_kNm=size * even)
+        return both | numbers(foot_mm=600.0, own_weight=0.0, mm_per_kN=size * shears), {"tip": tip}
 
     return None, at
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.plant import arm as arms
 from tests.plant import memory
 from tests.plant.effects.depends import force as force_
 from tests.plant.effects.depends import tip as tip_
@@ -175,9 +176,26 @@ def _pulling(j: int, way: np.ndarray, law) -> dict:
     return {"load": load}
 
 
-@declare(LIBRARY, "force", 0.02, 60.0, signal="force", all_runs=True, depends=READ)
+@declare(LIBRARY, "force", 0.02, 60.0, signal="force", all_runs=True, depends=PULL)
 def cable_pull(draw: Draw):
-    """The sensor's own cable pulls with the travel of a joint, `size` in N per degree along its axes."""
+    """A cable pulls at the end effector with the travel of a joint, `size` in N per degree along its axes."""
+    name, j = draw.joint()
+    way = draw.direction()
+
+    def at(size):
+        def load(run: Run):
+            _, axes = arms.pose(run.body(), np.ascontiguousarray(run.q_load[::SLOW]))
+            along = axes @ run.believed.tool.axes.T @ way
+            run.force_N = run.force_N + size * _travel_deg(run, j)[:, None] * along
+
+        return numbers(N_per_deg=size, direction=way), {"load": load}
+
+    return name, at
+
+
+@other_form("cable_pull", READ)
+def cable_pull_of_the_sensor(draw: Draw):
+    """The sensor's own cable pulls at the sensor alone: no arm bends."""
     name, j = draw.joint()
     way = draw.direction()
 

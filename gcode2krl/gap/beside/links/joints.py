@@ -100,7 +100,7 @@ class _DriveLink(Link):
         return drives(trace.inputs, applied)
 
     def base(self, context: Context) -> tuple[Applied, ...]:
-        """Return slips, and what the motors' encoders were found to misread."""
+        """Return slips, and what encoders were found to misread."""
         return (*context.slips, *(each for each in context.learned if each.effect.is_misread))
 
     def learn(self, context: Context, judged: FittedVerdict) -> Context:
