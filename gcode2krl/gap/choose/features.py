@@ -84,7 +84,7 @@ class FamilyFeatures:
     """What is known of a family that the rest of a gap depends on."""
 
     lead_nats: float
-    """Its evidence over that of the best other family or of none, over the inflation of the best."""
+    """Its evidence over that of the best other family of its signal or of none, over the inflation."""
     share: float
     """Of the gap's power, what it takes."""
     p: float
@@ -99,11 +99,11 @@ FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 
 def family_features(rest: Rest, evidence: Evidence) -> FamilyFeatures:
-    """Return the features of a family of a rest."""
-    evidences = rest.study.evidences
-    other = max((each.nats for each in evidences if each is not evidence), default=0.0)
+    """Return the features of a family of a rest; those of other signals, of another joint, are no rivals."""
+    rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
+    other = max((each.nats for each in rivals if each is not evidence), default=0.0)
     return FamilyFeatures(
-        lead_nats=_within((evidence.nats - max(other, 0.0)) / evidences[0].inflation),
+        lead_nats=_within((evidence.nats - max(other, 0.0)) / rivals[0].inflation),
         share=rest.share(evidence),
         p=rest.study.p_of(evidence),
     )

@@ -1,5 +1,6 @@
 """On what a gap without a name depends, in words and numbers: a family as the answer states it."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
@@ -37,15 +38,20 @@ def depends_on(judgement: Judgement) -> Iterator[DependsOnResult]:
         return
     if not (rest.worth_naming or rest.is_gap):
         return
-    features = [(each, family_features(rest, each)) for each in rest.study.evidences]
     table = probabilities_table()
-    probabilities = [table.dependence(each) for _, each in features]
-    # one family is the right one
-    scale = max(sum(probabilities), 1.0)
-    told = zip(features, probabilities, strict=True)
-    for (evidence, each), probability in sorted(told, key=lambda entry: -entry[1]):
-        if probability / scale >= _LIMITS.least_probability:
-            yield _result(judgement, evidence, probability / scale, each)
+    told = [(each, family_features(rest, each)) for each in rest.study.evidences]
+    certain = [table.dependence(features) for _, features in told]
+    of_signal: dict[int | None, float] = defaultdict(float)
+    for (evidence, _), probability in zip(told, certain, strict=True):
+        of_signal[evidence.place.component] += probability
+    # one family of each signal is the right one
+    scaled = [
+        (probability / max(of_signal[evidence.place.component], 1.0), evidence, features)
+        for (evidence, features), probability in zip(told, certain, strict=True)
+    ]
+    for probability, evidence, features in sorted(scaled, key=lambda entry: -entry[0]):
+        if probability >= _LIMITS.least_probability:
+            yield _result(judgement, evidence, probability, features)
 
 
 def _result(

@@ -76,7 +76,7 @@ def where_lines(gap: Gap) -> Iterator[str]:
 def left_lines(gap: Gap) -> Iterator[str]:
     """Yield on what depends what no named cause explains, the most probable first."""
     for found in gap.unexplained.depends_on[: _LIMITS.report_lines]:
-        yield f"{found.probability:.2f} {depends(found)}; takes {found.share:.0%} of what is left"
+        yield f"{found.probability:.2f} {depends(found)}; takes {found.share:.0%} of the gap"
 
 
 def _link(link: LinkResult) -> str:
