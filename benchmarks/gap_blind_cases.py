@@ -127,6 +127,10 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
     return cases
 
 
+TWINS = {"force_delay": ("clock",)}
+"""What is the same thing under another name, and is taken out of the library with it."""
+
+
 def _check_seeds(first_seed: int) -> None:
     last = first_seed + len(KINDS) * BLOCK - 1
     if first_seed < SCORED_FROM <= last:
@@ -143,7 +147,8 @@ def _case(kind: str, seed: int, i: int, names: Sequence[str]) -> Case:
     if kind == "single":
         return Case(seed, kind, name, _form(name, i, len(names)))
     if kind == "deleted":
-        return Case(seed, kind, name, without=(name.partition("@")[0],))
+        effect = name.partition("@")[0]
+        return Case(seed, kind, name, without=(effect, *TWINS.get(effect, ())))
     return Case(seed, kind, name)
 
 

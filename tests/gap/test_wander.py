@@ -17,10 +17,14 @@ def swing(run):
     return np.sqrt(2.0) * np.sin(2.0 * np.pi * (0.05 + 0.02 * run) * TIME_S + 2.0 * run)
 
 
-def judged(forms):
+def residual(run, form):
+    """Return noise (n, 3) with a form (n,) in the first component."""
+    return noise(COUNT, 30 + run, width=3) + form[:, None] * [1.0, 0.0, 0.0]
+
+
+def judged(forms, link="force"):
     traces = [
-        trace(noise(COUNT, 30 + run) + form[:, None], number=run, inputs=motion(20.0))
-        for run, form in enumerate(forms)
+        trace(residual(run, form), link, number=run, inputs=motion(20.0)) for run, form in enumerate(forms)
     ]
     found = examined(traces, [wave(9.0)], 1.0)
     rest = LinkFamilies(found, traces).rest
@@ -31,6 +35,10 @@ def test_a_swing_of_each_runs_own_is_wander():
     rest, wanders = judged([swing(run) for run in range(RUNS)])
     assert rest.is_gap
     assert wanders
+
+
+def test_an_encoder_does_not_wander():
+    assert not judged([swing(run) for run in range(RUNS)], link="servo")[1]
 
 
 def test_more_than_twice_the_short_noise_is_a_finding():

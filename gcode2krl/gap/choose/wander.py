@@ -25,8 +25,16 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 
 def is_wander(found: Examination, traces: Sequence[Trace], rest: Rest) -> bool:
-    """Tell whether what is left of a link without any cause (`rest`, of these traces) is such a wander."""
-    if len(traces) < 2 or not rest.study.evidences or not _is_own_time(rest.study.evidences):
+    """Tell whether what is left of a link without any cause (`rest`, of these traces) is such a wander.
+
+    Trackers and force sensors wander; an encoder counts.
+    """
+    if (
+        found.link.of_joints
+        or len(traces) < 2
+        or not rest.study.evidences
+        or not _is_own_time(rest.study.evidences)
+    ):
         return False
     best = rest.study.evidences[0]
     if not _is_small(best, found.noise):
