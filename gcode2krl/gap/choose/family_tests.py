@@ -35,8 +35,7 @@ class FamilyTests:
 
     margin: float
     """Evidence of its own family over that of the best other one with the cause taken out, in nats, over the
-    inflation; the refitted form counts as a member of its family. 0 where the other is ahead by less of the
-    gap's power than is worth naming."""
+    inflation; the refitted form counts as a member of its family."""
     form_ratio: float
     """Of what its own family takes, the share that its form takes."""
     other_share: float
@@ -187,7 +186,7 @@ class LinkFamilies:
         margin = np.inf
         if better is not None:
             best = max([form_nats, *(each.nats for each in own)])
-            margin = self._margin(best - better.nats, better.inflation)
+            margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
         rest = self.rest.study
         own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
         near = [each for each in rest.evidences if is_near(applied, each)]
@@ -204,17 +203,6 @@ class LinkFamilies:
             family=own[0] if own else None,
             better=better,
         )
-
-    def _margin(self, nats: float, inflation: float) -> float:
-        """Return how far its own family is ahead of another one, by so many nats, over the inflation.
-
-        A family that contains nearly the same, a smooth function beside a constant, is ahead where the least
-        rest follows it. So much as is not worth naming beside a cause speaks of a rest, not of another cause.
-        """
-        if nats >= 0.0:
-            return nats
-        explained = self._bare.chi2 - self._whole.chi2
-        return 0.0 if -2.0 * nats < _LIMITS.ahead_share * explained else nats / inflation
 
     def _power_share(self, other: Evidence, number: int) -> float:
         """Return a family's share of the power that it and an accepted effect have in the signal."""

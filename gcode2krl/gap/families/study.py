@@ -9,6 +9,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
+from gcode2krl.gap.families.nested import simplest_first
 from gcode2krl.gap.families.rows import Rows
 from gcode2krl.gap.families.steps import Steps, step_evidence
 from gcode2krl.gap.families.tone_search import angle_tones, tones
@@ -83,7 +84,7 @@ def _study(view: View, found: Sequence[Evidence]) -> Study:
         best.setdefault(each.key, each)
     if not found:
         return Study(view.chi2, (), 1.0)
-    return Study(view.chi2, tuple(best.values()), _p(found, max(each.unbounded for each in found)))
+    return Study(view.chi2, simplest_first(best.values()), _p(found, max(each.unbounded for each in found)))
 
 
 def _p(found: Sequence[Evidence], nats: float) -> float:

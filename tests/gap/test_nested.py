@@ -1,0 +1,49 @@
+"""A family that contains another is told before it only where it takes clearly more."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.families.evidence import Evidence
+from gcode2krl.gap.families.grid import Place
+from gcode2krl.gap.families.nested import CONTAINS, simplest_first
+
+
+def evidence(on, nats, place="tip"):
+    return Evidence(
+        place=Place(place, Where.TIP, ()),
+        on=on,
+        nats=nats,
+        gain=2.0 * nats,
+        inflation=1.0,
+        flipped=np.zeros(1),
+        unbounded=nats,
+        signal=(),
+    )
+
+
+def order(*evidences):
+    return [(each.on, each.nats) for each in simplest_first(evidences)]
+
+
+@pytest.mark.parametrize("larger", sorted(CONTAINS, key=lambda each: each.value))
+def test_the_smaller_one_is_told_where_the_larger_takes_hardly_more(larger):
+    smaller = min(CONTAINS[larger], key=lambda each: each.value)
+    assert order(evidence(larger, 1000.0), evidence(smaller, 985.0)) == [(smaller, 1000.0), (larger, 985.0)]
+    assert order(evidence(larger, 1000.0), evidence(smaller, 900.0)) == [(larger, 1000.0), (smaller, 900.0)]
+
+
+def test_a_chain_ends_at_the_smallest():
+    found = order(
+        evidence(Dependence.RUN_TIME, 1000.0),
+        evidence(Dependence.PLACE, 995.0),
+        evidence(Dependence.CONSTANT, 990.0),
+    )
+    assert [on for on, _ in found] == [Dependence.CONSTANT, Dependence.PLACE, Dependence.RUN_TIME]
+
+
+def test_families_of_other_places_and_without_evidence_stay():
+    apart = [evidence(Dependence.PLACE, 1000.0), evidence(Dependence.CONSTANT, 995.0, place="A1")]
+    assert order(*apart) == [(Dependence.PLACE, 1000.0), (Dependence.CONSTANT, 995.0)]
+    poor = [evidence(Dependence.PLACE, -1.0), evidence(Dependence.CONSTANT, -1.01)]
+    assert order(*poor) == [(Dependence.PLACE, -1.0), (Dependence.CONSTANT, -1.01)]
