@@ -8,5 +8,6 @@ Ints = NDArray[np.int64]
 Ints32 = NDArray[np.int32]
 """Source lines, tools and rows of other tables: the columns that are stored as they are."""
 Bools = NDArray[np.bool_]
+Complexes = NDArray[np.complex128]
 Rows = NDArray[np.int64]
 """Row numbers, to index a table's columns with."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
-from gcode2krl.cutting.milling import Removal, cut, force_basis, no_forces, remove
+from gcode2krl.cutting.milling import Removal, cut, force_basis, mean_cut, no_forces, remove
 
 # compiled kernels are looked up when they are first called
 drop_stale(
@@ -18,4 +18,14 @@ drop_stale(
     "walls.py",
 )
 
-__all__ = ["Load", "Removal", "cut", "cutting_load", "force_basis", "mean_force", "no_forces", "remove"]
+__all__ = [
+    "Load",
+    "Removal",
+    "cut",
+    "cutting_load",
+    "force_basis",
+    "mean_cut",
+    "mean_force",
+    "no_forces",
+    "remove",
+]

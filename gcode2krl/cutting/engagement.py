@@ -6,14 +6,13 @@ any number of threads gives the same result to the last bit.
 """
 
 import math
-import os
 from collections.abc import Sequence
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell.sections import Tool
-from gcode2krl.compiled.threads import in_threads
+from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
@@ -140,7 +139,7 @@ def _tangents(position_mm: Floats, first: Bools) -> Floats:
 
 def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:
     """Return the borders of strips with equally many samples each, none narrower than useful."""
-    strips = min(threads or os.cpu_count() or 1, max(1, int(np.ptp(along_mm) / (2.0 * halo_mm))))
+    strips = min(threads or cores(), max(1, int(np.ptp(along_mm) / (2.0 * halo_mm))))
     if threads is None and len(along_mm) < _FEW_SAMPLES:
         strips = 1
     inner = np.quantile(along_mm, np.linspace(0.0, 1.0, strips + 1)[1:-1])

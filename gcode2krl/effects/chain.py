@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gcode2krl import frames as fr
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import arm
 from gcode2krl.effects.arm import Load
 from gcode2krl.effects.effect import Applied, Effect
@@ -101,21 +101,20 @@ def _joints(inputs: Inputs, applied: Sequence[Applied]) -> tuple[Floats, Floats,
     q_act = inputs.q_cmd_rad
     for one in applied:
         q_act = one.effect.servo(q_act, inputs, one)
-    q_load = _measured(q_act, inputs.q_act_rad)
+    q_load = _measured(q_act, inputs.q_act_rad, inputs.is_act_missing)
     for one in applied:
         q_load = one.effect.gear(q_load, inputs, one)
-    q_true = _measured(q_load, inputs.q_load_rad)
+    q_true = _measured(q_load, inputs.q_load_rad, inputs.is_load_missing)
     for one in applied:
         q_true = one.effect.joints(q_true, inputs, one)
     return q_act, q_load, q_true
 
 
-def _measured(model_rad: Floats, measured_rad: Floats | None) -> Floats:
-    """Return the measured joints (m, 6), the model's where there are none: columns that are NaN."""
+def _measured(model_rad: Floats, measured_rad: Floats | None, is_missing: Bools) -> Floats:
+    """Return the measured joints (m, 6), the model's where there are none."""
     if measured_rad is None:
         return model_rad
-    missing = np.isnan(measured_rad).all(axis=0)
-    return np.where(missing, model_rad, measured_rad) if missing.any() else measured_rad
+    return np.where(is_missing, model_rad, measured_rad) if is_missing.any() else measured_rad
 
 
 def _cut(inputs: Inputs, applied: Sequence[Applied]) -> Load:

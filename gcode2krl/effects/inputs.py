@@ -1,14 +1,15 @@
 """What the measuring chain of one run starts from: what is planned, where the arm stands, what is cut."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, wraps
+from typing import Any, TypeVar
 
 import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl import robot
-from gcode2krl.arrays import Floats, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.effects import arm, masses
 from gcode2krl.effects.arm import Load
@@ -18,6 +19,24 @@ from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, S_PER_H
 
 Cut = Callable[[Motion, Cell], Forces]
 Plan = Callable[[Targets, Cell], Motion]
+
+
+Sources = tuple[Any, ...]
+Made = TypeVar("Made")
+
+
+def of_the_command(make: "Callable[[Inputs], Made]") -> "cached_property[Made]":
+    """Return a property that follows from commanded motion and cell alone: runs and links share its value."""
+
+    def once(inputs: "Inputs") -> Made:
+        sources = inputs.commanded
+        known = inputs.kept.get(make.__name__)
+        if known is None or any(old is not new for old, new in zip(known[0], sources, strict=True)):
+            known = inputs.kept[make.__name__] = sources, make(inputs)
+        made: Made = known[1]
+        return made
+
+    return cached_property(wraps(make)(once))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,16 +81,23 @@ class Inputs:
     """Removes the material again, along another motion or in a changed cell."""
     plan: Plan | None = None
     """Plans the motion again, with other targets or in a changed cell."""
+    kept: dict[str, tuple[Sources, Any]] = field(default_factory=dict, repr=False)
+    """What was computed of the commanded motion, by name: all inputs with the same columns share it."""
 
     def __len__(self) -> int:
         return len(self.time_s)
 
-    @cached_property
+    @property
+    def commanded(self) -> Sources:
+        """What the commanded motion consists of, and the cell."""
+        return self.cell, self.time_s, self.q_cmd_rad, self.position_mm, self.rotation, self.tool
+
+    @of_the_command
     def tool_rotation(self) -> Floats:
         """(m, 3, 3) commanded rotations of the tool frame in ``$BASE``."""
         return fr.rotation_from_quaternion(self.rotation)
 
-    @cached_property
+    @of_the_command
     def sensor_rotation(self) -> Floats:
         """(m, 3, 3) rotations of the force sensor in ``$BASE``; its axes are those of the flange."""
         turned = np.empty((len(self), 3, 3))
@@ -85,7 +111,7 @@ class Inputs:
         down: Floats = self.cell.base_matrix()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
         return down
 
-    @cached_property
+    @of_the_command
     def jacobian(self) -> Floats:
         """(m, 6, 6) of the tip at the commanded joints, along ``$BASE``."""
         return arm.jacobian_base(self.q_cmd_rad, self.cell, self.tool)
@@ -101,19 +127,24 @@ class Inputs:
             return np.zeros_like(self.q_cmd_rad)
         force_N = self.force_base_N if self.load_base_N is None else self.load_base_N
         torque = arm.torque_Nm(self.jacobian, force_N, self.moment_base_Nmm)
-        return torque + masses.torque_Nm(self.bodies, self.bodies_push_N, self.axes_mm, self.jacobian)
+        return torque + self._weight_Nm
 
-    @cached_property
+    @of_the_command
+    def _weight_Nm(self) -> Floats:
+        """(m, 6) torque of weight and inertia of links and payload."""
+        return masses.torque_Nm(self.bodies, self.bodies_push_N, self.axes_mm, self.jacobian)
+
+    @of_the_command
     def axes_mm(self) -> Floats:
         """(m, 6, 3) a point of each joint's axis in ``$BASE``: where the links meet."""
         return arm.axes_mm(self.q_cmd_rad, self.lengths_mm, self.cell)
 
-    @cached_property
+    @of_the_command
     def bodies(self) -> masses.Bodies:
         """Links and payload as points with a mass."""
         return masses.bodies_of(self.cell, self.axes_mm, self.position_mm, self.tool_rotation, self.tool)
 
-    @cached_property
+    @of_the_command
     def bodies_push_N(self) -> Floats:
         """(m, b, 3) weight and inertia of links and payload along ``$BASE``."""
         speed = [gradient(at, self.time_s) for at in np.moveaxis(self.bodies.centre_mm, 1, 0)]
@@ -130,6 +161,16 @@ class Inputs:
     def softness(self) -> Floats | None:
         """(10, 3) of the virtual joints in rad/(N·mm); None where the cell does not state all."""
         return arm.softness_of(self.cell)
+
+    @cached_property
+    def is_act_missing(self) -> Bools:
+        """(6,) joints whose motor side was not measured where others were."""
+        return _is_missing(self.q_act_rad)
+
+    @cached_property
+    def is_load_missing(self) -> Bools:
+        """(6,) joints without an encoder behind the gear where others have one."""
+        return _is_missing(self.q_load_rad)
 
     @property
     def joints_rad(self) -> Floats:
@@ -152,7 +193,7 @@ class Inputs:
         load = (force_N, self.moment_base_Nmm)
         return arm.bend(self.joints_rad, *load, self.softness, self.cell, self.tool)[0]
 
-    @cached_property
+    @of_the_command
     def velocity_mm_s(self) -> Floats:
         """(m, 3) of the commanded tip along ``$BASE``; central differences."""
         return gradient(self.position_mm, self.time_s)
@@ -174,7 +215,7 @@ class Inputs:
         tip_mm = arm.tip_mm(q_rad, lengths_mm, self.cell, self.tool)
         return self.position_mm + (tip_mm - self._commanded_tip_mm)
 
-    @cached_property
+    @of_the_command
     def _commanded_tip_mm(self) -> Floats:
         return arm.tip_mm(self.q_cmd_rad, self.lengths_mm, self.cell, self.tool)
 
@@ -237,6 +278,13 @@ class Inputs:
 
     def _at(self, values: Floats | None, time_s: Floats) -> Floats | None:
         return None if values is None else resampled(values, self.time_s, time_s)
+
+
+def _is_missing(measured_rad: Floats | None) -> Bools:
+    """Return which columns of (m, 6) are NaN."""
+    if measured_rad is None:
+        return np.ones(6, dtype=np.bool_)
+    return np.asarray(np.isnan(measured_rad).all(axis=0))
 
 
 def resampled(values: Floats, time_s: Floats, at_s: Floats) -> Floats:

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from gcode2krl.compiled.threads import in_threads
+from gcode2krl.compiled.threads import cores, in_threads
 
 
 def test_results_come_in_the_order_of_the_tasks():
@@ -35,3 +35,11 @@ def test_an_error_comes_out():
 
 def test_no_tasks_no_results():
     assert in_threads(str, []) == []
+
+
+def test_the_environment_says_how_many_threads(monkeypatch):
+    """Several processes at once, each on a core of its own, do the same work in less time alone."""
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
+    assert cores() == 1
+    monkeypatch.delenv("NUMBA_NUM_THREADS")
+    assert cores() >= 1

@@ -8,6 +8,7 @@ import pytest
 from gcode2krl.effects import Applied, library
 from gcode2krl.gap.choose.fitted_joints import fitted_signal
 from gcode2krl.gap.fit.noise import white
+from gcode2krl.gap.fit.signatures import Signatures
 from tests.gap.constructed import (
     applied,
     joint_rates,
@@ -24,10 +25,12 @@ INPUTS = motion()
 EFFECT = wave(2.0)
 
 
-def fitted(one, effects=(), asked=None):
+def fitted(one, effects=(), asked=None, stamps_s=None):
     """Return what the fitted model says of a trace, from as much of an examination as that takes."""
     known = [white(SIGMA)] * one.shape[1]
-    return fitted_signal(one, stub(applied=tuple(effects), noise=known, question=asked or question([])))
+    data = stub(known=Signatures())
+    found = stub(applied=tuple(effects), noise=known, question=asked or question([]), data=data)
+    return fitted_signal(one, found, stamps_s)
 
 
 def test_the_effect_without_the_noise_is_what_later_links_see():
@@ -72,8 +75,5 @@ def test_rows_that_were_left_out_have_a_model_too():
     cut = replace(
         whole, time_s=whole.time_s[kept], measured=(whole.measured + change)[kept], segments=segments
     )
-    known = [white(SIGMA)]
-    found = fitted_signal(
-        cut, stub(applied=(applied(EFFECT, 0.01),), noise=known, question=question([])), INPUTS.time_s
-    )
+    found = fitted(cut, [applied(EFFECT, 0.01)], stamps_s=INPUTS.time_s)
     np.testing.assert_allclose(found, change, atol=1e-12)

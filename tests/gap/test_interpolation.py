@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from gcode2krl.effects import simulate
-from gcode2krl.gap.beside.interpolation import cubic, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
 from tests.gap.constructed import applied, joints, motion, wave
 
 GENERATOR = np.random.default_rng(1)
@@ -56,6 +56,19 @@ def test_the_path_in_a_signal_goes_by_cubics_and_what_deviates_by_lines():
     np.testing.assert_allclose(interpolate(signals, "q_act_rad", times_s), expected, atol=1e-6)
     force = interpolate(signals, "force_meas_base_N", times_s)
     assert force.shape == (len(times_s), 3)
+
+
+def test_a_path_is_kept_for_its_times_alone():
+    """Every later call gets what a first one would, with the same times, others and another path."""
+    inputs = motion()
+    signals = simulate(inputs, [applied(wave(12.0), 0.01)])
+    last, times_s = LastPath(), inputs.time_s[5:-5] + 0.007
+    for each in (times_s, times_s.copy(), times_s + 0.003, times_s):
+        expected = interpolate(signals, "q_act_rad", each)
+        np.testing.assert_array_equal(interpolate(signals, "q_act_rad", each, last), expected)
+    kept = last.at(times_s, inputs.time_s, inputs.q_cmd_rad)
+    assert last.at(times_s.copy(), inputs.time_s, inputs.q_cmd_rad) is kept
+    assert last.at(times_s, inputs.time_s, inputs.q_cmd_rad + 0.1) is not kept
 
 
 def test_measured_joints_stand_for_those_of_the_model():

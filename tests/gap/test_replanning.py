@@ -19,10 +19,11 @@ def _found(share):
     """Return as much of an examination as a refit looks at: one run that takes longer by a share."""
     traces = (run(share, noise_rad=SIGMA),)
     return SimpleNamespace(
-        data=SimpleNamespace(place_times=PlaceTimes(traces)),
+        data=SimpleNamespace(place_times=PlaceTimes(traces), values=traces[0].measured.size),
         likelihood=likelihood(traces, sigma=SIGMA),
         applied=(),
         traces=traces,
+        fitted=refit(likelihood(traces, sigma=SIGMA), ()),
     )
 
 
@@ -40,3 +41,11 @@ def test_one_that_is_hopeless_is_not_searched_for():
     linear = applied(SLOWER, 0.01, None)
     rough = replanned(found, Block(SLOWER, None), linear, 0.0)
     assert rough.chi2 >= replanned(found, Block(SLOWER, None), linear, np.inf).chi2
+
+
+def test_a_run_in_time_is_given_up_after_a_few_steps():
+    """Another effect takes half of the rest; a share that is not there brings nothing."""
+    found = _found(0.0)
+    linear = applied(SLOWER, 0.01, None)
+    started = replanned(found, Block(SLOWER, None), linear, 0.5 * found.fitted.chi2)
+    assert started.chi2 == refit(found.likelihood, (linear,), steps=3).chi2

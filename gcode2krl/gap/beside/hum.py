@@ -5,11 +5,12 @@ cut is bound to it but a spindle that turns at that speed, and then nothing is t
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.gap.beside.band import Bands
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import RAD_PER_REV
@@ -20,6 +21,10 @@ _MULTIPLES = (1, 2, 3, 5)
 """Of a grid: transformers give the second, rectifiers and cores odd ones."""
 _TEETH = 12
 """A cutter has no more: so many multiples of the spindle's speed may be in a force."""
+_GAP, _BESIDE = 0.2, 40
+"""Share of the surroundings that a tone may fill, and how many frequencies on either side are asked."""
+_MEDIAN = float(np.log(2.0))
+"""Power of noise is distributed exponentially: its median over its mean."""
 
 
 def without_hum(traces: Sequence[Trace]) -> list[Trace]:
@@ -32,10 +37,10 @@ def _without(trace: Trace) -> Trace:
     if trace.still or count < LIMITS.hum_least_rows:
         return trace
     step_s = float(np.median(np.diff(trace.time_s)))
-    measured = trace.measured.copy()
+    measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])
     for hz in _mains_hz(trace):
         if 4.0 * LIMITS.hum_around_hz < _folded(hz, step_s):  # what is folded to a drift is none to be told
-            _take_off(trace, measured, hz)
+            spectrum.take_off(measured, trace.nominal, hz)
     return replace(trace, measured=measured) if not np.array_equal(measured, trace.measured) else trace
 
 
@@ -53,25 +58,37 @@ def _folded(hz: float, step_s: float) -> float:
     return min(turns, 1.0 - turns) / step_s
 
 
-def _take_off(trace: Trace, measured: Floats, hz: float) -> None:
-    """Take a tone off the columns (n, k) in which it stands out of what is beside it in the spectrum."""
-    time_s = trace.time_s - trace.time_s[0]
-    span_s = float(time_s[-1])
-    fine = np.arange(-LIMITS.hum_wander_hz, LIMITS.hum_wander_hz + 1e-9, 0.1 / span_s)
-    beside = LIMITS.hum_around_hz * np.linspace(0.2, 1.0, 40)
-    for j in range(measured.shape[1]):
-        rest = measured[:, j] - trace.nominal[:, j]
-        rest = rest - rest.mean()
-        power = np.abs(_transform(rest, time_s, hz + fine)) ** 2
-        around = np.abs(_transform(rest, time_s, np.concatenate([hz - beside, hz + beside]))) ** 2
-        # power of noise is distributed exponentially: its median is log 2 of its mean
-        level = float(np.median(around)) / np.log(2.0)
-        if power.max() > level * np.log(len(fine) / LIMITS.hum_false):
-            angle = 2.0 * np.pi * (hz + fine[int(np.argmax(power))]) * time_s
-            tone = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            measured[:, j] -= tone @ np.linalg.lstsq(tone, rest, rcond=None)[0]
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """The spectrum of one trace around frequencies of the mains."""
 
+    near: Bands
+    """Where a tone of the mains may be."""
+    around: Bands
+    """What is beside it, below as well as above."""
 
-def _transform(values: Floats, time_s: Floats, hz: Floats) -> Floats:
-    transformed: Floats = np.exp(-2j * np.pi * hz[:, None] * time_s) @ values
-    return transformed
+    @classmethod
+    def of(cls, time_s: Floats) -> "_Spectrum":
+        step_hz = 0.1 / float(time_s[-1])
+        count = int(2.0 * LIMITS.hum_wander_hz / step_hz + 1e-6) + 1
+        reach_hz = (1.0 - _GAP) * LIMITS.hum_around_hz
+        return cls(Bands(time_s, step_hz, count), Bands(time_s, reach_hz / (_BESIDE - 1), _BESIDE))
+
+    def level(self, hz: float, values: Floats) -> Floats:
+        """Return the mean power (k,) of noise beside a frequency."""
+        starts = (hz - LIMITS.hum_around_hz, hz + _GAP * LIMITS.hum_around_hz)
+        around = np.concatenate([self.around.power(start, values) for start in starts])
+        level: Floats = np.median(around, axis=0) / _MEDIAN
+        return level
+
+    def take_off(self, measured: Floats, nominal: Floats, hz: float) -> None:
+        """Take a tone off the columns (n, k) in which it stands out of what is beside it."""
+        rests = measured - nominal
+        rests -= rests.mean(axis=0)
+        first_hz = hz - LIMITS.hum_wander_hz
+        powers = self.near.power(first_hz, rests)
+        for j, (power, level) in enumerate(zip(powers.T, self.level(hz, rests), strict=True)):
+            if power.max() > level * np.log(len(power) / LIMITS.hum_false):
+                angle = 2.0 * np.pi * self.near.hz(first_hz)[int(np.argmax(power))] * self.near.time_s
+                tone = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+                measured[:, j] -= tone @ np.linalg.lstsq(tone, rests[:, j], rcond=None)[0]

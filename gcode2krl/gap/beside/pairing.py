@@ -3,8 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 
 from gcode2krl.effects import Inputs, inputs_of
+from gcode2krl.effects.inputs import Cut
 from gcode2krl.gap.beside.fine_prediction import refined_prediction
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.planning import remembered_plan
@@ -40,7 +42,16 @@ def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
 
 def _shared(prediction: Prediction) -> tuple[Inputs, Simulator]:
     fine = refined_prediction(prediction)
-    return inputs_of(fine, plan=remembered_plan(fine)), Simulator()
+    return inputs_of(fine, plan=remembered_plan(fine), cut=_cut_of(fine)), Simulator()
+
+
+def _cut_of(prediction: Prediction) -> Cut | None:
+    """Return what cuts the part again for its mean forces; None where none are predicted."""
+    if prediction.forces is None:
+        return None
+    from gcode2krl.cutting import mean_cut
+
+    return partial(mean_cut, prediction.toolpath)
 
 
 def first_start(runs: Sequence[Run]) -> datetime | None:

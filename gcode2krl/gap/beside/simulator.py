@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from hashlib import blake2b
+from weakref import WeakKeyDictionary
 
 from gcode2krl.effects import Applied, Inputs, Signals, commanded
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -18,13 +19,16 @@ class Simulator:
 
     def __init__(self) -> None:
         self._kept: OrderedDict[Hashable, Signals] = OrderedDict()
+        self._digests: WeakKeyDictionary[Inputs, bytes] = WeakKeyDictionary()
 
     def commanded(self, inputs: Inputs, applied: Sequence[Applied]) -> Signals:
         """Return the signals of the commanded path with effects at work, clocks included."""
         effects = tuple(
             (each.effect.name, each.target, each.planned, *each.values.items()) for each in applied
         )
-        key = (_digest(inputs), effects)
+        if inputs not in self._digests:
+            self._digests[inputs] = _digest(inputs)
+        key = (self._digests[inputs], effects)
         if key not in self._kept:
             self._kept[key] = commanded(inputs, applied)
             if len(self._kept) > LIMITS.remembered_paths:

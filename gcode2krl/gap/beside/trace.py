@@ -9,7 +9,7 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.interpolation import interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.interpolation import LastPath, interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -152,6 +152,11 @@ class Trace:
     def _plain(self) -> Signals:
         return self._simulated(self.base)
 
+    @cached_property
+    def _last_paths(self) -> tuple[LastPath, LastPath]:
+        """Of ``plus`` and of ``minus``, whose clocks may differ."""
+        return LastPath(), LastPath()
+
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
         if not applied:
@@ -171,14 +176,16 @@ class Trace:
             # the inputs are this signal as it was stamped: a clock of its own shows in the other one
             times = times - signals.own_late_s(self.minus, stamps)
         if self.minus is None:
-            values = interpolate(signals, self.plus, times)
+            values = interpolate(signals, self.plus, times, self._last_paths[0])
         else:
             other = signals.table_time(self.minus, stamps)
             if np.array_equal(times, other):
                 apart = values_of(signals, self.plus) - values_of(signals, self.minus)
                 values = linear(times, signals.time_s, apart)
             else:
-                values = interpolate(signals, self.plus, times) - interpolate(signals, self.minus, other)
+                plus, minus = self._last_paths
+                values = interpolate(signals, self.plus, times, plus)
+                values = values - interpolate(signals, self.minus, other, minus)
         if self.in_sensor_frame or self.in_tool_frame:
             values = self._turned(signals, values, times)
         return values[:, list(self.columns)]

@@ -25,14 +25,14 @@ def fitted_signal(trace: Trace, examination: Examination, stamps_s: Floats | Non
     the joints turn about, have a model too.
     """
     applied = examination.applied
-    nuisance = nuisance_for([trace], examination.question, Signatures())
+    nuisance = nuisance_for([trace], examination.question, examination.data.known)
     likelihood = Likelihood([trace], nuisance, examination.noise)
     b = likelihood.nuisance_of(likelihood.whiten([trace.measured - trace.sample(applied)]))
     if trace.link.instrument:
         applied = tuple(each for each in applied if not each.effect.is_clock)
         b[np.isin(likelihood.design.names(0), trace.link.instrument)] = 0.0
     shown, design = trace, likelihood.design
-    if stamps_s is not None:
+    if stamps_s is not None and not np.array_equal(stamps_s, trace.time_s):
         shown = at_stamps(trace, stamps_s)
         design = NuisanceDesign.of(nuisance_for([shown], examination.question, Signatures()))
         b = _renamed(b, likelihood.design.names(0), design.names(0))

@@ -1,6 +1,7 @@
 """The refit of an effect that plans anew.
 
-Its signals are late by seconds, and least squares on them have a minimum at each stop.
+Its signals are late by seconds, and least squares on them have a minimum at each stop. Where little
+more than noise is left they have one minimum, and a few steps tell what the effect can bring.
 """
 
 from collections.abc import Iterator
@@ -12,18 +13,27 @@ from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.refitting import refit, searched
 from gcode2krl.gap.fit.signatures import Block
+from gcode2krl.gap.thresholds import THRESHOLDS
 
+_LIMITS = THRESHOLDS.choose
 _STARTS = (1.0, -0.7, 3.0)
 """In typical sizes from nominal: both ways, and far."""
+_NEAR_STEPS = 3
 _PLACED = 2
 """So many of the starts, those nearest to the measured times, are fitted."""
 
 
-def replanned(found: Examination, block: Block, linear: Applied, hopeless: float) -> Fitted:
+def replanned(found: Examination, block: Block, linear: Applied, best_chi2: float) -> Fitted:
     """Return the best refit from the numbers that meet the times at which the runs are at each place.
 
-    Where these leave more than ``hopeless`` as chi2 no better ones are searched for.
+    Where these leave many times ``best_chi2``, that of the best other effect, no better ones are searched
+    for. Where little more than noise is left of the runs, the first order has to bring a share of its gain.
     """
+    hopeless = _LIMITS.hopeless * best_chi2
+    if np.isfinite(best_chi2) and found.fitted.chi2 <= _LIMITS.hopeless * found.data.values:
+        near = refit(found.likelihood, (*found.applied, linear), steps=_NEAR_STEPS)
+        if found.fitted.chi2 - near.chi2 < _LIMITS.bent_share * (found.fitted.chi2 - best_chi2):
+            return near
     times, likelihood, others = found.data.place_times, found.likelihood, found.applied
     starts = sorted([linear, *_starts(found, block, linear)], key=lambda each: times.size((*others, each)))
     placed = [times.fitted(others, start) for start in starts[:_PLACED]]

@@ -136,7 +136,7 @@ def _trials(found: Examination, scores: Sequence[Score]) -> Iterator[_Trial]:
         block = found.data.candidates.block(score.column)
         start = block.applied(score.coefficients, found.traces[0])
         if block.effect.plans_anew:
-            fitted = replanned(found, block, start, _LIMITS.hopeless * best)
+            fitted = replanned(found, block, start, best)
         else:
             fitted = with_shown_numbers(found, _refitted(found, start, best))
         best = min(best, fitted.chi2)

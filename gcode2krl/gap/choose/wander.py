@@ -40,6 +40,8 @@ def is_wander(found: Examination, traces: Sequence[Trace], rest: Rest) -> bool:
     if not _is_small(best, found.noise):
         return False
     steady = [_less(trace, best, signal) for trace, signal in zip(traces, best.signal, strict=True)]
+    for before, after in zip(traces, steady, strict=True):
+        found.data.known.same(before, after)  # what was measured changes no signature
     plain = _without_causes(found)
     nuisance = nuisance_for(steady, found.question, found.data.known)
     if size_of_gap(steady, nuisance, found.noise, (), found.mismatch).significant:

@@ -129,19 +129,34 @@ class Grid:
         own = self.inputs
         yield from self._of_time
         yield from self._of_motion(place)
-        yield Dependence.TRAVEL, smooth([each.travel_mm for each in own])
+        yield self._of_travel
         if place.joint is not None:
             yield from self._of_joint(place.joint)
         if any(each.force_N.any() for each in own):
-            yield from self._of_force(place)
+            yield from self._of_force
         if place.joint is None:
             yield Dependence.PLACE, smooth_sum([each.position_mm for each in own])
-        if place.where is not Where.TIP:
-            yield Dependence.PLACE, free(self._pose(place.where is Where.FORCE_AXIS))
+        if place.where is Where.FORCE_AXIS:
+            yield Dependence.PLACE, free(self._pose(turned=True))
+        elif place.where is Where.JOINT:
+            yield Dependence.PLACE, self._of_position
+
+    # The same at every place
+
+    @cached_property
+    def _of_travel(self) -> tuple[Dependence, Functions]:
+        return Dependence.TRAVEL, smooth([each.travel_mm for each in self.inputs])
+
+    @cached_property
+    def _of_position(self) -> Functions:
+        return free(self._pose(turned=False))
+
+    @cached_property
+    def _of_force(self) -> list[tuple[Dependence, Functions]]:
+        return list(self._functions_of_force())
 
     @cached_property
     def _of_time(self) -> list[tuple[Dependence, Functions]]:
-        """The same at every place."""
         return list(self._functions_of_time())
 
     def _functions_of_time(self) -> Iterator[tuple[Dependence, Functions]]:
@@ -193,7 +208,7 @@ class Grid:
             joined = [np.concatenate(each, axis=1) for each in zip(single, loops, loads, strict=True)]
             yield Dependence.OWN_TORQUE, free(joined)
 
-    def _of_force(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
+    def _functions_of_force(self) -> Iterator[tuple[Dependence, Functions]]:
         own = self.inputs
         force = [each.force_N for each in own]
         size = [np.linalg.norm(each, axis=1, keepdims=True) for each in force]
@@ -222,7 +237,7 @@ class Grid:
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""
-        columns, _ = place.lifted(free(self._pose(turned=False)))
+        columns, _ = place.lifted(self._of_position)
         tool, arm_, bends = [], [], []
         at = list(self.traces[0].columns)
         sigma = float(np.mean(self._sigma))

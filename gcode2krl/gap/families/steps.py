@@ -7,7 +7,7 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.gap.families.columns import Beside, Columns
-from gcode2krl.gap.families.evidence import Evidence, evidence_of, log_evidence, log_mean
+from gcode2krl.gap.families.evidence import AMPLITUDES, Evidence, evidence_of, log_mean
 from gcode2krl.gap.families.grid import Place
 from gcode2krl.gap.families.rows import Rows
 from gcode2krl.gap.families.view import View
@@ -132,9 +132,18 @@ def scan(view: View, steps: Steps, columns: Columns, signs: Floats) -> tuple[Flo
 
 
 def _each(values: Floats, scores: Floats) -> Floats:
-    """Return the log evidence (…, m) of each moment from its eigenvalues (m, d) and scores (…, m, d)."""
-    moments = [log_mean(log_evidence(own, scores[..., m, :])) for m, own in enumerate(values)]
-    return np.stack(moments, axis=-1)
+    """Return the log evidence (…, m) of each moment from its eigenvalues (m, d) and scores (…, m, d).
+
+    `log_evidence` and its mean over the amplitudes, of all moments at once.
+    """
+    squares = AMPLITUDES[:, None] ** 2
+    grown = squares * values[:, None]
+    falls = np.moveaxis(scores**2, -2, 0)  # (m, …, d)
+    shrunk = (squares / (1.0 + grown)).swapaxes(1, 2)
+    fall = falls.reshape(len(values), -1, values.shape[1]) @ shrunk
+    evidence = log_mean(0.5 * fall - 0.5 * np.log1p(grown).sum(axis=-1)[:, None])
+    each: Floats = np.moveaxis(evidence.reshape(falls.shape[:-1]), 0, -1)
+    return each
 
 
 def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> Evidence | None:

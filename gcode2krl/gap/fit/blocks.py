@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
@@ -40,9 +41,23 @@ class _Blocks:
 
     def means(self, values: Floats) -> Floats:
         """Return the means (b, …) of values (n, …) over the blocks that are kept."""
-        sums = np.add.reduceat(values, self.starts, axis=0)
-        means: Floats = (sums.T / self.counts).T[self.kept]
-        return means
+        wide = values if values.ndim == 2 else values[:, None]
+        means: Floats = _means(wide, np.append(self.starts, len(values)))[self.kept]
+        return means if values.ndim == 2 else means[:, 0]
+
+
+@numba.njit(cache=True, nogil=True)
+def _means(values: Floats, edges: Ints) -> Floats:
+    """Return the means (b, c) of values (n, c) between edges (b + 1,)."""
+    count, columns = len(edges) - 1, values.shape[1]
+    means = np.zeros((count, columns))
+    for block in range(count):
+        for i in range(edges[block], edges[block + 1]):
+            for c in range(columns):
+                means[block, c] += values[i, c]
+        for c in range(columns):
+            means[block, c] /= edges[block + 1] - edges[block]
+    return means
 
 
 def block_means(

@@ -12,10 +12,11 @@ from gcode2krl.arrays import Floats, Ints
 
 
 def cluster_scores(jacobian: Floats, residual: Floats, clusters: Ints) -> Floats:
-    """Return the scores u (g, p) of jacobian (n, p) and residual (n,), one row a cluster (n,)."""
-    names, at = np.unique(clusters, return_inverse=True)
-    scores = np.zeros((len(names), jacobian.shape[1]))
-    np.add.at(scores, at, jacobian * residual[:, None])
+    """Return the scores u (g, p) of jacobian (n, p) and residual (n,), one row a cluster (n,), 0 or more."""
+    used = np.bincount(clusters) > 0
+    at = (np.cumsum(used) - 1)[clusters]
+    sums = [np.bincount(at, column * residual, int(used.sum())) for column in jacobian.T]
+    scores: Floats = np.stack(sums, axis=1) if sums else np.zeros((int(used.sum()), 0))
     return scores
 
 

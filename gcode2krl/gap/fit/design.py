@@ -35,12 +35,13 @@ class Question:
 def nuisance_for(traces: Sequence[Trace], question: Question, known: Signatures) -> list[list[Nuisance]]:
     """Return the nuisance of each trace."""
     clock = question.clocks**0.5 * question.clock_share
-    return [
-        nuisance_of(
+
+    def make(trace: Trace) -> list[Nuisance]:
+        return nuisance_of(
             trace, question.library, question.mismatch, known, question.upstream, clock, question.joints
         )
-        for trace in traces
-    ]
+
+    return [known.once(trace, question, make) for trace in traces]
 
 
 @dataclass(frozen=True, eq=False)

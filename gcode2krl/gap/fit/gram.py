@@ -36,7 +36,7 @@ class SignatureGram:
         self.columns, self.signatures, self.places = columns, signatures, places
         self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
         self._fixed = [
-            [wide[rows].T @ wide[rows] for rows in members]
+            [_inner(wide[rows]) for rows in members]
             for wide, members in zip(columns, self._rows, strict=True)
         ]
 
@@ -55,6 +55,12 @@ class SignatureGram:
             traces.append(TraceGram(np.stack(grams), np.sum(grams, axis=0), self.places[number]))
         values = sum(len(new) for new in data)
         return Gram(tuple(traces), data[0].shape[1] - 1, self.signatures, values)
+
+
+def _inner(columns: Floats) -> Floats:
+    """Return the Gram matrix of columns; of one array BLAS makes half of the products."""
+    gram: Floats = columns.T @ columns
+    return gram
 
 
 def _joined(new: Floats, fixed: Floats, fixed_gram: Floats) -> Floats:

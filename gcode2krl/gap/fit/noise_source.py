@@ -98,13 +98,23 @@ class _Explained:
     """What is taken out of one trace before its noise is looked at."""
 
     def __init__(self, trace: Trace, signatures: Floats, nuisance: Sequence[Nuisance]) -> None:
-        columns = np.concatenate([signatures, *(each.columns for each in nuisance)], axis=2)
-        k, n, c = columns.shape
-        flat = columns.reshape(k * n, c)
-        scale = np.sqrt(np.sum(flat**2, axis=0))
-        self.flat = flat[:, scale > 0.0] / scale[scale > 0.0]
-        self.gram = self.flat.T @ self.flat
-        self.gram[np.diag_indices_from(self.gram)] += _RIDGE
+        parts = [signatures, *(each.columns for each in nuisance)]
+        # of each component those columns that are not zero there: most effects of a joint move it alone
+        self._used = [
+            np.flatnonzero(np.concatenate([p[j].any(axis=0) for p in parts])) for j in range(trace.shape[1])
+        ]
+        self._columns = [
+            np.concatenate([part[j] for part in parts], axis=1)[:, used] for j, used in enumerate(self._used)
+        ]
+        width = sum(part.shape[2] for part in parts)
+        gram = np.zeros((width, width))
+        for columns, used in zip(self._columns, self._used, strict=True):
+            gram[np.ix_(used, used)] += columns.T @ columns
+        self._kept = np.flatnonzero(np.diag(gram))
+        self._scale = np.sqrt(np.diag(gram)[self._kept])
+        self._gram = gram[np.ix_(self._kept, self._kept)] / np.outer(self._scale, self._scale)
+        self._gram[np.diag_indices_from(self._gram)] += _RIDGE
+        self._width = width
         t = trace.time_s
         count = max(2, round((t[-1] - t[0]) / _LIMITS.noise_slow_s) + 1)
         knots = np.linspace(t[0], t[-1], count)
@@ -113,11 +123,15 @@ class _Explained:
 
     def off(self, values: Floats) -> Floats:
         """Return values (n, k) without what effects and nuisance explain."""
-        if self.flat.shape[1] == 0:
+        if not len(self._kept):
             return values
-        y = values.T.reshape(-1)
-        rest = y - self.flat @ np.linalg.solve(self.gram, self.flat.T @ y)
-        unexplained: Floats = rest.reshape(values.shape[1], -1).T
+        sums = np.zeros(self._width)
+        for j, (columns, used) in enumerate(zip(self._columns, self._used, strict=True)):
+            sums[used] += columns.T @ values[:, j]
+        weights = np.zeros(self._width)
+        weights[self._kept] = np.linalg.solve(self._gram, sums[self._kept] / self._scale) / self._scale
+        explained = [columns @ weights[used] for columns, used in zip(self._columns, self._used, strict=True)]
+        unexplained: Floats = values - np.stack(explained, axis=1)
         return unexplained
 
     def fast(self, values: Floats) -> Floats:

@@ -5,8 +5,9 @@ around the nominal model, one for each of the settings that span the effect.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,6 +20,7 @@ from gcode2krl.gap.beside.trace import Trace
 _PADDED = 4
 """Finer than the lines of a spectrum, between which a tone would hide."""
 
+_Made = TypeVar("_Made")
 _Key = tuple[float, str, str | None, tuple[tuple[str, float], ...]]
 
 
@@ -161,6 +163,14 @@ class Signatures:
 
     def __init__(self) -> None:
         self._by_trace: WeakKeyDictionary[Trace, dict[_Key, Floats]] = WeakKeyDictionary()
+        self._made: WeakKeyDictionary[Trace, tuple[object, Any]] = WeakKeyDictionary()
+
+    def once(self, trace: Trace, asked: object, make: Callable[[Trace], _Made]) -> _Made:
+        """Return what ``make`` makes of a trace for a question, once as long as no other one is asked."""
+        if trace not in self._made or self._made[trace][0] is not asked:
+            self._made[trace] = asked, make(trace)
+        made: _Made = self._made[trace][1]
+        return made
 
     def same(self, known: Trace, other: Trace) -> None:
         """Let a trace whose stamps are moved by a few ms have the columns of the other one."""

@@ -171,6 +171,21 @@ class _Filter:
         return innovations(columns, segments, self.a, self.slow, self.gains, self.variances)
 
 
+@dataclass(frozen=True, eq=False)
+class _White:
+    """Innovations (n, p + 1) of a basis and of the data, and what the likelihood takes of them."""
+
+    columns: Floats
+    gram: Floats
+    determinant: float
+    """Log of that of the basis' part of the Gram matrix."""
+
+    @classmethod
+    def of(cls, columns: Floats) -> "_White":
+        gram = columns.T @ columns
+        return cls(columns, gram, float(np.linalg.slogdet(gram[:-1, :-1])[1]))
+
+
 class _Fit:
     """The likelihood of block means, with what was computed of it."""
 
@@ -180,6 +195,8 @@ class _Fit:
         self.usable = np.flatnonzero(scale > _RANK * max(float(scale.max(initial=0.0)), 1e-300))
         self._filters: dict[tuple[tuple[_Part, ...], float], _Filter] = {}
         self._short: tuple[Floats, float] | None = None
+        self._basis: Floats | None = None
+        self._whites: dict[tuple[tuple[_Part, ...], float], _White] = {}
 
     def _filter(self, parts: tuple[_Part, ...], kept: float = 0.0) -> "_Filter":
         """Return the filter of a model whose short part has innovations of unit variance."""
@@ -206,18 +223,34 @@ class _Fit:
         It is that of the data without what a basis (n, p) explains. ``more`` (n, q) explain too; likelihoods
         with and without them are of the same data.
         """
-        extra = np.zeros((len(basis), 0)) if more is None else more
-        filter_ = self._filter(parts, kept)
-        white = filter_.applied(np.column_stack([basis, extra, self.means.values]), self.means.segments)
-        gram = white.T @ white
+        white = self._white(basis, parts, kept)
+        gram, width, determinant = white.gram, basis.shape[1], white.determinant
+        if more is not None:
+            own = self._filter(parts, kept).applied(more, self.means.segments)
+            cross = own.T @ white.columns
+            gram = np.block(
+                [
+                    [gram[:width, :width], cross[:, :width].T, gram[:width, width:]],
+                    [cross[:, :width], own.T @ own, cross[:, width:]],
+                    [gram[width:, :width], cross[:, width:].T, gram[width:, width:]],
+                ]
+            )
         information, cross = gram[:-1, :-1], gram[:-1, -1]
         ridge = _RANK * np.diag(np.diag(information))
         left = max(float(gram[-1, -1] - cross @ np.linalg.solve(information + ridge, cross)), 1e-300)
-        width = basis.shape[1]
-        count = len(white) - width
-        determinant = float(np.linalg.slogdet(information[:width, :width])[1])
-        cost = count * np.log(left / count) + filter_.log_determinant + determinant
+        count = len(basis) - width
+        cost = count * np.log(left / count) + self._filter(parts, kept).log_determinant + determinant
         return _Peak(parts, float(cost), left / count)
+
+    def _white(self, basis: Floats, parts: tuple[_Part, ...], kept: float) -> "_White":
+        """Return a basis and the data as innovations, once as long as no other basis is asked for."""
+        if self._basis is not basis:
+            self._basis, self._whites = basis, {}
+        if (parts, kept) not in self._whites:
+            columns = np.column_stack([basis, self.means.values])
+            white = self._filter(parts, kept).applied(columns, self.means.segments)
+            self._whites[parts, kept] = _White.of(white)
+        return self._whites[parts, kept]
 
     def best(
         self,
@@ -271,7 +304,7 @@ class _Fit:
         """Yield the candidate and the tone of the largest gain, beside the slow part and without one."""
         numbers, tones = set(), set()
         for parts in {peak.parts, ()}:
-            x = self.whitened(np.column_stack([basis, self.means.values]), parts)
+            x = self._white(basis, parts, 0.0).columns
             known = np.linalg.qr(x[:, :-1])[0]
             y = x[:, -1] - known @ (known.T @ x[:, -1])
             numbers |= self._largest(known, y, parts)
