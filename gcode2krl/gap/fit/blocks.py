@@ -9,7 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.explaining import explaining
+from gcode2krl.gap.fit.explaining import explaining_columns
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.slow_noise import BlockMeans
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -73,7 +73,7 @@ def block_means(
     """
     blocks = [_Blocks.of(trace) for trace in traces]
     numbers = [each.numbers[each.kept] for each in blocks]
-    inputs = explaining(traces)
+    inputs = explaining_columns(traces)
     made = []
     for j in range(traces[0].shape[1]):
         y = [each.means(rows[:, j]) for each, rows in zip(blocks, residuals, strict=True)]

@@ -21,7 +21,7 @@ _STILL = 1e-9
 """A coordinate of less range does not move."""
 
 
-def explaining(traces: Sequence[Trace]) -> list[list[Floats]]:
+def explaining_columns(traces: Sequence[Trace]) -> list[list[Floats]]:
     """Return columns (n, c) of each component of each trace, alike in all traces."""
     inputs = [Admissible(trace) for trace in traces]
     parts = [
