@@ -185,6 +185,27 @@ def test_sealed_seeds_and_records_of_other_tests_are_refused(tmp_path, capsys, c
     assert not (tmp_path / "t.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("kind", "stand_ins", "teaches"),
+    [
+        ("deleted", [], True),
+        ("deleted", [{"effect": "base_frame", "left_over": 0.1}], False),
+        ("single", [{"effect": "base_frame", "left_over": 0.1}], True),
+        ("null_foreign_mismatch", [], False),
+    ],
+)
+def test_what_no_data_can_tell_teaches_nothing(tmp_path, kind, stand_ins, teaches):
+    folder = made_up.write_made_up(tmp_path)
+
+    def change(record):
+        record["case"].update(seed=1, kind=kind)
+        record["label"]["effects"][0]["stand_ins"] = stand_ins
+
+    changed(folder, change)
+    taught = [record["case"]["seed"] for record in rows_.records_of(folder)]
+    assert (1 in taught) is teaches
+
+
 def test_an_empty_folder_is_refused(tmp_path):
     with pytest.raises(rows_.RecordsError, match="gap_blind"):
         rows_.records_of(tmp_path)

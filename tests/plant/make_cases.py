@@ -17,7 +17,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.plant.make_cases", description=__doc__)
     parser.add_argument("--cases", type=int, default=10, help="how many")
     parser.add_argument("--seed", type=int, default=1, help="of the first case; case i has seed + i")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for case-0001 …")
+    parser.add_argument("-o", "--output", type=Path, help="folder for case-0001 …")
     parser.add_argument(
         "--effect", help="name, name@target, open:name, several with +, or none; default: drawn"
     )
@@ -29,6 +29,8 @@ def main(arguments: list[str] | None = None) -> int:
     if options.list:
         print("\n".join([*LIBRARY, *SLIPS, *(f"open:{name}" for name in UNKNOWN)]))
         return 0
+    if options.output is None:
+        parser.error("-o is missing: a folder for the cases")
     for i in range(options.cases):
         start = time.perf_counter()
         try:

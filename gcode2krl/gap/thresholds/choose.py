@@ -120,7 +120,7 @@ class ChooseThresholds:
     clock_most_s: float = convention(0.02, "larger clock errors of single runs are found by other means")
 
     # The next run
-    settled: float = convention(0.95, "probability from which on a cause without a rival alike is not open")
+    settled: float = convention(0.8, "probability from which on a cause without a rival alike is not open")
     least_open: float = convention(0.05, "probability below which an answer is not worth a run")
     most_open_pairs: int = convention(4, "pairs that programs are compared for, the most open first")
     most_log_odds: float = convention(
