@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap.fit.noise import Slow, drawn_slow
-from gcode2krl.gap.fit.slow_noise import BlockMeans, SlowPart, alike, slow_parts_of
+from gcode2krl.gap.fit.slow_noise import BlockMeans, slow_parts_of
 
 STEP_S = 0.05
 COUNT, RUNS = 300, 3
@@ -104,18 +104,3 @@ def test_few_blocks_tell_nothing():
     few = means(wandering(0.3))
     cut = BlockMeans(few.values[:40], np.array([[0, 40]]), few.known[:40], few.candidates[:40], ((0, 40),))
     assert slow_parts_of(cut) == ()
-
-
-def test_axes_of_an_instrument_wander_alike_as_far_as_each_is_seen_to_move():
-    def moved(sigma):
-        values = sigma * np.random.default_rng(5).standard_normal(400)
-        line = np.ones((400, 1))
-        return BlockMeans(values, np.array([[0, 400]]), line, np.zeros((400, 0)), ((0, 400),))
-
-    parts = [(SlowPart(0.5, 2.0),), (), (SlowPart(0.3, 0.5),)]
-    first, second, third = alike(parts, [moved(2.0), moved(0.4), moved(9.0)])
-    assert first == parts[0]
-    assert third == parts[0]
-    assert second[0].time_constant_s == 0.5
-    assert 0.4 < second[0].sigma < 0.6  # a quarter more than it was seen to move
-    assert alike([(), ()], [moved(1.0)] * 2) == [(), ()]

@@ -32,8 +32,7 @@ before (`beside.bursts`), hum of the mains is taken off (`beside.hum`).
 - Slow part (`slow_noise`, `blocks`): means over 0.05 s of the whole residual, beside a constant and a
   trend of each run and mismatch. Signatures, steps, tones, and functions of the inputs that families are made
   of (`explaining`) explain what they explain better than slow noise would; the rest is slow noise, its
-  variance by restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971). The axes
-  of one instrument wander alike: what is learnt on one holds for the others as far as they are seen to move.
+  variance by restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971).
 - Repeats of one program: of both parts only what differs between the runs is noise.
 - `run.toml` states short noise, as data sheets do: u has 0.9 to 2.5 times as much, and v is at most twice u.
   What wanders more slowly, each run in its own way, is told from a gap by `choose.wander`.

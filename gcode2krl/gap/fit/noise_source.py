@@ -14,7 +14,7 @@ from gcode2krl.gap.fit.blocks import block_means
 from gcode2krl.gap.fit.lines import without_lines
 from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased
 from gcode2krl.gap.fit.nuisance import Nuisance
-from gcode2krl.gap.fit.slow_noise import SlowPart, alike, slow_parts_of
+from gcode2krl.gap.fit.slow_noise import SlowPart, slow_parts_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.fit
@@ -53,10 +53,9 @@ def noise_of(
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
     residuals = [trace.measured - trace.sample(applied) for trace in traces]
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
-    parts = [slow_parts_of(each, floor) for each, floor in zip(means, floors, strict=True)]
-    if not traces[0].link.of_joints:
-        parts = alike(parts, means)
-    slow = [_of_rows(each, traces[0]) for each in parts]
+    slow = [
+        _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
+    ]
     generator = np.random.default_rng(0)
     slow_drawn = [
         [

@@ -11,8 +11,8 @@ value. What is left is the slow part, its variance by restricted likelihood, whi
 fitted (Patterson & Thompson 1971; Harville 1977).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -104,26 +104,6 @@ def slow_parts_of(means: BlockMeans, floor: float = 0.0) -> tuple[SlowPart, ...]
         SlowPart(_TIME_CONSTANTS_S[tau], sigma)
         for (tau, _), sigma in zip(peak.parts, sigmas.tolist(), strict=True)
     )
-
-
-def alike(parts: Sequence[tuple[SlowPart, ...]], means: Sequence[BlockMeans]) -> list[tuple[SlowPart, ...]]:
-    """Return the slow parts of an instrument's axes, which wander alike: each as the loudest of them.
-
-    Where some input explains what moves along one axis, the others still tell how the instrument wanders; an
-    axis that has been seen to move less (`noise_most_seen`) has no more.
-    """
-    loudest = max(parts, key=_rms)
-    found = []
-    for own, mean in zip(parts, means, strict=True):
-        most = _LIMITS.noise_most_seen * _seen(mean, _basis(mean.known)) if loudest else 0.0
-        share = min(1.0, most / max(_rms(loudest), 1e-300))
-        louder = share * _rms(loudest) > _rms(own)
-        found.append(tuple(replace(each, sigma=share * each.sigma) for each in loudest) if louder else own)
-    return found
-
-
-def _rms(parts: Sequence[SlowPart]) -> float:
-    return float(np.sqrt(sum(each.sigma**2 for each in parts)))
 
 
 def _seen(means: BlockMeans, basis: Floats) -> float:
