@@ -93,6 +93,22 @@ def direction_parameters(source: str) -> tuple[Parameter, ...]:
     )
 
 
+def size_from_zero(name: str, unit: str, *, high: float, start: float, source: str) -> Parameter:
+    """Return a size of one sign that the effect is proportional to: none of it at 0."""
+    return Parameter(
+        name=name,
+        unit=unit,
+        low=0.0,
+        high=high,
+        nominal=0.0,
+        start=start,
+        linear=True,
+        minimum=0.0,
+        role=Role.SIZE,
+        source=source,
+    )
+
+
 def phase_parameter(grid: tuple[float, ...] = ()) -> Parameter:
     """Return the phase of a sine, any angle in rad."""
     return Parameter(

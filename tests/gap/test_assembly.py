@@ -39,8 +39,10 @@ def _size(before=4.0, after=1.0, excess_before=3.0):
     )
 
 
-def _trace(link, factor=10.0, components=JOINTS, zero=0.0):
+def _trace(link, factor=10.0, components=JOINTS, zero=0.0, left_out=()):
     return SimpleNamespace(
+        run="run-1",
+        left_out=left_out,
         link=link,
         signal=link.signal,
         unit=link.unit,
@@ -148,6 +150,11 @@ def test_notes_name_joints_left_out_and_effects_within_mismatch():
         "servo: A5, A6 left out: not recorded, or never moving",
         "mechanics: backlash A2 within normal mismatch",
     ]
+
+
+def test_notes_name_what_was_taken_out_of_the_measured_values():
+    judgement = _judgement(FORCE, left_out=("hum of the mains at 50 Hz",))
+    assert list(assembly._notes([], [judgement])) == ["force, run-1: hum of the mains at 50 Hz left out"]
 
 
 def test_a_run_that_is_of_another_program_gets_an_answer_without_links(tmp_path):

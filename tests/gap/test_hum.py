@@ -47,3 +47,9 @@ def test_what_turns_with_the_spindle_stays():
 def test_noise_alone_stays_as_it_is():
     made = [trace(noise(COUNT, seed), inputs=motion(COUNT * STEP_S, STEP_S)) for seed in range(20)]
     assert sum(found is not one for found, one in zip(without_hum(made), made, strict=True)) <= 1
+
+
+def test_what_went_is_told():
+    tone = np.sin(2.0 * np.pi * 50.0 * TIME_S)[:, None]
+    (found,) = without_hum([trace(noise(COUNT, 3) + tone, inputs=motion(COUNT * STEP_S, STEP_S))])
+    assert found.left_out == ("hum of the mains at 50 Hz",)

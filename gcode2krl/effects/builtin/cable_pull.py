@@ -7,7 +7,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.effects.parameter import DIRECTION, direction_parameters, size_from_zero
 from gcode2krl.units import DEG_PER_RAD
 
 
@@ -28,16 +28,11 @@ class CablePull(Effect):
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
-        Parameter(
-            name="N_per_deg",
-            unit="N/deg",
-            low=0.0,
+        size_from_zero(
+            "N_per_deg",
+            "N/deg",
             high=20.0,
-            nominal=0.0,
             start=0.5,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="a cable pulls with up to some 50 N; over 30 deg of travel 0.1-2",
         ),
         *direction_parameters("any"),

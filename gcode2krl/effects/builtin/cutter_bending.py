@@ -7,7 +7,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import size_from_zero
 from gcode2krl.units import UM_PER_MM
 
 
@@ -24,16 +24,11 @@ class CutterBending(Effect):
     where = frozenset({Where.TIP})
     depends_on = frozenset({Dependence.FORCE})
     parameters = (
-        Parameter(
-            name="um_per_N",
-            unit="µm/N",
-            low=0.0,
+        size_from_zero(
+            "um_per_N",
+            "µm/N",
             high=10.0,
-            nominal=0.0,
             start=0.2,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="carbide, I of 0.8 diameters: 16 mm wide and 60 long 0.1, 6 by 40 1.4, 3 by 30 9",
         ),
     )

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.motor_effect import MotorEffect
-from gcode2krl.effects.parameter import Parameter, Role, phase_parameter
+from gcode2krl.effects.parameter import Parameter, Role, phase_parameter, size_from_zero
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 
@@ -27,16 +27,11 @@ class EncoderInterpolation(MotorEffect):
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.MOTOR_ANGLE})
     parameters = (
-        Parameter(
-            name="amplitude_deg",
-            unit="deg",
-            low=0.0,
+        size_from_zero(
+            "amplitude_deg",
+            "deg",
             high=0.01,
-            nominal=0.0,
             start=2e-4,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="1 % of a period of 512 a turn through a gear of 250: 3e-5; a resolver's 0.1 deg: 4e-4",
         ),
         Parameter(

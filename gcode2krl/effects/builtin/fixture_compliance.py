@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import size_from_zero
 from gcode2krl.effects.signals import Signals
 from gcode2krl.units import UM_PER_MM
 
@@ -27,16 +27,11 @@ class FixtureCompliance(Effect):
     depends_on = frozenset({Dependence.FORCE})
     vectors = MappingProxyType({"um_per_N": _NAMES})
     parameters = tuple(
-        Parameter(
-            name=name,
-            unit="µm/N",
-            low=0.0,
+        size_from_zero(
+            name,
+            "µm/N",
             high=20.0,
-            nominal=0.0,
             start=0.1,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="vices and clamped blocks 10-100 N/µm, plates on pillars and thin walls 0.1-5 N/µm",
         )
         for name in _NAMES

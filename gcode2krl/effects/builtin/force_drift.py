@@ -6,7 +6,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.effects.parameter import DIRECTION, direction_parameters, size_from_zero
 
 
 class ForceDrift(Effect):
@@ -20,17 +20,8 @@ class ForceDrift(Effect):
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
-        Parameter(
-            name="N_per_h",
-            unit="N/h",
-            low=0.0,
-            high=100.0,
-            nominal=0.0,
-            start=5.0,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
-            source="1-5 N/h once warm, more while it warms up",
+        size_from_zero(
+            "N_per_h", "N/h", high=100.0, start=5.0, source="1-5 N/h once warm, more while it warms up"
         ),
         *direction_parameters("any"),
     )

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -25,17 +25,8 @@ class Friction(Effect):
     depends_on = frozenset({Dependence.REVERSALS})
     targets = staticmethod(every_joint)
     parameters = (
-        Parameter(
-            name="spike_deg",
-            unit="deg",
-            low=0.0,
-            high=0.1,
-            nominal=0.0,
-            start=0.01,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
-            source="reversal spikes of geared axes 0.3-3 arcmin",
+        size_from_zero(
+            "spike_deg", "deg", high=0.1, start=0.01, source="reversal spikes of geared axes 0.3-3 arcmin"
         ),
         Parameter(
             name="decay_s",

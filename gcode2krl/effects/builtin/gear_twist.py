@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import size_from_zero
 from gcode2krl.units import N_PER_KN, RAD_PER_DEG
 
 
@@ -26,16 +26,11 @@ class GearTwist(Effect):
     depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
     parameters = (
-        Parameter(
-            name="deg_per_kNm",
-            unit="deg/(kN·m)",
-            low=0.0,
+        size_from_zero(
+            "deg_per_kNm",
+            "deg/(kN·m)",
             high=1.0,
-            nominal=0.0,
             start=0.02,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="gears of large arms 1-10 MN·m/rad (Haehn & Weigold 2020): 0.006-0.06; wrists 10 times",
         ),
     )

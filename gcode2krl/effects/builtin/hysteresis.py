@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -27,16 +27,11 @@ class Hysteresis(Effect):
     depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
     parameters = (
-        Parameter(
-            name="loss_deg",
-            unit="deg",
-            low=0.0,
+        size_from_zero(
+            "loss_deg",
+            "deg",
             high=0.1,
-            nominal=0.0,
             start=0.01,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="hysteresis loss of cycloidal and wave gears 0.5-2 arcmin",
         ),
     )

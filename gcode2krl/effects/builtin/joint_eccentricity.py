@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role, phase_parameter
+from gcode2krl.effects.parameter import phase_parameter, size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -24,17 +24,8 @@ class JointEccentricity(Effect):
     depends_on = frozenset({Dependence.OWN_ANGLE})
     targets = staticmethod(every_joint)
     parameters = (
-        Parameter(
-            name="amplitude_deg",
-            unit="deg",
-            low=0.0,
-            high=0.1,
-            nominal=0.0,
-            start=0.01,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
-            source="10-50 µm on a radius of 100 mm: 0.006-0.03",
+        size_from_zero(
+            "amplitude_deg", "deg", high=0.1, start=0.01, source="10-50 µm on a radius of 100 mm: 0.006-0.03"
         ),
         phase_parameter(),
     )

@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -24,16 +24,11 @@ class NonlinearStiffness(Effect):
     depends_on = frozenset({Dependence.OWN_TORQUE})
     targets = staticmethod(every_joint)
     parameters = (
-        Parameter(
-            name="soft_deg",
-            unit="deg",
-            low=0.0,
+        size_from_zero(
+            "soft_deg",
+            "deg",
             high=0.1,
-            nominal=0.0,
             start=0.01,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="lost motion of cycloidal gears about 1 arcmin at 3 % of the rated torque",
         ),
         Parameter(

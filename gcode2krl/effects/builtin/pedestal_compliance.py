@@ -7,7 +7,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
 from gcode2krl.units import MM_PER_M, N_PER_KN, RAD_PER_MRAD
 
 _SIZES = ("x_mrad_per_kNm", "y_mrad_per_kNm")
@@ -29,16 +29,11 @@ class PedestalCompliance(Effect):
     depends_on = frozenset({Dependence.FORCE_BY_PLACE, Dependence.PLACE, Dependence.ACCELERATION})
     parameters = (
         *(
-            Parameter(
-                name=name,
-                unit="mrad/(kN·m)",
-                low=0.0,
+            size_from_zero(
+                name,
+                "mrad/(kN·m)",
                 high=1.0,
-                nominal=0.0,
                 start=0.02,
-                linear=True,
-                minimum=0.0,
-                role=Role.SIZE,
                 source="a bolted steel pedestal on concrete 20-200 MN·m/rad; rails ten times softer",
             )
             for name in _SIZES

@@ -12,7 +12,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
 from gcode2krl.effects.weight import with_weight
 from gcode2krl.units import RAD_PER_DEG
 
@@ -32,18 +32,7 @@ class RsiOn(Effect):
     kind = "slip"
     searched_in = frozenset({"servo"})
     parameters = (
-        Parameter(
-            name="gain",
-            unit="",
-            low=0.0,
-            high=1.5,
-            nominal=0.0,
-            start=1.0,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
-            source="1 takes all of the modelled deflection back",
-        ),
+        size_from_zero("gain", "", high=1.5, start=1.0, source="1 takes all of the modelled deflection back"),
         Parameter(
             name="delay_s",
             unit="s",

@@ -9,7 +9,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters, size_from_zero
 from gcode2krl.units import RAD_PER_DEG, S_PER_H
 
 TIP = "tip"
@@ -61,16 +61,11 @@ class Step(_Step):
     direction = DIRECTION
     parameters = (
         _AT_S,
-        Parameter(
-            name="size_mm",
-            unit="mm",
-            low=0.0,
+        size_from_zero(
+            "size_mm",
+            "mm",
             high=5.0,
-            nominal=0.0,
             start=0.1,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="a tool, spindle bracket or pedestal that slips 0.05-1 mm; a collision some mm",
         ),
         *direction_parameters("any"),

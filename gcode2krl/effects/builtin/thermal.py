@@ -8,7 +8,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters, size_from_zero
 
 
 class Thermal(Effect):
@@ -26,18 +26,7 @@ class Thermal(Effect):
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
-        Parameter(
-            name="mm_per_h",
-            unit="mm/h",
-            low=0.0,
-            high=2.0,
-            nominal=0.0,
-            start=0.2,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
-            source="0.1-0.5 mm in 1-3 h of warming up",
-        ),
+        size_from_zero("mm_per_h", "mm/h", high=2.0, start=0.2, source="0.1-0.5 mm in 1-3 h of warming up"),
         Parameter(
             name="time_constant_h",
             unit="h",

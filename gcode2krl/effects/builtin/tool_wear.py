@@ -8,7 +8,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import size_from_zero
 from gcode2krl.units import MM_PER_M
 
 
@@ -24,16 +24,11 @@ class ToolWear(Effect):
     where = frozenset({Where.FORCE_AXIS})
     depends_on = frozenset({Dependence.FORCE, Dependence.METRES_CUT})
     parameters = (
-        Parameter(
-            name="growth_per_m",
-            unit="1/m",
-            low=0.0,
+        size_from_zero(
+            "growth_per_m",
+            "1/m",
             high=3.0,
-            nominal=0.0,
             start=0.05,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="+20-100 % force over a tool's life of 0.5 m (hard steel) to kilometres (aluminium)",
         ),
     )

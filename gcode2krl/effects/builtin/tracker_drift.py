@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters
+from gcode2krl.effects.parameter import DIRECTION, direction_parameters, size_from_zero
 from gcode2krl.effects.signals import Signals
 
 
@@ -24,16 +24,11 @@ class TrackerDrift(Effect):
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
-        Parameter(
-            name="mm_per_h",
-            unit="mm/h",
-            low=0.0,
+        size_from_zero(
+            "mm_per_h",
+            "mm/h",
             high=0.1,
-            nominal=0.0,
             start=0.03,
-            linear=True,
-            minimum=0.0,
-            role=Role.SIZE,
             source="a warm tracker on a stable stand 0.005-0.03 mm/h, one just switched on up to 0.1",
         ),
         *direction_parameters("any"),

@@ -7,6 +7,7 @@ go keeps all its rows: that is then how the instrument, or what it sees, is.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +30,11 @@ def without_bursts(traces: Sequence[Trace]) -> list[Trace]:
 
 def _without(trace: Trace) -> Trace:
     loud = loud_rows(trace.time_s, trace.residual, trace.segments)
-    return with_rows(trace, ~loud) if loud.any() else trace
+    if not loud.any():
+        return trace
+    kept = with_rows(trace, ~loud)
+    told = f"{int(loud.sum())} of {len(loud)} rows: bursts or outliers of the instrument"
+    return replace(kept, left_out=(*kept.left_out, told))
 
 
 def loud_rows(time_s: Floats, values: Floats, segments: Ints) -> Bools:

@@ -38,10 +38,13 @@ def _without(trace: Trace) -> Trace:
         return trace
     step_s = float(np.median(np.diff(trace.time_s)))
     measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])
-    for hz in _mains_hz(trace):
-        if 4.0 * LIMITS.hum_around_hz < _folded(hz, step_s):  # what is folded to a drift is none to be told
-            spectrum.take_off(measured, trace.nominal, hz)
-    return replace(trace, measured=measured) if not np.array_equal(measured, trace.measured) else trace
+    # what is folded to a drift is none to be told
+    told = (hz for hz in _mains_hz(trace) if 4.0 * LIMITS.hum_around_hz < _folded(hz, step_s))
+    found = [hz for hz in told if spectrum.take_off(measured, trace.nominal, hz)]
+    if not found:
+        return trace
+    hum = f"hum of the mains at {', '.join(f'{hz:g}' for hz in found)} Hz"
+    return replace(trace, measured=measured, left_out=(*trace.left_out, hum))
 
 
 def _mains_hz(trace: Trace) -> list[float]:
@@ -81,14 +84,15 @@ class _Spectrum:
         level: Floats = np.median(around, axis=0) / _MEDIAN
         return level
 
-    def take_off(self, measured: Floats, nominal: Floats, hz: float) -> None:
-        """Take a tone off the columns (n, k) in which it stands out of what is beside it."""
+    def take_off(self, measured: Floats, nominal: Floats, hz: float) -> bool:
+        """Take a tone off the columns (n, k) in which it stands out; tell whether there are any."""
         rests = measured - nominal
         rests -= rests.mean(axis=0)
         first_hz = hz - LIMITS.hum_wander_hz
         powers = self.near.power(first_hz, rests)
-        for j, (power, level) in enumerate(zip(powers.T, self.level(hz, rests), strict=True)):
-            if power.max() > level * np.log(len(power) / LIMITS.hum_false):
-                angle = 2.0 * np.pi * self.near.hz(first_hz)[int(np.argmax(power))] * self.near.time_s
-                tone = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-                measured[:, j] -= tone @ np.linalg.lstsq(tone, rests[:, j], rcond=None)[0]
+        stands_out = powers.max(axis=0) > self.level(hz, rests) * np.log(len(powers) / LIMITS.hum_false)
+        for j in np.flatnonzero(stands_out):
+            angle = 2.0 * np.pi * self.near.hz(first_hz)[int(np.argmax(powers[:, j]))] * self.near.time_s
+            tone = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            measured[:, j] -= tone @ np.linalg.lstsq(tone, rests[:, j], rcond=None)[0]
+        return bool(stands_out.any())

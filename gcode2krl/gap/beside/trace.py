@@ -101,6 +101,8 @@ class Trace:
     in_tool_frame: bool = False
     still: bool = False
     """Each row is a pose in which the robot stands."""
+    left_out: tuple[str, ...] = ()
+    """What was taken out of the measured values because it is the instrument's, in a person's words."""
 
     @property
     def signal(self) -> str:

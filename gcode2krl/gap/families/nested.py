@@ -1,7 +1,7 @@
 """Families that contain others: a smooth function can be a constant, what each run does over time anything.
 
-The larger one is ahead where the least rest follows it. It is told before the smaller one only where it takes
-more of the gap than is worth naming.
+The larger one is ahead where the least rest follows it. It is told before the smaller one only where its
+evidence is larger by a share worth naming.
 """
 
 from collections.abc import Iterable, Mapping
@@ -38,7 +38,7 @@ CONTAINS: Mapping[Dependence, frozenset[Dependence]] = MappingProxyType(
 def simplest_first(evidences: Iterable[Evidence]) -> tuple[Evidence, ...]:
     """Return families, the most probable first; a smaller one changes evidence with one that contains it.
 
-    Unless that one is ahead by more of its evidence than `ahead_share`.
+    Unless that one is ahead by more than `ahead_share` of its own evidence.
     """
     told = sorted(evidences, key=lambda evidence: -evidence.nats)
     moved = True

@@ -288,3 +288,6 @@ def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[s
         if judgement.usual:
             labels = ", ".join(applied.label for applied in judgement.usual)
             yield f"{judgement.link.name}: {labels} within normal mismatch"
+    for judgement in judgements:
+        for trace in judgement.traces:
+            yield from (f"{judgement.link.name}, {trace.run}: {what} left out" for what in trace.left_out)

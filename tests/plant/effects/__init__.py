@@ -4,6 +4,7 @@ from tests.plant.effects import (
     body,
     forces,
     joints,
+    open,
     readings,
     slips,
     steps,
@@ -11,8 +12,6 @@ from tests.plant.effects import (
     surroundings,
     timing,
 )
-from tests.plant.effects import open as open_
 from tests.plant.effects.registry import LIBRARY, SLIPS, UNKNOWN, Draw, Kind
 
 __all__ = ["LIBRARY", "SLIPS", "UNKNOWN", "Draw", "Kind"]
-SHELVES = (body, forces, joints, readings, slips, steps, structure, surroundings, timing, *open_.FILES)
