@@ -14,11 +14,11 @@ TIMING = "timing"
 """``at`` of what moves all joints along the path, and of the links that see it."""
 PLACES = {"tip": {"tip"}, "force": AXES, "part": {"tip", "part"}, "clock": {"tip", TIMING} | AXES | JOINTS}
 """Where, in the words of a label -> ``at``, in those of an answer. A joint is the label's own."""
-STEP_IN_TIME = "step in time"
-"""An answer may tell it as time in the run, in the form of a step."""
+TIME, STEP = "time in the run", "step in time"
+"""One input: a step is a form of it."""
 INPUTS = {
-    "time_smooth": {"time in the run"},
-    "time_step": {STEP_IN_TIME},
+    "time_smooth": {TIME},
+    "time_step": {TIME},
     "time_since_start": {"time since the run's start"},
     "own_torque_memory": {"own torque"},
     "force_memory": {"force"},
@@ -100,15 +100,14 @@ def allowed_by(entry: dict[str, Any]) -> Allowed | None:
 
 def _of_rest(result: dict[str, Any]) -> Iterable[Said]:
     for each in result["unexplained"].get("depends_on") or ():
-        is_step = (each["on"], each["form"]) == ("time in the run", "step")
-        yield Said(each["at"], STEP_IN_TIME if is_step else each["on"], each["form"], each["probability"])
+        yield Said(each["at"], each["on"], each["form"], each["probability"])
 
 
 def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:
     for cause in causes:
         if cause.get("family"):
             at, _, on = cause["family"].partition(", ")
-            yield Said(at, on, None, cause["probability"])
+            yield Said(at, TIME if on == STEP else on, None, cause["probability"])
 
 
 def _compared(said: Said, allowed: Allowed) -> Told:

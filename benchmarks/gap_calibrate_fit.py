@@ -8,6 +8,7 @@ Effect-free cases and those whose cause the library lacks count together as much
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,15 @@ import numpy as np
 from gap_calibrate_rows import OUTSIDE, Behind, Row
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.calibrated import MOST_UNNAMED, NAME, UNKNOWN, Head, probability_of, terms_of
+from gcode2krl.gap.choose.calibrated import (
+    DEPENDENCE,
+    MOST_UNNAMED,
+    NAME,
+    UNKNOWN,
+    Head,
+    probability_of,
+    terms_of,
+)
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 ALL_BEST, ALL_BEST_CASES = 0.97, 10.0
@@ -43,6 +52,8 @@ ONE_WORST = {
     "lead": 0.1,
     "share": 0.3,
     "chance": 0.3,
+    "largest": 0.2,
+    "first": 0.3,
 }
 """Prior: the same where one test is at its worst and all others at their best."""
 PRIOR_CASES = 1.0
@@ -59,13 +70,14 @@ Weigh = Callable[[Sequence[Row]], Floats]
 
 
 def weights_of(rows: Sequence[Row]) -> Floats:
-    """Return the weight (n,) of each row; they add up to n."""
+    """Return the weight (n,) of each row; families of one case, which may be many, share one."""
+    families = Counter(row.case for row in rows if DEPENDENCE in row.right)
+    weights = np.array([1.0 / max(families[row.case], 1) for row in rows])
     foreign = np.array([row.kind in OUTSIDE or row.kind.startswith("null") for row in rows])
-    n, m = len(rows), int(foreign.sum())
-    if m in (0, n):
-        return np.ones(n)
-    weights: Floats = np.where(foreign, n / (2.0 * m), n / (2.0 * (n - m)))
-    return weights
+    if foreign.all() or not foreign.any():
+        return weights
+    half = 0.5 * weights.sum()
+    return np.where(foreign, half / weights[foreign].sum(), half / weights[~foreign].sum()) * weights
 
 
 def missing_of(rows: Sequence[Row], terms: int) -> tuple[float, ...]:

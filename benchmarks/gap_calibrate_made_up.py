@@ -93,7 +93,9 @@ def _record(kind: str, seed: int, effect: str, draw: np.random.Generator) -> dic
 
 def _family(draw: np.random.Generator) -> dict[str, Any]:
     right = bool(draw.random() < 0.7)
-    tests = FamilyFeatures(lead_nats=30.0 if right else 2.0, share=0.5, p=0.005)
+    tests = FamilyFeatures(
+        lead_nats=30.0 if right else 2.0, share=0.5, p=0.005, of_largest=1.0 if right else 0.2, larger_links=0
+    )
     place = (
         {"at": "A2", "on": "reversals", "form": "loop"}
         if right

@@ -148,7 +148,7 @@ def cause_rows(records: Sequence[dict[str, Any]], alike_nats: float) -> Iterator
 
 
 def family_rows(records: Sequence[dict[str, Any]]) -> Iterator[Row]:
-    """Yield a row for each family of a rest, where one effect is at work."""
+    """Yield a row for the family with the most evidence in each signal, where one effect is at work."""
     for record in records:
         entries = record["label"]["effects"]
         if len(entries) > 1:
@@ -156,6 +156,8 @@ def family_rows(records: Sequence[dict[str, Any]]) -> Iterator[Row]:
         rest = _rest(record["result"])
         stated = probabilities(entries[0], record["result"]) if entries else [(0.0, False)] * len(rest)
         for each, (_, right) in zip(rest, stated, strict=False):
+            if each["tests"]["lead_nats"] < 0.0:
+                continue
             yield Row(
                 case=name_of(record),
                 kind=record["case"]["kind"],

@@ -105,16 +105,21 @@ def test_a_named_cause_states_its_own_family():
 
 @pytest.mark.parametrize(
     ("on", "stated"),
-    [("time_step", "step in time"), ("time_step", "time in the run"), ("own_torque_memory", "own torque")],
+    [("time_step", "time in the run"), ("own_torque_memory", "own torque")],
 )
 def test_words_of_the_label_and_of_the_answer(on, stated):
     tip = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "step"})
     assert told(tip, rest=[depends("tip", stated, "step")]) == (True, True, True)
 
 
-def test_a_drift_is_no_step():
+def test_a_drift_is_another_form_than_a_step():
     tip = effect(depends={"where": "tip", "joints": [], "on": ["time_step"], "form": "step"})
-    assert told(tip, rest=[depends("tip", "time in the run", "drift")]) == (True, False, False)
+    assert told(tip, rest=[depends("tip", "time in the run", "drift")]) == (True, True, False)
+
+
+def test_a_named_step_is_of_time_in_the_run():
+    tip = effect(depends={"where": "tip", "joints": [], "on": ["time_step"], "form": "step"})
+    assert told(tip, [cause("step", family="tip, step in time")]) == (True, True, True)
 
 
 def test_what_the_timing_sees_may_be_told_of_the_timing():

@@ -68,3 +68,22 @@ def test_all_components_lose_the_row_and_a_calm_trace_stays_itself():
     np.testing.assert_array_equal(second.measured, shaken.measured[kept])
     (told,) = second.left_out
     assert told.startswith(f"{COUNT - second.shape[0]} of {COUNT} rows")
+
+
+def test_what_is_commanded_has_no_bursts():
+    """At corners the robot may be elsewhere than planned: that is no instrument's."""
+    y = noise(COUNT, 5)[:, 0]
+    y[700:720] *= 8.0
+    inputs = motion(15.0, 0.01)
+    (planned, measured) = (trace(1e-4 * y[:, None], link, inputs=inputs) for link in ("path", "servo"))
+    assert without_bursts([planned])[0] is planned
+    assert without_bursts([measured])[0].shape[0] < COUNT
+
+
+def test_where_the_model_jumps_nothing_is_left_out():
+    """A tool that enters the material: what is left beside the jumps of the model is the model's."""
+    y, edges = noise(COUNT, 7)[:, 0], 20.0 * (np.mod(TIME_S, 0.04) > 0.02) * (np.abs(TIME_S - 7.0) < 0.1)
+    y += 0.5 * edges
+    assert loud(y).sum() > 10
+    model = edges.reshape(COUNT, -1)
+    assert not loud_rows(TIME_S, y.reshape(COUNT, -1), WHOLE, model)[np.abs(TIME_S - 7.0) < 0.15].any()

@@ -122,7 +122,7 @@ def test_with_a_weight_each_term_lowers_the_probability(term):
 @pytest.mark.parametrize("name", ["lead_nats", "share", "p"])
 def test_a_family_of_a_rest_is_monotone_too(name):
     values = {"lead_nats": [100.0, 10.0, 0.0, -50.0], "share": [0.9, 0.2, 0.0], "p": [0.005, 0.05, 1.0]}[name]
-    good = FamilyFeatures(lead_nats=100.0, share=0.9, p=0.005)
+    good = FamilyFeatures(lead_nats=100.0, share=0.9, p=0.005, of_largest=1.0, larger_links=0)
     found = [weighted().dependence(replace(good, **{name: value})) for value in values]
     assert (np.diff(found) <= 0.0).all()
     assert found[-1] < found[0]

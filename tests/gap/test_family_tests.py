@@ -109,6 +109,25 @@ def test_what_is_left_in_another_joint_does_not_speak_against_a_cause():
     assert result.rest.worth_naming[0].place.name == "A2"
 
 
+def test_of_an_effect_in_no_joint_alone_only_the_joints_that_it_moves_are_near():
+    """What couples two joints acts in one of them: noise of the other, which has no gap, says nothing."""
+    coupling = Dragging("coupling", speed)
+    made = [
+        c.trace(
+            np.stack([3.0 * speed(T), 0.0 * T], axis=1) * SIGMA + c.noise(500, number, SIGMA, 2),
+            number=number,
+            declared_sigma=SIGMA,
+        )
+        for number in range(2)
+    ]
+    found = c.examined(made, [coupling])
+    (tests,) = LinkFamilies(found, made).tests
+    assert tests.components == {0}
+    rest = LinkFamilies(found, made).rest.study.evidences
+    assert {each.place.name for each in rest if tests.is_near(each)} == {"A1"}
+    assert tests.is_alone
+
+
 def test_an_effect_that_states_no_family_is_its_own():
     effect = c.Added("nameless", speed)
     found = first_tests(lambda run, t: 3.0 * speed(t), effect)
@@ -118,15 +137,15 @@ def test_an_effect_that_states_no_family_is_its_own():
 
 
 def test_each_test_alone_forbids_the_name():
-    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None)
+    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset())
     # most of what can be told, a hundredth of the gap
-    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None)
+    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None, frozenset())
     assert hidden.passed
     assert good.passed
     for worse in (
-        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None),
+        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset()),
+        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None, frozenset()),
+        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None, frozenset()),
     ):
         assert not worse.passed
 

@@ -82,4 +82,5 @@ def test_the_lead_of_a_family_is_over_the_best_other():
     assert first.lead_nats == pytest.approx(-second.lead_nats)
     assert first.share > 0.9
     assert isinstance(first, FamilyFeatures)
-    assert list(first.as_dict()) == ["lead_nats", "share", "p"]
+    assert list(first.as_dict()) == ["lead_nats", "share", "p", "of_largest", "larger_links"]
+    assert (first.of_largest, first.larger_links) == (1.0, 0)

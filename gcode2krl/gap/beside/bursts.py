@@ -29,7 +29,9 @@ def without_bursts(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _without(trace: Trace) -> Trace:
-    loud = loud_rows(trace.time_s, trace.residual, trace.segments)
+    if not trace.link.has_instrument:
+        return trace
+    loud = loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
     if not loud.any():
         return trace
     kept = with_rows(trace, ~loud)
@@ -37,25 +39,36 @@ def _without(trace: Trace) -> Trace:
     return replace(kept, left_out=(*kept.left_out, told))
 
 
-def loud_rows(time_s: Floats, values: Floats, segments: Ints) -> Bools:
-    """Return which rows (n,) of values (n, k) are in a burst or outliers, in any component."""
-    from scipy.ndimage import median_filter
+def loud_rows(time_s: Floats, values: Floats, segments: Ints, model: Floats | None = None) -> Bools:
+    """Return which rows (n,) of values (n, k) are in a burst or outliers, in any component.
 
+    Rows stay at which the ``model`` (n, k) itself is as rough as the values usually are: what is left there
+    is the model's.
+    """
     loud = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * _LEAST_WINDOW:
         return loud
     window = max(_LEAST_WINDOW, round(LIMITS.burst_s / float(np.median(np.diff(time_s))))) | 1
-    for column in values.T:
+    for j, column in enumerate(values.T):
         rough = np.abs(_fourth_differences(column, segments))
         usual = float(np.median(rough[np.isfinite(rough)])) if np.isfinite(rough).any() else 0.0
         if usual <= _LEAST_SCALE:  # the last decimal, or nothing, moves
             continue
-        local = median_filter(np.where(np.isfinite(rough), rough, usual), size=window, mode="nearest")
-        rows = _widened(local > LIMITS.burst_times * usual, window // 2)
+        rows = _widened(_local(rough, usual, window) > LIMITS.burst_times * usual, window // 2)
         rows |= _outliers(column, segments, usual)
+        if model is not None:
+            rows &= ~_widened(np.abs(_fourth_differences(model[:, j], segments)) > usual, window)
         if np.mean(rows) <= LIMITS.bursts_most:
             loud |= rows
     return loud
+
+
+def _local(rough: Floats, usual: float, window: int) -> Floats:
+    """Return the median (n,) of a roughness around each row."""
+    from scipy.ndimage import median_filter
+
+    local: Floats = median_filter(np.where(np.isfinite(rough), rough, usual), size=window, mode="nearest")
+    return local
 
 
 def _fourth_differences(values: Floats, segments: Ints) -> Floats:

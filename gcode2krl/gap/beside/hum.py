@@ -34,7 +34,7 @@ def without_hum(traces: Sequence[Trace]) -> list[Trace]:
 
 def _without(trace: Trace) -> Trace:
     count = len(trace.time_s)
-    if trace.still or count < LIMITS.hum_least_rows:
+    if trace.still or not trace.link.has_instrument or count < LIMITS.hum_least_rows:
         return trace
     step_s = float(np.median(np.diff(trace.time_s)))
     measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])

@@ -58,6 +58,11 @@ class Signal:
         """Return the planned signal (m, k) that shows how far a run has come."""
         raise NotImplementedError(f"{self.name} does not show how far a run has come")
 
+    @property
+    def has_instrument(self) -> bool:
+        """Tell whether an instrument measures it; what is commanded has no noise."""
+        return self.model_rms == 0.0
+
     def mismatch(self, trace: "Trace", mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
         """Yield what its instrument may be off by: names, and columns (k, n, c) for one deviation."""
         return iter(())

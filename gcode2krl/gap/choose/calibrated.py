@@ -85,6 +85,8 @@ FAMILY_TERMS: Terms = {
     "lead": {"lead_nats": Scale(-10.0, 50.0, "asinh")},
     "share": {"share": Scale(0.01, 0.5, "log")},
     "chance": {"p": Scale(0.1, 0.005, "log")},
+    "largest": {"of_largest": Scale(0.05, 1.0, "log")},
+    "first": {"larger_links": Scale(2.0, 0.0)},
 }
 """Of `FamilyFeatures`."""
 
@@ -172,7 +174,7 @@ class Probabilities:
         return min(self._of(UNKNOWN, features), 1.0 - self.name(features))
 
     def dependence(self, features: FamilyFeatures) -> float:
-        """Return the probability that a family of a rest is right, with its place."""
+        """Return the probability that the best family of a signal is the right one, with its place."""
         return self.heads[DEPENDENCE].probability(goodnesses(features.as_dict(), FAMILY_TERMS))
 
     def _of(self, head: str, features: Features) -> float:

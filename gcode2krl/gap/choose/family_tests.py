@@ -27,6 +27,8 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.families
 _PRIOR = THRESHOLDS.fit.prior_sizes
+_MOVED = 1e-3
+"""Of the power in the component that a cause moves most: one with less is not moved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,12 @@ class FamilyTests:
     """The best member of its own family."""
     better: Evidence | None
     """The best other family with the cause taken out."""
+    components: frozenset[int]
+    """Of the signal, which the cause moves."""
+
+    def is_near(self, evidence: Evidence) -> bool:
+        """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
+        return _is_in(self.components, evidence)
 
     @property
     def is_best(self) -> bool:
@@ -189,7 +197,8 @@ class LinkFamilies:
             margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
         rest = self.rest.study
         own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
-        near = [each for each in rest.evidences if is_near(applied, each)]
+        components = self._components(number)
+        near = [each for each in rest.evidences if _is_in(components, each)]
         other = max((each for each in near if not _is_of(applied, each)), key=net_gain, default=None)
         if other is not None and net_gain(other) <= own_rest:
             other = None  # its own family takes more of the same: it is of another form, not beside another
@@ -202,7 +211,16 @@ class LinkFamilies:
             other_p=1.0 if other is None else rest.p_of(other),
             family=own[0] if own else None,
             better=better,
+            components=components,
         )
+
+    def _components(self, number: int) -> frozenset[int]:
+        """Return the components of the signal that an accepted effect moves."""
+        applied, rest = self._found.applied, self._found.without(number)
+        power = sum(
+            np.sum((trace.sample(applied) - trace.sample(rest)) ** 2, axis=0) for trace in self._rows.traces
+        )
+        return frozenset(np.flatnonzero(power > _MOVED * np.max(power)).tolist())
 
     def _power_share(self, other: Evidence, number: int) -> float:
         """Return a family's share of the power that it and an accepted effect have in the signal."""
@@ -223,10 +241,8 @@ class LinkFamilies:
         return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
 
 
-def is_near(applied: Applied, evidence: Evidence) -> bool:
-    """Tell whether a family is where an effect acts; one in another joint does not speak against it."""
-    place = evidence.place
-    return place.component is None or applied.target not in JOINTS or place.name == applied.target
+def _is_in(components: frozenset[int], evidence: Evidence) -> bool:
+    return evidence.place.component is None or evidence.place.component in components
 
 
 def _is_of(applied: Applied, evidence: Evidence) -> bool:

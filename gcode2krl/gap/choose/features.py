@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from gcode2krl.effects import Role
 from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
-from gcode2krl.gap.choose.family_tests import FamilyTests, Rest, is_near
+from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.rivals import Rival
 from gcode2krl.gap.families.evidence import Evidence
@@ -89,6 +89,10 @@ class FamilyFeatures:
     """Of the gap's power, what it takes."""
     p: float
     """Of its evidence by chance."""
+    of_largest: float
+    """Its evidence over that of the best family of all signals of its link."""
+    larger_links: int
+    """Links with a larger gap that has no name, or not all of one: what they leave may show here too."""
 
     def as_dict(self) -> dict[str, float | None]:
         """Return name -> number, rounded."""
@@ -98,7 +102,7 @@ class FamilyFeatures:
 FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 
-def family_features(rest: Rest, evidence: Evidence) -> FamilyFeatures:
+def family_features(rest: Rest, evidence: Evidence, larger_links: int = 0) -> FamilyFeatures:
     """Return the features of a family of a rest; those of other signals, of another joint, are no rivals."""
     rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
     other = max((each.nats for each in rivals if each is not evidence), default=0.0)
@@ -106,6 +110,8 @@ def family_features(rest: Rest, evidence: Evidence) -> FamilyFeatures:
         lead_nats=_within((evidence.nats - max(other, 0.0)) / rivals[0].inflation),
         share=rest.share(evidence),
         p=rest.study.p_of(evidence),
+        of_largest=min(max(evidence.nats, 0.0) / max(rest.study.evidences[0].nats, 1.0), 1.0),
+        larger_links=larger_links,
     )
 
 
@@ -136,7 +142,7 @@ def features_of(
     chi2 = found.likelihood.chi2(found.without(number))
     # by convention, not by the table, which is made from these numbers
     told = [rival for rival in rivals if rival.behind_nats >= _LIMITS.alike_chi2 / 2.0]
-    near = [each for each in rest.worth_naming if is_near(found.applied[number], each)]
+    near = [each for each in rest.worth_naming if tests.is_near(each)]
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(chi2 - found.fitted.chi2, 0.0) / found.data.values) ** 0.5,

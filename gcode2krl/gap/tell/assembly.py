@@ -23,6 +23,7 @@ from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,
     CauseResult,
+    DependsOnResult,
     Detectable,
     Gap,
     GapSize,
@@ -242,9 +243,9 @@ def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -
     """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
-    families = [
-        result for judgement in sorted(signals, key=_weight, reverse=True) for result in depends_on(judgement)
-    ]
+    families: list[DependsOnResult] = []
+    for judgement in sorted(signals, key=_weight, reverse=True):
+        families += depends_on(judgement, larger_links=len({each.link for each in families}))
     size = largest.told
     left = bool(size.significant) and largest.verdict != "explained"
     significant = left or any(each.link == largest.link.name for each in families)

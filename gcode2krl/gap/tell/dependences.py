@@ -1,14 +1,12 @@
 """On what a gap without a name depends, in words and numbers: a family as the answer states it."""
 
-from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.choose.calibrated import probabilities_table
-from gcode2krl.gap.choose.features import FamilyFeatures, family_features
+from gcode2krl.gap.choose.family_probabilities import FamilyProbability, family_probabilities
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.tell.result import DependsOnResult
@@ -31,33 +29,23 @@ _AXES = ("fx", "fy", "fz")
 _TIP = "tip"
 
 
-def depends_on(judgement: Judgement) -> Iterator[DependsOnResult]:
-    """Yield on what the gap of a link without a name, or beside named causes, may depend; best first."""
+def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[DependsOnResult]:
+    """Yield on what the gap of a link without a name, or beside named causes, may depend; best first.
+
+    ``larger_links`` have a larger gap without a name.
+    """
     rest = judgement.rest
     if rest is None or judgement.verdict in ("no_gap", "explained"):
         return
     if not (rest.worth_naming or rest.is_gap):
         return
-    table = probabilities_table()
-    told = [(each, family_features(rest, each)) for each in rest.study.evidences]
-    certain = [table.dependence(features) for _, features in told]
-    of_signal: dict[int | None, float] = defaultdict(float)
-    for (evidence, _), probability in zip(told, certain, strict=True):
-        of_signal[evidence.place.component] += probability
-    # one family of each signal is the right one
-    scaled = [
-        (probability / max(of_signal[evidence.place.component], 1.0), evidence, features)
-        for (evidence, features), probability in zip(told, certain, strict=True)
-    ]
-    for probability, evidence, features in sorted(scaled, key=lambda entry: -entry[0]):
-        if probability >= _LIMITS.least_probability:
-            yield _result(judgement, evidence, probability, features)
+    for told in family_probabilities(rest, larger_links):
+        if told.probability >= _LIMITS.least_probability:
+            yield _result(judgement, told)
 
 
-def _result(
-    judgement: Judgement, evidence: Evidence, probability: float, features: FamilyFeatures
-) -> DependsOnResult:
-    signals = evidence.signal
+def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
+    evidence, signals = told.evidence, told.evidence.signal
     is_step = evidence.on is Dependence.RUN_TIME_STEP
     largest = _largest(signals)
     along = largest if is_step else _main_axis(signals)
@@ -69,9 +57,9 @@ def _result(
         at=_at(evidence, signals),
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
-        probability=probability,
-        share=features.share,
-        tests=features.as_dict(),
+        probability=told.probability,
+        share=told.features.share,
+        tests=told.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
         run=None if moment is None else judgement.every[moment[0]].run,
         size=judgement.factor * float(np.linalg.norm(largest)),
