@@ -50,6 +50,9 @@ def _one_effect(cases: Sequence[Judged]) -> Iterator[Row]:
         yield _high(f"{form} form, >= noise: declared set", seen, lambda e: e.declared, aims[0])
         yield _high("  exact", seen, lambda e: e.exact, aims[1])
         yield _high("  family and place, or declared", seen, lambda e: e.family_or_name, aims[2])
+        told_apart = [each for each in mine if each.decidable]
+        yield _high("  beyond mismatch, not imitated: declared set", told_apart, lambda e: e.declared)
+        yield _high("  beyond mismatch, not imitated: exact", told_apart, lambda e: e.exact)
         yield _high("  truth among the named", seen, lambda e: e.hit)
         yield _low("  something else named", seen, lambda e: e.is_wrongly_named)
         yield _low("  said no gap", seen, lambda e: e.verdict == "no_gap")
@@ -101,6 +104,8 @@ def _others(cases: Sequence[Judged]) -> Iterator[Row]:
     pairs = [each for each in _of(cases, "pair") if each.observable]
     yield _high("two effects: both exactly right", pairs, lambda e: e.exact, ">= .90")
     yield _high("  within the declared sets", pairs, lambda e: e.declared)
+    told_apart = [each for each in pairs if each.decidable]
+    yield _high("  beyond mismatch, not imitated: both exactly right", told_apart, lambda e: e.exact)
     slips = _of(cases, "slip")
     yield _high("set-up slips: right", slips, lambda e: e.exact)
     yield _high("  within the declared sets", slips, lambda e: e.declared)

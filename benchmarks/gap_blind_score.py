@@ -44,6 +44,8 @@ class Judged:
     form: str
     ratio: float
     """RMS of the smallest true effect over the noise."""
+    beyond: float = 0.0
+    """The same of what normal mismatch could not do of it; the ratio itself where that is not known."""
     is_imitated: bool = False
     """A simple effect of the library fits the change to within the noise."""
     is_undecided: bool = False
@@ -89,6 +91,11 @@ class Judged:
         return self.ratio >= 1.0
 
     @property
+    def decidable(self) -> bool:
+        """Tell whether mismatch leaves as much as the noise of it, and no simple effect fits it."""
+        return self.beyond >= 1.0 and not self.is_imitated
+
+    @property
     def flagged(self) -> bool:
         """Tell whether the answer says that something is unknown."""
         return self.verdict in UNKNOWN
@@ -114,6 +121,11 @@ class Judged:
         return " + ".join(text(one) for one in self.named) or self.verdict
 
 
+def _beyond(entry: dict[str, Any]) -> float:
+    left = entry.get("left_by_mismatch")
+    return float(entry["ratio"] if left is None else left)
+
+
 def judge(record: dict[str, Any]) -> Judged:
     """Return the judgement of a record; one without a result counts as wrong."""
     label, case, result = record["label"], record["case"], record.get("result")
@@ -127,6 +139,7 @@ def judge(record: dict[str, Any]) -> Judged:
         subject=" + ".join(sorted(effect for effect, _ in truths)) or " + ".join(_foreign(label)) or "usual",
         form="other" if any(entry["form"] == "other" for entry in entries) else "same",
         ratio=min((entry["ratio"] for entry in entries), default=0.0),
+        beyond=min((_beyond(entry) for entry in entries), default=0.0),
         is_imitated=any(entry.get("stand_ins") for entry in entries),
         is_undecided=bool(label.get("undecided")),
         plant_s=record.get("plant_s", 0.0),

@@ -2,8 +2,8 @@
 
 from dataclasses import asdict
 
+from tests.plant import beyond, imitation, instruments, truth
 from tests.plant import faults as acting
-from tests.plant import imitation, instruments, truth
 from tests.plant.effects import LIBRARY, SLIPS
 from tests.plant.faults import Fault
 from tests.plant.instruments import Instruments
@@ -75,6 +75,7 @@ def _entries(plan: Plan, sizes: list[float], driven: list[Run], without: list[Ru
             sized["scan"] = truth.scan_size(alone, without, plan.how)
         entry = _entry(fault, size, changes, sized, plan.how)
         main = entry["main_signal"] or ""
+        entry["left_by_mismatch"] = beyond.left_by_mismatch(changes, bare, main, plan.how)
         entry["stand_ins"] = imitation.stand_ins(changes, bare, plan.days, main, plan.how)
         out.append(entry)
     return out
