@@ -102,21 +102,33 @@ def cutting_load(
     The thrust of a drill's chisel edge (up to about as much again) is not in the law: its axial force is a
     lower bound.
     """
-    shape = shape_of(tool)
     columns = _columns(phi_rad, a_p_mm, f_z_mm, ramp_rad)
-    mean = _means(columns, tool.teeth, shape, law)
-    peaks = np.full(len(mean), np.nan)
-    if peak:
-        lag = 0.0 if tool.kind == "drill" else math.tan(tool.helix_deg * RAD_PER_DEG) * 2.0 / tool.diameter_mm
-
-        def fill(start: int, end: int) -> None:
-            rows = slice(start, end)
-            phi, a_p, f_z, ramp = (column[rows] for column in columns)
-            peak_rows(phi, a_p, f_z, ramp, tool.teeth, lag, shape.array(), law, peaks[rows])
-
-        in_chunks(fill, chunk_borders(len(mean)))
-        peaks = np.maximum(peaks, np.linalg.norm(mean[:, :3], axis=1))  # no mean exceeds its peak
+    mean = _means(columns, tool.teeth, shape_of(tool), law)
+    if not peak:
+        return Load(mean[:, :3], mean[:, 3], np.full(len(mean), np.nan))
+    # no mean exceeds its peak
+    peaks = np.maximum(_peaks(columns, tool, law), np.linalg.norm(mean[:, :3], axis=1))
     return Load(mean[:, :3], mean[:, 3], peaks)
+
+
+def peak_force(
+    tool: Tool, law: Floats, phi_rad: ArrayLike, a_p_mm: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike
+) -> Floats:
+    """Return the peak force (n,) of `cutting_load`, which it raises to the mean where that is larger."""
+    return _peaks(_columns(phi_rad, a_p_mm, f_z_mm, ramp_rad), tool, law)
+
+
+def _peaks(columns: tuple[Floats, ...], tool: Tool, law: Floats) -> Floats:
+    lag = 0.0 if tool.kind == "drill" else math.tan(tool.helix_deg * RAD_PER_DEG) * 2.0 / tool.diameter_mm
+    shape, out = shape_of(tool).array(), np.zeros(len(columns[0]))
+
+    def fill(start: int, end: int) -> None:
+        rows = slice(start, end)
+        phi, a_p, f_z, ramp = (column[rows] for column in columns)
+        peak_rows(phi, a_p, f_z, ramp, tool.teeth, lag, shape, law, out[rows])
+
+    in_chunks(fill, chunk_borders(len(out)))
+    return out
 
 
 def _means(columns: tuple[Floats, ...], teeth: int, shape: Shape, law: Floats) -> Floats:

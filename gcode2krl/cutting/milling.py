@@ -10,7 +10,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.engagement import engage
 from gcode2krl.cutting.findings import Cut, findings_of
-from gcode2krl.cutting.force import cutting_load
+from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
 from gcode2krl.cutting.raw_part import height_field_of
@@ -242,6 +242,5 @@ def _peaks(
     for number, one in enumerate(tools):
         rows = np.flatnonzero((tool == number) & np.isfinite(phi_rad[:, 0]) & (mean_N > 0.0))
         if len(rows):
-            load = cutting_load(one, law, phi_rad[rows], a_p_mm[rows], f_z_mm[rows], ramp_rad[rows])
-            peak[rows] = load.peak_N
+            peak[rows] = peak_force(one, law, phi_rad[rows], a_p_mm[rows], f_z_mm[rows], ramp_rad[rows])
     return np.maximum(peak, mean_N)

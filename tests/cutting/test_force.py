@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from gcode2krl.cell.sections import Kienzle, LinearEdge, Material, Tool
 from gcode2krl.cutting.cutter import shape_of
-from gcode2krl.cutting.force import cutting_load, mean_force
+from gcode2krl.cutting.force import cutting_load, mean_force, peak_force
 from gcode2krl.cutting.law import law_array, linear_edge_law, spindle_power
 from gcode2krl.errors import NotUnderstoodError
 from tests.cutting import brute_force as brute
@@ -190,6 +190,8 @@ def test_peak_is_within_3_percent(cutter, arcs, ramp):
     assert load.peak_N[0] >= np.linalg.norm(load.force_N[0]) * (1 - 1e-9)
     silent = cutting_load(tool, linear_edge_law(AL), [np.ravel(ARCS[arcs])], depth, 0.08, peak=False)
     assert np.isnan(silent.peak_N).all()
+    alone = peak_force(tool, linear_edge_law(AL), [np.ravel(ARCS[arcs])], depth, 0.08, RAMPS[ramp])
+    assert load.peak_N == np.maximum(alone, np.linalg.norm(load.force_N, axis=1))
 
 
 def test_torque_is_cutting_pressure_times_volume():
