@@ -6,8 +6,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.choose.family_probabilities import FamilyProbability, family_probabilities
 from gcode2krl.gap.choose.judged import Judgement
+from gcode2krl.gap.choose.likely_families import FamilyProbability, family_probabilities
 from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.tell.result import DependsOnResult
 from gcode2krl.gap.thresholds import THRESHOLDS

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap.choose.calibrated import probabilities_table
-from gcode2krl.gap.choose.family_probabilities import family_probabilities
 from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.choose.likely_families import family_probabilities
 from tests.gap import constructed as c
 
 SIGMA = 1e-4
