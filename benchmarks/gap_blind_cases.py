@@ -127,7 +127,7 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
     return cases
 
 
-TWINS = {"force_delay": ("clock",)}
+TWINS = {"force_delay": ("clock",), "tool_diameter": ("swapped_tool",), "gravity": ("load",)}
 """What is the same thing under another name, and is taken out of the library with it."""
 
 

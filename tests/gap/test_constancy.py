@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import library
+from gcode2krl.gap.choose import constancy
 from gcode2krl.gap.choose.constancy import constancy_of, spread_between_runs
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.selection import examine
@@ -82,3 +83,30 @@ def test_clocks_that_were_set_run_by_run_still_differ():
     interval = intervals_of(found)[0]["offset_s"]
     assert interval.high - interval.low == pytest.approx(2.0 * half, rel=0.1)
     assert constancy_of(found, 0).p > 0.01  # 2 ms are normal
+
+
+@pytest.mark.parametrize(
+    ("sizes", "is_one"), [([1.0, 1.0, 1.0], True), ([0.9, 1.0, 1.1], True), ([0.5, 1.0, 1.5], False)]
+)
+def test_a_size_that_varies_by_more_than_a_fifth_is_not_one_number(sizes, is_one):
+    constant, _ = judged(sizes)
+    assert constant.is_one_number == is_one
+
+
+def test_a_run_whose_own_zero_hides_the_effect_says_nothing_of_its_size():
+    """A step that has happened before a run is constant in it, as the zero of the run's encoders is."""
+    rows = np.ones(400, dtype=bool)
+    step = np.where(np.arange(400) < 200, np.arange(400) >= 100, 1.0)  # in the first of two runs
+    zeros = 1e3 * np.stack([np.arange(400) < 200, np.arange(400) >= 200], axis=1)
+    both = constancy._Residual(
+        left=noise(400, 1)[:, 0],
+        change=5.0 * step,
+        nuisance=zeros,
+        run=np.repeat([0, 1], 200),
+        time_s=np.tile(np.arange(200.0), 2),
+        component=np.zeros(400),
+        inflation=1.0,
+        set_share=np.zeros(2),
+    )
+    assert both.part(rows & (both.run == 0)).share == pytest.approx(0.0, abs=0.1)
+    assert both.part(rows & (both.run == 1)) is None

@@ -8,8 +8,9 @@ is monotone in every test, also for effects and set-ups that the table has not s
 lowers a probability. It stays within 0.02 … 0.98. ``b`` and ``w`` stand in ``thresholds/probabilities.json``,
 which ``benchmarks/gap_calibrate.py`` writes from cases of the independent plant with whole effects left out.
 
-A name also needs the conditions of `FamilyTests`: its family is the best, its form fits, no other family
-takes a share beside it. Where one of them fails the cause is not named, whatever the model says.
+A name also needs the conditions of `FamilyTests` (its family is the best, its form fits, no other family
+takes a share beside it) and that its size is one number (`Constancy`). Where one of them fails the cause is
+not named, whatever the model says.
 """
 
 import math

@@ -30,6 +30,11 @@ class Constancy:
     p: float
     """Probability of at least that spread where the size is one number."""
 
+    @property
+    def is_one_number(self) -> bool:
+        """Tell whether the size may be one number: it varies little, or no more than chance lets it."""
+        return self.inconstancy < _LIMITS.most_inconstant or self.p > _LIMITS.inconstant_p
+
 
 class Part(NamedTuple):
     """A part of the data: by which share of it a cause is larger there, and the variance of that."""
@@ -131,8 +136,10 @@ class _Residual:
         inner = columns.T @ columns + np.eye(columns.shape[1])
         explained = np.linalg.solve(inner, columns.T @ np.column_stack([change, left]))
         information = float(change @ change - (columns.T @ change) @ explained[:, 0])
-        share = float(change @ left - (columns.T @ change) @ explained[:, 1]) / max(information, 1e-30)
-        return Part(share, self.inflation / max(information, 1e-30))
+        if information < _LIMITS.least_part * float(change @ change):  # the run's own mismatch does the same
+            return None
+        share = float(change @ left - (columns.T @ change) @ explained[:, 1]) / information
+        return Part(share, self.inflation / information)
 
 
 def _set_shares(found: Examination, number: int) -> Floats:

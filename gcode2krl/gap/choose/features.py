@@ -65,7 +65,7 @@ class Features:
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
-    """How many of the conditions of a name fail: family best, form fits, no other family beside it."""
+    """How many of the conditions of a name fail: family best, form fits, no other beside it, one size."""
 
     def as_dict(self) -> dict[str, float | None]:
         """Return name -> number, rounded."""
@@ -165,9 +165,12 @@ def features_of(
         causes=len(found.causes),
         links_missing=len(found.question.upstream),
         gap_p=gap_p,
-        conditions_failed=max(
-            [tests.is_best, tests.form_fits, tests.is_alone].count(False), int(not tests.passed)
-        ),
+        conditions_failed=[
+            tests.is_best,
+            tests.form_fits,
+            tests.is_alone,
+            constant is None or constant.is_one_number,
+        ].count(False),
     )
 
 

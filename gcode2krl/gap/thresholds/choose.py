@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from gcode2krl.gap.thresholds.stated import DEVELOPMENT, calibrated, convention, physics
+from gcode2krl.gap.thresholds.stated import DEVELOPMENT, WITH_ONCE_SCORED, calibrated, convention, physics
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,12 @@ class ChooseThresholds:
     least_part: float = convention(
         0.02, "of what an effect does: a part of the data with less of it does not tell its size"
     )
+    most_inconstant: float = calibrated(
+        0.2,
+        WITH_ONCE_SCORED,
+        "spread of a size over runs, halves and joints: of 268 right names 2 had more, other forms by chance",
+    )
+    inconstant_p: float = convention(0.001, "a spread that chance makes more often than this is none")
     minor_chi2: float = convention(
         6.6, "fall of chi2 over its inflation, one in a hundred by chance: less does not show a minor number"
     )
