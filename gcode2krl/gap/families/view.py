@@ -8,12 +8,16 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_array
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.families.rows import Rows
 from gcode2krl.gap.fit.box import MOST, boxed
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _PRIOR = THRESHOLDS.fit.prior_sizes**-2
+_LEAST_SAYING = 3
+"""Components: fewer cannot outvote one that has an effect."""
+_KNOWN = 0.1
+"""Of the variance before any data, the most that is left of what a component knows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +47,56 @@ class View:
         return {None: self}
 
     def at(self, component: int | None) -> "View":
-        """Return the view of one component alone: nothing couples joints but clocks."""
-        if component not in self._of_component:
+        """Return the view of one component alone; clocks, which couple joints, are what the others say.
+
+        One joint alone would take an effect of its own, a lag, for the clock of all.
+        """
+        if component is not None and component not in self._of_component:
+            said = self._said_beside(component)
+            known = self._used(component) & ~np.isnan(said)
+            alone = self._of_rows(component, self._used(component) & ~known)
             rows = self.components == component
-            tangents, nuisance = self.tangents[rows], self.nuisance[rows]
-            self._of_component[component] = View(
-                self.residual[rows],
-                tangents[:, np.any(tangents, axis=0)],
-                nuisance[:, np.any(nuisance, axis=0)],
-                self.members[:, np.flatnonzero(rows)],
-                self.components[rows],
-            )
+            moved = self.fixed[np.ix_(rows, known)] @ said[known]
+            self._of_component[component] = replace(alone, residual=alone.residual - moved)
         return self._of_component[component]
+
+    def _used(self, component: int) -> Bools:
+        """Return which of T and N (t + m,) are not zero in a component."""
+        used: Bools = np.any(self.fixed[self.components == component], axis=0)
+        return used
+
+    def _of_rows(self, component: int, columns: Bools) -> "View":
+        """Return the view of a component's rows with some of T and N (t + m,)."""
+        rows, t = self.components == component, self.tangents.shape[1]
+        return View(
+            self.residual[rows],
+            self.tangents[np.ix_(rows, columns[:t])],
+            self.nuisance[np.ix_(rows, columns[t:])],
+            self.members[:, np.flatnonzero(rows)],
+            self.components[rows],
+        )
+
+    @cached_property
+    def _said(self) -> Floats:
+        """(k, t + m) what each component alone says of δ and b; nan of what it hardly knows."""
+        said = np.full((int(self.components.max()) + 1, self.fixed.shape[1]), np.nan)
+        for component in range(len(said)):
+            used = self._used(component)
+            alone = self._of_rows(component, used)
+            left = np.diag(alone.solved(np.diag(alone._precision)))  # of the variance before any data
+            said[component, used] = np.where(left < _KNOWN, alone.solved(alone.cross), np.nan)
+        return said
+
+    def _said_beside(self, component: int) -> Floats:
+        """Return the middle one (t + m,) of what the other components say; nan where few say anything.
+
+        One with an effect of its own is outvoted.
+        """
+        said = np.delete(self._said, component, axis=0)
+        few = np.sum(~np.isnan(said), axis=0) < _LEAST_SAYING
+        middle = np.full(said.shape[1], np.nan)
+        middle[~few] = np.nanmedian(said[:, ~few], axis=0)
+        return middle
 
     @cached_property
     def fixed(self) -> Floats:
