@@ -133,4 +133,4 @@ def test_right_names_stay(link, effect):
     assert names(found) == [effect.partition(":")[0]]
     assert found.verdict == "explained"
     (cause,) = found.causes
-    assert cause.tests.passed
+    assert cause.features.conditions_failed == 0

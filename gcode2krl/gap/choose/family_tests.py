@@ -77,11 +77,6 @@ class FamilyTests:
         """Tell whether no other family takes a share worth naming beside it."""
         return self.other_share < _LIMITS.other_share or self.other_power < _LIMITS.other_power
 
-    @property
-    def passed(self) -> bool:
-        """Tell whether the cause may be named."""
-        return self.is_best and self.form_fits and self.is_alone
-
 
 def net_gain(evidence: Evidence) -> float:
     """Return twice the evidence: the gain minus what its numbers cost; 0 where it is not significant."""
