@@ -197,6 +197,10 @@ class NotUnderstoodError(Gcode2KrlError):
     """The input cannot be understood: unreadable file, G-code, cell or option (exit code 2)."""
 
 
+class InstallationError(Gcode2KrlError):
+    """A part of the package is missing or does not fit the rest (exit code 2)."""
+
+
 class RefusedError(Gcode2KrlError):
     """The input is understood and must not become a program: reach, limits, tool, … (exit code 1)."""
 

@@ -66,7 +66,8 @@ STATE = np.dtype(
         ("spiral_start", "f8"),
         ("spiral_end", "f8"),
         ("spiral_unit_mm", "f8"),
-    ]
+    ],
+    align=True,  # as C lays it out
 )
 
 DOUBT_X, DOUBT_Y, DOUBT_Z, DOUBT_MOTION, DOUBT_FEED, DOUBT_UNIT = (1 << k for k in range(6))

@@ -5,15 +5,32 @@ floating-point formatting is involved.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gcode2krl import ascii_codes as ch
-from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.core import (
+    BYTES,
+    FLOAT,
+    FLOATS,
+    INT,
+    INTS,
+    INTS32,
+    OUT_BYTES,
+    OUT_FLOATS,
+    OUT_INTS,
+    core_function,
+)
 
 BYTES_PER_TARGET = 240
 NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
+
+_fixed = core_function("krl_fixed", OUT_BYTES, FLOAT, INT, returns=INT)
+_in_decimals = core_function("krl_in_decimals", FLOATS, INT, OUT_INTS)
+_lines = core_function(
+    "krl_motion_lines",
+    *(FLOATS, FLOATS, FLOATS, FLOATS, INTS32, OUT_FLOATS, INT, BYTES, INTS, OUT_BYTES),
+    returns=INT,
+)
 
 
 def motion_lines(
@@ -35,16 +52,15 @@ def motion_lines(
     """
     text, start = before
     buffer = np.empty(BYTES_PER_TARGET * len(position_mm) + len(text), dtype=np.uint8)
-    size = _lines(
-        position_mm, abc_deg, speed_m_s, cdis_mm, source_line, state, comment_every, text, start, buffer
-    )
+    position, abc = np.ascontiguousarray(position_mm), np.ascontiguousarray(abc_deg)
+    size = _lines(position, abc, speed_m_s, cdis_mm, source_line, state, comment_every, text, start, buffer)
     return buffer[:size].tobytes()
 
 
 def fixed(value: float, decimals: int) -> str:
     """Return one number with fixed decimals, by the same rule."""
     buffer = np.empty(40, dtype=np.uint8)
-    size = _fixed(buffer, 0, float(value), decimals)
+    size = _fixed(buffer, float(value), decimals)
     return buffer[:size].tobytes().decode("ascii")
 
 
@@ -53,104 +69,3 @@ def in_decimals(values: Floats, decimals: int) -> Ints:
     whole = np.empty(len(values), dtype=np.int64)
     _in_decimals(np.ascontiguousarray(values), decimals, whole)
     return whole
-
-
-@njit(cache=True)
-def _in_decimals(values, decimals, whole):
-    unit = 1
-    for _ in range(9 - decimals):
-        unit *= 10
-    for i in range(len(values)):
-        value = values[i]
-        if np.isnan(value):
-            whole[i] = 0
-            continue
-        scaled = (np.int64(np.rint(abs(value) * 1e9)) + unit // 2) // unit
-        whole[i] = -scaled if value < 0 else scaled
-
-
-@njit(cache=True)
-def _fixed(buffer, at, value, decimals):
-    nano = np.int64(np.rint(abs(value) * 1e9))
-    unit = 1
-    for _ in range(9 - decimals):
-        unit *= 10
-    scaled = (nano + unit // 2) // unit
-    if value < 0 and scaled > 0:
-        buffer[at] = ch.MINUS
-        at += 1
-    ten = 1
-    for _ in range(decimals):
-        ten *= 10
-    whole = scaled // ten
-    rest = scaled % ten
-    at = _integer(buffer, at, whole)
-    if decimals > 0:
-        buffer[at] = ch.POINT
-        at += 1
-        for _ in range(decimals):
-            ten //= 10
-            buffer[at] = ch.DIGIT_0 + rest // ten % 10
-            at += 1
-    return at
-
-
-@njit(cache=True)
-def _integer(buffer, at, value):
-    digits = 1
-    power = 10
-    while power <= value:
-        power *= 10
-        digits += 1
-    for k in range(digits):
-        buffer[at + digits - 1 - k] = ch.DIGIT_0 + value % 10
-        value //= 10
-    return at + digits
-
-
-@njit(cache=True)
-def _put(buffer, at, text):
-    for k in range(len(text)):
-        buffer[at + k] = text[k]
-    return at + len(text)
-
-
-def _bytes(text: str) -> NDArray[np.uint8]:
-    return np.frombuffer(text.encode("ascii"), dtype=np.uint8).copy()
-
-
-_LIN, _BLEND, _EXACT = _bytes(f"{w.LIN} {{{w.POSE_KEYS[0]} "), _bytes(f"}} {w.C_DIS}\r\n"), _bytes("}\r\n")
-_VEL, _CDIS, _LINE = _bytes(f"{w.VEL_CP}="), _bytes(f"{w.APO_CDIS}="), _bytes("; line ")
-_KEYS = np.stack([_bytes(f",{key} ") for key in w.POSE_KEYS[1:]])
-_CRLF = _bytes("\r\n")
-
-
-@njit(cache=True)
-def _lines(position, abc, speed, cdis, source_line, state, comment_every, text, start, buffer):
-    at = 0
-    for i in range(len(position)):
-        state[2] += 1
-        if comment_every > 0 and state[2] >= comment_every and source_line[i] > 0:
-            at = _put(buffer, at, _LINE)
-            at = _integer(buffer, at, source_line[i])
-            at = _put(buffer, at, _CRLF)
-            state[2] = 0
-        if speed[i] != state[0]:
-            state[0] = speed[i]
-            at = _put(buffer, at, _VEL)
-            at = _fixed(buffer, at, speed[i], 7)
-            at = _put(buffer, at, _CRLF)
-        if cdis[i] > 0 and cdis[i] != state[1]:
-            state[1] = cdis[i]
-            at = _put(buffer, at, _CDIS)
-            at = _fixed(buffer, at, cdis[i], 3)
-            at = _put(buffer, at, _CRLF)
-        if len(text) > 0:
-            at = _put(buffer, at, text[start[i] : start[i + 1]])
-        at = _put(buffer, at, _LIN)
-        at = _fixed(buffer, at, position[i, 0], 3)
-        for k in range(5):
-            at = _put(buffer, at, _KEYS[k])
-            at = _fixed(buffer, at, position[i, k + 1], 3) if k < 2 else _fixed(buffer, at, abc[i, k - 2], 4)
-        at = _put(buffer, at, _BLEND if cdis[i] > 0 else _EXACT)
-    return at

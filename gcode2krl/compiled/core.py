@@ -1,0 +1,120 @@
+"""The compiled core: its library, found and loaded once, and how its functions are called.
+
+The core is C (``native/`` in the source tree), compiled when the package is built. A function is declared
+once, beside the Python that calls it::
+
+    _lines = core_function("krl_lines", FLOATS, OUT_BYTES, INT, returns=INT)
+
+An array goes in as a view: its address, its rows and the numbers in a row. It has to be contiguous and of the
+declared type; one that is written to has to be writeable. A call releases the interpreter's lock.
+"""
+
+import ctypes
+import os
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from gcode2krl.errors import InstallationError, Issue
+
+_SUFFIX: Final = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+_BUILT: Final = Path(__file__).parent / "built"
+_NATIVE: Final = Path(__file__).parents[2] / "native"
+BUILD_VARIABLE = "GCODE2KRL_CORE"
+"""In the environment: ``checked`` takes the build that checks every index, ``plain`` the plain one."""
+
+INT, FLOAT = ctypes.c_int64, ctypes.c_double
+
+
+class View(ctypes.Structure):
+    """What C sees of an array."""
+
+    _fields_ = (("at", ctypes.c_void_p), ("rows", ctypes.c_int64), ("columns", ctypes.c_int64))
+
+
+class ArrayOf:
+    """An argument that is an array of a type; ctypes calls `from_param` with what is passed."""
+
+    def __init__(self, dtype: DTypeLike, *, written: bool = False) -> None:
+        """Take the type of the numbers, and whether the function writes to them."""
+        self.dtype = np.dtype(dtype)
+        self.written = written
+
+    def from_param(self, array: NDArray[Any]) -> View:
+        """Return the view; it holds no reference, so the array has to outlive the call."""
+        flags = array.flags
+        if array.dtype != self.dtype or not flags.c_contiguous or (self.written and not flags.writeable):
+            raise TypeError(f"the core takes a contiguous array of {self.dtype}, not {_described(array)}")
+        rows = len(array)
+        return View(array.ctypes.data, rows, array.size // rows if rows else 1)
+
+
+def _described(array: NDArray[Any]) -> str:
+    order = "contiguous" if array.flags.c_contiguous else "not contiguous"
+    return f"{array.dtype} {array.shape}, {order}, {'' if array.flags.writeable else 'not '}writeable"
+
+
+FLOATS, INTS, INTS32 = ArrayOf(np.float64), ArrayOf(np.int64), ArrayOf(np.int32)
+BYTES, BOOLS = ArrayOf(np.uint8), ArrayOf(np.bool_)
+OUT_FLOATS, OUT_INTS, OUT_INTS32, OUT_BYTES, OUT_BOOLS = (
+    ArrayOf(each.dtype, written=True) for each in (FLOATS, INTS, INTS32, BYTES, BOOLS)
+)
+
+
+def core_function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:
+    """Return a function of the core, declared by the types of its arguments and of what it returns."""
+    function = getattr(_library(), name)
+    function.argtypes = arguments
+    function.restype = returns
+    return function  # type: ignore[no-any-return]
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """Load the core that fits this processor.
+
+    Raises
+    ------
+    InstallationError
+        If there is none, or in a source tree one of other sources.
+    """
+    wanted = os.environ.get(BUILD_VARIABLE, "")
+    core = _loaded("core_checked" if wanted == "checked" else "core")
+    _refuse_other_sources(core)
+    return _loaded("core_wide") if not wanted and core.core_is_wide() else core
+
+
+def _loaded(name: str) -> ctypes.CDLL:
+    path = _BUILT / f"{name}{_SUFFIX}"
+    if not path.exists():
+        raise _wrong_installation(f"the compiled core {path.name} is missing from {_BUILT}")
+    return ctypes.CDLL(str(path))
+
+
+def _refuse_other_sources(core: ctypes.CDLL) -> None:
+    """In a source tree compare what the core was built from with what is there."""
+    if not (_NATIVE / "core.h").exists():
+        return
+    core.core_sources.restype = ctypes.c_char_p
+    if core.core_sources().decode() != _digest():
+        raise _wrong_installation("the compiled core is older than its sources")
+
+
+def _digest() -> str:
+    """Return the digest of the sources, as `native/build.py` writes it into the core."""
+    import hashlib
+
+    digest = hashlib.sha256()
+    for path in sorted([*_NATIVE.rglob("*.c"), *_NATIVE.rglob("*.h")]):
+        digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()[:16]
+
+
+def _wrong_installation(message: str) -> InstallationError:
+    remedy = "run python native/build.py" if (_NATIVE / "core.h").exists() else "install the package anew"
+    return InstallationError(Issue("error", "core-missing", 0, message, remedy))

@@ -1,0 +1,425 @@
+/* Made by native/constants.py from the Python modules; not to be edited. */
+
+#ifndef CONSTANTS_H
+#define CONSTANTS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* gcode2krl.ascii_codes */
+#define CH_TAB 9
+#define CH_NEWLINE 10
+#define CH_RETURN 13
+#define CH_SPACE 32
+#define CH_END_OF_TAPE 26
+#define CH_EXCLAMATION 33
+#define CH_HASH 35
+#define CH_PERCENT 37
+#define CH_AMPERSAND 38
+#define CH_PAREN_OPEN 40
+#define CH_PAREN_CLOSE 41
+#define CH_PLUS 43
+#define CH_COMMA 44
+#define CH_MINUS 45
+#define CH_POINT 46
+#define CH_SLASH 47
+#define CH_DIGIT_0 48
+#define CH_DIGIT_1 49
+#define CH_DIGIT_6 54
+#define CH_DIGIT_9 57
+#define CH_SEMICOLON 59
+#define CH_LESS 60
+#define CH_EQUALS 61
+#define CH_GREATER 62
+#define CH_LETTER_A 65
+#define CH_LETTER_C 67
+#define CH_LETTER_F 70
+#define CH_LETTER_G 71
+#define CH_LETTER_I 73
+#define CH_LETTER_K 75
+#define CH_LETTER_M 77
+#define CH_LETTER_N 78
+#define CH_LETTER_O 79
+#define CH_LETTER_R 82
+#define CH_LETTER_S 83
+#define CH_LETTER_T 84
+#define CH_LETTER_X 88
+#define CH_LETTER_Y 89
+#define CH_LETTER_Z 90
+#define CH_BRACKET_OPEN 91
+#define CH_BRACKET_CLOSE 93
+#define CH_SMALL_A 97
+#define CH_SMALL_G 103
+#define CH_SMALL_M 109
+#define CH_SMALL_S 115
+#define CH_SMALL_Z 122
+#define CH_BRACE_OPEN 123
+#define CH_BRACE_CLOSE 125
+#define CH_CASE_BIT 32
+#define CH_FIRST_FOREIGN 128
+
+/* gcode2krl.krl_words */
+#define W_LIN "LIN"
+#define W_PTP "PTP"
+#define W_C_DIS "C_DIS"
+#define W_BRAKE "BRAKE"
+#define W_WAIT "WAIT"
+#define W_SEC "SEC"
+#define W_FOR "FOR"
+#define W_HALT "HALT"
+#define W_CONTINUE "CONTINUE"
+#define W_DEF "DEF"
+#define W_END "END"
+#define W_EXT "EXT"
+#define W_DECL "DECL"
+#define W_GLOBAL "GLOBAL"
+#define W_TRIGGER "TRIGGER"
+#define W_WHEN "WHEN"
+#define W_DISTANCE "DISTANCE"
+#define W_DELAY "DELAY"
+#define W_DO "DO"
+#define W_PRIO "PRIO"
+#define W_PRIO_BY_CONTROLLER (-1)
+#define W_INTERRUPT "INTERRUPT"
+#define W_PULSE "PULSE"
+#define W_EXIT "EXIT"
+#define W_RSI_INTERRUPT 21
+#define W_STOP_INTERRUPT 3
+#define W_BAS "BAS"
+#define W_INITMOV "#INITMOV"
+#define W_EXT_BAS "EXT BAS (BAS_COMMAND :IN,REAL :IN )"
+#define W_RSI_FAST "#IPO_FAST"
+#define W_RSI_SLOW "#IPO"
+#define W_VEL_CP "$VEL.CP"
+#define W_APO_CDIS "$APO.CDIS"
+#define W_BASE "$BASE"
+#define W_TOOL "$TOOL"
+#define W_LOAD "$LOAD"
+#define W_ACT_BASE "$ACT_BASE"
+#define W_ACT_TOOL "$ACT_TOOL"
+#define W_BASE_DATA "BASE_DATA"
+#define W_TOOL_DATA "TOOL_DATA"
+#define W_OUT "$OUT"
+#define W_OWN_PREFIX "GK_"
+#define W_PILOT_SUBPROGRAM "GK_PILOT"
+#define W_LOST_SUBPROGRAM "GK_RSI_LOST"
+#define W_RSI_PREFIX "GK_RSI_"
+#define W_RSI_RESULT "GK_RSI_RET"
+#define W_RSI_ID "GK_RSI_ID"
+#define W_FOLD ";FOLD"
+#define W_ENDFOLD ";ENDFOLD"
+#define W_DWELL "dwell"
+#define W_NO_GUARD "(--no-guard)"
+#define W_SOURCE_SUFFIX ".src"
+#define W_DATA_SUFFIX ".dat"
+#define W_SIDECAR_SUFFIX ".pilot.csv"
+#define W_SIGNAL_FLOW_SUFFIX ".rsi.xml"
+#define W_ETHERNET_SUFFIX "_ETH.xml"
+#define W_LONGEST_LINE 471
+#define W_LONGEST_NAME 24
+#define W_LONGEST_RSI_NAME 16
+#define W_KIND_LIN 0
+#define W_KIND_PTP 1
+#define W_KIND_VEL_CP 2
+#define W_KIND_APO_CDIS 3
+#define W_KIND_WAIT_SEC 4
+#define W_KIND_OTHER 5
+#define W_KIND_PTP_AXES 6
+#define W_KIND_TRIGGER 7
+#define W_MALFORMED (-1)
+#define W_ASSIGNS 1
+#define W_CALLS 2
+
+/* gcode2krl.gcode.vocabulary */
+#define V_LETTER_A 65
+#define V_LETTERS 26
+#define V_WORD_E 4
+#define V_WORD_F 5
+#define V_WORD_H 7
+#define V_WORD_P 15
+#define V_WORD_Q 16
+#define V_WORD_R 17
+#define V_WORD_S 18
+#define V_WORD_T 19
+#define V_WORD_I 8
+#define V_WORD_J 9
+#define V_WORD_K 10
+#define V_WORD_X 23
+#define V_WORD_Y 24
+#define V_WORD_Z 25
+#define V_TENFOLD 10
+#define V_LARGEST_G 999
+#define V_LARGEST_M 9999
+#define V_G0 0
+#define V_G4 40
+#define V_G5 50
+#define V_G7 70
+#define V_G8 80
+#define V_G10 100
+#define V_G20 200
+#define V_G28 280
+#define V_G28_1 281
+#define V_G30 300
+#define V_G30_1 301
+#define V_G33 330
+#define V_G38 380
+#define V_G41 410
+#define V_G43 430
+#define V_G49 490
+#define V_G52 520
+#define V_G53 530
+#define V_G54 540
+#define V_G59 590
+#define V_G64 640
+#define V_G70 700
+#define V_G73 730
+#define V_G76 760
+#define V_G81 810
+#define V_G80 800
+#define V_G90 900
+#define V_G90_1 901
+#define V_G91_1 911
+#define V_G92 920
+#define V_G96 960
+#define V_M0 0
+#define V_M1 1
+#define V_M2 2
+#define V_M30 30
+#define V_M60 60
+#define V_M3 3
+#define V_M4 4
+#define V_M5 5
+#define V_M6 6
+#define V_M7 7
+#define V_M9 9
+#define V_M19 19
+#define V_M48 48
+#define V_M53 53
+#define V_M61 61
+#define V_M62 62
+#define V_M70 70
+#define V_M72 72
+#define V_M73 73
+#define V_M98 98
+#define V_M99 99
+#define V_MOTION_CANCELLED (-1)
+#define V_MOTION_RAPID 0
+#define V_MOTION_LINE 1
+#define V_MOTION_ARC_CW 2
+#define V_MOTION_ARC_CCW 3
+#define V_PLANE_XY 17
+#define V_PLANE_ZX 18
+#define V_INVERSE_TIME 93
+#define V_PER_MINUTE 94
+#define V_PER_REVOLUTION 95
+#define V_NON_MODAL 0
+#define V_MOTION 1
+#define V_PLANE 2
+#define V_DISTANCE 3
+#define V_CENTRE 4
+#define V_FEED_MODE 5
+#define V_UNIT 6
+#define V_RADIUS_COMPENSATION 7
+#define V_LENGTH_OFFSET 8
+#define V_RETRACT 9
+#define V_WORK_OFFSET 10
+#define V_PATH_CONTROL 11
+#define V_SPINDLE_MODE 12
+#define V_GROUPS 13
+#define V_M_STOP 4
+#define V_M_TOOL_CHANGE 6
+#define V_M_SPINDLE 7
+#define V_M_COOLANT 8
+#define V_M_OVERRIDE 9
+#define V_M_CODES 4
+
+/* gcode2krl.gcode.findings */
+#define F_FIRST_FOREIGN 128
+#define F_LETTER_A 65
+#define F_OK 0
+#define F_BAD_CHARACTER 1
+#define F_NO_NUMBER 2
+#define F_NUMBER_TOO_LONG 3
+#define F_COMMENT_OPEN 4
+#define F_COMMENT_NESTED 5
+#define F_EXPRESSION 6
+#define F_O_WORD 7
+#define F_LINE_TOO_LONG 8
+#define F_UNKNOWN_LETTER 9
+#define F_ROTARY_WORD 10
+#define F_REPEATED_WORD 11
+#define F_SAME_GROUP_G 12
+#define F_SAME_GROUP_M 13
+#define F_UNKNOWN_G 14
+#define F_UNSUPPORTED_G 15
+#define F_UNSUPPORTED_M 16
+#define F_BAD_M 17
+#define F_NO_FEED 18
+#define F_NEGATIVE_FEED 19
+#define F_NO_INVERSE_TIME 20
+#define F_FEED_PER_REV_STOPPED 21
+#define F_NO_MOTION_MODE 22
+#define F_TWO_AXIS_CODES 23
+#define F_UNUSED_WORD 24
+#define F_ARC_NO_CENTRE 25
+#define F_ARC_BOTH_FORMATS 26
+#define F_ARC_RADIUS_MISMATCH 27
+#define F_ARC_RADIUS_TOO_SMALL 28
+#define F_ARC_R_FULL_CIRCLE 29
+#define F_ARC_ZERO_RADIUS 30
+#define F_ARC_WRONG_OFFSET 31
+#define F_ARC_TURNS 32
+#define F_ARC_NEEDS_OFFSETS 33
+#define F_DWELL_NO_P 34
+#define F_DWELL_NEGATIVE 35
+#define F_TOOL_NOT_SELECTED 36
+#define F_BAD_INTEGER 37
+#define F_G53_NEEDS_RAPID_OR_FEED 38
+#define F_G53_INCREMENTAL 39
+#define F_NEGATIVE_TOLERANCE 40
+#define F_NEGATIVE_SPEED 41
+#define F_TOO_FAR 42
+#define F_TOOL_UNDECLARED 43
+#define F_H_DIFFERS 44
+#define F_OFFSET_UNKNOWN 45
+#define F_N_NOT_FIRST 46
+#define F_TOO_MANY_M 47
+#define F_DWELL_WITH_ARC 48
+#define F_BAD_LINE_NUMBER 49
+#define F_UNKNOWN_START 50
+#define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
+#define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
+
+/* gcode2krl.gcode.state */
+#define S_DOUBT_X 1
+#define S_DOUBT_Y 2
+#define S_DOUBT_Z 4
+#define S_DOUBT_MOTION 8
+#define S_DOUBT_FEED 16
+#define S_DOUBT_UNIT 32
+#define S_DOUBT_PLANE 64
+#define S_DOUBT_DISTANCE 128
+#define S_DOUBT_CENTRE 256
+#define S_DOUBT_FEED_MODE 512
+#define S_DOUBT_TOOL 1024
+#define S_DOUBT_SPEED 2048
+#define S_DOUBT_POSITION 7
+#define S_DOUBT_ALL 4095
+#define S_NOTE_ROTARY 0
+#define S_NOTE_CENTRE 1
+#define S_NOTE_HOME 2
+#define S_NOTE_OVERRIDE 3
+#define S_UNKNOWN_GROUP (-1)
+#define S_UNSUPPORTED_GROUP (-2)
+#define S_EVENT_TOOL 0
+#define S_EVENT_SPINDLE 1
+#define S_EVENT_COOLANT 2
+#define S_EVENT_M 4
+#define S_EVENT_TEXT 5
+#define S_IMPLIED_M5 (-5)
+
+typedef struct {
+    double x;
+    double y;
+    double z;
+    int8_t known_x;
+    int8_t known_y;
+    int8_t known_z;
+    double unit_mm;
+    int8_t absolute;
+    int8_t arc_absolute;
+    int32_t plane;
+    int32_t motion;
+    int32_t feed_mode;
+    double feed;
+    double rpm;
+    int32_t direction;
+    int32_t tool;
+    int32_t selected_tool;
+    double length_offset;
+    int32_t offset_tool;
+    int8_t exact_stop;
+    double tolerance;
+    int32_t work_offset;
+    double home_28[3];
+    double home_30[3];
+    int32_t arcs;
+    int8_t mist;
+    int8_t flood;
+    int8_t ended;
+    int32_t end_line;
+    int32_t tape_marks;
+    int8_t unit_named;
+    int64_t blocks;
+    double largest_mm;
+    int32_t unknown_feed_line;
+    int8_t unknown_reported;
+    int32_t doubt;
+    int32_t motion_line;
+    int32_t distance_line;
+    int32_t feed_mode_line;
+    int32_t rotary_refused;
+    int32_t note_count[4];
+    int32_t note_line[4];
+    int32_t note_word[4];
+    int32_t misfits;
+    int32_t misfits_other_centre;
+    int32_t spirals;
+    int32_t spiral_line;
+    double spiral_start;
+    double spiral_end;
+    double spiral_unit_mm;
+} State;
+typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
+typedef char State_y_stands_at_8[offsetof(State, y) == 8 ? 1 : -1];
+typedef char State_z_stands_at_16[offsetof(State, z) == 16 ? 1 : -1];
+typedef char State_known_x_stands_at_24[offsetof(State, known_x) == 24 ? 1 : -1];
+typedef char State_known_y_stands_at_25[offsetof(State, known_y) == 25 ? 1 : -1];
+typedef char State_known_z_stands_at_26[offsetof(State, known_z) == 26 ? 1 : -1];
+typedef char State_unit_mm_stands_at_32[offsetof(State, unit_mm) == 32 ? 1 : -1];
+typedef char State_absolute_stands_at_40[offsetof(State, absolute) == 40 ? 1 : -1];
+typedef char State_arc_absolute_stands_at_41[offsetof(State, arc_absolute) == 41 ? 1 : -1];
+typedef char State_plane_stands_at_44[offsetof(State, plane) == 44 ? 1 : -1];
+typedef char State_motion_stands_at_48[offsetof(State, motion) == 48 ? 1 : -1];
+typedef char State_feed_mode_stands_at_52[offsetof(State, feed_mode) == 52 ? 1 : -1];
+typedef char State_feed_stands_at_56[offsetof(State, feed) == 56 ? 1 : -1];
+typedef char State_rpm_stands_at_64[offsetof(State, rpm) == 64 ? 1 : -1];
+typedef char State_direction_stands_at_72[offsetof(State, direction) == 72 ? 1 : -1];
+typedef char State_tool_stands_at_76[offsetof(State, tool) == 76 ? 1 : -1];
+typedef char State_selected_tool_stands_at_80[offsetof(State, selected_tool) == 80 ? 1 : -1];
+typedef char State_length_offset_stands_at_88[offsetof(State, length_offset) == 88 ? 1 : -1];
+typedef char State_offset_tool_stands_at_96[offsetof(State, offset_tool) == 96 ? 1 : -1];
+typedef char State_exact_stop_stands_at_100[offsetof(State, exact_stop) == 100 ? 1 : -1];
+typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1 : -1];
+typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
+typedef char State_home_28_stands_at_120[offsetof(State, home_28) == 120 ? 1 : -1];
+typedef char State_home_30_stands_at_144[offsetof(State, home_30) == 144 ? 1 : -1];
+typedef char State_arcs_stands_at_168[offsetof(State, arcs) == 168 ? 1 : -1];
+typedef char State_mist_stands_at_172[offsetof(State, mist) == 172 ? 1 : -1];
+typedef char State_flood_stands_at_173[offsetof(State, flood) == 173 ? 1 : -1];
+typedef char State_ended_stands_at_174[offsetof(State, ended) == 174 ? 1 : -1];
+typedef char State_end_line_stands_at_176[offsetof(State, end_line) == 176 ? 1 : -1];
+typedef char State_tape_marks_stands_at_180[offsetof(State, tape_marks) == 180 ? 1 : -1];
+typedef char State_unit_named_stands_at_184[offsetof(State, unit_named) == 184 ? 1 : -1];
+typedef char State_blocks_stands_at_192[offsetof(State, blocks) == 192 ? 1 : -1];
+typedef char State_largest_mm_stands_at_200[offsetof(State, largest_mm) == 200 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_208[offsetof(State, unknown_feed_line) == 208 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_212[offsetof(State, unknown_reported) == 212 ? 1 : -1];
+typedef char State_doubt_stands_at_216[offsetof(State, doubt) == 216 ? 1 : -1];
+typedef char State_motion_line_stands_at_220[offsetof(State, motion_line) == 220 ? 1 : -1];
+typedef char State_distance_line_stands_at_224[offsetof(State, distance_line) == 224 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_228[offsetof(State, feed_mode_line) == 228 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_232[offsetof(State, rotary_refused) == 232 ? 1 : -1];
+typedef char State_note_count_stands_at_236[offsetof(State, note_count) == 236 ? 1 : -1];
+typedef char State_note_line_stands_at_252[offsetof(State, note_line) == 252 ? 1 : -1];
+typedef char State_note_word_stands_at_268[offsetof(State, note_word) == 268 ? 1 : -1];
+typedef char State_misfits_stands_at_284[offsetof(State, misfits) == 284 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_288[offsetof(State, misfits_other_centre) == 288 ? 1 : -1];
+typedef char State_spirals_stands_at_292[offsetof(State, spirals) == 292 ? 1 : -1];
+typedef char State_spiral_line_stands_at_296[offsetof(State, spiral_line) == 296 ? 1 : -1];
+typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 304 ? 1 : -1];
+typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+
+#endif

@@ -1,0 +1,80 @@
+"""The compiled core: built from these sources, of one mind with the Python modules, refusing wrong arrays."""
+
+import ctypes
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcode2krl.compiled import core
+from gcode2krl.compiled.core import FLOATS, OUT_FLOATS
+
+ROOT = Path(__file__).parents[2]
+
+
+def native(name):
+    spec = importlib.util.spec_from_file_location(f"native_{name}", ROOT / "native" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_constants_of_the_core_are_those_of_the_python_modules():
+    constants = native("constants")
+    assert constants.HEADER.read_text(encoding="ascii") == constants.header()
+
+
+def test_a_view_has_the_shape_of_the_array():
+    for shape, seen in (((5,), (5, 1)), ((4, 3), (4, 3)), ((2, 3, 4), (2, 12)), ((0, 3), (0, 1))):
+        view = FLOATS.from_param(np.zeros(shape))
+        assert (view.rows, view.columns) == seen
+
+
+def test_another_type_or_order_is_refused():
+    for array in (np.zeros(3, np.float32), np.zeros((4, 4))[:, :2], np.zeros((3, 2)).T):
+        with pytest.raises(TypeError, match="contiguous array of float64"):
+            FLOATS.from_param(array)
+
+
+def test_an_array_that_must_not_be_written_to_is_no_output():
+    array = np.zeros(3)
+    array.flags.writeable = False
+    assert FLOATS.from_param(array).rows == 3
+    with pytest.raises(TypeError, match="not writeable"):
+        OUT_FLOATS.from_param(array)
+
+
+@pytest.mark.parametrize(
+    ("build", "expected"),
+    [("plain", "core"), ("", "core_wide" if core._library().core_is_wide() else "core")],
+)
+def test_the_processor_or_the_environment_chooses_the_build(build, expected):
+    code = "from gcode2krl.compiled import core; print(core._library()._name)"
+    environment = os.environ | {core.BUILD_VARIABLE: build}
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
+    )
+    assert Path(run.stdout.strip()).stem == expected
+
+
+def test_a_core_of_other_sources_is_refused_with_the_remedy(monkeypatch):
+    monkeypatch.setattr(core, "_digest", lambda: "another")
+    library = ctypes.CDLL(core._library()._name)
+    if not (core._NATIVE / "core.h").exists():
+        pytest.skip("no sources beside the installed package")
+    with pytest.raises(core.InstallationError, match="older than its sources"):
+        core._refuse_other_sources(library)
+
+
+def test_a_missing_core_is_one_clear_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(core, "_BUILT", tmp_path)
+    with pytest.raises(core.InstallationError, match="is missing from"):
+        core._loaded("core")
+
+
+def test_the_build_has_one_digest_with_the_loader():
+    assert native("build").sources_digest() == core._digest()
