@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core.h"
+
 /* gcode2krl.ascii_codes */
 #define CH_TAB 9
 #define CH_NEWLINE 10
@@ -318,6 +320,17 @@
 #define S_EVENT_TEXT 5
 #define S_IMPLIED_M5 (-5)
 
+/* gcode2krl.cutting.sweep */
+#define SW_LANES 16
+#define SW_BLOCK 32
+#define SW_FLAT 0
+#define SW_BALL 1
+#define SW_OTHER 2
+
+/* gcode2krl.cutting.law */
+#define LAW_LINEAR_EDGE 0
+#define LAW_KIENZLE 1
+
 typedef struct {
     double x;
     double y;
@@ -421,5 +434,66 @@ typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 3
 typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
 typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+
+typedef struct {
+    double bottom_mm;
+    double corner_mm;
+    double kappa_rad;
+    double side_mm;
+    double flute_mm;
+} Shape;
+
+typedef struct {
+    Floats32 height;
+    Ints32 wall;
+    Floats32 bound;
+    Ints32 visits;
+    double x_mm;
+    double y_mm;
+    double dx_mm;
+    double dy_mm;
+    int64_t row;
+    int64_t column;
+    double bottom_mm;
+} Grid;
+
+typedef struct {
+    Floats position_mm;
+    Ints32 tool;
+    Bools rapid;
+    Bools first;
+    Floats outlines;
+    Floats direction;
+    Bools read;
+} Path;
+
+typedef struct {
+    Floats bands;
+    Ints used;
+    Ints wall_bins;
+    Ints ring_bins;
+    Floats teeth;
+    Floats lag_mm;
+    Floats above;
+} Cutters;
+
+typedef struct {
+    Floats turn;
+    Floats heading;
+    Floats rows;
+    Floats reach;
+} Work;
+
+typedef struct {
+    Floats force_N;
+    Floats moment_Nmm;
+    Floats torque_Nmm;
+    Floats a_p_mm;
+    Floats a_e_mm;
+    Floats phi_rad;
+    Floats ramp_rad;
+    Floats centre_mm;
+    Floats overlap_mm;
+} Result;
 
 #endif

@@ -4,8 +4,8 @@ Run after a change of one of these modules; a test compares the file with what t
 
     python native/constants.py
 
-A whole number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, and a record
-of numpy a C struct with the same fields in the same places.
+A whole number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a record of
+numpy a C struct with the same fields in the same places, and a `StructOf` the C struct that the core gets.
 """
 
 from collections.abc import Iterator
@@ -15,6 +15,8 @@ from types import ModuleType
 
 import numpy as np
 
+from gcode2krl.compiled import core
+
 HEADER = Path(__file__).resolve().parent / "constants.h"
 MODULES = {
     "CH": "gcode2krl.ascii_codes",
@@ -22,10 +24,29 @@ MODULES = {
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
+    "SW": "gcode2krl.cutting.sweep",
+    "LAW": "gcode2krl.cutting.law",
 }
 """Prefix -> module whose whole numbers and words the core uses."""
 RECORDS = {"State": ("gcode2krl.gcode.state", "STATE")}
 """Name of the struct -> module and numpy record."""
+ARGUMENTS = {
+    "Shape": ("gcode2krl.cutting.cutter", "SHAPE"),
+    "Grid": ("gcode2krl.cutting.sweep", "GRID"),
+    "Path": ("gcode2krl.cutting.sweep", "PATH"),
+    "Cutters": ("gcode2krl.cutting.edge", "CUTTERS"),
+    "Work": ("gcode2krl.cutting.edge", "WORK"),
+    "Result": ("gcode2krl.cutting.reading", "RESULT"),
+}
+"""Name of the struct -> module and `StructOf`."""
+_VIEWS = {
+    "f8": "Floats",
+    "f4": "Floats32",
+    "i8": "Ints",
+    "i4": "Ints32",
+    "u1": "Bytes",
+    "b1": "Bools",
+}
 _TYPES = {"f8": "double", "i8": "int64_t", "i4": "int32_t", "i1": "int8_t", "u1": "uint8_t", "b1": "uint8_t"}
 
 
@@ -39,11 +60,15 @@ def header() -> str:
         "#include <stddef.h>",
         "#include <stdint.h>",
         "",
+        '#include "core.h"',
+        "",
     ]
     for prefix, name in MODULES.items():
         lines += [*_constants(prefix, import_module(name)), ""]
     for name, (module, record) in RECORDS.items():
         lines += [*_struct(name, getattr(import_module(module), record)), ""]
+    for name, (module, argument) in ARGUMENTS.items():
+        lines += [*_argument(name, getattr(import_module(module), argument)), ""]
     return "\n".join([*lines, "#endif", ""])
 
 
@@ -73,5 +98,16 @@ def _struct(name: str, record: np.dtype) -> Iterator[str]:
     yield f"typedef char {name}_has_its_size[sizeof({name}) == {record.itemsize} ? 1 : -1];"
 
 
+def _argument(name: str, argument: core.StructOf) -> Iterator[str]:
+    yield "typedef struct {"
+    for field, kind in argument.fields.items():
+        if isinstance(kind, core.ArrayOf):
+            yield f"    {_VIEWS[kind.dtype.str[1:]]} {field};"
+        else:
+            yield f"    {'double' if kind is core.FLOAT else 'int64_t'} {field};"
+    yield f"}} {name};"
+
+
 if __name__ == "__main__":
+    core.core_function = lambda *_, **__: None  # what the modules declare is perhaps not built yet
     HEADER.write_text(header(), encoding="ascii", newline="\n")

@@ -25,6 +25,7 @@ A constant of the Python modules stands in constants.h under the name of its mod
         int64_t rows, columns; \
     } name
 VIEW(Floats, double);
+VIEW(Floats32, float);
 VIEW(Ints, int64_t);
 VIEW(Ints32, int32_t);
 VIEW(Bytes, uint8_t);
@@ -44,5 +45,10 @@ int64_t core_inside(int64_t index, int64_t count, const char *file, int line);
 
 static inline int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 static inline int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }
+
+/* The lesser and the greater of two numbers, the first where they are equal; NaN as in Python's min and max. */
+static inline double lesser(double a, double b) { return b < a ? b : a; }
+static inline double greater(double a, double b) { return b > a ? b : a; }
+static inline double squared(double x) { return x * x; }
 
 #endif

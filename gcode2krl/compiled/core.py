@@ -6,7 +6,8 @@ once, beside the Python that calls it::
     _lines = core_function("krl_lines", FLOATS, OUT_BYTES, INT, returns=INT)
 
 An array goes in as a view: its address, its rows and the numbers in a row. It has to be contiguous and of the
-declared type; one that is written to has to be writeable. A call releases the interpreter's lock.
+declared type; one that is written to has to be writeable. What many functions take together is a named tuple
+of arrays and numbers, in C a struct of the same fields (`StructOf`). A call releases the interpreter's lock.
 """
 
 import ctypes
@@ -60,10 +61,30 @@ def _described(array: NDArray[Any]) -> str:
 
 
 FLOATS, INTS, INTS32 = ArrayOf(np.float64), ArrayOf(np.int64), ArrayOf(np.int32)
-BYTES, BOOLS = ArrayOf(np.uint8), ArrayOf(np.bool_)
-OUT_FLOATS, OUT_INTS, OUT_INTS32, OUT_BYTES, OUT_BOOLS = (
-    ArrayOf(each.dtype, written=True) for each in (FLOATS, INTS, INTS32, BYTES, BOOLS)
+BYTES, BOOLS, FLOATS32 = ArrayOf(np.uint8), ArrayOf(np.bool_), ArrayOf(np.float32)
+OUT_FLOATS, OUT_INTS, OUT_INTS32, OUT_BYTES, OUT_BOOLS, OUT_FLOATS32 = (
+    ArrayOf(each.dtype, written=True) for each in (FLOATS, INTS, INTS32, BYTES, BOOLS, FLOATS32)
 )
+
+
+class StructOf:
+    """An argument that is a record with fields of these types; C gets a pointer to a struct of the same.
+
+    ``native/constants.py`` writes the struct into ``constants.h``.
+    """
+
+    def __init__(self, **fields: Any) -> None:
+        """Take the type of each field: an array, INT or FLOAT."""
+        self.fields = fields
+        kinds = [(name, View if isinstance(kind, ArrayOf) else kind) for name, kind in fields.items()]
+        self.struct = type("Struct", (ctypes.Structure,), {"_fields_": kinds})
+
+    def from_param(self, record: Any) -> Any:
+        """Return a pointer to the struct; it holds no array of the record, which has to outlive the call."""
+        values = [(kind, getattr(record, name)) for name, kind in self.fields.items()]
+        return ctypes.byref(
+            self.struct(*(kind.from_param(it) if isinstance(kind, ArrayOf) else it for kind, it in values))
+        )
 
 
 def core_function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:

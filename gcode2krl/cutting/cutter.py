@@ -10,6 +10,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.core import FLOAT, StructOf
 from gcode2krl.units import RAD_PER_DEG
 
 DRILL_POINT_DEG = 118.0
@@ -51,9 +52,9 @@ class Shape:
         straight = max(self.side_mm - self.arc_top_mm, 0.0)
         return self.arc_radius_mm + straight * _cot(self.kappa_rad)
 
-    def array(self) -> Floats:
-        """Return bottom, corner, kappa, side, flute (5,) for compiled code."""
-        return np.array([self.bottom_mm, self.corner_mm, self.kappa_rad, self.side_mm, self.flute_mm])
+
+SHAPE = StructOf(bottom_mm=FLOAT, corner_mm=FLOAT, kappa_rad=FLOAT, side_mm=FLOAT, flute_mm=FLOAT)
+"""A `Shape` as the compiled core takes it."""
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell.sections import Tool
 from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
-from gcode2krl.cutting.edge import ARCS, BAND_COLUMNS, Cutters, new_work
+from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import Result, cut_strip
+from gcode2krl.cutting.reading import ARCS, Result, cut_strip
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path
 from gcode2krl.tables import chord_directions
 
@@ -28,7 +28,6 @@ _CELLS_PER_BAND = 4.0
 _FEWEST_BANDS, _MOST_BANDS = 6, 12
 _BOTTOM_BANDS = 4
 _MARGIN_CELLS = 4
-_SPARE_CELLS = 64
 _FEW_SAMPLES = 2000
 """Samples below which a second thread does not pay."""
 
@@ -57,7 +56,7 @@ def engage(
     tool : (n,) row of ``tools``; no sweep joins two samples of different tools.
     rapid : (n,) True where the sweep that leads to the sample must not meet material.
     f_z_mm : (n,) feed per tooth along the path.
-    law : (8,) force law as in `slices.arc_force`.
+    law : (8,) force law of `law.law_array`.
     threads : how many; default: all cores.
     direction : (n, 3) unit tangents; by default those of the chords.
     read : (n,) False at points that only shape the sweep and get no result; default: none.
@@ -82,15 +81,15 @@ def engage(
         np.ascontiguousarray(rapid, dtype=np.bool_),
         first,
         outlines_of(tools),
-        np.ascontiguousarray(_tangents(position, first) if direction is None else direction),
+        np.ascontiguousarray(
+            _tangents(position, first) if direction is None else direction, dtype=np.float64
+        ),
         np.ones(count, dtype=np.bool_) if read is None else np.ascontiguousarray(read, dtype=np.bool_),
     )
     cutters = _cutters(tools, cell_mm)
     steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
     way_mm = np.concatenate([[0.0], np.cumsum(steps)])
     feed = np.ascontiguousarray(f_z_mm, dtype=np.float64)
-    longest_mm = float(steps.max(initial=0.0)) + 2.0 * float(path.outlines[:, 0].max())
-    index = np.arange(int(longest_mm / field.cell_mm.min()) + _SPARE_CELLS, dtype=np.float32)
     widest_mm = float(max(path.outlines[:, 0].max(), cutters.above[:, ::2].max()))
     halo_mm = widest_mm + _MARGIN_CELLS * cell_mm  # how far around itself a sample reads
     axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))
@@ -114,7 +113,6 @@ def engage(
             high,
             axis,
             reach_mm,
-            index,
             new_work(),
             rapid_mm,
             result,
@@ -147,7 +145,7 @@ def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float
 
 
 def outlines_of(tools: Sequence[Tool]) -> Floats:
-    """Return `removal.Path.outlines` (t, 7) of tools."""
+    """Return `sweep.Path.outlines` (t, 7) of tools."""
     return np.array([_outline(shape_of(tool)) for tool in tools])
 
 

@@ -120,7 +120,7 @@ def peak_force(
 
 def _peaks(columns: tuple[Floats, ...], tool: Tool, law: Floats) -> Floats:
     lag = 0.0 if tool.kind == "drill" else math.tan(tool.helix_deg * RAD_PER_DEG) * 2.0 / tool.diameter_mm
-    shape, out = shape_of(tool).array(), np.zeros(len(columns[0]))
+    shape, out = shape_of(tool), np.zeros(len(columns[0]))
 
     def fill(start: int, end: int) -> None:
         rows = slice(start, end)
@@ -137,7 +137,7 @@ def _means(columns: tuple[Floats, ...], teeth: int, shape: Shape, law: Floats) -
     def fill(start: int, end: int) -> None:
         rows = slice(start, end)
         phi, a_p, f_z, ramp = (column[rows] for column in columns)
-        mean_rows(phi, a_p, f_z, ramp, teeth, shape.array(), law, out[rows])
+        mean_rows(phi, a_p, f_z, ramp, teeth, shape, law, out[rows])
 
     in_chunks(fill, chunk_borders(len(out)))
     return out

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats
-from gcode2krl.cutting.kernels import kernel
-from gcode2krl.cutting.sweep import BLOCK, LANES, Grid, refresh
+from gcode2krl.compiled.core import core_function
+from gcode2krl.cutting.sweep import BLOCK, GRID, LANES, Grid
 
 CELLS_PER_DIAMETER = 160.0
 """Default resolution: 0.1 mm for a cutter of 16 mm."""
@@ -19,7 +19,8 @@ MAX_CELLS = 16_000_000
 """Default limit of a field: 128 MB, and as much again while it is cut."""
 MESH_CELLS = 250_000
 """Default limit of the cells of a mesh that is made from a field."""
-_EMPTY_MM = 1e-3
+
+_bound = core_function("cutting_bound", GRID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +57,24 @@ class HeightField:
     def grid(self, axis: int, first: int, after: int) -> Grid:
         """Return a copy of some columns (axis 0) or rows (axis 1) as the kernels take it."""
         part = self.height_mm[:, first:after] if axis == 0 else self.height_mm[first:after]
-        height = np.full((part.shape[0] + 2, part.shape[1] + 1 + int(LANES)), -np.inf, np.float32)
+        height = np.full((part.shape[0] + 2, part.shape[1] + 1 + LANES), -np.inf, np.float32)
         height[1:-1, 1 : part.shape[1] + 1] = part
-        dx, dy = float(self.cell_mm[0]), float(self.cell_mm[1])
-        shift = (-1, first - 1) if axis == 0 else (first - 1, -1)  # one empty cell all around
+        row, column = (-1, first - 1) if axis == 0 else (first - 1, -1)  # one empty cell all around
         blocks = -(-height.shape[0] // BLOCK), -(-height.shape[1] // BLOCK)
         grid = Grid(
             height=height,
             wall=np.full(height.shape, -1, np.int32),
             bound=np.empty(blocks, np.float32),
             visits=np.zeros(blocks, np.int32),
-            place=(float(self.origin_mm[0]), float(self.origin_mm[1]), dx, dy),
-            shift=shift,
+            x_mm=float(self.origin_mm[0]),
+            y_mm=float(self.origin_mm[1]),
+            dx_mm=float(self.cell_mm[0]),
+            dy_mm=float(self.cell_mm[1]),
+            row=row,
+            column=column,
             bottom_mm=self.bottom_mm,
         )
-        _bound(grid.height, grid.bound)
+        _bound(grid)
         return grid
 
     def take_back(self, grid: Grid, axis: int, first: int, after: int, skip: int) -> None:
@@ -80,10 +84,3 @@ class HeightField:
             self.height_mm[:, first:after] = grid.height[1 : 1 + self.height_mm.shape[0], inner]
         else:
             self.height_mm[first:after] = grid.height[inner, 1 : 1 + self.height_mm.shape[1]]
-
-
-@kernel
-def _bound(height: NDArray[np.float32], bound: NDArray[np.float32]) -> None:
-    for i in range(bound.shape[0]):
-        for j in range(bound.shape[1]):
-            refresh(height, bound, i, j)

@@ -7,9 +7,12 @@ from numpy.typing import ArrayLike
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Material
-from gcode2krl.cutting.slices import KIENZLE, LINEAR_EDGE
 from gcode2krl.errors import input_error
 from gcode2krl.units import MM_PER_M, RAD_PER_REV
+
+LINEAR_EDGE, KIENZLE = 0, 1
+"""Kinds of law: ``[LINEAR_EDGE, Ktc, Krc, Kac, Kte, Kre, Kae, 0]`` or ``[KIENZLE, kc11, mc, radial ratio,
+axial ratio, 0, 0, 0]``."""
 
 THIN_CHIP_MM = 0.005
 """Below this largest chip an edge rubs and ploughs rather than cuts: an assumption, about the edge radius of
@@ -22,7 +25,7 @@ tooth."""
 
 
 def law_array(material: Material) -> Floats:
-    """Return a material's force law (8,) as compiled code takes it (see `slices.arc_force`).
+    """Return a material's force law (8,) as compiled code takes it (see `KIENZLE`).
 
     Raises an input error where the material has no law.
     """

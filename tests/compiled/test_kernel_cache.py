@@ -77,21 +77,22 @@ def test_a_changed_callee_runs_its_new_code(place, tmp_path):
     assert list(where.rglob("caller.total-*.nbi"))
 
 
-BOUND = """
+WRIST_NEAR_ITS_SINGULARITY = """
 import numpy as np
-from gcode2krl.cutting.height_field import BLOCK, _bound
-bound = np.zeros((1, 1), dtype=np.float32)
-_bound(np.full((BLOCK, BLOCK), 5, dtype=np.float32), bound)
-print(float(bound[0, 0]))
+from gcode2krl.robot.standing import _judge_rows
+q, limits = np.full((1, 6), 0.05), np.array([[-3.0, 3.0]] * 6)
+wrong = np.zeros(1, dtype=np.uint16)
+_judge_rows(q, np.ones(1), limits, np.empty(0), np.zeros(1), wrong)
+print(wrong[0] > 0)
 """
 
 
 def test_a_kernel_of_the_package_runs_the_new_code_of_another_file(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "gcode2krl", ignore=shutil.ignore_patterns("__pycache__"))
     cache = str(tmp_path / "cache")
-    assert ask(BOUND, tmp_path, NUMBA_CACHE_DIR=cache) == "5.0"
-    rewrite(tmp_path / "gcode2krl" / "cutting" / "sweep.py", "bound[i, j] = top", "bound[i, j] = 7.0")
-    assert ask(BOUND, tmp_path, NUMBA_CACHE_DIR=cache) == "7.0"
+    assert ask(WRIST_NEAR_ITS_SINGULARITY, tmp_path, NUMBA_CACHE_DIR=cache) == "True"
+    rewrite(tmp_path / "gcode2krl" / "units.py", "math.pi / 180.0", "math.pi / 980.0")
+    assert ask(WRIST_NEAR_ITS_SINGULARITY, tmp_path, NUMBA_CACHE_DIR=cache) == "False"
 
 
 def test_unchanged_sources_keep_their_kernels(tmp_path, monkeypatch):

@@ -30,7 +30,7 @@ def test_strips_cover_the_field_and_come_back(axis):
         own, wide = some.cells(axis, low, high), some.cells(axis, low - 0.6, high + 0.6)
         grid = some.grid(axis, *wide)
         assert grid.height[0].max() == grid.height[:, 0].max() == -np.inf
-        assert grid.height[:, -int(LANES) :].max() == -np.inf
+        assert grid.height[:, -LANES:].max() == -np.inf
         grid.height[:] += 1.0
         some.take_back(grid, axis, *own, own[0] - wide[0])
     np.testing.assert_array_equal(some.height_mm, kept + 1.0)
@@ -41,8 +41,8 @@ def test_a_grid_knows_where_it_lies(axis):
     some = field()
     grid = some.grid(axis, 2, 5)
     row, column = (3, 2) if axis == 0 else (2, 3)  # of the field
-    assert grid.height[row - grid.shift[0], column - grid.shift[1]] == some.height_mm[row, column]
-    assert grid.place == (-1.0, 2.0, 0.5, 0.25)
+    assert grid.height[row - grid.row, column - grid.column] == some.height_mm[row, column]
+    assert (grid.x_mm, grid.y_mm, grid.dx_mm, grid.dy_mm) == (-1.0, 2.0, 0.5, 0.25)
 
 
 def test_bounds_are_above_every_height():

@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.cutting.cutter import outline
-from gcode2krl.cutting.edge import _edge_force
 from gcode2krl.cutting.engagement import engage, outlines_of
 from gcode2krl.cutting.force import mean_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.slices import arc_force
-from gcode2krl.cutting.sweep import outline_height
 from tests.cutting import scenes
 from tests.cutting.scenes import LAW
 
@@ -26,6 +25,9 @@ BALL = Tool(kind="ball", diameter_mm=16, teeth=3, corner_radius_mm=8, flute_leng
 TAPERED = Tool(kind="tapered", diameter_mm=6, taper_deg=10, corner_radius_mm=1, teeth=3, flute_length_mm=15)
 DRILL = Tool(kind="drill", diameter_mm=8, point_deg=118, teeth=2, flute_length_mm=40)
 COEFFICIENTS = LAW[1:7]
+
+linear_edge = core_function("cutting_linear_edge", FLOATS, *(FLOAT,) * 4, FLOATS, OUT_FLOATS)
+outline_height = core_function("cutting_outline_height", FLOAT, FLOATS, returns=FLOAT)
 
 
 def block(low, high, cell_mm=0.1):
@@ -229,15 +231,17 @@ def test_integrals_give_the_force_of_an_arc(start, width, kappa, gamma, f_z_mm):
     wanted, found = np.zeros(4), np.zeros(4)
     chip = (f_z_mm, math.sin(gamma), math.cos(gamma))
     arc_force(start, stop, math.sin(kappa), math.cos(kappa), *chip, LAW, wanted)
-    integrals = (
-        stop - start,
-        math.cos(start) - math.cos(stop),
-        math.sin(stop) - math.sin(start),
-        0.5 * (stop - start) - 0.25 * (math.sin(2 * stop) - math.sin(2 * start)),
-        0.5 * (math.sin(stop) ** 2 - math.sin(start) ** 2),
+    integrals = np.array(
+        [
+            stop - start,
+            math.cos(start) - math.cos(stop),
+            math.sin(stop) - math.sin(start),
+            0.5 * (stop - start) - 0.25 * (math.sin(2 * stop) - math.sin(2 * start)),
+            0.5 * (math.sin(stop) ** 2 - math.sin(start) ** 2),
+        ]
     )
-    band = (0.0, 1.0, 1.0, 1.0, math.sin(kappa), math.cos(kappa), 1.0)
-    _edge_force(integrals, band, chip, LAW, found)
+    swing, offset = (math.sin(kappa) * math.cos(gamma), math.cos(kappa) * math.sin(gamma))
+    linear_edge(integrals, math.sin(kappa), math.cos(kappa), f_z_mm * swing, f_z_mm * offset, LAW, found)
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
@@ -320,7 +324,7 @@ def test_volume_against_exact_booleans(tool):
 @pytest.mark.parametrize("tool", [FLAT, BULL, BALL, TAPERED, DRILL], ids=lambda tool: tool.kind)
 def test_outline_is_that_of_the_cutter(tool):
     r, z = outline(tool)
-    own = tuple(outlines_of([tool])[0])
+    own = outlines_of([tool])[0]
     assert [outline_height(radius, own) for radius in r] == pytest.approx(z, abs=1e-6)
 
 

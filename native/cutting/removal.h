@@ -1,0 +1,11 @@
+/* Lower a height field below the sweeps of a cutter. */
+
+#ifndef CUTTING_REMOVAL_H
+#define CUTTING_REMOVAL_H
+
+#include "cutting/sweep.h"
+
+/* Lower the field below the sweep that ends at sample k; return the height a rapid has cut off, else 0. */
+double remove_sweep(const Grid *grid, const Path *path, int64_t k);
+
+#endif

@@ -1,0 +1,38 @@
+/* What is known of one sample while its engagement is read. */
+
+#ifndef CUTTING_SAMPLE_H
+#define CUTTING_SAMPLE_H
+
+#include "cutting/slices.h"
+#include "cutting/sweep.h"
+
+enum { MOST_RECENT = 8 };
+
+/* First and last sample of sweeps that the field does not show yet. */
+typedef struct {
+    int64_t start, end;
+} Recent;
+
+typedef struct {
+    double x, y, z;
+    double top; /* no material is higher above the tip */
+    double bottom; /* the material's bottom above the tip */
+    double fx, fy; /* heading in plan */
+    Chip chip;
+    int64_t tool;
+    const Outline *outline;
+    Recent recent[MOST_RECENT];
+    int recent_count;
+} Sample;
+
+/* A ring of the cutter: the circle on which a point of the edge turns, read in bins from `first` on. For each bin
+   its direction in plan, the top of the material, and how far it stands above a level or the cutter. `tops` and
+   `above` may be the same. */
+typedef struct {
+    double r, level;
+    int64_t first, after;
+    const double *east, *north;
+    double *tops, *above;
+} Ring;
+
+#endif

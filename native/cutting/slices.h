@@ -1,0 +1,41 @@
+/* Force of one tooth while it sweeps an arc, per mm of engaged edge: the integral behind all means.
+
+The angle phi runs from the feed normal in the sense of rotation of a right-hand cutter (clockwise seen from the
+holder): the tooth stands at (sin phi, cos phi) in (feed, normal). The edge angle kappa is 90° on a cylinder and 0
+on a flat bottom; gamma is the angle of descent. The chip is the feed seen along the outward normal of the edge,
+h = f_z·(sin phi·sin kappa·cos gamma + cos kappa·sin gamma), cut at 0. After Altintas, Manufacturing Automation,
+2nd ed. 2012, ch. 2 (linear edge forces), with the edge angle as in Engin and Altintas 2001 (general end mills). */
+
+#ifndef CUTTING_SLICES_H
+#define CUTTING_SLICES_H
+
+#include "constants.h"
+#include "core.h"
+
+/* Feed per tooth along the velocity in mm, and the angle of descent. */
+typedef struct {
+    double f_z_mm, sin_gamma, cos_gamma;
+} Chip;
+
+/* Feed, normal and axial force (holder to tip) and tangential force. */
+typedef struct {
+    double feed, normal, axial, tangential;
+} Force;
+
+/* Integrals of 1, sin phi, cos phi, sin² phi and sin phi·cos phi over an arc. */
+typedef struct {
+    double one, sin, cos, sin_sin, sin_cos;
+} Integrals;
+
+/* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of contact
+   width, N·rad/mm. An empty or NaN arc adds nothing; cos gamma >= 0. The contact width is dz/sin kappa; the mean
+   over a revolution is teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
+void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
+                   const double *law, Force *out);
+
+/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip
+   h = swing·sin phi + offset is not negative. */
+void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, double swing_mm,
+                     double offset_mm, const double *law, Force *out);
+
+#endif
