@@ -1,13 +1,15 @@
 """A raster of a million lines: time and memory of each stage and the whole process, beside other programs.
 
 The yardstick is LinuxCNC's stand-alone interpreter, ``rs274 -g``, which reads the same file in the same run.
-Every figure is a whole process, start-up included, unless the table says otherwise; kernels are compiled
-before. Nothing is judged here: the figures are printed.
+Every figure is a whole process, start-up included, unless the table says otherwise. The row that a user
+meets is ``translate, as typed``: the command of the README with the built-in cell. Nothing is judged here:
+the figures are printed.
 
     python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
     python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
     python benchmarks/throughput.py --scaling                     also 10^4, 10^5 and 10^6 lines
-    python benchmarks/throughput.py --scaling 10000000            up to 10^7 (needs memory and minutes)
+    python benchmarks/throughput.py --scaling 10000000            up to 10^7 (needs minutes)
+    python benchmarks/throughput.py --parts 2,8                   several parts at once, a thread each
 """
 
 import argparse
@@ -22,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -33,6 +36,7 @@ import gcode2krl
 HERE = Path(__file__).resolve().parent
 PEERS = ("rs274", "gcodeparser", "pygcode", "toppra")
 YARDSTICK = "LinuxCNC rs274 -g, interprets only"
+AS_TYPED = "translate, as typed"
 PYGCODE_LINES = 20_000
 WARM_UP_LINES = 2_000
 CYCLE_S = 0.012
@@ -240,22 +244,26 @@ def chain_work(name: str, part: Path, cell: str, to_reach: float | None = None, 
     return Work(name, [sys.executable, "-c", code], to_reach)
 
 
+def translate(part: Path, out: str) -> list[str]:
+    """Return the command of the README, which says nothing on standard error here."""
+    return [sys.executable, "-m", "gcode2krl", str(part), "-o", out, "-q"]
+
+
 def our_work(part: Path) -> list[Work]:
     """Return reading, translating and, where it exists, the chain with the time law."""
     out = str(part.with_name("out.src"))
     read = [sys.executable, "-c", READ.format(part=str(part))]
-    translate = [sys.executable, "-m", "gcode2krl", str(part), "-o", out, "-q"]
-    work = [Work("read into a Toolpath", read, 0.25), Work("translate: KRL written and verified", translate)]
+    work = [Work("read into a Toolpath", read, 0.2), Work(AS_TYPED, translate(part, out), 2.5)]
     if HAS_MOTION:
-        work.append(chain_work("the same, 12 ms plan, joints", part, "unlimited.toml", 0.6))
-        work.append(chain_work("the same with compliance", part, "unlimited.toml", 0.6, COMPLIANCE))
+        work.append(chain_work("read, 12 ms plan, joints, KRL verified", part, "unlimited.toml", 0.6))
+        work.append(chain_work("the same with compliance", part, "unlimited.toml", 0.7, COMPLIANCE))
         work.append(chain_work("whole chain, material at 0.25 mm cells", part, "material.toml", 1.8, WHOLE))
         work.append(chain_work("12 ms plan, joints, with look-ahead on", part, "look_ahead.toml"))
     return work
 
 
 def warm_up(folder: Path) -> None:
-    """Compile the kernels: everything once on a short raster."""
+    """Bring what is imported into the machine's memory: everything once on a short raster."""
     for work in our_work(make_raster(folder, WARM_UP_LINES)):
         work.repeat(folder)
 
@@ -285,7 +293,7 @@ def stages(part: str, cell_path: str, out: str) -> list[tuple[str, float, int]]:
 
 
 def run_stages(part: str, folder: Path) -> None:
-    """Print the stages as JSON, once the kernels are loaded."""
+    """Print the stages as JSON, once everything is imported."""
     out = str(folder / "stages.src")
     stages(str(folder / f"raster_{WARM_UP_LINES}.nc"), "unlimited.toml", out)
     print(json.dumps(stages(part, "unlimited.toml", out)))
@@ -293,7 +301,7 @@ def run_stages(part: str, folder: Path) -> None:
 
 def print_stages(part: Path, lines: int, folder: Path) -> None:
     once = run([sys.executable, str(Path(__file__).resolve()), "--stages-of", str(part)], folder)
-    print("\nstage by stage, one process, kernels loaded, look-ahead unlimited; write_krl verifies too")
+    print("\nstage by stage, one process, all imported, look-ahead unlimited; write_krl verifies too")
     if once.problem:
         print(f"  {once.problem}")
         return
@@ -359,7 +367,7 @@ def print_scaling(largest: int, repeats: int, folder: Path) -> None:
     while size <= largest:
         part = make_raster(folder, size)
         lines = count_lines(part)
-        for work in our_work(part)[:3]:
+        for work in our_work(part)[:2]:
             for _ in range(repeats):
                 work.repeat(folder)
             if work.problem:
@@ -377,6 +385,25 @@ def print_scaling(largest: int, repeats: int, folder: Path) -> None:
         size *= 10
 
 
+def print_parts(counts: Sequence[int], part: Path, repeats: int, folder: Path) -> None:
+    """Print how much longer parts take one after the other than all at once, a thread each."""
+    print(f"\nparts of {count_lines(part):,} lines, a process and a thread each, {os.cpu_count()} processors")
+    for count in counts:
+        commands = [[*translate(part, str(folder / f"p{k}.src")), "--threads", "1"] for k in range(count)]
+        in_turn, at_once = [], []
+        for _ in range(repeats):
+            in_turn.append(sum(run(command, folder).seconds for command in commands))
+            start = time.perf_counter()
+            with ThreadPoolExecutor(count) as pool:
+                problems = [once.problem for once in pool.map(lambda each: run(each, folder), commands)]
+            at_once.append(time.perf_counter() - start)
+            if any(problems):
+                print(f"  {count} parts: {next(filter(None, problems))}")
+                return
+        one, all_ = min(in_turn), min(at_once)
+        print(f"  {count} parts: {one:.2f} s one after the other, {all_:.2f} s at once, {one / all_:.2f} x")
+
+
 # --- command ---------------------------------------------------------------------------------------
 
 
@@ -388,6 +415,10 @@ def peer_names(text: str) -> list[str]:
     return names
 
 
+def part_counts(text: str) -> list[int]:
+    return [int(count) for count in text.split(",")]
+
+
 def options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -396,6 +427,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all four")
     parser.add_argument("--repeats", type=int, default=3, help="rounds (default: 3)")
     parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
+    parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")
     parser.add_argument("--stages-of", help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -410,6 +442,8 @@ def main() -> None:
         write_inputs(folder)
         warm_up(folder)
         compare(arguments, folder)
+        if arguments.parts:
+            print_parts(arguments.parts, make_raster(folder, arguments.lines), arguments.repeats, folder)
         if arguments.scaling:
             print_scaling(arguments.scaling, arguments.repeats, folder)
 

@@ -78,3 +78,22 @@ def test_a_missing_core_is_one_clear_line(monkeypatch, tmp_path):
 
 def test_the_build_has_one_digest_with_the_loader():
     assert native("build").sources_digest() == core._digest()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for the compiler")
+def test_a_compiler_that_finds_no_headers_is_passed_over(tmp_path):
+    build = native("build")
+    broken = tmp_path / "cc"
+    broken.write_text("#!/bin/sh\nexit 1\n")
+    broken.chmod(0o755)
+    assert not build._works(str(broken))
+
+
+@pytest.mark.parametrize("target", native("build").TARGETS)
+def test_every_platform_of_a_wheel_has_a_library_of_its_own_kind(target):
+    machine = native("build").Machine.named(target)
+    names = [name for name, _ in native("build")._variants(machine, checked=False, by_zig=True)]
+    assert names == (
+        ["core", "core_wide"] if target in ("x86_64-windows-gnu", "x86_64-linux-gnu") else ["core"]
+    )
+    assert machine.flags[0] == "-target"
