@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gcode2krl.cell import Cell, resolve_cell
-from gcode2krl.cutting import cut
+from gcode2krl.cutting.milling import remove
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import plan_motion, set_targets
 from gcode2krl.tables import Forces, Motion, Toolpath
@@ -121,7 +121,7 @@ def planned(program: Program) -> tuple[Toolpath, Motion]:
 
 def timed(toolpath: Toolpath, motion: Motion, cell: Cell, **options: Any) -> tuple[Forces, float]:
     start = time.process_time()
-    return cut(toolpath, motion, cell, **options), time.process_time() - start
+    return remove(toolpath, motion, cell, **options).forces, time.process_time() - start
 
 
 def compared(name: str) -> str:
@@ -145,8 +145,8 @@ def compared(name: str) -> str:
     )
 
 
-EVERY: dict[str, Any] = {}
-"""Options of `cut` with which every sample is read."""
+EVERY = {"nodes_per_diameter": math.inf}
+"""Options of `remove` with which every sample is read."""
 
 
 def main() -> None:

@@ -135,7 +135,7 @@ def _variants(machine: Machine, *, checked: bool, by_zig: bool) -> Iterator[tupl
         return
     yield "core", ()
     if machine.is_x86:
-        # without fma: gcc 12 takes fused additions and subtractions in pairs although nothing is to be contracted
+        # without fma: gcc 12 fuses pairs of additions and subtractions although nothing is to be contracted
         yield "core_wide", ("-mcpu=x86_64_v3-fma",) if by_zig else ("-march=x86-64-v3", "-mno-fma")
 
 

@@ -327,6 +327,9 @@
 #define SW_BALL 1
 #define SW_OTHER 2
 
+/* gcode2krl.cutting.reading */
+#define RD_ARCS 3
+
 /* gcode2krl.cutting.law */
 #define LAW_LINEAR_EDGE 0
 #define LAW_KIENZLE 1
@@ -459,13 +462,22 @@ typedef struct {
 
 typedef struct {
     Floats position_mm;
+    Floats way_mm;
     Ints32 tool;
     Bools rapid;
     Bools first;
     Floats outlines;
-    Floats direction;
-    Bools read;
 } Path;
+
+typedef struct {
+    Floats position_mm;
+    Floats direction;
+    Floats way_mm;
+    Floats f_z_mm;
+    Ints32 tool;
+    Ints point;
+    Bools node;
+} Samples;
 
 typedef struct {
     Floats bands;
@@ -494,6 +506,7 @@ typedef struct {
     Floats ramp_rad;
     Floats centre_mm;
     Floats overlap_mm;
+    Bools is_read;
 } Result;
 
 #endif

@@ -25,6 +25,7 @@ MODULES = {
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",
+    "RD": "gcode2krl.cutting.reading",
     "LAW": "gcode2krl.cutting.law",
 }
 """Prefix -> module whose whole numbers and words the core uses."""
@@ -34,6 +35,7 @@ ARGUMENTS = {
     "Shape": ("gcode2krl.cutting.cutter", "SHAPE"),
     "Grid": ("gcode2krl.cutting.sweep", "GRID"),
     "Path": ("gcode2krl.cutting.sweep", "PATH"),
+    "Samples": ("gcode2krl.cutting.sweep", "SAMPLES"),
     "Cutters": ("gcode2krl.cutting.edge", "CUTTERS"),
     "Work": ("gcode2krl.cutting.edge", "WORK"),
     "Result": ("gcode2krl.cutting.reading", "RESULT"),

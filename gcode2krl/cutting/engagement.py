@@ -16,10 +16,11 @@ from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import ARCS, Result, cut_strip
-from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path
+from gcode2krl.cutting.reading import ARCS, Result, cut_strip, mark_corners, mark_nodes
+from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path, Samples
 from gcode2krl.tables import chord_directions
 
+NODES_PER_DIAMETER = 20.0
 _BINS = 16
 _FEWEST_BINS = 96
 _MOST_WALL_BINS = 960
@@ -42,88 +43,97 @@ def engage(
     law: Floats,
     threads: int | None = None,
     direction: Floats | None = None,
-    read: Bools | None = None,
+    wanted: Bools | None = None,
+    nodes_per_diameter: float = NODES_PER_DIAMETER,
 ) -> Result:
     """Cut a motion out of a field (in place); return engagement and mean force of every sample.
 
-    Each sample is read at its own position, before the sweep that leads to it is removed. Forces are means
-    over a revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge;
-    the moment is that of heights above the tip times lateral forces, and the torque.
+    A sample that is read is read at its own position, before the sweep that leads to it is removed; a sample
+    between two nodes has what lies between theirs, with its own heading and feed. Forces are means over a
+    revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge; the
+    moment is that of heights above the tip times lateral forces, and the torque.
 
     Parameters
     ----------
-    position_mm : (n, 3) tips in the frame of the field, whose z is the tool axis.
-    tool : (n,) row of ``tools``; no sweep joins two samples of different tools.
-    rapid : (n,) True where the sweep that leads to the sample must not meet material.
-    f_z_mm : (n,) feed per tooth along the path.
+    position_mm : (k, 3) tips in the frame of the field, whose z is the tool axis.
+    tool : (k,) row of ``tools``; no sweep joins two points of different tools.
+    rapid : (k,) True where the sweep that leads to the point must not meet material.
+    f_z_mm : (k,) feed per tooth along the path.
     law : (8,) force law of `law.law_array`.
     threads : how many; default: all cores.
-    direction : (n, 3) unit tangents; by default those of the chords.
-    read : (n,) False at points that only shape the sweep and get no result; default: none.
+    direction : (k, 3) unit tangents; by default those of the chords.
+    wanted : (k,) True at the n samples; False at points that only shape the path. Default: all are samples.
+    nodes_per_diameter : the least number of readings while the tool goes its diameter; inf: every sample.
 
     Notes
     -----
     Material is a height field: exact heights over the middle of cells, walls left by a cutter's rim to a
     twentieth of a cell, edges of a mesh to half a cell. The tool axis does not tilt. The path between
-    samples is straight.
+    points is straight.
     """
     position = np.ascontiguousarray(position_mm, dtype=np.float64)
     tool = np.ascontiguousarray(tool, dtype=np.int32)
-    count = len(position)
-    result = _air(count)
-    if count == 0:
+    rows = np.arange(len(position)) if wanted is None else np.flatnonzero(wanted)
+    result = _air(len(rows))
+    if len(position) == 0:
         return result
-    cell_mm = float(field.cell_mm.max())
     first = np.concatenate([[True], tool[1:] != tool[:-1]])
-    path = Path(
-        position,
-        tool,
-        np.ascontiguousarray(rapid, dtype=np.bool_),
-        first,
-        outlines_of(tools),
-        np.ascontiguousarray(
-            _tangents(position, first) if direction is None else direction, dtype=np.float64
-        ),
-        np.ones(count, dtype=np.bool_) if read is None else np.ascontiguousarray(read, dtype=np.bool_),
+    tangents = _tangents(position, first) if direction is None else direction
+    way_mm = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    outlines, rapid = outlines_of(tools), np.ascontiguousarray(rapid, dtype=np.bool_)
+    path, corner = _path(position, way_mm, tool, rapid, first, outlines)
+    apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter
+    samples = Samples(
+        position[rows],
+        np.ascontiguousarray(tangents[rows], dtype=np.float64),
+        way_mm[rows],
+        np.ascontiguousarray(f_z_mm[rows], dtype=np.float64),
+        tool[rows],
+        np.cumsum(corner)[rows] - 1,
+        np.empty(len(rows), dtype=np.bool_),
     )
+    mark_nodes(
+        samples, rapid[rows], apart_mm if np.isfinite(nodes_per_diameter) else apart_mm - 1.0, samples.node
+    )
+    cell_mm = float(field.cell_mm.max())
     cutters = _cutters(tools, cell_mm)
-    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    way_mm = np.concatenate([[0.0], np.cumsum(steps)])
-    feed = np.ascontiguousarray(f_z_mm, dtype=np.float64)
-    widest_mm = float(max(path.outlines[:, 0].max(), cutters.above[:, ::2].max()))
-    halo_mm = widest_mm + _MARGIN_CELLS * cell_mm  # how far around itself a sample reads
+    widest_mm = float(max(outlines[:, 0].max(), cutters.above[:, ::2].max()))
+    farthest_mm = float(apart_mm.max())
+    # how far around itself a strip reads: around a sample, and around the nodes beside it
+    halo_mm = widest_mm + farthest_mm + _MARGIN_CELLS * cell_mm
     axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))
-    bounds = _bounds(position[:, axis], halo_mm, threads)
+    bounds = _bounds(samples.position_mm[:, axis], halo_mm, threads)
 
     def cut(strip: int) -> _Piece:
         low, high = bounds[strip], bounds[strip + 1]
         begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
         own_begin, own_end = field.cells(axis, low, high)
-        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(count)
+        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(len(path.way_mm))
         # one cell more: the grid begins with a whole one, and a sweep takes the disc at its start as cut
-        reach_mm = halo_mm + float(path.outlines[:, 0].max()) + cell_mm
-        cut_strip(
-            grid,
-            path,
-            cutters,
-            law,
-            feed,
-            way_mm,
-            low,
-            high,
-            axis,
-            reach_mm,
-            new_work(),
-            rapid_mm,
-            result,
-        )
+        reach_mm = halo_mm + float(outlines[:, 0].max()) + cell_mm
+        lengths = (reach_mm, farthest_mm)
+        cut_strip(grid, path, samples, cutters, law, low, high, axis, *lengths, new_work(), rapid_mm, result)
         return grid, own_begin, own_end, own_begin - begin, rapid_mm
 
     strips = range(len(bounds) - 1)
-    for grid, begin, end, skip, rapid_mm in in_threads(cut, strips, len(strips)):
+    rapid_mm = np.zeros(len(path.way_mm))
+    for grid, begin, end, skip, of_strip_mm in in_threads(cut, strips, len(strips)):
         field.take_back(grid, axis, begin, end, skip)
-        np.maximum(result.overlap_mm[:, 0], rapid_mm, out=result.overlap_mm[:, 0])
+        np.maximum(rapid_mm, of_strip_mm, out=rapid_mm)
+    # what a rapid cuts off on the way to a sample is that sample's
+    owner = np.searchsorted(rows, np.flatnonzero(corner)).clip(max=len(rows) - 1)
+    np.maximum.at(result.overlap_mm[:, 0], owner, rapid_mm)
     return result
+
+
+def _path(
+    position_mm: Floats, way_mm: Floats, tool: Ints32, rapid: Bools, first: Bools, outlines: Floats
+) -> tuple[Path, Bools]:
+    """Return the path through the points (k) between which it is straight, and which of them these are."""
+    corner = np.empty(len(position_mm), dtype=np.bool_)
+    mark_corners(position_mm, first, rapid, tool, outlines[:, -1] == OTHER, corner)
+    columns = (each[corner] for each in (position_mm, way_mm, tool, rapid, first))
+    return Path(*columns, outlines), corner
 
 
 _Piece = tuple[Grid, int, int, int, Floats]
@@ -229,4 +239,5 @@ def _air(count: int) -> Result:
         ramp_rad=np.zeros(count),
         centre_mm=np.zeros(count),
         overlap_mm=np.zeros((count, 3)),
+        is_read=np.zeros(count, dtype=np.bool_),
     )

@@ -8,7 +8,7 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
-from gcode2krl.cutting.engagement import engage
+from gcode2krl.cutting.engagement import NODES_PER_DIAMETER, engage
 from gcode2krl.cutting.findings import Cut, findings_of
 from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
@@ -69,11 +69,17 @@ def force_basis(toolpath: Toolpath, motion: Motion, cell: Cell) -> Floats:
 
 
 def remove(
-    toolpath: Toolpath, motion: Motion, cell: Cell, law: Floats | None = None, *, is_checked: bool = True
+    toolpath: Toolpath,
+    motion: Motion,
+    cell: Cell,
+    law: Floats | None = None,
+    *,
+    is_checked: bool = True,
+    nodes_per_diameter: float = NODES_PER_DIAMETER,
 ) -> Removal:
     """Return the result of `cut` and the machined part; ``law`` (8,) replaces that of the material.
 
-    Unless ``is_checked``, that of `mean_cut`.
+    Unless ``is_checked``, that of `mean_cut`. ``nodes_per_diameter`` as in `engagement.engage`.
     """
     if cell.material is None:
         raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
@@ -89,13 +95,13 @@ def remove(
     f_z_mm = feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth
     programmed_f_z_mm = feed_per_tooth(np.where(rapid, 0.0, toolpath.feed_mm_s[row]), spindle, 1) / teeth
     position = np.ascontiguousarray(motion.position_mm @ to_field.T)
-    field = height_field_of(toolpath, cell, to_field, tools, len(motion))
+    field = height_field_of(toolpath, cell, to_field, tools)
     before = _uncut(field)
     # the sweep to the first sample of a rapid move began on the feed move before it
     wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
     way = _way(position, motion, to_field, tool)
     rows = way.sample
-    found = engage(
+    engaged = engage(
         field,
         way.position_mm,
         tool[rows],
@@ -104,10 +110,10 @@ def remove(
         [_with_shank(one) for one in tools],
         law,
         direction=(motion.direction @ to_field.T)[rows],
-        read=way.read,
+        wanted=way.read,
+        nodes_per_diameter=nodes_per_diameter,
     )
-    overlap_mm = way.gathered(found.overlap_mm)
-    engaged = Result(*(column[way.read] for column in found))
+    overlap_mm = engaged.overlap_mm
     flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
     overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
     # a rapid through material is reported as a collision, and is not a cut
@@ -115,11 +121,10 @@ def remove(
         np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm)
     )
     mean_N = np.linalg.norm(force_N, axis=1)
-    edges = (engaged.phi_rad, engaged.a_p_mm, f_z_mm, engaged.ramp_rad, tool)
     forces = Forces(
         force_base_N=force_N @ to_field,
         moment_base_Nmm=moment_Nmm @ to_field,
-        peak_N=_peaks(*edges, tools, law, mean_N) if is_checked else mean_N,
+        peak_N=_peaks(engaged, f_z_mm, tool, tools, law, mean_N) if is_checked else mean_N,
         torque_Nmm=np.where(rapid, 0.0, engaged.torque_Nmm),
         a_p_mm=engaged.a_p_mm,
         a_e_mm=engaged.a_e_mm,
@@ -228,19 +233,21 @@ def _set_up(motion: Motion) -> Floats:
 
 
 def _peaks(
-    phi_rad: Floats,
-    a_p_mm: Floats,
-    f_z_mm: Floats,
-    ramp_rad: Floats,
-    tool: Ints32,
-    tools: list[Tool],
-    law: Floats,
-    mean_N: Floats,
+    engaged: Result, f_z_mm: Floats, tool: Ints32, tools: list[Tool], law: Floats, mean_N: Floats
 ) -> Floats:
-    """Return the largest force of a revolution (m,), at least the mean; zero in air."""
-    peak = np.zeros(len(a_p_mm))
+    """Return the largest force of a revolution (m,), at least the mean; zero in air.
+
+    Between two samples that were read its ratio to the mean lies between theirs.
+    """
+    peak = np.zeros(len(mean_N))
+    cuts = np.isfinite(engaged.phi_rad[:, 0]) & (mean_N > 0.0)
     for number, one in enumerate(tools):
-        rows = np.flatnonzero((tool == number) & np.isfinite(phi_rad[:, 0]) & (mean_N > 0.0))
+        rows = np.flatnonzero((tool == number) & cuts & engaged.is_read)
         if len(rows):
-            peak[rows] = peak_force(one, law, phi_rad[rows], a_p_mm[rows], f_z_mm[rows], ramp_rad[rows])
+            arcs, depth, ramp = engaged.phi_rad[rows], engaged.a_p_mm[rows], engaged.ramp_rad[rows]
+            peak[rows] = peak_force(one, law, arcs, depth, f_z_mm[rows], ramp)
+    read, between = np.flatnonzero(cuts & engaged.is_read), np.flatnonzero(cuts & ~engaged.is_read)
+    if len(between):
+        ratio = np.interp(between, read, peak[read] / mean_N[read])
+        peak[between] = ratio * mean_N[between]
     return np.maximum(peak, mean_N)

@@ -23,8 +23,6 @@ from gcode2krl.tables import Toolpath
 if TYPE_CHECKING:
     import trimesh
 
-MANY_SAMPLES = 200_000
-_FEW_CELLS_PER_DIAMETER = 40.0
 _METRES_MM = 1.0
 """A mesh smaller than this in every direction is taken to be in metres."""
 _LARGEST_MM = 20_000.0
@@ -32,17 +30,14 @@ _COARSEST_OF_DIAMETER = 20.0
 """Cells across the smallest tool below which a field is too coarse to be useful."""
 
 
-def height_field_of(
-    toolpath: Toolpath, cell: Cell, to_field: Floats, tools: list[Tool], samples: int = 0
-) -> HeightField:
+def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: list[Tool]) -> HeightField:
     """Return the raw part before the first cut, in the frame of the field.
 
     Parameters
     ----------
     to_field : (3, 3) rotation from ``$BASE`` to the field, whose z is the tool axis.
-    tools : those that the program uses; the smallest gives the resolution where the cell does not: a 160th
-        of its diameter, a 40th for more than `MANY_SAMPLES` samples (force errors of 2 instead of 1 %).
-    samples : of the motion that will be cut.
+    tools : those that the program uses; the smallest gives the resolution where the cell does not, by
+        `CELLS_PER_DIAMETER`: the same for parts of any length, as it shows in the force.
 
     Raises
     ------
@@ -51,21 +46,20 @@ def height_field_of(
     """
     stock = cell.stock
     own_mm = stock.resolution_mm if stock is not None else None
-    per_diameter = _FEW_CELLS_PER_DIAMETER if samples > MANY_SAMPLES else CELLS_PER_DIAMETER
     if stock is not None and stock.mesh is not None:
         mesh = load_mesh(Path(stock.mesh))
         mesh.apply_transform(np.block([[to_field, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
-        return _from_mesh(mesh, _resolution(mesh.bounds, tools, own_mm, per_diameter))
+        return _from_mesh(mesh, _resolution(mesh.bounds, tools, own_mm))
     if stock is not None and stock.box_mm is not None:
         box = np.array(stock.box_mm)
         if np.allclose(to_field, np.eye(3)):
-            return block(box, _resolution(box, tools, own_mm, per_diameter))
+            return block(box, _resolution(box, tools, own_mm))
         corners = np.array(np.meshgrid(*box.T)).reshape(3, -1).T @ to_field.T
         bounds = np.array([corners.min(axis=0), corners.max(axis=0)])
-        return _from_mesh(_turned_box(box, to_field), _resolution(bounds, tools, own_mm, per_diameter))
+        return _from_mesh(_turned_box(box, to_field), _resolution(bounds, tools, own_mm))
     radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
     box = guessed_box(toolpath, to_field, radius_mm, edges_mm)
-    return block(box, _resolution(box, tools, own_mm, per_diameter), guessed=True)
+    return block(box, _resolution(box, tools, own_mm), guessed=True)
 
 
 def _edges_mm(tool: Tool) -> float:
@@ -235,7 +229,7 @@ def _raise_to(triangles: Floats, origin_mm: Floats, cell_mm: Floats, height: Flo
         np.maximum(part, np.where(inside, z, -np.inf), out=part)
 
 
-def _resolution(bounds: Floats, tools: list[Tool], own_mm: float | None, per_diameter: float) -> float:
+def _resolution(bounds: Floats, tools: list[Tool], own_mm: float | None) -> float:
     """Return the cell size: the user's, else a fraction of the smallest tool, larger if necessary."""
     width, depth = (float(size) for size in bounds[1, :2] - bounds[0, :2])
     smallest = min(tool.diameter_mm for tool in tools)
@@ -255,4 +249,4 @@ def _resolution(bounds: Floats, tools: list[Tool], own_mm: float | None, per_dia
             f"the stock of {width:.0f} x {depth:.0f} mm is too large for a tool of {smallest:g} mm",
             "state a smaller [stock], or resolution_mm",
         )
-    return max(least, smallest / per_diameter)
+    return max(least, smallest / CELLS_PER_DIAMETER)

@@ -2,10 +2,20 @@
 
 from typing import NamedTuple
 
-from gcode2krl.arrays import Floats
-from gcode2krl.compiled.core import FLOAT, FLOATS, INT, OUT_FLOATS, StructOf, core_function
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.compiled.core import (
+    BOOLS,
+    FLOAT,
+    FLOATS,
+    INT,
+    INTS32,
+    OUT_BOOLS,
+    OUT_FLOATS,
+    StructOf,
+    core_function,
+)
 from gcode2krl.cutting.edge import CUTTERS, WORK
-from gcode2krl.cutting.sweep import GRID, PATH
+from gcode2krl.cutting.sweep import GRID, PATH, SAMPLES
 
 ARCS = 3
 """Engagement arcs that are reported; the widest where there are more."""
@@ -29,18 +39,36 @@ class Result(NamedTuple):
     """(n,) material below the middle of a descending tool."""
     overlap_mm: Floats
     """(n, 3) how far rapid, shank and holder are in the material."""
+    is_read: Bools
+    """(n,) False where a row lies between those of the samples read before and after it."""
 
 
-RESULT = StructOf(**dict.fromkeys(Result._fields, OUT_FLOATS))
+RESULT = StructOf(**dict.fromkeys(Result._fields, OUT_FLOATS) | {"is_read": OUT_BOOLS})
+
+mark_nodes = core_function("cutting_mark_nodes", SAMPLES, BOOLS, FLOATS, OUT_BOOLS)
+"""Mark the samples (n,) at which the engagement is read in any case.
+
+Takes samples, whether each is rapid, the largest distance (t,) in mm between two nodes of a tool, and the
+marks. A node stands where the tool has gone so far, where its way turns by 10° and wherever tool or kind of
+move changes; behind such a place every sample is one for a while.
+"""
+
+mark_corners = core_function("cutting_mark_corners", FLOATS, BOOLS, BOOLS, INTS32, BOOLS, OUT_BOOLS)
+"""Mark the points (k,) between which a path is straight.
+
+Takes positions, `Path.first`, `Path.rapid`, `Path.tool`, whether a tool's sweeps along a slope have to be
+short (t,), and the marks.
+"""
 
 cut_strip = core_function(
     "cutting_cut_strip",
-    *(GRID, PATH, CUTTERS, FLOATS, FLOATS, FLOATS, FLOAT, FLOAT, INT, FLOAT, WORK, OUT_FLOATS, RESULT),
+    *(GRID, PATH, SAMPLES, CUTTERS, FLOATS, FLOAT, FLOAT, INT, FLOAT, FLOAT, WORK, OUT_FLOATS, RESULT),
 )
-"""Cut all samples one after the other; read those whose coordinate ``axis`` lies in [low, high).
+"""Cut all samples one after the other; write the rows of those whose coordinate ``axis`` lies in [low, high).
 
-Takes grid, path, cutters, the law (8,), ``f_z_mm`` and ``way_mm`` (n,), low, high, axis, ``reach_mm``, an
-`edge.new_work`, ``rapid_mm`` (n,), which gets the height that rapids cut off, and a `Result`. Sweeps farther
-than ``reach_mm`` from the strip are left out: the field outside is another strip's. The reading of a sample
-depends only on the samples before it, not on how the field is divided.
+Takes grid, path, samples, cutters, the law (8,), low, high, axis, ``reach_mm``, ``apart_mm``, an
+`edge.new_work`, ``rapid_mm`` (p,), which gets the height that rapids cut off, and a `Result`. Sweeps farther
+than ``reach_mm`` from the strip are left out: the field outside is another strip's. Nodes up to ``apart_mm``
+outside are read as well. The reading of a sample depends only on the samples before it, not on how the field
+is divided.
 """

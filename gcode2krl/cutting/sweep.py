@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.compiled.core import (
     BOOLS,
     FLOAT,
     FLOATS,
     INT,
+    INTS,
     INTS32,
     OUT_FLOATS32,
     OUT_INTS32,
@@ -49,21 +50,36 @@ class Grid(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Points in the order of time, in the frame of the field (z = tool axis)."""
+    """Points between which the tip moves straight, in the frame of the field (z = tool axis)."""
+
+    position_mm: Floats
+    """(p, 3) tips."""
+    way_mm: Floats
+    """(p,) along the path."""
+    tool: Ints32
+    """(p,) row of `outlines`."""
+    rapid: Bools
+    first: Bools
+    """(p,) True where no sweep leads to the point: the first one, and after a change of tool."""
+    outlines: Floats
+    """(t, 7) radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
+
+
+class Samples(NamedTuple):
+    """Places on the path at which the engagement is wanted, in the order of time."""
 
     position_mm: Floats
     """(n, 3) tips."""
-    tool: Ints32
-    """(n,) row of `outlines`."""
-    rapid: Bools
-    first: Bools
-    """(n,) True where no sweep leads to the sample: the first one, and after a change of tool."""
-    outlines: Floats
-    """(t, 7) radius, bottom, corner, end of the corner arc (r, z), steepness of the side above it, kind."""
     direction: Floats
-    """(n, 3) unit tangents."""
-    read: Bools
-    """(n,) True where the engagement is read: False at points that only shape the sweep."""
+    """(n, 3) unit tangents; zero where the tool stands."""
+    way_mm: Floats
+    f_z_mm: Floats
+    """(n,) feed per tooth."""
+    tool: Ints32
+    point: Ints
+    """(n,) the last point of the path that is not after the sample."""
+    node: Bools
+    """(n,) True where the engagement is read in any case."""
 
 
 GRID = StructOf(
@@ -81,10 +97,18 @@ GRID = StructOf(
 )
 PATH = StructOf(
     position_mm=FLOATS,
+    way_mm=FLOATS,
     tool=INTS32,
     rapid=BOOLS,
     first=BOOLS,
     outlines=FLOATS,
+)
+SAMPLES = StructOf(
+    position_mm=FLOATS,
     direction=FLOATS,
-    read=BOOLS,
+    way_mm=FLOATS,
+    f_z_mm=FLOATS,
+    tool=INTS32,
+    point=INTS,
+    node=BOOLS,
 )

@@ -112,7 +112,7 @@ static void extend(double z, double radius, Bins bins, const double *restrict sh
 }
 
 /* Return the force of a band from the integrals over its bins: linear edge forces. */
-static Force integrated(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
+static Parts integrated(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
                         const double *share) {
     const double *sine = &CELL(strip->work->turn, BIN_SIN, 0), *cosine = &CELL(strip->work->turn, BIN_COS, 0);
     const double *sin_sin = &CELL(strip->work->turn, BIN_SIN_SIN, 0);
@@ -125,37 +125,41 @@ static Force integrated(const Strip *strip, const Sample *sample, const Band *ba
         arc.sin_sin += share[j] * sin_sin[j];
         arc.sin_cos += share[j] * sin_cos[j];
     }
-    Force part = {0.0, 0.0, 0.0, 0.0};
-    const Chip chip = sample->chip;
-    if (arc.one > 0.0 && chip.f_z_mm > 0.0) {
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+    if (arc.one > 0.0) {
         arc.one = arc.one * TURN / (double)all;
-        const double swing = chip.f_z_mm * band->sin_kappa * chip.cos_gamma;
-        const double offset = chip.f_z_mm * band->cos_kappa * chip.sin_gamma;
-        add_linear_edge(&arc, band->sin_kappa, band->cos_kappa, swing, offset, strip->law, &part);
+        const double swing = band->sin_kappa * sample->chip.cos_gamma;
+        const double offset = band->cos_kappa * sample->chip.sin_gamma;
+        add_linear_edge(&arc, band->sin_kappa, band->cos_kappa, swing, offset, strip->law, &parts);
     }
-    return part;
+    return parts;
+}
+
+static void add_share(Force *force, const Force *one, double share) {
+    force->feed += share * one->feed;
+    force->normal += share * one->normal;
+    force->axial += share * one->axial;
+    force->tangential += share * one->tangential;
 }
 
 /* Return the force of a band arc by arc: any law. */
-static Force by_arcs(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
+static Parts by_arcs(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
                      const double *share) {
-    Force part = {0.0, 0.0, 0.0, 0.0};
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
     for (int64_t at = bins.first, end; at < bins.after; at = most(end, at + 1)) {
         double added = 0.0;
         for (end = at; end < bins.after && share[end] > 0.0 && fabs(share[end] - share[at]) < COARSE_JUMP; end++)
             added += share[end];
         if (end == at)
             continue;
-        Force one = {0.0, 0.0, 0.0, 0.0};
-        add_arc_force(bin_angle((double)at, all), bin_angle((double)end, all), band->sin_kappa, band->cos_kappa,
+        Parts one = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+        add_arc_parts(bin_angle((double)at, all), bin_angle((double)end, all), band->sin_kappa, band->cos_kappa,
                       &sample->chip, strip->law, &one);
         const double mean = added / (double)(end - at);
-        part.feed += mean * one.feed;
-        part.normal += mean * one.normal;
-        part.axial += mean * one.axial;
-        part.tangential += mean * one.tangential;
+        add_share(&parts.chip, &one.chip, mean);
+        add_share(&parts.edge, &one.edge, mean);
     }
-    return part;
+    return parts;
 }
 
 /* List the arcs over which any band between rings is engaged, and their extent normal to the feed. */
@@ -189,10 +193,10 @@ static void add_band(const Strip *strip, const Sample *sample, const Band *band,
     write_share(sample->bottom, band, bins, rows[LOWER], rows[UPPER], rows[SHARE]);
     extend(sample->z, band->r_high, bins, rows[SHARE], rows[LOWER_TOP], rows[UPPER], rows[UPPER_TOP],
            &CELL(work->reach, 0, 0), &CELL(work->reach, 1, 0));
-    const Force part = is_linear ? integrated(strip, sample, band, bins, all, rows[SHARE])
-                                 : by_arcs(strip, sample, band, bins, all, rows[SHARE]);
+    const Parts parts = is_linear ? integrated(strip, sample, band, bins, all, rows[SHARE])
+                                  : by_arcs(strip, sample, band, bins, all, rows[SHARE]);
     const double lever = 0.5 * (band->low + greater(sample->bottom - band->low, 0.0) + band->high);
-    add_force(reading, &part, band->width, 0.5 * (band->r_low + band->r_high), lever);
+    add_force(reading, &parts, band->width, 0.5 * (band->r_low + band->r_high), lever);
 }
 
 /* Read a ring that becomes a band's upper one; what was the upper one becomes the lower. */

@@ -33,25 +33,34 @@ typedef struct {
     const double *law;
 } Strip;
 
-/* What is read at a sample: force of a tooth times rad, its moment about the tip, torque; depth in mm, extent to the
+/* Force of a tooth times rad, its moment about the tip, torque. */
+typedef struct {
+    double feed, normal, axial, about_feed, about_normal, torque;
+} Load;
+
+/* What is read at a sample: the load of the chip at 1 mm a tooth and that of the edge; depth in mm, extent to the
    right and left of the feed in mm; arcs. */
 typedef struct {
-    Force force;
-    double about_feed, about_normal, torque, a_p_mm, least_mm, most_mm;
+    Load chip, edge;
+    double a_p_mm, least_mm, most_mm;
     Arcs arcs;
 } Reading;
 
 static inline double bin_angle(double bin, int64_t bins) { return -0.25 * TURN + bin * TURN / (double)bins; }
 
 /* Add a force per mm of contact width at a radius and a height: with its moment and the torque. */
-static inline void add_force(Reading *reading, const Force *part, double width, double radius, double z) {
-    reading->force.feed += width * part->feed;
-    reading->force.normal += width * part->normal;
-    reading->force.axial += width * part->axial;
-    reading->force.tangential += width * part->tangential;
-    reading->about_feed -= z * width * part->normal;
-    reading->about_normal += z * width * part->feed;
-    reading->torque += radius * width * part->tangential;
+static inline void add_load(Load *load, const Force *part, double width, double radius, double z) {
+    load->feed += width * part->feed;
+    load->normal += width * part->normal;
+    load->axial += width * part->axial;
+    load->about_feed -= z * width * part->normal;
+    load->about_normal += z * width * part->feed;
+    load->torque += radius * width * part->tangential;
+}
+
+static inline void add_force(Reading *reading, const Parts *parts, double width, double radius, double z) {
+    add_load(&reading->chip, &parts->chip, width, radius, z);
+    add_load(&reading->edge, &parts->edge, width, radius, z);
 }
 
 /* Tabulate sine and cosine in the middle of the bins, and integrals over those of rings. */

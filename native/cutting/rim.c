@@ -58,9 +58,9 @@ static void read_tops(const Strip *strip, const Sample *sample, const Ring *rim)
 static void add_arc(const Strip *strip, const Sample *sample, const Band *band, double a, double b, double deep,
                     double foot, Reading *reading) {
     const double width = lesser(deep, band->high - foot);
-    Force part = {0.0, 0.0, 0.0, 0.0};
-    add_arc_force(a, b, band->sin_kappa, band->cos_kappa, &sample->chip, strip->law, &part);
-    add_force(reading, &part, width, band->r_high, foot + 0.5 * width);
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+    add_arc_parts(a, b, band->sin_kappa, band->cos_kappa, &sample->chip, strip->law, &parts);
+    add_force(reading, &parts, width, band->r_high, foot + 0.5 * width);
     reading->a_p_mm = greater(reading->a_p_mm, deep + foot - greater(sample->bottom, 0.0));
     reading->most_mm = greater(reading->most_mm, band->r_high * cos(a));
     reading->least_mm = lesser(reading->least_mm, band->r_high * cos(b));

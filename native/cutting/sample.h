@@ -19,6 +19,7 @@ typedef struct {
     double bottom; /* the material's bottom above the tip */
     double fx, fy; /* heading in plan */
     Chip chip;
+    bool moves;
     int64_t tool;
     const Outline *outline;
     Recent recent[MOST_RECENT];

@@ -24,7 +24,7 @@ static const double WEIGHT[NODES] = {
 };
 
 void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, double swing_mm,
-                     double offset_mm, const double *law, Force *out) {
+                     double offset_mm, const double *law, Parts *out) {
     const double h = swing_mm * arc->sin + offset_mm * arc->one;
     const double h_sin = swing_mm * arc->sin_sin + offset_mm * arc->sin;
     const double h_cos = swing_mm * arc->sin_cos + offset_mm * arc->cos;
@@ -32,10 +32,14 @@ void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, d
     const double radial_e = sin_kappa * law[5] + cos_kappa * law[6];
     const double axial_c = sin_kappa * law[3] - cos_kappa * law[2];
     const double axial_e = sin_kappa * law[6] - cos_kappa * law[5];
-    out->feed -= law[1] * h_cos + law[4] * arc->cos + radial_c * h_sin + radial_e * arc->sin;
-    out->normal += law[1] * h_sin + law[4] * arc->sin - radial_c * h_cos - radial_e * arc->cos;
-    out->axial += axial_c * h + axial_e * arc->one;
-    out->tangential += law[1] * h + law[4] * arc->one;
+    out->chip.feed -= law[1] * h_cos + radial_c * h_sin;
+    out->chip.normal += law[1] * h_sin - radial_c * h_cos;
+    out->chip.axial += axial_c * h;
+    out->chip.tangential += law[1] * h;
+    out->edge.feed -= law[4] * arc->cos + radial_e * arc->sin;
+    out->edge.normal += law[4] * arc->sin - radial_e * arc->cos;
+    out->edge.axial += axial_e * arc->one;
+    out->edge.tangential += law[4] * arc->one;
 }
 
 static Integrals integrals_of(double a, double b) {
@@ -68,31 +72,30 @@ static void add_kienzle(double a, double b, double sin_kappa, double cos_kappa, 
 
 /* Add the integral over an arc on which h = swing·sin phi + offset is not negative. */
 static void add(double a, double b, double sin_kappa, double cos_kappa, double swing_mm, double offset_mm,
-                const double *law, Force *out) {
+                const double *law, Parts *out) {
     if (law[0] == LAW_LINEAR_EDGE) {
         const Integrals arc = integrals_of(a, b);
         add_linear_edge(&arc, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out);
     } else {
-        add_kienzle(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out);
+        add_kienzle(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, &out->chip);
     }
 }
 
-void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
-                   const double *law, Force *out) {
-    const double f_z_mm = chip->f_z_mm;
-    if (!(phi_b > phi_a && f_z_mm > 0.0))
+void add_arc_parts(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
+                   const double *law, Parts *out) {
+    if (!(phi_b > phi_a))
         return;
     const double swing = sin_kappa * chip->cos_gamma, offset = cos_kappa * chip->sin_gamma;
     if (swing < NOT_ENGAGED) {
         if (offset > NOT_ENGAGED)
-            add(phi_a, phi_b, sin_kappa, cos_kappa, 0.0, f_z_mm * offset, law, out);
+            add(phi_a, phi_b, sin_kappa, cos_kappa, 0.0, offset, law, out);
         return;
     }
     if (offset <= -swing)
         return;
     const bool is_in_front = offset >= 0.0 && phi_a >= 0.0 && phi_b <= PI;
     if (is_in_front || offset >= swing) {
-        add(phi_a, phi_b, sin_kappa, cos_kappa, f_z_mm * swing, f_z_mm * offset, law, out);
+        add(phi_a, phi_b, sin_kappa, cos_kappa, swing, offset, law, out);
         return;
     }
     const double start = -asin(offset / swing), stop = PI - start; /* a chip from here to there, every turn */
@@ -100,8 +103,21 @@ void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kapp
     for (; start + turn < phi_b; turn += TURN) {
         const double a = greater(phi_a, start + turn), b = lesser(phi_b, stop + turn);
         if (b > a)
-            add(a, b, sin_kappa, cos_kappa, f_z_mm * swing, f_z_mm * offset, law, out);
+            add(a, b, sin_kappa, cos_kappa, swing, offset, law, out);
     }
+}
+
+void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
+                   const double *law, Force *out) {
+    if (!(chip->f_z_mm > 0.0))
+        return;
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+    add_arc_parts(phi_a, phi_b, sin_kappa, cos_kappa, chip, law, &parts);
+    const double scale = feed_scale(law, chip->f_z_mm);
+    out->feed += scale * parts.chip.feed + parts.edge.feed;
+    out->normal += scale * parts.chip.normal + parts.edge.normal;
+    out->axial += scale * parts.chip.axial + parts.edge.axial;
+    out->tangential += scale * parts.chip.tangential + parts.edge.tangential;
 }
 
 /* What the mean of a sample is made of. arcs: pairs of angles, NaN pairs are none. */
@@ -188,6 +204,10 @@ EXPORT void cutting_arc_force(double phi_a, double phi_b, double sin_kappa, doub
 /* For tests: the same of linear edge forces, from the integrals (5) over the arc. */
 EXPORT void cutting_linear_edge(Floats integrals, double sin_kappa, double cos_kappa, double swing_mm,
                                 double offset_mm, Floats law, Floats out) {
-    add_linear_edge((const Integrals *)&AT(integrals, 0), sin_kappa, cos_kappa, swing_mm, offset_mm, law.at,
-                    (Force *)&AT(out, 0));
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+    add_linear_edge((const Integrals *)&AT(integrals, 0), sin_kappa, cos_kappa, swing_mm, offset_mm, law.at, &parts);
+    AT(out, 0) += parts.chip.feed + parts.edge.feed;
+    AT(out, 1) += parts.chip.normal + parts.edge.normal;
+    AT(out, 2) += parts.chip.axial + parts.edge.axial;
+    AT(out, 3) += parts.chip.tangential + parts.edge.tangential;
 }

@@ -22,20 +22,37 @@ typedef struct {
     double feed, normal, axial, tangential;
 } Force;
 
+/* A force as a function of the feed per tooth, `feed_scale`·chip + edge: of the chip that 1 mm a tooth would make,
+   and of the edge that rubs. */
+typedef struct {
+    Force chip, edge;
+} Parts;
+
 /* Integrals of 1, sin phi, cos phi, sin² phi and sin phi·cos phi over an arc. */
 typedef struct {
     double one, sin, cos, sin_sin, sin_cos;
 } Integrals;
 
+/* Return by what the force of the chip grows with the feed per tooth: linear edge forces with the feed itself,
+   Kienzle's with feed^(1 - mc). */
+static inline double feed_scale(const double *law, double f_z_mm) {
+    return law[0] == LAW_LINEAR_EDGE ? f_z_mm : pow(f_z_mm, 1.0 - law[2]);
+}
+
 /* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of contact
-   width, N·rad/mm. An empty or NaN arc adds nothing; cos gamma >= 0. The contact width is dz/sin kappa; the mean
-   over a revolution is teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
+   width, N·rad/mm. An empty or NaN arc adds nothing; cos gamma >= 0; the chip's feed is not looked at. The contact
+   width is dz/sin kappa; the mean over a revolution is teeth/(2·pi)·width times this. law: as
+   `cutting.law.law_array` makes it. */
+void add_arc_parts(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
+                   const double *law, Parts *out);
+
+/* The same at the chip's feed. */
 void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
                    const double *law, Force *out);
 
-/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip
+/* The parts of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip
    h = swing·sin phi + offset is not negative. */
 void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, double swing_mm,
-                     double offset_mm, const double *law, Force *out);
+                     double offset_mm, const double *law, Parts *out);
 
 #endif

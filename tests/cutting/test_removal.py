@@ -40,7 +40,17 @@ def run(field, position, tool=FLAT, rapid=None, threads=1, law=LAW, f_z_mm=0.1):
     count = len(position)
     rapid = np.zeros(count, bool) if rapid is None else rapid
     feed = np.full(count, f_z_mm)
-    return engage(field, position, np.zeros(count, np.int32), rapid, feed, [tool], law, threads)
+    return engage(
+        field,
+        position,
+        np.zeros(count, np.int32),
+        rapid,
+        feed,
+        [tool],
+        law,
+        threads,
+        nodes_per_diameter=math.inf,
+    )
 
 
 def local(position, force):

@@ -1,0 +1,82 @@
+/* Which samples of a motion are read, and which of its points a sweep has to begin and end at. */
+
+#include "constants.h"
+#include "core.h"
+
+#define TURN_COSINE 0.984807753012208 /* of 10 degrees: a node where the path has turned by more */
+#define STRAIGHT_SINE 1e-5 /* a sweep of 400 mm leaves a path that turns by less by half a micrometre */
+
+typedef struct {
+    double x, y, z;
+} Vector;
+
+static Vector row_of(Floats table, int64_t i) {
+    return (Vector){CELL(table, i, 0), CELL(table, i, 1), CELL(table, i, 2)};
+}
+
+static Vector from_to(Vector a, Vector b) { return (Vector){b.x - a.x, b.y - a.y, b.z - a.z}; }
+
+static double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+static double squared_cross(Vector a, Vector b) {
+    return squared(a.y * b.z - a.z * b.y) + squared(a.z * b.x - a.x * b.z) + squared(a.x * b.y - a.y * b.x);
+}
+
+/* Tell whether something changes at sample i that nothing may be interpolated across. */
+static bool changes(const Samples *samples, Bools rapid, int64_t i) {
+    const Vector before = row_of(samples->direction, i - 1), here = row_of(samples->direction, i);
+    return AT(samples->tool, i) != AT(samples->tool, i - 1) || AT(rapid, i) != AT(rapid, i - 1) ||
+           dot(before, before) == 0.0 || dot(here, here) == 0.0;
+}
+
+/* Tell whether the path has turned too much at sample i since a node. */
+static bool has_turned(const Samples *samples, int64_t node, int64_t i) {
+    return dot(row_of(samples->direction, i), row_of(samples->direction, node)) < TURN_COSINE;
+}
+
+/* Mark the nodes of a motion: apart_mm (a row a tool) of way apart at most, if samples are that dense.
+
+   Behind a turn or a change the engagement is a new one, and every sample is a node for twice as far. */
+EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Bools node) {
+    int64_t last = 0;
+    double settled_mm = -INFINITY;
+    AT(node, 0) = 1;
+    for (int64_t i = 1; i < node.rows; i++) {
+        const double way_mm = AT(samples->way_mm, i), apart = AT(apart_mm, AT(samples->tool, i));
+        const bool is_new = changes(samples, rapid, i) || has_turned(samples, last, i);
+        if (is_new)
+            settled_mm = way_mm + 2.0 * apart;
+        AT(node, i) = is_new || way_mm < settled_mm || i == node.rows - 1;
+        if (last < i - 1 && (is_new || way_mm - AT(samples->way_mm, last) > apart)) {
+            AT(node, i - 1) = 1;
+            last = i - 1;
+        }
+        if (AT(node, i) || way_mm - AT(samples->way_mm, last) > apart) {
+            AT(node, i) = 1;
+            last = i;
+        }
+    }
+}
+
+/* Mark the points of a path between which it is straight; every point of a rapid, whose findings name it, and of a slope
+   that a cutter goes whose sweeps are exact only if they are short (a row of is_short a tool). */
+EXPORT void cutting_mark_corners(Floats position_mm, Bools first, Bools rapid, Ints32 tool, Bools is_short,
+                                 Bools corner) {
+    Vector onward = {0.0, 0.0, 0.0}; /* from the last corner to the point after it */
+    AT(corner, 0) = 1;
+    for (int64_t i = 1; i < corner.rows; i++) {
+        const bool is_last = i == corner.rows - 1 || AT(first, i + 1);
+        const Vector here = row_of(position_mm, i), arriving = from_to(row_of(position_mm, i - 1), here);
+        if (dot(onward, onward) == 0.0)
+            onward = arriving;
+        AT(corner, i) = AT(first, i) || is_last || AT(rapid, i) || AT(rapid, i + 1);
+        if (!AT(corner, i)) {
+            const Vector leaving = from_to(here, row_of(position_mm, i + 1));
+            const double sizes = dot(onward, onward) * dot(leaving, leaving);
+            AT(corner, i) = squared_cross(onward, leaving) > squared(STRAIGHT_SINE) * sizes ||
+                            dot(onward, leaving) < 0.0 || (onward.z != 0.0 && AT(is_short, AT(tool, i)));
+        }
+        if (AT(corner, i))
+            onward = (Vector){0.0, 0.0, 0.0};
+    }
+}
