@@ -79,7 +79,7 @@ static void read_ring(const Strip *strip, const Sample *sample, double r, Bins b
     stand_above_cutter(strip->grid, sample, &ring);
     if (has_walls)
         correct_at_walls(strip->grid, strip->path, sample, &ring);
-    take_off_recent(strip->path, sample, &ring);
+    take_off_recent(sample, &ring);
 }
 
 /* Write the fraction of a band that is engaged: between its rings the thickness changes linearly. */

@@ -51,15 +51,15 @@ static void list_recent(const Path *path, int64_t i, int64_t lag, int64_t met, S
     const int64_t stride = most((met - lag + MOST_RECENT - 1) / MOST_RECENT, 1);
     const double dx = sample->fx * sample->chip.cos_gamma, dy = sample->fy * sample->chip.cos_gamma;
     const double dz = -sample->chip.sin_gamma;
-    const double *here = &CELL(path->position_mm, i, 0);
+    const double *here = place_of(path, i);
     sample->recent_count = 0;
     for (int64_t start = lag; start < met; start += stride) {
-        const double *there = &CELL(path->position_mm, start, 0);
+        const double *there = place_of(path, start);
         const double ax = here[0] - there[0], ay = here[1] - there[1], az = here[2] - there[2];
         const double back = ax * dx + ay * dy + az * dz, aside = ax * dy - ay * dx;
         const double off = ax * ax + ay * ay + az * az - back * back;
         if (back < 0.0 || off > squared(LEVEL * back) + 1e-12 || fabs(aside) > STRAIGHT * back)
-            sample->recent[sample->recent_count++] = (Recent){start, least(start + stride, met)};
+            sample->recent[sample->recent_count++] = (Recent){there, place_of(path, least(start + stride, met))};
     }
 }
 
@@ -117,7 +117,7 @@ static void write_row(Reading *reading, const Sample *sample, double teeth, int6
 /* Read the engagement at sample i and write its row. */
 static void read_sample(const Strip *strip, const Motion *motion, int64_t i, int64_t lag, const Result *result) {
     const Grid *grid = strip->grid;
-    const double *position = &CELL(strip->path->position_mm, i, 0);
+    const double *position = place_of(strip->path, i);
     Sample sample = {.x = position[0], .y = position[1], .z = position[2], .tool = AT(strip->path->tool, i)};
     sample.outline = outline_of(strip->path, sample.tool);
     sample.bottom = grid->bottom_mm - sample.z;

@@ -8,9 +8,9 @@
 
 enum { MOST_RECENT = 8 };
 
-/* First and last sample of sweeps that the field does not show yet. */
+/* First and last place of sweeps that the field does not show yet. */
 typedef struct {
-    int64_t start, end;
+    const double *a, *b;
 } Recent;
 
 typedef struct {

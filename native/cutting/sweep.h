@@ -34,46 +34,47 @@ typedef struct {
     int64_t row, column;
 } Cell;
 
+static inline const double *place_of(const Path *path, int64_t k) { return &CELL(path->position_mm, k, 0); }
+
 static inline const Outline *outline_of(const Path *path, int64_t tool) {
     return (const Outline *)&CELL(path->outlines, tool, 0);
 }
 
 /* Return the height of the cutter's lower outline above the tip at radius r. */
 static inline double outline_height(double r, const Outline *outline) {
-    if (r < outline->arc_radius || outline->steep == 0.0) {
-        const double x = lesser(greater(r - outline->bottom, 0.0), outline->corner);
-        return outline->corner - sqrt(outline->corner * outline->corner - x * x);
-    }
-    return outline->arc_top + (r - outline->arc_radius) * outline->steep;
+    const double corner = outline->corner, x = lesser(greater(r - outline->bottom, 0.0), corner);
+    const double arc = corner - sqrt(corner * corner - x * x);
+    const double side = outline->arc_top + (r - outline->arc_radius) * outline->steep;
+    return (r < outline->arc_radius) | (outline->steep == 0.0) ? arc : side;
 }
 
-static inline Nearest nearest(const Path *path, int64_t first, int64_t last, double x, double y) {
-    const double *a = &CELL(path->position_mm, first, 0), *b = &CELL(path->position_mm, last, 0);
-    const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
-    const double square = ux * ux + uy * uy;
-    if (square < 1e-18)
-        return (Nearest){sqrt(squared(x - a[0]) + squared(y - a[1])), 0.0, a[2] + lesser(uz, 0.0)};
-    const double share = lesser(greater(((x - a[0]) * ux + (y - a[1]) * uy) / square, 0.0), 1.0);
+/* Of the sweep from a to b. */
+static inline Nearest nearest(const double *a, const double *b, double x, double y) {
+    const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], square = ux * ux + uy * uy;
+    const double along = lesser(greater(((x - a[0]) * ux + (y - a[1]) * uy) / square, 0.0), 1.0);
+    const bool is_upright = square < 1e-18;
+    const double share = is_upright ? 0.0 : along, rise = is_upright ? lesser(uz, 0.0) : share * uz;
     const double distance = sqrt(squared(x - a[0] - share * ux) + squared(y - a[1] - share * uy));
-    return (Nearest){distance, share, a[2] + share * uz};
+    return (Nearest){distance, share, a[2] + rise};
 }
 
-/* Return how deep the sweep between two samples cuts at a point, inf beside it. */
-static inline double sweep_height(const Path *path, int64_t first, int64_t last, const Outline *outline,
-                                  double x, double y, double slack) {
-    const double radius = outline->radius;
-    const Nearest point = nearest(path, first, last, x, y);
-    if (point.distance >= radius + slack)
-        return INFINITY;
-    double lowest = point.z + outline_height(lesser(point.distance, radius), outline);
-    const int64_t ends[2] = {first, last};
-    for (int side = 0; side < 2; side++) { /* on a slope the nearest point in plan is not always the lowest */
-        const double *end = &CELL(path->position_mm, ends[side], 0);
-        const double r = sqrt(squared(x - end[0]) + squared(y - end[1]));
-        if (r < radius + slack)
-            lowest = lesser(lowest, end[2] + outline_height(lesser(r, radius), outline));
-    }
-    return lowest;
+/* Return how deep the cutter at a place cuts at a point of the rim's slack, inf beside it. */
+static inline double height_from(const double *place, const Outline *outline, double x, double y, double slack) {
+    const double r = sqrt(squared(x - place[0]) + squared(y - place[1]));
+    const double height = place[2] + outline_height(lesser(r, outline->radius), outline);
+    return r < outline->radius + slack ? height : INFINITY;
+}
+
+/* Return how deep the sweep from a to b cuts at a point, inf beside it. Without branches: the compiler takes several
+   points at once. */
+static inline double sweep_height(const double *a, const double *b, const Outline *outline, double x, double y,
+                                  double slack) {
+    const Nearest point = nearest(a, b, x, y);
+    double lowest = point.z + outline_height(lesser(point.distance, outline->radius), outline);
+    /* on a slope the nearest point in plan is not always the lowest */
+    lowest = lesser(lowest, height_from(a, outline, x, y, slack));
+    lowest = lesser(lowest, height_from(b, outline, x, y, slack));
+    return point.distance >= outline->radius + slack ? INFINITY : lowest;
 }
 
 static inline bool is_inside(const Grid *grid, Cell cell) {
