@@ -59,7 +59,7 @@ static void list_recent(const Path *path, int64_t i, int64_t lag, int64_t met, S
         const double back = ax * dx + ay * dy + az * dz, aside = ax * dy - ay * dx;
         const double off = ax * ax + ay * ay + az * az - back * back;
         if (back < 0.0 || off > squared(LEVEL * back) + 1e-12 || fabs(aside) > STRAIGHT * back)
-            sample->recent[sample->recent_count++] = (Recent){there, place_of(path, least(start + stride, met))};
+            sample->recent[sample->recent_count++] = way_between(there, place_of(path, least(start + stride, met)));
     }
 }
 

@@ -8,11 +8,6 @@
 
 enum { MOST_RECENT = 8 };
 
-/* First and last place of sweeps that the field does not show yet. */
-typedef struct {
-    const double *a, *b;
-} Recent;
-
 typedef struct {
     double x, y, z;
     double top; /* no material is higher above the tip */
@@ -21,7 +16,7 @@ typedef struct {
     Chip chip;
     int64_t tool;
     const Outline *outline;
-    Recent recent[MOST_RECENT];
+    Way recent[MOST_RECENT]; /* sweeps that the field does not show yet */
     int recent_count;
 } Sample;
 

@@ -25,6 +25,13 @@ typedef struct {
     double distance, share, z;
 } Nearest;
 
+/* The straight way of a sweep from a to b; of an upright one the nearest point is the lower end: its square in plan is
+   taken as infinite, so that the share is 0, and it dips. */
+typedef struct {
+    const double *a, *b;
+    double ux, uy, uz, square, dip;
+} Way;
+
 /* Cells in a row or column: the first and the one after the last. */
 typedef struct {
     int64_t first, after;
@@ -48,32 +55,34 @@ static inline double outline_height(double r, const Outline *outline) {
     return (r < outline->arc_radius) | (outline->steep == 0.0) ? arc : side;
 }
 
-/* Of the sweep from a to b. */
-static inline Nearest nearest(const double *a, const double *b, double x, double y) {
+static inline Way way_between(const double *a, const double *b) {
     const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], square = ux * ux + uy * uy;
-    const double along = lesser(greater(((x - a[0]) * ux + (y - a[1]) * uy) / square, 0.0), 1.0);
     const bool is_upright = square < 1e-18;
-    const double share = is_upright ? 0.0 : along, rise = is_upright ? lesser(uz, 0.0) : share * uz;
-    const double distance = sqrt(squared(x - a[0] - share * ux) + squared(y - a[1] - share * uy));
-    return (Nearest){distance, share, a[2] + rise};
+    return (Way){a, b, ux, uy, uz, is_upright ? INFINITY : square, is_upright ? lesser(uz, 0.0) : 0.0};
 }
 
-/* Return how deep the cutter at a place cuts at a point of the rim's slack, inf beside it. */
+static inline Nearest nearest(const Way *way, double x, double y) {
+    const double u = x - way->a[0], v = y - way->a[1];
+    const double share = lesser(greater((u * way->ux + v * way->uy) / way->square, 0.0), 1.0);
+    const double distance = sqrt(squared(u - share * way->ux) + squared(v - share * way->uy));
+    return (Nearest){distance, share, way->a[2] + (share * way->uz + way->dip)};
+}
+
+/* Return how deep the cutter at a place cuts at a point, inf beside it. */
 static inline double height_from(const double *place, const Outline *outline, double x, double y, double slack) {
     const double r = sqrt(squared(x - place[0]) + squared(y - place[1]));
     const double height = place[2] + outline_height(lesser(r, outline->radius), outline);
     return r < outline->radius + slack ? height : INFINITY;
 }
 
-/* Return how deep the sweep from a to b cuts at a point, inf beside it. Without branches: the compiler takes several
-   points at once. */
-static inline double sweep_height(const double *a, const double *b, const Outline *outline, double x, double y,
-                                  double slack) {
-    const Nearest point = nearest(a, b, x, y);
+/* Return how deep a sweep cuts at a point, inf beside it. Without branches: the compiler takes several points at
+   once. */
+static inline double sweep_height(const Way *way, const Outline *outline, double x, double y, double slack) {
+    const Nearest point = nearest(way, x, y);
     double lowest = point.z + outline_height(lesser(point.distance, outline->radius), outline);
     /* on a slope the nearest point in plan is not always the lowest */
-    lowest = lesser(lowest, height_from(a, outline, x, y, slack));
-    lowest = lesser(lowest, height_from(b, outline, x, y, slack));
+    lowest = lesser(lowest, height_from(way->a, outline, x, y, slack));
+    lowest = lesser(lowest, height_from(way->b, outline, x, y, slack));
     return point.distance >= outline->radius + slack ? INFINITY : lowest;
 }
 

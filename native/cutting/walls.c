@@ -27,18 +27,18 @@ double height_at(const Grid *grid, const Path *path, double x, double y) {
 
 double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell, double x, double y) {
     const double here = CELL(grid->height, cell.row, cell.column);
-    const double *a = place_of(path, sweep - 1), *b = place_of(path, sweep);
+    const Way way = way_between(place_of(path, sweep - 1), place_of(path, sweep));
     const Outline *outline = outline_of(path, AT(path->tool, sweep));
-    const double cut = sweep_height(a, b, outline, x, y, WALL_SLACK * grid->dx_mm);
+    const double cut = sweep_height(&way, outline, x, y, WALL_SLACK * grid->dx_mm);
     if (cut < INFINITY)
         return lesser(here, cut);
     const double middle_x = grid->x_mm + ((double)(cell.column + grid->column) + 0.5) * grid->dx_mm;
     const double middle_y = grid->y_mm + ((double)(cell.row + grid->row) + 0.5) * grid->dy_mm;
-    if (nearest(a, b, middle_x, middle_y).distance >= outline->radius)
+    if (nearest(&way, middle_x, middle_y).distance >= outline->radius)
         return here;
     /* the cell's height is that of the cut side */
-    const Nearest foot = nearest(a, b, x, y);
-    const double foot_x = a[0] + foot.share * (b[0] - a[0]), foot_y = a[1] + foot.share * (b[1] - a[1]);
+    const Nearest foot = nearest(&way, x, y);
+    const double foot_x = way.a[0] + foot.share * way.ux, foot_y = way.a[1] + foot.share * way.uy;
     const double away_x = (x - foot_x) / foot.distance * grid->dx_mm;
     const double away_y = (y - foot_y) / foot.distance * grid->dy_mm;
     const Cell away = cell_at(grid, x + away_x, y + away_y);
@@ -49,12 +49,13 @@ double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell,
 static bool is_deeper(const Drawing *drawing, int64_t old, double x, double y) {
     const Path *path = drawing->path;
     const Outline *outline = outline_of(path, AT(path->tool, old));
-    const double *old_a = place_of(path, old - 1), *old_b = place_of(path, old);
-    const double old_floor = lesser(old_a[2], old_b[2]) + outline_height(outline->radius, outline);
+    const Way way = way_between(drawing->a, drawing->b);
+    const Way old_way = way_between(place_of(path, old - 1), place_of(path, old));
+    const double old_floor = lesser(old_way.a[2], old_way.b[2]) + outline_height(outline->radius, outline);
     if (drawing->floor < old_floor - FEEL_MM)
         return true;
-    const double old_gap = nearest(old_a, old_b, x, y).distance - outline->radius;
-    const double new_gap = nearest(drawing->a, drawing->b, x, y).distance - drawing->radius;
+    const double old_gap = nearest(&old_way, x, y).distance - outline->radius;
+    const double new_gap = nearest(&way, x, y).distance - drawing->radius;
     return new_gap < old_gap - 0.5 * WALL_SLACK * drawing->grid->dx_mm;
 }
 
