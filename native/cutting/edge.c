@@ -98,6 +98,15 @@ static void write_share(double bottom, const Band *band, Bins bins, const double
     }
 }
 
+/* Leave out bins at both ends that are not engaged. */
+static Bins engaged(Bins bins, const double *share) {
+    while (bins.first < bins.after && share[bins.first] == 0.0)
+        bins.first++;
+    while (bins.first < bins.after && share[bins.after - 1] == 0.0)
+        bins.after--;
+    return bins;
+}
+
 /* Note the radius of a band, and the height of the material above the tip, where the band is engaged. */
 static void extend(double z, double radius, Bins bins, const double *restrict share,
                    const double *restrict lower_top, const double *restrict upper,
@@ -187,6 +196,9 @@ static void add_band(const Strip *strip, const Sample *sample, const Band *band,
     const Work *work = strip->work;
     const bool is_linear = strip->law[0] == LAW_LINEAR_EDGE;
     write_share(sample->bottom, band, bins, rows[LOWER], rows[UPPER], rows[SHARE]);
+    bins = engaged(bins, rows[SHARE]);
+    if (bins.first == bins.after)
+        return;
     extend(sample->z, band->r_high, bins, rows[SHARE], rows[LOWER_TOP], rows[UPPER], rows[UPPER_TOP],
            &CELL(work->reach, 0, 0), &CELL(work->reach, 1, 0));
     const Force part = is_linear ? integrated(strip, sample, band, bins, all, rows[SHARE])
