@@ -21,6 +21,8 @@ from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path, Samples
 from gcode2krl.tables import chord_directions
 
 NODES_PER_DIAMETER = 20.0
+_LONGEST_OF_LAG = 0.5
+"""Longest sweep, as a share of the distance by which the field lags: longer ones would lag farther."""
 _BINS = 16
 _FEWEST_BINS = 96
 _MOST_WALL_BINS = 960
@@ -81,7 +83,13 @@ def engage(
     tangents = _tangents(position, first) if direction is None else direction
     way_mm = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
     outlines, rapid = outlines_of(tools), np.ascontiguousarray(rapid, dtype=np.bool_)
-    path, corner = _path(position, way_mm, tool, rapid, first, outlines)
+    cell_mm = float(field.cell_mm.max())
+    cutters = _cutters(tools, cell_mm)
+    corner = np.empty(len(position), dtype=np.bool_)
+    is_short = outlines[:, -1] == OTHER
+    columns = (position, way_mm, first, rapid, tool)
+    mark_corners(*columns, _LONGEST_OF_LAG * cutters.lag_mm, is_short, corner)
+    path = Path(*(each[corner] for each in (position, way_mm, tool, rapid, first)), outlines)
     apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter
     samples = Samples(
         position[rows],
@@ -95,8 +103,6 @@ def engage(
     mark_nodes(
         samples, rapid[rows], apart_mm if np.isfinite(nodes_per_diameter) else apart_mm - 1.0, samples.node
     )
-    cell_mm = float(field.cell_mm.max())
-    cutters = _cutters(tools, cell_mm)
     widest_mm = float(max(outlines[:, 0].max(), cutters.above[:, ::2].max()))
     farthest_mm = float(apart_mm.max())
     # how far around itself a strip reads: around a sample, and around the nodes beside it
@@ -124,16 +130,6 @@ def engage(
     owner = np.searchsorted(rows, np.flatnonzero(corner)).clip(max=len(rows) - 1)
     np.maximum.at(result.overlap_mm[:, 0], owner, rapid_mm)
     return result
-
-
-def _path(
-    position_mm: Floats, way_mm: Floats, tool: Ints32, rapid: Bools, first: Bools, outlines: Floats
-) -> tuple[Path, Bools]:
-    """Return the path through the points (k) between which it is straight, and which of them these are."""
-    corner = np.empty(len(position_mm), dtype=np.bool_)
-    mark_corners(position_mm, first, rapid, tool, outlines[:, -1] == OTHER, corner)
-    columns = (each[corner] for each in (position_mm, way_mm, tool, rapid, first))
-    return Path(*columns, outlines), corner
 
 
 _Piece = tuple[Grid, int, int, int, Floats]

@@ -53,11 +53,13 @@ marks. A node stands where the tool has gone so far, where its way turns by 10°
 move changes; behind such a place every sample is one for a while.
 """
 
-mark_corners = core_function("cutting_mark_corners", FLOATS, BOOLS, BOOLS, INTS32, BOOLS, OUT_BOOLS)
+mark_corners = core_function(
+    "cutting_mark_corners", FLOATS, FLOATS, BOOLS, BOOLS, INTS32, FLOATS, BOOLS, OUT_BOOLS
+)
 """Mark the points (k,) between which a path is straight.
 
-Takes positions, `Path.first`, `Path.rapid`, `Path.tool`, whether a tool's sweeps along a slope have to be
-short (t,), and the marks.
+Takes `Path.position_mm`, ``way_mm``, ``first``, ``rapid`` and ``tool`` of all points, the longest sweep of a
+tool (t,) in mm, whether its sweeps along a slope have to be short (t,), and the marks.
 """
 
 cut_strip = core_function(

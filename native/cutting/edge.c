@@ -79,7 +79,7 @@ static void read_ring(const Strip *strip, const Sample *sample, double r, Bins b
     stand_above_cutter(strip->grid, sample, &ring);
     if (has_walls)
         correct_at_walls(strip->grid, strip->path, sample, &ring);
-    take_off_recent(strip->path, sample, &ring);
+    take_off_recent(sample, &ring);
 }
 
 /* Write the fraction of a band that is engaged: between its rings the thickness changes linearly. */
@@ -96,6 +96,15 @@ static void write_share(double bottom, const Band *band, Bins bins, const double
         part = low_in | high_in ? part : 0.0;
         share[j] = sound * (low_in & high_in ? 1.0 : part);
     }
+}
+
+/* Leave out bins at both ends that are not engaged. */
+static Bins engaged(Bins bins, const double *share) {
+    while (bins.first < bins.after && share[bins.first] == 0.0)
+        bins.first++;
+    while (bins.first < bins.after && share[bins.after - 1] == 0.0)
+        bins.after--;
+    return bins;
 }
 
 /* Note the radius of a band, and the height of the material above the tip, where the band is engaged. */
@@ -191,6 +200,9 @@ static void add_band(const Strip *strip, const Sample *sample, const Band *band,
     const Work *work = strip->work;
     const bool is_linear = strip->law[0] == LAW_LINEAR_EDGE;
     write_share(sample->bottom, band, bins, rows[LOWER], rows[UPPER], rows[SHARE]);
+    bins = engaged(bins, rows[SHARE]);
+    if (bins.first == bins.after)
+        return;
     extend(sample->z, band->r_high, bins, rows[SHARE], rows[LOWER_TOP], rows[UPPER], rows[UPPER_TOP],
            &CELL(work->reach, 0, 0), &CELL(work->reach, 1, 0));
     const Parts parts = is_linear ? integrated(strip, sample, band, bins, all, rows[SHARE])

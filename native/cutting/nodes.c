@@ -58,25 +58,33 @@ EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart
     }
 }
 
-/* Mark the points of a path between which it is straight; every point of a rapid, whose findings name it, and of a slope
-   that a cutter goes whose sweeps are exact only if they are short (a row of is_short a tool). */
-EXPORT void cutting_mark_corners(Floats position_mm, Bools first, Bools rapid, Ints32 tool, Bools is_short,
-                                 Bools corner) {
+/* Tell whether two directions differ, by more than the path may be off. */
+static bool bends(Vector onward, Vector leaving) {
+    const double sizes = dot(onward, onward) * dot(leaving, leaving);
+    return squared_cross(onward, leaving) > squared(STRAIGHT_SINE) * sizes || dot(onward, leaving) < 0.0;
+}
+
+/* Mark the points of a path between which it is straight and no longer than longest_mm (a row a tool); every point of a
+   rapid, whose findings name it, and of a slope that a cutter goes whose sweeps are exact only if they are short. */
+EXPORT void cutting_mark_corners(Floats position_mm, Floats way_mm, Bools first, Bools rapid, Ints32 tool,
+                                 Floats longest_mm, Bools is_short, Bools corner) {
     Vector onward = {0.0, 0.0, 0.0}; /* from the last corner to the point after it */
-    AT(corner, 0) = 1;
-    for (int64_t i = 1; i < corner.rows; i++) {
-        const bool is_last = i == corner.rows - 1 || AT(first, i + 1);
-        const Vector here = row_of(position_mm, i), arriving = from_to(row_of(position_mm, i - 1), here);
-        if (dot(onward, onward) == 0.0)
-            onward = arriving;
-        AT(corner, i) = AT(first, i) || is_last || AT(rapid, i) || AT(rapid, i + 1);
-        if (!AT(corner, i)) {
-            const Vector leaving = from_to(here, row_of(position_mm, i + 1));
-            const double sizes = dot(onward, onward) * dot(leaving, leaving);
-            AT(corner, i) = squared_cross(onward, leaving) > squared(STRAIGHT_SINE) * sizes ||
-                            dot(onward, leaving) < 0.0 || (onward.z != 0.0 && AT(is_short, AT(tool, i)));
+    double from_mm = 0.0;
+    for (int64_t i = 0; i < corner.rows; i++) {
+        const bool is_end = i == 0 || i == corner.rows - 1 || AT(first, i) || AT(first, i + 1);
+        bool is_corner = is_end || AT(rapid, i) || AT(rapid, i + 1);
+        if (!is_corner) {
+            const Vector here = row_of(position_mm, i), leaving = from_to(here, row_of(position_mm, i + 1));
+            const int64_t t = AT(tool, i);
+            if (dot(onward, onward) == 0.0)
+                onward = from_to(row_of(position_mm, i - 1), here);
+            is_corner = bends(onward, leaving) || AT(way_mm, i + 1) - from_mm > AT(longest_mm, t) ||
+                        (onward.z != 0.0 && AT(is_short, t));
         }
-        if (AT(corner, i))
+        AT(corner, i) = is_corner;
+        if (is_corner) {
             onward = (Vector){0.0, 0.0, 0.0};
+            from_mm = AT(way_mm, i);
+        }
     }
 }

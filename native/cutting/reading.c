@@ -67,12 +67,12 @@ static void list_recent(const Path *path, int64_t lag, int64_t met, Sample *samp
     const double dz = -sample->chip.sin_gamma;
     sample->recent_count = 0;
     for (int64_t start = lag; start < met; start += stride) {
-        const double *there = &CELL(path->position_mm, start, 0);
+        const double *there = place_of(path, start);
         const double ax = sample->x - there[0], ay = sample->y - there[1], az = sample->z - there[2];
         const double back = ax * dx + ay * dy + az * dz, aside = ax * dy - ay * dx;
         const double off = ax * ax + ay * ay + az * az - back * back;
         if (back < 0.0 || off > squared(LEVEL * back) + 1e-12 || fabs(aside) > STRAIGHT * back)
-            sample->recent[sample->recent_count++] = (Recent){start, least(start + stride, met)};
+            sample->recent[sample->recent_count++] = way_between(there, place_of(path, least(start + stride, met)));
     }
 }
 
@@ -254,6 +254,12 @@ static void follow(const Strip *strip, const Samples *samples, int64_t i, Range 
     remove_up_to(strip, lag, near, rapid_mm, progress);
 }
 
+/* Return the share of the way from one sample to another at which a third lies. */
+static double share_of_way(const Samples *samples, int64_t begin, int64_t i, int64_t end) {
+    const double from_mm = AT(samples->way_mm, begin), length_mm = AT(samples->way_mm, end) - from_mm;
+    return length_mm > 0.0 ? (AT(samples->way_mm, i) - from_mm) / length_mm : 0.0;
+}
+
 /* Read the samples after one node up to the next, `end`; those between the two are read only where the two are not
    alike. Rows are written for samples in the strip. Returns the reading at `end`. */
 static Node read_stretch(const Strip *strip, const Samples *samples, int64_t begin, int64_t end, const Node *before,
@@ -262,14 +268,12 @@ static Node read_stretch(const Strip *strip, const Samples *samples, int64_t beg
     Sample last = sample_at(strip, samples, end, is_own ? result : NULL);
     const Node after = read_node(strip, samples, end, lag, &last);
     const bool is_between = before != NULL && is_alike(strip, before, &after, AT(samples->f_z_mm, end));
-    const double length_mm = AT(samples->way_mm, end) - AT(samples->way_mm, begin);
     for (int64_t i = begin + 1; i < end; i++) {
         if (!is_in(own, &CELL(samples->position_mm, i, 0)))
             continue;
         Sample sample = sample_at(strip, samples, i, result);
         if (is_between) {
-            const double from_mm = AT(samples->way_mm, i) - AT(samples->way_mm, begin);
-            write_row(strip, samples, &sample, i, before, &after, length_mm > 0.0 ? from_mm / length_mm : 0.0, result);
+            write_row(strip, samples, &sample, i, before, &after, share_of_way(samples, begin, i, end), result);
         } else {
             const Node here = read_node(strip, samples, i, lag, &sample);
             write_row(strip, samples, &sample, i, &here, &here, 0.0, result);

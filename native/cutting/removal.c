@@ -2,6 +2,9 @@
 
 #include "cutting/removal.h"
 
+/* Room for rounding in a bound of the height below a sweep: ten times that of coordinates of a metre. */
+#define ROUNDING_MM 1e-3f
+
 enum { REFRESH = 48 }; /* visits after which the bound of a block is computed again */
 
 /* A sweep from (ax, ay, az): its direction and length in plan, its slope in plan and along the path. */
@@ -29,6 +32,7 @@ typedef struct {
 typedef struct {
     float z, slope, sink, length, square, towards;
     float bottom, corner, arc_radius, arc_top, steep;
+    float lowest; /* no point of the cutter gets below it */
 } Sweep32;
 
 typedef float Below(const Sweep32 *sweep, float along, float beside);
@@ -86,20 +90,67 @@ static inline float below_other(const Sweep32 *sweep, float along, float beside)
     return sweep->z + min32(min32(min32(min32(at_lowest, near), at_a), at_b), at_middle);
 }
 
-/* Lower the cells of a row, SW_LANES at once: without branches and with as many spare cells behind a row, so that
-   the compiler takes eight or sixteen together. Where a cell is lowered, older walls end. */
-static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 sweep, Below *below) {
+/* The same where all heights along the way are alike: on the level, as higher radii are not lower, or upright. */
+static inline float below_level(const Sweep32 *sweep, float along, float beside) {
+    const float square = beside * beside, reach = root32(sweep->square - square);
+    float a = along - reach, b = along + reach;
+    a = a > 0.0f ? a : 0.0f;
+    b = b < sweep->length ? b : sweep->length;
+    b = b > a ? b : a;
+    return sweep->z + height_at_way(sweep, along, square, clamp32(along, a, b));
+}
+
+/* Not above `below_other`: the nearest point of the way, as if it were at the lower end of the slope. */
+static inline float bound_other(const Sweep32 *sweep, float along, float beside) {
+    const float off = along - clamp32(along, 0.0f, sweep->length);
+    return sweep->lowest + height32(sweep, beside * beside + off * off);
+}
+
+/* Not above any: what no point of the cutter gets below. */
+static inline float bound_any(const Sweep32 *sweep, float along, float beside) {
+    (void)along;
+    (void)beside;
+    return sweep->lowest;
+}
+
+/* Write the height below a sweep over SW_LANES cells, the first of them `from` cells after the row's begin. */
+static inline void heights_below(const Row *row, const Sweep32 *sweep, Below *below, int32_t from, float *lows) {
     const float along = (float)row->along, along_step = (float)row->along_step;
     const float beside = (float)row->beside, beside_step = (float)row->beside_step;
+    for (int32_t lane = 0; lane < SW_LANES; lane++) {
+        const float at = (float)(from + lane);
+        lows[lane] = below(sweep, along + at * along_step, beside + at * beside_step);
+    }
+}
+
+static inline bool any_above(const float *heights, const float *lows) {
+    int32_t is_above = 0;
+    for (int32_t lane = 0; lane < SW_LANES; lane++)
+        is_above |= heights[lane] > lows[lane];
+    return is_above;
+}
+
+/* Lower the cells of a row, SW_LANES at once: without branches and with as many spare cells behind a row, so that
+   the compiler takes eight together. Where a cell is lowered, older walls end. Cells that are all below a bound of
+   the sweep are left out; most were cut by the sweep before. */
+static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 *sweep, Below *below, Below *bound) {
+    float lows[SW_LANES];
     for (int64_t j = row->cells.first; j < row->cells.after; j += SW_LANES) {
-        float *restrict height = &CELL(grid->height, row->i, j);
-        int32_t *restrict wall = &CELL(grid->wall, row->i, j);
+        float *height = &CELL(grid->height, row->i, j);
+        int32_t *wall = &CELL(grid->wall, row->i, j);
         (void)INSIDE(j + SW_LANES - 1, grid->height.columns);
         const int32_t from = (int32_t)(j - row->begin), left = (int32_t)least(row->cells.after - j, SW_LANES);
+        heights_below(row, sweep, bound_any, from, lows);
+        if (!any_above(height, lows))
+            continue;
+        if (bound != bound_any) {
+            heights_below(row, sweep, bound, from, lows);
+            if (!any_above(height, lows))
+                continue;
+        }
+        heights_below(row, sweep, below, from, lows);
         for (int32_t lane = 0; lane < SW_LANES; lane++) {
-            const float at = (float)(from + lane);
-            float low = below(&sweep, along + at * along_step, beside + at * beside_step);
-            low = lane < left ? low : INFINITY;
+            const float low = lane < left ? lows[lane] : INFINITY;
             wall[lane] = low < height[lane] ? -1 : wall[lane];
             height[lane] = low < height[lane] ? low : height[lane];
         }
@@ -147,6 +198,7 @@ static Sweep32 in_single(const Sweep *sweep) {
         .arc_radius = outline->steep > 0.0 ? (float)outline->arc_radius : INFINITY,
         .arc_top = (float)outline->arc_top,
         .steep = (float)outline->steep,
+        .lowest = (float)(sweep->az + lesser(sweep->slope * sweep->length, 0.0)) - ROUNDING_MM,
     };
 }
 
@@ -235,13 +287,15 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
 static void lower(const Grid *grid, const Row *row, const Sweep *sweep, const Sweep32 *single, double y) {
     const double kind = sweep->outline->kind;
     if (kind == SW_BALL)
-        lower_row(grid, row, *single, below_ball);
+        lower_row(grid, row, single, below_ball, bound_any);
     else if (kind == SW_FLAT && sweep->slope == 0.0)
         lower_flat(grid, row, sweep, y);
     else if (kind == SW_FLAT)
-        lower_row(grid, row, *single, below_ramp);
+        lower_row(grid, row, single, below_ramp, bound_any);
+    else if (sweep->slope == 0.0 && (sweep->outline->steep == 0.0 || sweep->length == 0.0))
+        lower_row(grid, row, single, below_level, bound_any);
     else
-        lower_row(grid, row, *single, below_other);
+        lower_row(grid, row, single, below_other, bound_other);
 }
 
 double remove_sweep(const Grid *grid, const Path *path, int64_t k) {

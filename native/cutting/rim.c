@@ -22,11 +22,8 @@ static double edge_between(const Strip *strip, const Sample *sample, const Ring 
         const double x = sample->x + rim->r * (rim->east[j - 1] + middle * (rim->east[j] - rim->east[j - 1]));
         const double y = sample->y + rim->r * (rim->north[j - 1] + middle * (rim->north[j] - rim->north[j - 1]));
         double height = height_at(strip->grid, strip->path, x, y);
-        for (int past = 0; past < sample->recent_count; past++) {
-            const Recent sweep = sample->recent[past];
-            height = lesser(height,
-                            sweep_height(strip->path, sweep.start, sweep.end, sample->outline, x, y, 0.0));
-        }
+        for (int past = 0; past < sample->recent_count; past++)
+            height = lesser(height, sweep_height(&sample->recent[past], sample->outline, x, y, 0.0));
         const double depth = depth_above(height, foot);
         if (fabs(depth - before) < fabs(depth - behind))
             low = middle;
@@ -51,7 +48,7 @@ static bool to_depths(const Ring *rim, double foot) {
 static void read_tops(const Strip *strip, const Sample *sample, const Ring *rim) {
     if (tops_on_ring(strip->grid, sample, rim))
         correct_at_walls(strip->grid, strip->path, sample, rim);
-    take_off_recent(strip->path, sample, rim);
+    take_off_recent(sample, rim);
 }
 
 /* Add the force over an arc of one depth above the band's foot. */

@@ -15,6 +15,6 @@ void stand_above_cutter(const Grid *grid, const Sample *sample, const Ring *ring
 void correct_at_walls(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring);
 
 /* Lower tops, and what is above the level, by the sweeps that the field does not show yet. */
-void take_off_recent(const Path *path, const Sample *sample, const Ring *ring);
+void take_off_recent(const Sample *sample, const Ring *ring);
 
 #endif

@@ -8,11 +8,6 @@
 
 enum { MOST_RECENT = 8 };
 
-/* First and last sample of sweeps that the field does not show yet. */
-typedef struct {
-    int64_t start, end;
-} Recent;
-
 typedef struct {
     double x, y, z;
     double top; /* no material is higher above the tip */
@@ -22,7 +17,7 @@ typedef struct {
     bool moves;
     int64_t tool;
     const Outline *outline;
-    Recent recent[MOST_RECENT];
+    Way recent[MOST_RECENT]; /* sweeps that the field does not show yet */
     int recent_count;
 } Sample;
 

@@ -25,6 +25,13 @@ typedef struct {
     double distance, share, z;
 } Nearest;
 
+/* The straight way of a sweep from a to b; of an upright one the nearest point is the lower end: its square in plan is
+   taken as infinite, so that the share is 0, and it dips. */
+typedef struct {
+    const double *a, *b;
+    double ux, uy, uz, square, dip;
+} Way;
+
 /* Cells in a row or column: the first and the one after the last. */
 typedef struct {
     int64_t first, after;
@@ -34,46 +41,49 @@ typedef struct {
     int64_t row, column;
 } Cell;
 
+static inline const double *place_of(const Path *path, int64_t k) { return &CELL(path->position_mm, k, 0); }
+
 static inline const Outline *outline_of(const Path *path, int64_t tool) {
     return (const Outline *)&CELL(path->outlines, tool, 0);
 }
 
 /* Return the height of the cutter's lower outline above the tip at radius r. */
 static inline double outline_height(double r, const Outline *outline) {
-    if (r < outline->arc_radius || outline->steep == 0.0) {
-        const double x = lesser(greater(r - outline->bottom, 0.0), outline->corner);
-        return outline->corner - sqrt(outline->corner * outline->corner - x * x);
-    }
-    return outline->arc_top + (r - outline->arc_radius) * outline->steep;
+    const double corner = outline->corner, x = lesser(greater(r - outline->bottom, 0.0), corner);
+    const double arc = corner - sqrt(corner * corner - x * x);
+    const double side = outline->arc_top + (r - outline->arc_radius) * outline->steep;
+    return (r < outline->arc_radius) | (outline->steep == 0.0) ? arc : side;
 }
 
-static inline Nearest nearest(const Path *path, int64_t first, int64_t last, double x, double y) {
-    const double *a = &CELL(path->position_mm, first, 0), *b = &CELL(path->position_mm, last, 0);
-    const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
-    const double square = ux * ux + uy * uy;
-    if (square < 1e-18)
-        return (Nearest){sqrt(squared(x - a[0]) + squared(y - a[1])), 0.0, a[2] + lesser(uz, 0.0)};
-    const double share = lesser(greater(((x - a[0]) * ux + (y - a[1]) * uy) / square, 0.0), 1.0);
-    const double distance = sqrt(squared(x - a[0] - share * ux) + squared(y - a[1] - share * uy));
-    return (Nearest){distance, share, a[2] + share * uz};
+static inline Way way_between(const double *a, const double *b) {
+    const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], square = ux * ux + uy * uy;
+    const bool is_upright = square < 1e-18;
+    return (Way){a, b, ux, uy, uz, is_upright ? INFINITY : square, is_upright ? lesser(uz, 0.0) : 0.0};
 }
 
-/* Return how deep the sweep between two samples cuts at a point, inf beside it. */
-static inline double sweep_height(const Path *path, int64_t first, int64_t last, const Outline *outline,
-                                  double x, double y, double slack) {
-    const double radius = outline->radius;
-    const Nearest point = nearest(path, first, last, x, y);
-    if (point.distance >= radius + slack)
-        return INFINITY;
-    double lowest = point.z + outline_height(lesser(point.distance, radius), outline);
-    const int64_t ends[2] = {first, last};
-    for (int side = 0; side < 2; side++) { /* on a slope the nearest point in plan is not always the lowest */
-        const double *end = &CELL(path->position_mm, ends[side], 0);
-        const double r = sqrt(squared(x - end[0]) + squared(y - end[1]));
-        if (r < radius + slack)
-            lowest = lesser(lowest, end[2] + outline_height(lesser(r, radius), outline));
-    }
-    return lowest;
+static inline Nearest nearest(const Way *way, double x, double y) {
+    const double u = x - way->a[0], v = y - way->a[1];
+    const double share = lesser(greater((u * way->ux + v * way->uy) / way->square, 0.0), 1.0);
+    const double distance = sqrt(squared(u - share * way->ux) + squared(v - share * way->uy));
+    return (Nearest){distance, share, way->a[2] + (share * way->uz + way->dip)};
+}
+
+/* Return how deep the cutter at a place cuts at a point, inf beside it. */
+static inline double height_from(const double *place, const Outline *outline, double x, double y, double slack) {
+    const double r = sqrt(squared(x - place[0]) + squared(y - place[1]));
+    const double height = place[2] + outline_height(lesser(r, outline->radius), outline);
+    return r < outline->radius + slack ? height : INFINITY;
+}
+
+/* Return how deep a sweep cuts at a point, inf beside it. Without branches: the compiler takes several points at
+   once. */
+static inline double sweep_height(const Way *way, const Outline *outline, double x, double y, double slack) {
+    const Nearest point = nearest(way, x, y);
+    double lowest = point.z + outline_height(lesser(point.distance, outline->radius), outline);
+    /* on a slope the nearest point in plan is not always the lowest */
+    lowest = lesser(lowest, height_from(way->a, outline, x, y, slack));
+    lowest = lesser(lowest, height_from(way->b, outline, x, y, slack));
+    return point.distance >= outline->radius + slack ? INFINITY : lowest;
 }
 
 static inline bool is_inside(const Grid *grid, Cell cell) {

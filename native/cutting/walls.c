@@ -27,18 +27,18 @@ double height_at(const Grid *grid, const Path *path, double x, double y) {
 
 double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell, double x, double y) {
     const double here = CELL(grid->height, cell.row, cell.column);
+    const Way way = way_between(place_of(path, sweep - 1), place_of(path, sweep));
     const Outline *outline = outline_of(path, AT(path->tool, sweep));
-    const double cut = sweep_height(path, sweep - 1, sweep, outline, x, y, WALL_SLACK * grid->dx_mm);
+    const double cut = sweep_height(&way, outline, x, y, WALL_SLACK * grid->dx_mm);
     if (cut < INFINITY)
         return lesser(here, cut);
     const double middle_x = grid->x_mm + ((double)(cell.column + grid->column) + 0.5) * grid->dx_mm;
     const double middle_y = grid->y_mm + ((double)(cell.row + grid->row) + 0.5) * grid->dy_mm;
-    if (nearest(path, sweep - 1, sweep, middle_x, middle_y).distance >= outline->radius)
+    if (nearest(&way, middle_x, middle_y).distance >= outline->radius)
         return here;
     /* the cell's height is that of the cut side */
-    const double *a = &CELL(path->position_mm, sweep - 1, 0), *b = &CELL(path->position_mm, sweep, 0);
-    const Nearest foot = nearest(path, sweep - 1, sweep, x, y);
-    const double foot_x = a[0] + foot.share * (b[0] - a[0]), foot_y = a[1] + foot.share * (b[1] - a[1]);
+    const Nearest foot = nearest(&way, x, y);
+    const double foot_x = way.a[0] + foot.share * way.ux, foot_y = way.a[1] + foot.share * way.uy;
     const double away_x = (x - foot_x) / foot.distance * grid->dx_mm;
     const double away_y = (y - foot_y) / foot.distance * grid->dy_mm;
     const Cell away = cell_at(grid, x + away_x, y + away_y);
@@ -49,12 +49,13 @@ double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell,
 static bool is_deeper(const Drawing *drawing, int64_t old, double x, double y) {
     const Path *path = drawing->path;
     const Outline *outline = outline_of(path, AT(path->tool, old));
-    const double old_z = lesser(CELL(path->position_mm, old - 1, 2), CELL(path->position_mm, old, 2));
-    const double old_floor = old_z + outline_height(outline->radius, outline);
+    const Way way = way_between(drawing->a, drawing->b);
+    const Way old_way = way_between(place_of(path, old - 1), place_of(path, old));
+    const double old_floor = lesser(old_way.a[2], old_way.b[2]) + outline_height(outline->radius, outline);
     if (drawing->floor < old_floor - FEEL_MM)
         return true;
-    const double old_gap = nearest(path, old - 1, old, x, y).distance - outline->radius;
-    const double new_gap = nearest(path, drawing->k - 1, drawing->k, x, y).distance - drawing->radius;
+    const double old_gap = nearest(&old_way, x, y).distance - outline->radius;
+    const double new_gap = nearest(&way, x, y).distance - drawing->radius;
     return new_gap < old_gap - 0.5 * WALL_SLACK * drawing->grid->dx_mm;
 }
 
@@ -148,7 +149,7 @@ static void draw_end(const Drawing *drawing, const double *next) {
 
 void draw_walls(const Grid *grid, const Path *path, int64_t k) {
     const Outline *outline = outline_of(path, AT(path->tool, k));
-    const double *a = &CELL(path->position_mm, k - 1, 0), *b = &CELL(path->position_mm, k, 0);
+    const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const double radius = outline->radius, floor_mm = lesser(a[2], b[2]) + outline_height(radius, outline);
     const double top = highest(grid, lesser(a[0], b[0]) - radius, greater(a[0], b[0]) + radius,
                                lesser(a[1], b[1]) - radius, greater(a[1], b[1]) + radius);
@@ -166,5 +167,5 @@ void draw_walls(const Grid *grid, const Path *path, int64_t k) {
         }
     }
     const bool has_next = k + 1 < path->position_mm.rows && !AT(path->first, k + 1);
-    draw_end(&drawing, has_next ? &CELL(path->position_mm, k + 1, 0) : b);
+    draw_end(&drawing, has_next ? place_of(path, k + 1) : b);
 }
