@@ -18,19 +18,23 @@ from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
-from gcode2krl.gcode.reporting import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
-from gcode2krl.gcode.rows import ROW
+from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.state import (
+    DOUBT_OF_G,
+    DOUBT_OF_GROUP,
+    DOUBT_OF_LETTER,
     EVENT_COOLANT,
     EVENT_M,
     EVENT_SPINDLE,
     EVENT_TOOL,
+    GROUP_OF_G,
     IMPLIED_M5,
     WORK_OFFSETS,
     initial_state,
 )
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
-from gcode2krl.gcode.words import LINE_LIMIT, Words, scan
+from gcode2krl.gcode.vocabulary import LINE_LIMIT
+from gcode2krl.gcode.words import Words, scan
 from gcode2krl.tables import Event, Toolpath
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
@@ -40,8 +44,8 @@ CHORD_TOLERANCE_MM = 0.01
 _PIECE_BYTES = 1_000_000
 _ROOM = 1.25
 """Room for rows is made for the estimated lines of the file, from its first piece, times this."""
-_BUFFER_ROWS = 8192
-"""Rows between the interpreter and the table: they stay in the processor's cache."""
+_FIRST_ROWS, _FIRST_EVENTS = 8192, 256
+"""Room at first; more is made when it is wanted."""
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
@@ -124,9 +128,16 @@ def read_stream(
     )
     offsets, offset_known = _work_offsets(cell)
     from_table = cell is not None and cell.program.tool_length == "from_table"
-    options = np.array([chord_tolerance_mm, float(block_delete), float(from_table)])
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
-    interpreter = _Interpreter(name, options, offsets, offset_known, lengths)
+    interpreter = _Interpreter(
+        name,
+        offsets_mm=offsets,
+        offset_known=offset_known,
+        tool_length_mm=lengths,
+        chord_tolerance_mm=chord_tolerance_mm,
+        block_delete=block_delete,
+        lengths_from_table=from_table,
+    )
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
@@ -247,79 +258,62 @@ def _reject_lone_returns(block: bytes, name: str) -> None:
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(
-        self,
-        name: str,
-        options: Floats,
-        offsets: Floats,
-        offset_known: Bools,
-        tool_length: Floats,
-    ) -> None:
+    def __init__(self, name: str, **settings: Any) -> None:
         self.name = name
-        self.state = initial_state()
-        self.counts = np.zeros(COUNTS, dtype=np.int64)
-        self.rows = np.zeros(_BUFFER_ROWS, dtype=ROW)
-        self.events = np.zeros(256, dtype=EVENT)
-        self.columns = Columns()
+        self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
+        self.columns = Columns(_FIRST_ROWS)
+        self.counts["rows"] = 1  # the start point
+        self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
+        self.machine = machine.Machine(
+            state=self.state,
+            counts=self.counts,
+            rows=self.columns.views(),
+            events=self.events,
+            found=self.found,
+            group_of_g=GROUP_OF_G,
+            doubt_of_g=DOUBT_OF_G,
+            doubt_of_group=DOUBT_OF_GROUP,
+            doubt_of_letter=DOUBT_OF_LETTER,
+            **settings,
+        )
         self.texts: dict[int, bytes] = {}
-        self.options = options
-        self.offsets, self.offset_known, self.tool_length = offsets, offset_known, tool_length
         self.messages: list[str] = []
         self.most_decimals = 0
         self.rest_line = 0
-        self._start_row()
 
     @property
     def ended(self) -> bool:
         return bool(self.state["ended"][0])
 
-    def _start_row(self) -> None:
-        row = self.rows[0]
-        row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
-        row["offset_tool"] = -1
-        row["rapid"], row["line"] = 1, 0
-        self.counts[ROWS] = 1
+    def _count(self, what: str) -> int:
+        return int(self.counts[what][0])
 
     def feed(self, words: Words, text: NDArray[np.uint8], first_line: int, size: int) -> None:
         """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
-        found_before = int(self.counts[FINDINGS])
-        self._execute(words, text, size)
+        found_before = self._count("findings")
+        if self._count("rows") == 1 and len(words.line):
+            lines = int(words.line[-1] - words.line[0]) + 1
+            self._reserve(int(_ROOM * lines * max(1.0, size / len(text))))
+        self._execute(words, text)
         self._remember_lines(text, first_line, found_before)
 
-    def _execute(self, words: Words, text: NDArray[np.uint8], size: int) -> None:
-        columns = (words.letter, words.value, words.extra, words.line)
-        self.counts[MARKS] = 0
+    def _execute(self, words: Words, text: NDArray[np.uint8]) -> None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         first_message = len(self.messages)
         words.value[words.letter == PAREN_OPEN] += first_message
         self.messages += [_decode(text[a:b]) for a, b in words.message_span]
-        if not self.columns.count and len(words.line):
-            lines = int(words.line[-1] - words.line[0]) + 1
-            self.columns.reserve(int(_ROOM * lines * max(1.0, size / len(text))))
+        self.counts["marks"] = 0
         at = 0
         while True:
-            before = at
-            at = machine.run(
-                columns,
-                at,
-                self.state,
-                self.rows,
-                self.counts,
-                self.events,
-                self.found,
-                self.options,
-                self.offsets,
-                self.offset_known,
-                self.tool_length,
-            )
+            at = machine.run(self.machine, words.letter, words.value, words.extra, words.line, at)
             if at >= len(words.letter) or self.ended:
                 return
-            self._make_room(stuck=at == before)
+            self._make_room()
 
     def _remember_lines(self, text: NDArray[np.uint8], first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
-        new = self.found[found_before : self.counts[FINDINGS]]
+        new = self.found[found_before : self._count("findings")]
         wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
         if not wanted:
             return
@@ -330,16 +324,17 @@ class _Interpreter:
             if row < len(ends):
                 self.texts[number] = text[starts[row] : ends[row]].tobytes()
 
-    def _make_room(self, *, stuck: bool) -> None:
-        """Hand all rows but the last, which may still change, to the table; grow what is too small."""
-        done = int(self.counts[ROWS]) - 1
-        if stuck and done == 0:  # an arc that is longer than the buffer
-            self.rows = _grown(self.rows)
-        self.columns.append(self.rows[:done])
-        self.rows[0] = self.rows[done]
-        self.counts[ROWS], self.counts[ROWS_BEFORE] = 1, self.counts[ROWS_BEFORE] + done
-        if self.counts[EVENTS] + machine.EVENTS_PER_BLOCK > len(self.events):
-            self.events = _grown(self.events)
+    def _make_room(self) -> None:
+        """Make the room that the next block wants."""
+        self._reserve(self._count("rows_wanted"))
+        if self._count("events_wanted") > len(self.events):
+            larger = np.zeros(2 * self._count("events_wanted"), dtype=EVENT)
+            larger[: len(self.events)] = self.events
+            self.events = self.machine.events = larger
+
+    def _reserve(self, rows: int) -> None:
+        self.columns.reserve(rows, self._count("rows"))
+        self.machine.rows = self.columns.views()
 
     def check_rest(self, text: NDArray[np.uint8], first_line: int) -> bool:
         """Remember the first line of code behind the program's end, so that it is reported; tell if any."""
@@ -353,7 +348,7 @@ class _Interpreter:
 
     def finish(self, head: bytes) -> Toolpath:
         """Raise the errors that were found, or return the table."""
-        found = found_issues(self.found, self.counts, self.state[0], self.texts)
+        found = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
         whole = program_issues(
@@ -366,10 +361,10 @@ class _Interpreter:
         return self._toolpath((*found, *whole))
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
-        self.columns.append(self.rows[: self.counts[ROWS]])
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (self.columns.count, 3))
+        rows = self._count("rows")
+        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
         return Toolpath(
-            **self.columns.finished(),
+            **self.columns.finished(rows),
             axis=axis,
             events=(*self._events(), *self._stopped_by_end()),
             issues=issues,
@@ -378,7 +373,7 @@ class _Interpreter:
 
     def _stopped_by_end(self) -> Iterator[Event]:
         """The program's end stops spindle and coolant (RS274/NGC, M2 and M30)."""
-        state, row = self.state[0], self.columns.count - 1
+        state, row = self.state[0], self._count("rows") - 1
         line = int(state["end_line"])
         if state["direction"]:
             yield Event(row, "spindle", {"rpm": 0.0, "m": v.M5, "line": line, "implied": True})
@@ -394,7 +389,7 @@ class _Interpreter:
             yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
 
     def _plain_events(self) -> Iterator[Event]:
-        for event in self.events[: self.counts[EVENTS]]:
+        for event in self.events[: self._count("events")]:
             row, kind, a, b, line = (
                 int(event["row"]),
                 int(event["kind"]),
@@ -418,12 +413,6 @@ class _Interpreter:
                 yield Event(row, "message", values if np.isnan(b) else {**values, "p": b})
             else:
                 yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
-
-
-def _grown(array: NDArray[np.void]) -> NDArray[np.void]:
-    larger = np.zeros(2 * len(array), dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
 
 
 def _decode(span: NDArray[np.uint8]) -> str:
