@@ -37,7 +37,10 @@ FLAGS = (
     *("-fno-sanitize=undefined", "-fvisibility=hidden", "-Wall", "-Wextra"),
     "-Werror=implicit-function-declaration",
 )
-CHECKING = ("-DCHECKED", "-g", "-O1")
+CHECKING = (
+    *("-DCHECKED", "-g", "-O1", "-fsanitize=undefined,float-cast-overflow"),
+    "-fsanitize-undefined-trap-on-error",  # no library of its own, for Python to load
+)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,23 @@
 
 #include "core.h"
 
+/* gcode2krl.units */
+#define U_MM_PER_INCH 25.4
+#define U_MM_PER_M 1000.0
+#define U_S_PER_MIN 60.0
+#define U_S_PER_H 3600.0
+#define U_MS_PER_S 1000.0
+#define U_US_PER_S 1000000.0
+#define U_UM_PER_MM 1000.0
+#define U_NMM_PER_NM 1000.0
+#define U_N_PER_KN 1000.0
+#define U_RAD_PER_MRAD 0.001
+#define U_RAD_PER_DEG 0.017453292519943295
+#define U_DEG_PER_RAD 57.29577951308232
+#define U_RAD_PER_REV 6.283185307179586
+#define U_BYTES_PER_MB 1000000
+#define U_GRAVITY_M_S2 9.80665
+
 /* gcode2krl.ascii_codes */
 #define CH_TAB 9
 #define CH_NEWLINE 10
@@ -92,6 +109,7 @@
 #define W_EXT_BAS "EXT BAS (BAS_COMMAND :IN,REAL :IN )"
 #define W_RSI_FAST "#IPO_FAST"
 #define W_RSI_SLOW "#IPO"
+#define W_RSI_SLOW_CYCLE_S 0.012
 #define W_VEL_CP "$VEL.CP"
 #define W_APO_CDIS "$APO.CDIS"
 #define W_BASE "$BASE"
@@ -133,7 +151,12 @@
 #define W_CALLS 2
 
 /* gcode2krl.gcode.vocabulary */
+#define V_CASE_BIT 32
+#define V_EXCLAMATION 33
 #define V_LETTER_A 65
+#define V_LINE_LIMIT 4096
+#define V_MARK 33
+#define V_UNREAD_NUMBER 32
 #define V_LETTERS 26
 #define V_WORD_E 4
 #define V_WORD_F 5
@@ -149,6 +172,7 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
 #define V_TENFOLD 10
 #define V_LARGEST_G 999
 #define V_LARGEST_M 9999
@@ -238,6 +262,7 @@
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
 #define F_LETTER_A 65
+#define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
 #define F_NO_NUMBER 2
@@ -289,6 +314,7 @@
 #define F_DWELL_WITH_ARC 48
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
+#define F_ARC_TOO_LONG 51
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -331,8 +357,12 @@
 #define RD_ARCS 3
 
 /* gcode2krl.cutting.law */
+#define LAW_MM_PER_M 1000.0
+#define LAW_RAD_PER_REV 6.283185307179586
 #define LAW_LINEAR_EDGE 0
 #define LAW_KIENZLE 1
+#define LAW_THIN_CHIP_MM 0.005
+#define LAW_THICK_CHIP_MM 0.2
 
 typedef struct {
     double x;
@@ -437,6 +467,58 @@ typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 3
 typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
 typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+
+typedef struct {
+    int64_t rows;
+    int64_t events;
+    int64_t findings;
+    int64_t marks;
+    int64_t dropped;
+    int64_t consequences;
+    int64_t mute;
+    int64_t rows_wanted;
+    int64_t events_wanted;
+} Counts;
+typedef char Counts_rows_stands_at_0[offsetof(Counts, rows) == 0 ? 1 : -1];
+typedef char Counts_events_stands_at_8[offsetof(Counts, events) == 8 ? 1 : -1];
+typedef char Counts_findings_stands_at_16[offsetof(Counts, findings) == 16 ? 1 : -1];
+typedef char Counts_marks_stands_at_24[offsetof(Counts, marks) == 24 ? 1 : -1];
+typedef char Counts_dropped_stands_at_32[offsetof(Counts, dropped) == 32 ? 1 : -1];
+typedef char Counts_consequences_stands_at_40[offsetof(Counts, consequences) == 40 ? 1 : -1];
+typedef char Counts_mute_stands_at_48[offsetof(Counts, mute) == 48 ? 1 : -1];
+typedef char Counts_rows_wanted_stands_at_56[offsetof(Counts, rows_wanted) == 56 ? 1 : -1];
+typedef char Counts_events_wanted_stands_at_64[offsetof(Counts, events_wanted) == 64 ? 1 : -1];
+typedef char Counts_has_its_size[sizeof(Counts) == 72 ? 1 : -1];
+
+typedef struct {
+    int64_t row;
+    int32_t kind;
+    int32_t line;
+    double a;
+    double b;
+    double dwell;
+} Event;
+typedef char Event_row_stands_at_0[offsetof(Event, row) == 0 ? 1 : -1];
+typedef char Event_kind_stands_at_8[offsetof(Event, kind) == 8 ? 1 : -1];
+typedef char Event_line_stands_at_12[offsetof(Event, line) == 12 ? 1 : -1];
+typedef char Event_a_stands_at_16[offsetof(Event, a) == 16 ? 1 : -1];
+typedef char Event_b_stands_at_24[offsetof(Event, b) == 24 ? 1 : -1];
+typedef char Event_dwell_stands_at_32[offsetof(Event, dwell) == 32 ? 1 : -1];
+typedef char Event_has_its_size[sizeof(Event) == 40 ? 1 : -1];
+
+typedef struct {
+    int32_t number;
+    int32_t line;
+    double a;
+    double b;
+    double c;
+} Found;
+typedef char Found_number_stands_at_0[offsetof(Found, number) == 0 ? 1 : -1];
+typedef char Found_line_stands_at_4[offsetof(Found, line) == 4 ? 1 : -1];
+typedef char Found_a_stands_at_8[offsetof(Found, a) == 8 ? 1 : -1];
+typedef char Found_b_stands_at_16[offsetof(Found, b) == 16 ? 1 : -1];
+typedef char Found_c_stands_at_24[offsetof(Found, c) == 24 ? 1 : -1];
+typedef char Found_has_its_size[sizeof(Found) == 32 ? 1 : -1];
 
 typedef struct {
     double bottom_mm;

@@ -4,10 +4,12 @@ Run after a change of one of these modules; a test compares the file with what t
 
     python native/constants.py
 
-A whole number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a record of
-numpy a C struct with the same fields in the same places, and a `StructOf` the C struct that the core gets.
+A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of whole
+numbers what an array begins with, a record of numpy a C struct with the same fields in the same places, and a
+`StructOf` the C struct that the core gets.
 """
 
+import math
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +21,7 @@ from gcode2krl.compiled import core
 
 HEADER = Path(__file__).resolve().parent / "constants.h"
 MODULES = {
+    "U": "gcode2krl.units",
     "CH": "gcode2krl.ascii_codes",
     "W": "gcode2krl.krl_words",
     "V": "gcode2krl.gcode.vocabulary",
@@ -28,8 +31,13 @@ MODULES = {
     "RD": "gcode2krl.cutting.reading",
     "LAW": "gcode2krl.cutting.law",
 }
-"""Prefix -> module whose whole numbers and words the core uses."""
-RECORDS = {"State": ("gcode2krl.gcode.state", "STATE")}
+"""Prefix -> module whose numbers and words the core uses."""
+RECORDS = {
+    "State": ("gcode2krl.gcode.state", "STATE"),
+    "Counts": ("gcode2krl.gcode.reporting", "COUNTS"),
+    "Event": ("gcode2krl.gcode.reporting", "EVENT"),
+    "Found": ("gcode2krl.gcode.reporting", "FOUND"),
+}
 """Name of the struct -> module and numpy record."""
 ARGUMENTS = {
     "Shape": ("gcode2krl.cutting.cutter", "SHAPE"),
@@ -77,14 +85,20 @@ def header() -> str:
 def _constants(prefix: str, module: ModuleType) -> Iterator[str]:
     yield f"/* {module.__name__} */"
     for name, value in vars(module).items():
-        if name.isupper() and not name.startswith("_"):
-            if type(value) is int:
-                yield (
-                    f"#define {prefix}_{name} {value}" if value >= 0 else f"#define {prefix}_{name} ({value})"
-                )
-            elif type(value) is str and value.isascii() and value.isprintable():
-                text = value.replace("\\", "\\\\").replace('"', '\\"')
-                yield f'#define {prefix}_{name} "{text}"'
+        if name.isupper() and not name.startswith("_") and (text := _literal(value)):
+            yield f"#define {prefix}_{name} {text}"
+
+
+def _literal(value: object) -> str:
+    """Return a constant as C writes it, empty for what is none."""
+    if type(value) in (int, float) and math.isfinite(value):
+        return f"{value!r}" if value >= 0 else f"({value!r})"
+    if type(value) is str and value.isascii() and value.isprintable():
+        text = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{text}"'
+    if type(value) is tuple and value and all(type(each) is int for each in value):
+        return f"{{{', '.join(map(str, value))}}}"
+    return ""
 
 
 def _struct(name: str, record: np.dtype) -> Iterator[str]:
@@ -111,5 +125,5 @@ def _argument(name: str, argument: core.StructOf) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    core.core_function = lambda *_, **__: None  # what the modules declare is perhaps not built yet
+    core.core_function = lambda *_, **__: None  # what is asked here comes before the core that has it
     HEADER.write_text(header(), encoding="ascii", newline="\n")

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -85,6 +85,32 @@ class StructOf:
         return ctypes.byref(
             self.struct(*(kind.from_param(it) if isinstance(kind, ArrayOf) else it for kind, it in values))
         )
+
+
+class Struct(ctypes.Structure):
+    """A struct of views and numbers; assigned by name, its arrays are checked and kept alive."""
+
+    declared: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, **values: Any) -> None:
+        """Take the values of some fields; the others are 0."""
+        super().__init__()
+        for name, value in values.items():
+            setattr(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        kind = self.declared[name]
+        self.__dict__[f"_{name}"] = value  # what a view shows has to live as long as the view
+        super().__setattr__(name, kind.from_param(value) if isinstance(kind, ArrayOf) else value)
+
+
+def core_struct(name: str, **fields: Any) -> type[Struct]:
+    """Return a struct of the core, declared by the types of its fields; it is passed by `pointer_to`."""
+    parts = [(field, View if isinstance(kind, ArrayOf) else kind) for field, kind in fields.items()]
+    return type(name, (Struct,), {"_fields_": parts, "declared": fields})
+
+
+pointer_to = ctypes.POINTER
 
 
 def core_function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:

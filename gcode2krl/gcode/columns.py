@@ -1,63 +1,70 @@
-"""The interpreter's rows as the columns of a Toolpath, a buffer at a time."""
+"""The columns of a Toolpath, into which the interpreter writes its rows."""
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-_COLUMNS: dict[str, tuple[str, DTypeLike]] = {
-    "rapid": ("rapid", np.bool_),
-    "feed_mm_s": ("feed", np.float64),
-    "spindle_rad_s": ("spindle", np.float64),
-    "tool": ("tool", np.int32),
-    "exact_stop": ("exact_stop", np.bool_),
-    "tolerance_mm": ("tolerance", np.float64),
-    "dwell_s": ("dwell", np.float64),
-    "source_line": ("line", np.int32),
-    "arc": ("arc", np.int32),
-    "machine": ("machine", np.bool_),
-    "length_offset_mm": ("length_offset", np.float64),
-    "length_offset_tool": ("offset_tool", np.int32),
+from gcode2krl.compiled.core import OUT_BOOLS, OUT_FLOATS, OUT_INTS32, core_struct
+
+_COLUMNS = {
+    "position_mm": OUT_FLOATS,
+    "rapid": OUT_BOOLS,
+    "feed_mm_s": OUT_FLOATS,
+    "spindle_rad_s": OUT_FLOATS,
+    "tool": OUT_INTS32,
+    "exact_stop": OUT_BOOLS,
+    "tolerance_mm": OUT_FLOATS,
+    "dwell_s": OUT_FLOATS,
+    "source_line": OUT_INTS32,
+    "arc": OUT_INTS32,
+    "machine": OUT_BOOLS,
+    "known": OUT_BOOLS,
+    "length_offset_mm": OUT_FLOATS,
+    "length_offset_tool": OUT_INTS32,
 }
-"""Column of the Toolpath: field of the row, type."""
-_TRIPLES: dict[str, tuple[tuple[str, str, str], DTypeLike]] = {
-    "position_mm": (("x", "y", "z"), np.float64),
-    "known": (("known_x", "known_y", "known_z"), np.bool_),
+"""Column of the Toolpath: its type."""
+_WIDTH = {"position_mm": 3, "known": 3}
+_START = {
+    "rapid": True,
+    "feed_mm_s": np.inf,
+    "tolerance_mm": np.nan,
+    "arc": -1,
+    "length_offset_mm": np.nan,
+    "length_offset_tool": -1,
 }
+"""What is not 0 in the row of the start point, from which nothing has moved."""
+Rows = core_struct("Rows", **_COLUMNS)
 
 
 class Columns:
-    """Columns that grow; pages that no row has reached yet cost nothing."""
+    """Columns with room for more rows; pages that no row has reached yet cost nothing."""
 
-    def __init__(self) -> None:
-        self.count = 0
-        self._room = 0
-        self._arrays: dict[str, NDArray[Any]] = {
-            **{name: np.empty(0, dtype) for name, (_, dtype) in _COLUMNS.items()},
-            **{name: np.empty((0, 3), dtype) for name, (_, dtype) in _TRIPLES.items()},
-        }
+    def __init__(self, room: int) -> None:
+        self._arrays = {name: self._empty(name, room) for name in _COLUMNS}
+        self.room = room
+        for name, array in self._arrays.items():
+            array[0] = _START.get(name, 0)
 
-    def reserve(self, rows: int) -> None:
-        """Make room for so many rows in all."""
-        if rows <= self._room:
+    @staticmethod
+    def _empty(name: str, room: int) -> NDArray[Any]:
+        tail = (_WIDTH[name],) if name in _WIDTH else ()
+        return np.empty((room, *tail), _COLUMNS[name].dtype)
+
+    def reserve(self, rows: int, used: int) -> None:
+        """Make room for so many rows in all; the first ``used`` are kept."""
+        if rows <= self.room:
             return
-        self._room = max(rows, self._room * 3 // 2)
+        self.room = max(rows, self.room * 3 // 2)
         for name, old in self._arrays.items():
-            larger = np.empty((self._room, *old.shape[1:]), old.dtype)
-            larger[: self.count] = old[: self.count]
+            larger = self._empty(name, self.room)
+            larger[:used] = old[:used]
             self._arrays[name] = larger
 
-    def append(self, rows: NDArray[np.void]) -> None:
-        """Take over rows of the interpreter (`machine.ROW`)."""
-        self.reserve(self.count + len(rows))
-        own = slice(self.count, self.count + len(rows))
-        for name, (field, _) in _COLUMNS.items():
-            self._arrays[name][own] = rows[field]
-        for name, (fields, _) in _TRIPLES.items():
-            for axis, field in enumerate(fields):
-                self._arrays[name][own, axis] = rows[field]
-        self.count += len(rows)
+    def views(self) -> Any:
+        """Return what the core writes to, until more room is made."""
+        return Rows(**self._arrays)
 
-    def finished(self) -> dict[str, NDArray[Any]]:
-        """Return the columns by their names in the Toolpath."""
-        return {name: array[: self.count] for name, array in self._arrays.items()}
+    def finished(self, count: int) -> dict[str, NDArray[Any]]:
+        """Return the first ``count`` rows of the columns by their names in the Toolpath."""
+        return {name: array[:count] for name, array in self._arrays.items()}

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.arrays import Ints
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
-from gcode2krl.gcode.reporting import CONSEQUENCES, DROPPED, FINDINGS
 from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
@@ -52,13 +50,13 @@ def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
 
 
 def found_issues(
-    found: NDArray[np.void], counts: Ints, state: Record, texts: Mapping[int, bytes]
+    found: NDArray[np.void], counts: Record, state: Record, texts: Mapping[int, bytes]
 ) -> list[Issue]:
     """Return the findings in the order of the file, then how many more there are.
 
     ``texts`` are the blocks by line, for quoting them.
     """
-    rows = found[: counts[FINDINGS]]
+    rows = found[: counts["findings"]]
     issues = [_issue(row, texts) for row in rows]
     misfits = [k for k, row in enumerate(rows) if row["number"] == f.ARC_RADIUS_MISMATCH]
     if misfits:
@@ -67,10 +65,11 @@ def found_issues(
         )
     issues = [issue for k, issue in enumerate(issues) if k not in misfits[1:]]
     severity: Severity = "error" if any(issue.severity == "error" for issue in issues) else "warning"
-    if counts[DROPPED]:
-        issues.append(Issue(severity, "more", 0, f"{int(counts[DROPPED])} more findings", "mend these first"))
-    if counts[CONSEQUENCES]:
-        count = int(counts[CONSEQUENCES])
+    if counts["dropped"]:
+        dropped = int(counts["dropped"])
+        issues.append(Issue(severity, "more", 0, f"{dropped} more findings", "mend these first"))
+    if counts["consequences"]:
+        count = int(counts["consequences"])
         rest = "1 more finding rests" if count == 1 else f"{count} more findings rest"
         sentence = f"{rest} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
         issues.append(Issue("note", "consequences", 0, sentence, "mend the errors, then read again"))

@@ -1,14 +1,15 @@
 """``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
@@ -18,19 +19,23 @@ from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
-from gcode2krl.gcode.reporting import COUNTS, EVENT, EVENTS, FINDINGS, FOUND, MARKS, ROWS, ROWS_BEFORE
-from gcode2krl.gcode.rows import ROW
+from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.state import (
+    DOUBT_OF_G,
+    DOUBT_OF_GROUP,
+    DOUBT_OF_LETTER,
     EVENT_COOLANT,
     EVENT_M,
     EVENT_SPINDLE,
     EVENT_TOOL,
+    GROUP_OF_G,
     IMPLIED_M5,
     WORK_OFFSETS,
     initial_state,
 )
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
-from gcode2krl.gcode.words import LINE_LIMIT, Words, scan
+from gcode2krl.gcode.vocabulary import LINE_LIMIT
+from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
@@ -40,8 +45,8 @@ CHORD_TOLERANCE_MM = 0.01
 _PIECE_BYTES = 1_000_000
 _ROOM = 1.25
 """Room for rows is made for the estimated lines of the file, from its first piece, times this."""
-_BUFFER_ROWS = 8192
-"""Rows between the interpreter and the table: they stay in the processor's cache."""
+_FIRST_ROWS, _FIRST_EVENTS = 8192, 256
+"""Room at first; more is made when it is wanted."""
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
@@ -124,17 +129,24 @@ def read_stream(
     )
     offsets, offset_known = _work_offsets(cell)
     from_table = cell is not None and cell.program.tool_length == "from_table"
-    options = np.array([chord_tolerance_mm, float(block_delete), float(from_table)])
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
-    interpreter = _Interpreter(name, options, offsets, offset_known, lengths)
+    interpreter = _Interpreter(
+        name,
+        offsets_mm=offsets,
+        offset_known=offset_known,
+        tool_length_mm=lengths,
+        chord_tolerance_mm=chord_tolerance_mm,
+        block_delete=block_delete,
+        lengths_from_table=from_table,
+    )
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
     for first_line, text, words in _scanned(_pieces(stream, name)):
         if not interpreter.ended:
-            head = head or text[:4000].tobytes()
+            head = head or text[:4000]
             interpreter.feed(words, text, first_line, size)
-            diameters += named_diameters(text.tobytes(), first_line)
+            diameters += named_diameters(text, first_line)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
@@ -148,13 +160,14 @@ def read_stream(
 
 
 def _scanned(
-    pieces: Iterator[tuple[int, NDArray[np.uint8]]],
-) -> Iterator[tuple[int, NDArray[np.uint8], Words]]:
+    pieces: Iterator[tuple[int, bytes]],
+) -> Iterator[tuple[int, bytes, Words]]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
+    scanners = cycle((Scanner(), Scanner()))  # one's words are read while the other writes
 
-    def scan_next() -> tuple[int, NDArray[np.uint8], Words] | None:
+    def scan_next() -> tuple[int, bytes, Words] | None:
         piece = next(pieces, None)
-        return None if piece is None else (*piece, scan(piece[1], piece[0]))
+        return None if piece is None else (*piece, next(scanners).scan(piece[1], piece[0]))
 
     with ThreadPoolExecutor(1) as pool:
         scanned = scan_next()
@@ -183,8 +196,8 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
     return offsets, known
 
 
-def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-    """Yield (first line, whole lines as uint8) with bounded memory, whatever the file holds."""
+def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
+    """Yield (first line, whole lines) with bounded memory, whatever the file holds."""
     line, rest, first = 1, b"", True
     while True:
         block = stream.read(_PIECE_BYTES)
@@ -208,12 +221,17 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
                 source=name,
             )
         if end:
-            whole = np.frombuffer(text, dtype=np.uint8, count=end)
+            whole = text[:end]
             yield line, whole
-            line += text.count(b"\n", 0, end)
+            line += _line_count(whole)
         rest = text[end:]
         if not block:
             return
+
+
+def _line_count(text: bytes) -> int:
+    """Return the number of line ends; for lines as short as these `bytes.count` takes five times as long."""
+    return int(np.count_nonzero(np.frombuffer(text, np.uint8) == NEWLINE))
 
 
 def _reject_binary(block: bytes, name: str) -> None:
@@ -247,103 +265,83 @@ def _reject_lone_returns(block: bytes, name: str) -> None:
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(
-        self,
-        name: str,
-        options: Floats,
-        offsets: Floats,
-        offset_known: Bools,
-        tool_length: Floats,
-    ) -> None:
+    def __init__(self, name: str, **settings: Any) -> None:
         self.name = name
-        self.state = initial_state()
-        self.counts = np.zeros(COUNTS, dtype=np.int64)
-        self.rows = np.zeros(_BUFFER_ROWS, dtype=ROW)
-        self.events = np.zeros(256, dtype=EVENT)
-        self.columns = Columns()
+        self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
+        self.columns = Columns(_FIRST_ROWS)
+        self.counts["rows"] = 1  # the start point
+        self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
+        self.machine = machine.Machine(
+            state=self.state,
+            counts=self.counts,
+            rows=self.columns.views(),
+            events=self.events,
+            found=self.found,
+            group_of_g=GROUP_OF_G,
+            doubt_of_g=DOUBT_OF_G,
+            doubt_of_group=DOUBT_OF_GROUP,
+            doubt_of_letter=DOUBT_OF_LETTER,
+            **settings,
+        )
         self.texts: dict[int, bytes] = {}
-        self.options = options
-        self.offsets, self.offset_known, self.tool_length = offsets, offset_known, tool_length
         self.messages: list[str] = []
         self.most_decimals = 0
         self.rest_line = 0
-        self._start_row()
 
     @property
     def ended(self) -> bool:
         return bool(self.state["ended"][0])
 
-    def _start_row(self) -> None:
-        row = self.rows[0]
-        row["feed"], row["tolerance"], row["length_offset"], row["arc"] = np.inf, np.nan, np.nan, -1
-        row["offset_tool"] = -1
-        row["rapid"], row["line"] = 1, 0
-        self.counts[ROWS] = 1
+    def _count(self, what: str) -> int:
+        return int(self.counts[what][0])
 
-    def feed(self, words: Words, text: NDArray[np.uint8], first_line: int, size: int) -> None:
+    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> None:
         """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
-        found_before = int(self.counts[FINDINGS])
-        self._execute(words, text, size)
+        found_before = self._count("findings")
+        if self._count("rows") == 1 and len(words.line):
+            lines = int(words.line[-1] - words.line[0]) + 1
+            self._reserve(int(_ROOM * lines * max(1.0, size / len(text))))
+        self._execute(words, text)
         self._remember_lines(text, first_line, found_before)
 
-    def _execute(self, words: Words, text: NDArray[np.uint8], size: int) -> None:
-        columns = (words.letter, words.value, words.extra, words.line)
-        self.counts[MARKS] = 0
+    def _execute(self, words: Words, text: bytes) -> None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
-        first_message = len(self.messages)
-        words.value[words.letter == PAREN_OPEN] += first_message
-        self.messages += [_decode(text[a:b]) for a, b in words.message_span]
-        if not self.columns.count and len(words.line):
-            lines = int(words.line[-1] - words.line[0]) + 1
-            self.columns.reserve(int(_ROOM * lines * max(1.0, size / len(text))))
+        if len(words.message_span):
+            words.value[words.letter == PAREN_OPEN] += len(self.messages)
+            self.messages += [_decode(text[a:b]) for a, b in words.message_span]
+        self.counts["marks"] = 0
         at = 0
         while True:
-            before = at
-            at = machine.run(
-                columns,
-                at,
-                self.state,
-                self.rows,
-                self.counts,
-                self.events,
-                self.found,
-                self.options,
-                self.offsets,
-                self.offset_known,
-                self.tool_length,
-            )
+            at = machine.run(self.machine, words.letter, words.value, words.extra, words.line, at)
             if at >= len(words.letter) or self.ended:
                 return
-            self._make_room(stuck=at == before)
+            self._make_room()
 
-    def _remember_lines(self, text: NDArray[np.uint8], first_line: int, found_before: int) -> None:
+    def _remember_lines(self, text: bytes, first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
-        new = self.found[found_before : self.counts[FINDINGS]]
+        new = self.found[found_before : self._count("findings")]
         wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
         if not wanted:
             return
-        ends = np.flatnonzero(text == NEWLINE)
-        starts = np.concatenate([[0], ends + 1])
-        for number in wanted:
-            row = number - first_line
-            if row < len(ends):
-                self.texts[number] = text[starts[row] : ends[row]].tobytes()
+        lines = text.split(b"\n")[:-1]
+        self.texts |= {n: lines[n - first_line] for n in wanted if n - first_line < len(lines)}
 
-    def _make_room(self, *, stuck: bool) -> None:
-        """Hand all rows but the last, which may still change, to the table; grow what is too small."""
-        done = int(self.counts[ROWS]) - 1
-        if stuck and done == 0:  # an arc that is longer than the buffer
-            self.rows = _grown(self.rows)
-        self.columns.append(self.rows[:done])
-        self.rows[0] = self.rows[done]
-        self.counts[ROWS], self.counts[ROWS_BEFORE] = 1, self.counts[ROWS_BEFORE] + done
-        if self.counts[EVENTS] + machine.EVENTS_PER_BLOCK > len(self.events):
-            self.events = _grown(self.events)
+    def _make_room(self) -> None:
+        """Make the room that the next block wants."""
+        self._reserve(self._count("rows_wanted"))
+        if self._count("events_wanted") > len(self.events):
+            larger = np.zeros(2 * self._count("events_wanted"), dtype=EVENT)
+            larger[: len(self.events)] = self.events
+            self.events = self.machine.events = larger
 
-    def check_rest(self, text: NDArray[np.uint8], first_line: int) -> bool:
+    def _reserve(self, rows: int) -> None:
+        self.columns.reserve(rows, self._count("rows"))
+        self.machine.rows = self.columns.views()
+
+    def check_rest(self, text: bytes, first_line: int) -> bool:
         """Remember the first line of code behind the program's end, so that it is reported; tell if any."""
-        lines = text.tobytes().splitlines()
+        lines = text.splitlines()
         behind = max(0, int(self.state["end_line"][0]) - first_line + 1)
         for number, line in enumerate(lines[behind:], start=first_line + behind):
             if line.strip() not in (b"", b"%", b"\x1a"):
@@ -353,7 +351,7 @@ class _Interpreter:
 
     def finish(self, head: bytes) -> Toolpath:
         """Raise the errors that were found, or return the table."""
-        found = found_issues(self.found, self.counts, self.state[0], self.texts)
+        found = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
         whole = program_issues(
@@ -366,10 +364,10 @@ class _Interpreter:
         return self._toolpath((*found, *whole))
 
     def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
-        self.columns.append(self.rows[: self.counts[ROWS]])
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (self.columns.count, 3))
+        rows = self._count("rows")
+        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
         return Toolpath(
-            **self.columns.finished(),
+            **self.columns.finished(rows),
             axis=axis,
             events=(*self._events(), *self._stopped_by_end()),
             issues=issues,
@@ -378,7 +376,7 @@ class _Interpreter:
 
     def _stopped_by_end(self) -> Iterator[Event]:
         """The program's end stops spindle and coolant (RS274/NGC, M2 and M30)."""
-        state, row = self.state[0], self.columns.count - 1
+        state, row = self.state[0], self._count("rows") - 1
         line = int(state["end_line"])
         if state["direction"]:
             yield Event(row, "spindle", {"rpm": 0.0, "m": v.M5, "line": line, "implied": True})
@@ -389,43 +387,28 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
-        for event, plain in zip(self.events, self._plain_events(), strict=False):
-            dwell_s = float(event["dwell"])
-            yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
+        for row, kind, line, a, b, dwell_s in self.events[: self._count("events")].tolist():
+            what, values = self._said(kind, line, a, b)
+            if dwell_s > 0:
+                values["dwell_s"] = dwell_s
+            yield Event(row, what, values)
 
-    def _plain_events(self) -> Iterator[Event]:
-        for event in self.events[: self.counts[EVENTS]]:
-            row, kind, a, b, line = (
-                int(event["row"]),
-                int(event["kind"]),
-                float(event["a"]),
-                float(event["b"]),
-                int(event["line"]),
-            )
-            if kind == EVENT_TOOL:
-                yield Event(row, "tool", {"tool": int(a), "line": line})
-            elif kind == EVENT_SPINDLE:
-                spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
-                yield Event(row, "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle)
-            elif kind == EVENT_COOLANT:
-                yield Event(
-                    row,
-                    "coolant",
-                    {"mist": bool(int(b) & 1), "flood": bool(int(b) & 2), "m": int(a), "line": line},
-                )
-            elif kind == EVENT_M:
-                values = {"m": int(a), "text": "", "line": line}
-                yield Event(row, "message", values if np.isnan(b) else {**values, "p": b})
-            else:
-                yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
+    def _said(self, kind: int, line: int, a: float, b: float) -> tuple[str, dict[str, Any]]:
+        """Return an event's name and what it says."""
+        if kind == EVENT_TOOL:
+            return "tool", {"tool": int(a), "line": line}
+        if kind == EVENT_SPINDLE:
+            spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
+            return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
+        if kind == EVENT_COOLANT:
+            mist, flood = bool(int(b) & 1), bool(int(b) & 2)
+            return "coolant", {"mist": mist, "flood": flood, "m": int(a), "line": line}
+        if kind == EVENT_M:
+            values: dict[str, Any] = {"m": int(a), "text": "", "line": line}
+            return "message", values if math.isnan(b) else {**values, "p": b}
+        return "message", {"m": -1, "text": self.messages[int(a)], "line": line}
 
 
-def _grown(array: NDArray[np.void]) -> NDArray[np.void]:
-    larger = np.zeros(2 * len(array), dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
-
-
-def _decode(span: NDArray[np.uint8]) -> str:
-    text = span.tobytes().decode("utf-8", errors="replace").strip()
+def _decode(span: bytes) -> str:
+    text = span.decode("utf-8", errors="replace").strip()
     return text[3:].lstrip(" ,").strip()

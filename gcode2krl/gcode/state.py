@@ -121,8 +121,8 @@ _UNSUPPORTED = (
 """G-codes of this and other dialects that are known and not read."""
 
 
-def _group_table() -> NDArray[np.int8]:
-    table = np.full(v.LARGEST_G + 1, UNKNOWN_GROUP, dtype=np.int8)
+def _group_table() -> Ints32:
+    table = np.full(v.LARGEST_G + 1, UNKNOWN_GROUP, dtype=np.int32)
     for group, codes in _GROUPS.items():
         for code in codes:
             table[round(code * v.TENFOLD)] = group

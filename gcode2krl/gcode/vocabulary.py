@@ -1,10 +1,17 @@
 """The words of the dialect (LinuxCNC's RS274/NGC) by name: letters, G and M numbers, modal groups.
 
-Plain module constants: numba puts their values into the compiled code. In the kernels a G number is ten
-times its value, so that G28.1 is a whole number, 281; an M number is its value.
+Plain module constants: the compiled core takes their values from here. In it a G number is ten times its
+value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import LETTER_A
+from gcode2krl.ascii_codes import CASE_BIT, EXCLAMATION, LETTER_A
+
+LINE_LIMIT = 4096
+"""Longest line that is read, in bytes; a part program has none that long."""
+MARK = EXCLAMATION
+"""Stands in the column of letters where something cannot be read."""
+UNREAD_NUMBER = CASE_BIT
+"""Added to a letter whose value cannot be read: the small letter."""
 
 LETTERS = 26
 
@@ -22,7 +29,7 @@ OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
 
 TENFOLD = 10
 LARGEST_G = 999
-"""Largest G number in the kernels, G99.9."""
+"""Largest G number in the core, G99.9."""
 LARGEST_M = 9999
 
 G0 = 0

@@ -23,7 +23,7 @@ def columns(text, name="part.nc"):
 def test_same_table(monkeypatch, text, piece_bytes, buffer_rows):
     whole = columns(text)
     monkeypatch.setattr(read, "_PIECE_BYTES", piece_bytes)
-    monkeypatch.setattr(read, "_BUFFER_ROWS", buffer_rows)
+    monkeypatch.setattr(read, "_FIRST_ROWS", buffer_rows)
     for name, column in columns(text).items():
         if isinstance(column, np.ndarray):
             np.testing.assert_array_equal(column, whole[name], err_msg=name)
@@ -34,11 +34,18 @@ def test_same_table(monkeypatch, text, piece_bytes, buffer_rows):
 def test_an_arc_longer_than_the_buffer_keeps_its_dwell():
     toolpath = read_stream(io.BytesIO(LONG_ARC.encode()), "part.nc", chord_tolerance_mm=0.0005)
     chords = np.flatnonzero(toolpath.arc == 0)
-    assert len(chords) > read._BUFFER_ROWS
+    assert len(chords) > read._FIRST_ROWS
     assert toolpath.dwell_s[chords[-1]] == 0.5
     assert np.count_nonzero(toolpath.dwell_s) == 1
     radius = np.hypot(toolpath.position_mm[chords, 0] - 50, toolpath.position_mm[chords, 1])
     np.testing.assert_allclose(radius, 50, rtol=0, atol=1e-9)
+
+
+def test_a_line_may_have_more_messages_than_there_is_room_for_events():
+    text = "G21\n" + "(MSG, a)" * 400 + "\nG0 X1\nM30\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
+    assert [event.values["text"] for event in toolpath.events[:400]] == ["a"] * 400
+    assert len(toolpath.events) == 401
 
 
 @pytest.mark.parametrize("piece_bytes", [30, 10**6])

@@ -1,0 +1,28 @@
+/* Arcs: centre from R, and the chords that replace an arc.
+
+   Everything is in the arc's own axes: (u, v) span the plane, w is the axis of a helix. The planes are the
+   right-handed pairs of RS274/NGC: G17 X Y (Z), G18 Z X (Y), G19 Y Z (X). */
+
+#ifndef GCODE_ARCS_H
+#define GCODE_ARCS_H
+
+#include "core.h"
+
+/* LinuxCNC's 0.00005 inch: a smaller radius is zero, and R may miss half the chord by as much. */
+#define SMALLEST_RADIUS_MM 0.00127
+
+/* An arc of more chords is a mistake: at 0.01 mm one of 1000 m radius takes 22,000 a turn. */
+enum { MOST_CHORDS = 1000000 };
+
+typedef enum { FITS, SPIRAL, MISFIT } Fit;
+typedef struct {
+    double u, v;
+} Point;
+
+Fit radii_fit(double start_mm, double end_mm, double unit_mm);
+int centre_from_radius(Point start, Point end, double radius, bool ccw, Point *centre);
+double sweep_angle(Point start, Point end, Point centre, bool ccw, int64_t turns, double *from_rad);
+int64_t chord_count(double radius_mm, double sweep_rad, double tolerance_mm);
+static inline double distance(Point a, Point b) { return hypot(a.u - b.u, a.v - b.v); }
+
+#endif

@@ -1,0 +1,211 @@
+/* The words of one block, sorted: values by letter, G-codes by modal group, M-codes. */
+
+#include "gcode/block_words.h"
+
+#include "gcode/reporting.h"
+
+/* A code this far from a whole number is one that a post has rounded. */
+static const double CODE_SLACK = 1e-6;
+
+/* Whether a word is understood, and where it is not what is then in doubt. */
+typedef struct {
+    bool good;
+    int32_t doubt;
+} Taken;
+static const Taken UNDERSTOOD = {true, 0}, WITHOUT_DOUBT = {false, 0};
+
+/* --- G-codes -------------------------------------------------------------------------------------------- */
+
+static inline Taken faulty(int32_t doubt) { return (Taken){false, doubt}; }
+
+static Taken take_g(Block *b, double value) {
+    const double tenfold = value * V_TENFOLD;
+    const int64_t code = (int64_t)rint(tenfold);
+    const bool outside = code < 0 || code > V_LARGEST_G || fabs(tenfold - (double)code) > CODE_SLACK;
+    const int32_t group = outside ? S_UNKNOWN_GROUP : AT(b->machine->group_of_g, code);
+    if (group == S_UNKNOWN_GROUP) {
+        report(b, F_UNKNOWN_G, (Says){.a = tenfold});
+        return faulty(AT(b->machine->doubt_of_g, V_LARGEST_G));
+    }
+    if (group == S_UNSUPPORTED_GROUP) {
+        report(b, F_UNSUPPORTED_G, (Says){.a = (double)code});
+        return faulty(AT(b->machine->doubt_of_g, code));
+    }
+    int32_t *of_group = &b->g[group];
+    if (*of_group < 0) {
+        *of_group = (int32_t)code;
+    } else if (group == V_MOTION && (*of_group == V_G80 || code == V_G80)) { /* header lines say G0 … G80 */
+        *of_group = (int32_t)most(0, least(*of_group, code));
+    } else {
+        report(b, F_SAME_GROUP_G, (Says){.a = *of_group, .b = (double)code});
+        return faulty(AT(b->machine->doubt_of_group, group));
+    }
+    return UNDERSTOOD;
+}
+
+/* --- M-codes -------------------------------------------------------------------------------------------- */
+
+static bool is_unsupported_m(int64_t code) {
+    return code == V_M19 || code == V_M98 || code == V_M99 || (code >= V_M61 && code <= V_M73);
+}
+
+/* Return what is in doubt after an M-code that is not read. */
+static int32_t doubt_of_m(int64_t code) {
+    if (code == V_M61)
+        return S_DOUBT_TOOL;
+    return code >= V_M72 ? S_DOUBT_ALL : 0; /* modal state restored, or a subprogram */
+}
+
+/* Return the modal group of an M-code, 0 for none. */
+static int m_group(int64_t code) {
+    if (code == V_M0 || code == V_M1 || code == V_M2 || code == V_M30 || code == V_M60)
+        return V_M_STOP;
+    if (code == V_M6)
+        return V_M_TOOL_CHANGE;
+    if (code >= V_M3 && code <= V_M5)
+        return V_M_SPINDLE;
+    if (code >= V_M7 && code <= V_M9)
+        return V_M_COOLANT;
+    return code >= V_M48 && code <= V_M53 ? V_M_OVERRIDE : 0;
+}
+
+static Taken take_m(Block *b, double value) {
+    const int64_t code = (int64_t)rint(value);
+    if (fabs(value - (double)code) > CODE_SLACK || code < 0 || code > V_LARGEST_M) {
+        report(b, F_BAD_M, (Says){.a = value});
+        return WITHOUT_DOUBT;
+    }
+    if (is_unsupported_m(code)) {
+        report(b, F_UNSUPPORTED_M, (Says){.a = (double)(code * V_TENFOLD)});
+        return faulty(doubt_of_m(code));
+    }
+    const int group = m_group(code);
+    bool good = true;
+    int count = 0;
+    while (count < V_M_CODES && b->m_codes[count] >= 0)
+        count++;
+    if (count == V_M_CODES) {
+        report(b, F_TOO_MANY_M, (Says){0});
+        return WITHOUT_DOUBT;
+    }
+    for (int k = 0; k < count; k++)
+        if (group > 0 && m_group(b->m_codes[k]) == group) {
+            report(b, F_SAME_GROUP_M,
+                   (Says){.a = b->m_codes[k] * V_TENFOLD, .b = (double)(code * V_TENFOLD)});
+            good = false;
+        }
+    b->m_codes[count] = (int32_t)code;
+    return good ? UNDERSTOOD : WITHOUT_DOUBT;
+}
+
+/* --- all words of a block ------------------------------------------------------------------------------- */
+
+static Taken take(Block *b, uint8_t c, double value) {
+    if (c >= CH_SMALL_A) /* a word whose value cannot be read */
+        return faulty(AT(b->machine->doubt_of_letter, c - CH_SMALL_A));
+    if (c == CH_LETTER_G)
+        return take_g(b, value);
+    if (c == CH_LETTER_M)
+        return take_m(b, value);
+    const int index = c - CH_LETTER_A;
+    const bool repeated = b->has[index];
+    b->has[index] = true;
+    b->word[index] = value;
+    if (!repeated)
+        return UNDERSTOOD;
+    report(b, F_REPEATED_WORD, (Says){.a = c});
+    return faulty(AT(b->machine->doubt_of_letter, index));
+}
+
+/* Use up the scanner's marks of words that are left out. */
+static void pass_marks(Block *b, const Words *words, int64_t from, int64_t to) {
+    for (int64_t k = from; k < to; k++)
+        b->counts->marks += AT(words->letter, k) == V_MARK;
+}
+
+/* Take note of % at word k: the second ends the program, or the first behind any block. */
+static void tape_mark(Block *b, const Words *words, int64_t k, int64_t to, bool alone) {
+    State *s = b->state;
+    if (!alone) {
+        report(b, F_BAD_CHARACTER, (Says){.a = CH_PERCENT});
+        pass_marks(b, words, k, to);
+        return;
+    }
+    s->tape_marks++;
+    if (s->tape_marks == 2 || (s->tape_marks == 1 && s->blocks > 0)) {
+        s->ended = 1;
+        s->end_line = b->line;
+    }
+}
+
+static void take_mark(Block *b, const Words *words, double finding) {
+    const int64_t mark = b->counts->marks++;
+    report(b, (int32_t)finding, (Says){.a = mark < words->extra.rows ? AT(words->extra, mark) : 0.0});
+}
+
+/* Rotary and secondary axes: 0 is no motion and is noted; the first other value of each is an error. */
+static bool rotary_is_harmless(Block *b) {
+    State *s = b->state;
+    bool good = true;
+    for (int k = 0; k < OTHER_AXES_COUNT; k++) {
+        const int index = OTHER_AXES[k], letter = index + CH_LETTER_A;
+        if (!b->has[index])
+            continue;
+        if (b->word[index] == 0.0) {
+            note(b, S_NOTE_ROTARY, letter);
+            continue;
+        }
+        good = false;
+        if (s->rotary_refused & 1 << index)
+            b->counts->consequences++;
+        else
+            report(b, F_ROTARY_WORD, (Says){.a = letter, .b = b->word[index]});
+        s->rotary_refused |= 1 << index;
+    }
+    return good;
+}
+
+static void begin_without_codes(Block *b) {
+    for (int k = 0; k < V_GROUPS; k++)
+        b->g[k] = -1;
+    for (int k = 0; k < V_M_CODES; k++)
+        b->m_codes[k] = -1;
+}
+
+/* Sort the words of a block that has none yet; `doubt` gets the bits of what is in doubt after it. */
+BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t *doubt) {
+    bool good = true, used = false;
+    *doubt = 0;
+    begin_without_codes(b);
+    for (int64_t k = from; k < to; k++) {
+        const uint8_t c = AT(words->letter, k);
+        if (c == CH_SLASH) {
+            if (b->machine->block_delete) {
+                pass_marks(b, words, from, to);
+                return LEFT_OUT;
+            }
+        } else if (c == CH_PERCENT) {
+            tape_mark(b, words, k, to, to - from == 1);
+            return LEFT_OUT;
+        } else if (c == CH_PAREN_OPEN) {
+            event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
+        } else if (c == V_MARK) {
+            take_mark(b, words, AT(words->value, k));
+            good = false;
+        } else {
+            const Taken taken = take(b, c, AT(words->value, k));
+            used = true;
+            good = good && taken.good;
+            *doubt |= taken.doubt;
+        }
+    }
+    if (b->has[V_WORD_E] && good) { /* else it belongs to what has been reported, as in M68 E0 */
+        report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
+        good = false;
+    }
+    if (!rotary_is_harmless(b))
+        good = false;
+    if (!used && good)
+        return LEFT_OUT;
+    return good ? GOOD : FAULTY;
+}

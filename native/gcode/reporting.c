@@ -1,0 +1,52 @@
+/* What the interpreter hands over beside rows: findings, consequences, notes and events. */
+
+#include "gcode/reporting.h"
+
+/* Keep a finding of a line, unless its block has been reported already. */
+void report_at(Block *block, int32_t line, int32_t number, Says says) {
+    Counts *counts = block->counts;
+    if (counts->mute)
+        return;
+    const Findings found = block->machine->found;
+    const bool warning = number == F_TOOL_UNDECLARED || number == F_H_DIFFERS || number == F_OFFSET_UNKNOWN;
+    const int64_t room = warning ? found.rows / 2 : found.rows; /* warnings never crowd out an error */
+    if (counts->findings < room)
+        AT(found, counts->findings++) = (Found){number, line, says.a, says.b, says.c};
+    else
+        counts->dropped++;
+}
+
+/* Keep a finding of this block. */
+void report(Block *block, int32_t number, Says says) { report_at(block, block->line, number, says); }
+
+/* Tell whether what is found now rests on state in doubt; if so, count it as a consequence. */
+bool rests_on_doubt(Block *block, int32_t doubt) {
+    if (!(block->state->doubt & doubt))
+        return false;
+    if (!block->counts->mute)
+        block->counts->consequences++;
+    return true;
+}
+
+/* Keep a finding, unless it rests on state in doubt. */
+void report_unless(Block *block, int32_t doubt, int32_t number, Says says) {
+    if (!rests_on_doubt(block, doubt))
+        report(block, number, says);
+}
+
+/* Count a block with something harmless; the first is kept with its line. */
+void note(Block *block, int which, int32_t word) {
+    State *s = block->state;
+    if (s->note_count[which] == 0) {
+        s->note_line[which] = block->line;
+        s->note_word[which] = word;
+    }
+    s->note_count[which]++;
+}
+
+/* Keep an event at the row where the tool stands. */
+void event(Block *block, int32_t kind, double a, double b) {
+    const int64_t row = block->counts->rows - 1;
+    const double dwell_s = AT(block->machine->rows.dwell_s, row);
+    AT(block->machine->events, block->counts->events++) = (Event){row, kind, block->line, a, b, dwell_s};
+}

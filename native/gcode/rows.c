@@ -1,0 +1,44 @@
+/* Rows of straight moves, and where the axis words of a block lead. */
+
+#include "gcode/rows.h"
+
+/* Find the tip position that the axis words ask for; axes not named stay. */
+void target(const Block *block, double to_mm[3]) {
+    const State *s = block->state;
+    const double here_mm[3] = {s->x, s->y, s->z};
+    const double *base_mm = work_offset_mm(block);
+    for (int axis = 0; axis < 3; axis++) {
+        to_mm[axis] = here_mm[axis];
+        if (block->has[V_WORD_X + axis])
+            to_mm[axis] = block->word[V_WORD_X + axis] * s->unit_mm + (s->absolute ? base_mm : here_mm)[axis];
+    }
+}
+
+/* Note which axes have been programmed: in absolute mode always, else if they were known before. */
+void learn(Block *block) {
+    State *s = block->state;
+    const bool *has = block->has;
+    if (s->absolute) {
+        s->known_x |= has[V_WORD_X];
+        s->known_y |= has[V_WORD_Y];
+        s->known_z |= has[V_WORD_Z];
+    }
+    if (s->doubt == 0)
+        return;
+    const int32_t named =
+        has[V_WORD_X] * S_DOUBT_X + has[V_WORD_Y] * S_DOUBT_Y + has[V_WORD_Z] * S_DOUBT_Z;
+    if (s->doubt & (S_DOUBT_UNIT | S_DOUBT_DISTANCE))
+        s->doubt |= named;
+    else if (s->absolute)
+        s->doubt &= ~named;
+}
+
+/* Go where the axis words lead, without a row: after an error the next block starts there. */
+void follow(Block *block) {
+    double to_mm[3];
+    target(block, to_mm);
+    block->state->x = to_mm[0];
+    block->state->y = to_mm[1];
+    block->state->z = to_mm[2];
+    learn(block);
+}

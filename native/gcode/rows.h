@@ -1,0 +1,46 @@
+/* Rows of straight moves, and where the axis words of a block lead. */
+
+#ifndef GCODE_ROWS_H
+#define GCODE_ROWS_H
+
+#include "gcode/block.h"
+
+enum { NO_ARC = -1 };
+static const double RAPID_MM_S = INFINITY;
+
+/* Write the next row: it ends at the state's position. */
+static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool rapid, bool by_machine,
+                        int32_t arc) {
+    const State *s = machine->state.at;
+    const Rows *rows = &machine->rows;
+    const int64_t row = machine->counts.at->rows++;
+    CELL(rows->position_mm, row, 0) = s->x;
+    CELL(rows->position_mm, row, 1) = s->y;
+    CELL(rows->position_mm, row, 2) = s->z;
+    AT(rows->feed_mm_s, row) = feed_mm_s;
+    AT(rows->spindle_rad_s, row) = s->rpm * s->direction * 2.0 * PI / U_S_PER_MIN;
+    AT(rows->tolerance_mm, row) = s->tolerance;
+    AT(rows->dwell_s, row) = 0.0;
+    AT(rows->length_offset_mm, row) = s->length_offset;
+    AT(rows->length_offset_tool, row) = s->offset_tool;
+    AT(rows->tool, row) = s->tool;
+    AT(rows->source_line, row) = line;
+    AT(rows->arc, row) = arc;
+    AT(rows->rapid, row) = rapid;
+    AT(rows->exact_stop, row) = s->exact_stop != 0;
+    AT(rows->machine, row) = by_machine;
+    CELL(rows->known, row, 0) = s->known_x != 0;
+    CELL(rows->known, row, 1) = s->known_y != 0;
+    CELL(rows->known, row, 2) = s->known_z != 0;
+}
+
+/* Where the work offset in force has its zero. */
+static inline const double *work_offset_mm(const Block *block) {
+    return &CELL(block->machine->offsets_mm, block->state->work_offset, 0);
+}
+
+void target(const Block *block, double to_mm[3]);
+void learn(Block *block);
+void follow(Block *block);
+
+#endif

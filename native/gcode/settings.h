@@ -1,0 +1,13 @@
+/* Everything of a block before its motion, in the order of RS274/NGC. */
+
+#ifndef GCODE_SETTINGS_H
+#define GCODE_SETTINGS_H
+
+#include "gcode/block.h"
+
+enum { NOT_WHOLE = -1 };
+int32_t whole(double value);
+bool stops(int32_t m);
+void apply_settings(Block *block);
+
+#endif
