@@ -4,7 +4,7 @@ Run after a change of one of these modules; a test compares the file with what t
 
     python native/constants.py
 
-A whole number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, and a record
+A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, and a record
 of numpy a C struct with the same fields in the same places.
 """
 
@@ -19,11 +19,12 @@ HEADER = Path(__file__).resolve().parent / "constants.h"
 MODULES = {
     "CH": "gcode2krl.ascii_codes",
     "W": "gcode2krl.krl_words",
+    "U": "gcode2krl.units",
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
 }
-"""Prefix -> module whose whole numbers and words the core uses."""
+"""Prefix -> module whose numbers and words the core uses."""
 RECORDS = {"State": ("gcode2krl.gcode.state", "STATE")}
 """Name of the struct -> module and numpy record."""
 _TYPES = {"f8": "double", "i8": "int64_t", "i4": "int32_t", "i1": "int8_t", "u1": "uint8_t", "b1": "uint8_t"}
@@ -55,6 +56,8 @@ def _constants(prefix: str, module: ModuleType) -> Iterator[str]:
                 yield (
                     f"#define {prefix}_{name} {value}" if value >= 0 else f"#define {prefix}_{name} ({value})"
                 )
+            elif type(value) is float:
+                yield f"#define {prefix}_{name} {value!r}"
             elif type(value) is str and value.isascii() and value.isprintable():
                 text = value.replace("\\", "\\\\").replace('"', '\\"')
                 yield f'#define {prefix}_{name} "{text}"'

@@ -219,11 +219,11 @@ class _Reader:
         values = value[rows]
         return ReadTriggers(
             motion=before[rows].astype(np.int64),
-            distance=values[:, sc.DISTANCE],
-            delay_ms=values[:, sc.DELAY],
-            written=values[:, sc.WRITTEN : sc.WRITTEN + sc.NUMBERS],
+            distance=values[:, w.TRIGGER_DISTANCE],
+            delay_ms=values[:, w.TRIGGER_DELAY],
+            written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
             calls=blend[rows] == w.CALLS,
-            names=self._names_written(values[:, sc.NAME :].astype(np.int64), file_of[rows]),
+            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of[rows]),
             line=line[rows],
             file_of=file_of[rows],
         )
