@@ -14,7 +14,8 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.compiled.chunks import in_chunks
 from gcode2krl.compiled.core import BYTES, INT, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, core_function
 
-_CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 20
+"""Bytes that a thread scans at a time, and whole lines more."""
 
 _count = core_function("krl_count", BYTES, INT, INT, OUT_INTS)
 _scan = core_function(
@@ -44,9 +45,9 @@ class Scanned(NamedTuple):
     """``;FOLD`` less ``;ENDFOLD``."""
 
 
-def scan_krl(text: bytes) -> Scanned:
+def scan_krl(text: bytes, chunk_bytes: int = CHUNK_BYTES) -> Scanned:
     """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
-    data, borders = np.frombuffer(text, dtype=np.uint8), _borders(text)
+    data, borders = np.frombuffer(text, dtype=np.uint8), _borders(text, chunk_bytes)
 
     def counted(start: int, end: int) -> Ints:
         lines_statements = np.empty(2, dtype=np.int64)
@@ -71,11 +72,11 @@ def scan_krl(text: bytes) -> Scanned:
     return Scanned(kind, line, span, value, blend, _first(too_long), _first(not_ascii), sum(folds))
 
 
-def _borders(text: bytes) -> list[int]:
+def _borders(text: bytes, chunk_bytes: int) -> list[int]:
     """Return where chunks of whole lines begin, and the end."""
     borders = [0]
-    while len(text) - borders[-1] > _CHUNK_BYTES:
-        behind = text.find(b"\n", borders[-1] + _CHUNK_BYTES - 1) + 1
+    while len(text) - borders[-1] > chunk_bytes:
+        behind = text.find(b"\n", borders[-1] + chunk_bytes - 1) + 1
         if behind in (0, len(text)):
             break
         borders.append(behind)
