@@ -67,7 +67,7 @@ static inline Place digits(Place at, Place end, uint64_t *whole) {
     return at;
 }
 
-/* Read a number; return the place behind it. NaN where there is none, or more digits than a double holds. */
+/* Read a number; return the place behind it, NULL and NaN where there is none or it has too many digits. */
 static inline Place number(Place at, Place end, double *value) {
     const bool negative = is(at, end, CH_MINUS);
     if (negative || is(at, end, CH_PLUS))
@@ -81,10 +81,11 @@ static inline Place number(Place at, Place end, double *value) {
         decimals = at - behind - 1;
         count += decimals;
     }
-    if (count == 0 || count > MOST_DIGITS)
+    if (count == 0 || count > MOST_DIGITS) {
         *value = NAN;
-    else
-        *value = (negative ? -1.0 : 1.0) * (double)(int64_t)whole / TEN_TO[decimals];
+        return NULL;
+    }
+    *value = (negative ? -1.0 : 1.0) * (double)(int64_t)whole / TEN_TO[decimals];
     return at;
 }
 
@@ -121,7 +122,7 @@ static inline Place components(Place at, Place end, double *value, int *found) {
         if (bit == NO_COMPONENT || at >= end || !is_blank(HERE(at, end)))
             return NULL;
         at = number(blank(at, end), end, &read);
-        if (isnan(read) || *found & (1 << bit))
+        if (at == NULL || *found & (1 << bit))
             return NULL;
         *found |= 1 << bit;
         SLOT(value, bit >= AXIS_BITS ? bit - AXIS_BITS : bit) = read;
@@ -159,6 +160,13 @@ static inline Statement motion(Place begin, Place end, double *value) {
     return read;
 }
 
+/* Read a number and the blanks after it; return NULL where there is none. */
+static Place number_at(Place at, Place end, double *value) {
+    *value = NAN;
+    at = at != NULL ? number(at, end, value) : NULL;
+    return at != NULL ? blank(at, end) : NULL;
+}
+
 /* Return the place behind the words of $VEL.CP, $APO.CDIS and WAIT SEC, else NULL. */
 static Place setting(Place begin, Place end, int *kind) {
     *kind = W_KIND_VEL_CP;
@@ -182,8 +190,8 @@ static int set_to(Place at, Place end, int kind, double *value) {
         sound = is(at, end, CH_EQUALS);
         at = blank_behind(at, end);
     }
-    at = blank(number(at, end, &SLOT(value, 0)), end);
-    if (!sound || isnan(SLOT(value, 0)) || !ends_here(at, end))
+    at = number_at(at, end, &SLOT(value, 0));
+    if (!sound || at == NULL || !ends_here(at, end))
         return W_MALFORMED;
     return kind == W_KIND_WAIT_SEC && at < end && STANDS(blank_behind(at, end), end, W_DWELL);
 }
@@ -192,15 +200,6 @@ static int set_to(Place at, Place end, int kind, double *value) {
 static Place behind(Place at, Place end, const char *word) {
     const int length = (int)strlen(word);
     return at != NULL && stands(at, end, word, length) ? blank(at + length, end) : NULL;
-}
-
-/* Read a number and the blanks after it; return NULL where there is none. */
-static Place number_at(Place at, Place end, double *value) {
-    *value = NAN;
-    if (at == NULL)
-        return NULL;
-    at = number(at, end, value);
-    return isnan(*value) ? NULL : blank(at, end);
 }
 
 /* Read the name that is assigned to or called; return the place of the `=` or `(`, NULL without one. */

@@ -1,6 +1,7 @@
 """KRL words, ASCII codes and G numbers stand once; the read-back shares only words with the writer."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ from gcode2krl import krl_words
 
 PACKAGE = Path(gcode2krl.__file__).parent
 KERNELS = ["gcode/words.py", "gcode/block_words.py", "gcode/machine.py", "gcode/motion.py",
-           "gcode/settings.py", "krl/scan.py"]  # fmt: skip  # one list of files
+           "gcode/settings.py"]  # fmt: skip  # one list of files
+NATIVE = PACKAGE.parent / "native"
 WRITERS = {"composition", "number_text", "statements", "pilot_text", "rsi_text", "write", "provenance"}
 SHORTEST_WORD = 4
 
@@ -57,3 +59,20 @@ def test_reading_back_imports_nothing_of_the_writer(file):
     modules = {(node.module or "").split(".")[-1] for node in nodes(file, ast.ImportFrom)}
     names = {alias.name for node in nodes(file, ast.ImportFrom) for alias in node.names}
     assert (modules | names) & WRITERS == set()
+
+
+@pytest.mark.skipif(not NATIVE.exists(), reason="no sources beside the installed package")
+@pytest.mark.parametrize("file", ["scan.c", "number_text.c", "number_text.h"])
+def test_the_core_has_no_characters_and_no_word_of_the_vocabulary(file):
+    code = re.sub(r"/\*.*?\*/", "", (NATIVE / "krl" / file).read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert re.findall(r"'\\?.'", code) == []
+    written = set(re.findall(r'"((?:[^"\\]|\\.)*)"', code))
+    assert not {
+        word for word in words_of_krl() | {krl_words.LIN, krl_words.PTP} for text in written if word in text
+    }
+
+
+@pytest.mark.skipif(not NATIVE.exists(), reason="no sources beside the installed package")
+def test_the_core_reads_back_without_the_writer():
+    included = re.findall(r'#include "(.*)"', (NATIVE / "krl" / "scan.c").read_text(encoding="utf-8"))
+    assert set(included) == {"core.h", "constants.h"}
