@@ -158,11 +158,12 @@ static Phases phases(double length, double v, double u0, double u1, double a, bo
     return (Phases){(top - u0) / a, greater(0.0, (length - ramps - brakes) / top), (top - u1) / a};
 }
 
-/* The end of the pieces written so far: their number, time, path, and the integral of the path over time. */
+/* The end of the pieces written so far: their number, time, path and its integral over time; the last one's speed
+   and acceleration. */
 typedef struct {
     Floats out;
     int64_t used;
-    double t, s, area;
+    double t, s, area, speed, acceleration;
 } Pieces;
 
 enum { TIME, PATH, SPEED, ACCELERATION, INTEGRAL };
@@ -173,6 +174,8 @@ static void write_piece(Pieces *pieces, double speed, double acceleration) {
     CELL(pieces->out, SPEED, pieces->used) = speed;
     CELL(pieces->out, ACCELERATION, pieces->used) = acceleration;
     CELL(pieces->out, INTEGRAL, pieces->used) = pieces->area;
+    pieces->speed = speed;
+    pieces->acceleration = acceleration;
     pieces->used++;
 }
 
@@ -180,9 +183,7 @@ static void write_piece(Pieces *pieces, double speed, double acceleration) {
 static void go_on(Pieces *pieces, double duration, double v, double acceleration) {
     if (duration <= 0.0)
         return;
-    const int64_t last = pieces->used - 1;
-    const bool same = last >= 0 && acceleration == 0.0 && CELL(pieces->out, ACCELERATION, last) == 0.0 &&
-                      CELL(pieces->out, SPEED, last) == v;
+    const bool same = pieces->used > 0 && acceleration == 0.0 && pieces->acceleration == 0.0 && pieces->speed == v;
     if (!same)
         write_piece(pieces, v, acceleration);
     pieces->area += pieces->s * duration + v * squared(duration) / 2.0 + acceleration * cubed(duration) / 6.0;

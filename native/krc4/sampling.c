@@ -97,46 +97,53 @@ static inline void way_of(const Moves *moves, int64_t i, double *way) {
         way[c] = end[c] - start[c];
 }
 
-/* The parabola at the end of a move, in units of 2·d: the square of its length up to tau grows by
-   bend·((t + middle)² + q²); x0, r0 and asinh0 are those terms at its begin. */
+/* The parabola at the end of a move: d before and after it, the tangents u and w there. Over tau from 0 to 1 the
+   square of its speed, in units of 2·d, is bend²·((tau + middle)² + q²); x0_r0 and asinh0 are terms of the length
+   at tau = 0. */
 typedef struct {
     int64_t move;
-    double d, before, bend, middle, q2, q, x0_r0, asinh0;
+    double u[3], w[3], d, speed, bend, middle, q2, q, x0_r0, asinh0;
     bool straight;
 } Corner;
 
-static Corner corner_of(const Moves *moves, int64_t i) {
-    double u[3], w[3];
-    way_of(moves, i, u);
-    way_of(moves, i + 1, w);
+static inline void set_corner(Corner *corner, const Moves *moves, int64_t i) {
     const double before = AT(moves->length, i), after = AT(moves->length, i + 1);
-    const double uu = product(u, u) / squared(before), ww = product(w, w) / squared(after);
-    const double uw = product(u, w) / (before * after);
-    Corner corner = {.move = i, .d = AT(moves->blend, i), .before = sqrt(uu), .bend = uu - 2.0 * uw + ww};
-    corner.straight = corner.bend < NO_BEND * (uu + ww);
-    if (corner.straight)
-        return corner;
-    const double x0 = corner.middle = (uw - uu) / corner.bend;
-    corner.q2 = greater(uu / corner.bend - x0 * x0, LEAST_Q2);
-    corner.q = sqrt(corner.q2);
-    corner.x0_r0 = x0 * sqrt(x0 * x0 + corner.q2);
-    corner.asinh0 = asinh(x0 / corner.q);
-    corner.bend = sqrt(corner.bend);
-    return corner;
+    double p[3], n[3];
+    way_of(moves, i, p);
+    way_of(moves, i + 1, n);
+    const double uu = product(p, p) / squared(before), ww = product(n, n) / squared(after);
+    const double uw = product(p, n) / (before * after), bend2 = uu - 2.0 * uw + ww;
+    corner->move = i;
+    corner->d = AT(moves->blend, i);
+    corner->speed = sqrt(uu);
+    for (int c = 0; c < 3; c++) {
+        corner->u[c] = p[c] / before;
+        corner->w[c] = n[c] / after;
+    }
+    corner->straight = bend2 < NO_BEND * (uu + ww);
+    if (corner->straight)
+        return;
+    const double x0 = (uw - uu) / bend2, q2 = greater(uu / bend2 - x0 * x0, LEAST_Q2), q = sqrt(q2);
+    corner->bend = sqrt(bend2);
+    corner->middle = x0;
+    corner->q2 = q2;
+    corner->q = q;
+    corner->x0_r0 = x0 * sqrt(x0 * x0 + q2);
+    corner->asinh0 = asinh(x0 / q);
 }
 
 /* Return the length of the parabola up to tau: the integral of |(1 - t)·u + t·w| from 0 to tau. */
-static double arc_length(const Corner *corner, double tau) {
+static inline double arc_length(const Corner *corner, double tau) {
     if (corner->straight)
-        return corner->before * tau;
+        return corner->speed * tau;
     const double x1 = tau + corner->middle, r1 = sqrt(x1 * x1 + corner->q2);
     const double turned = asinh(x1 / corner->q) - corner->asinh0;
     return corner->bend * (0.5 * (x1 * r1 - corner->x0_r0 + corner->q2 * turned));
 }
 
 /* Return how much path is left to the vertex at fraction tau of the corner. */
-static double short_of_vertex(const Corner *corner, double tau) {
-    return corner->d * (corner->before - 2.0 * arc_length(corner, tau));
+static inline double short_of_vertex(const Corner *corner, double tau) {
+    return corner->d * (corner->speed - 2.0 * arc_length(corner, tau));
 }
 
 /* Write the length of moves `first` up to `behind` in space (0 for a turn on the spot), and how much the corners
@@ -150,7 +157,8 @@ EXPORT void krc4_savings(Floats start, Floats end, Floats length, Floats blend, 
         AT(size, i) = norm(way);
         AT(saving, i) = 0.0;
         if (AT(moves.blend, i) > 0.0 && i + 1 < moves.length.rows) {
-            const Corner corner = corner_of(&moves, i);
+            Corner corner;
+            set_corner(&corner, &moves, i);
             way_of(&moves, i + 1, way);
             const double join = corner.d * norm(way) / AT(moves.length, i + 1);
             AT(saving, i) = join + short_of_vertex(&corner, 1.0);
@@ -174,12 +182,9 @@ static inline void tangent(const Moves *moves, int64_t i, double *u) {
 }
 
 /* Write the place on the parabola after a move; return its derivatives. */
-static Bend on_parabola(const Moves *moves, const Corner *corner, double tau, double *position) {
-    double u[3], w[3];
-    const double *vertex = &CELL(moves->end, corner->move, 0), d = corner->d;
+static inline Bend on_parabola(const Moves *moves, const Corner *corner, double tau, double *position) {
+    const double *vertex = &CELL(moves->end, corner->move, 0), *u = corner->u, *w = corner->w, d = corner->d;
     Bend bend;
-    tangent(moves, corner->move, u);
-    tangent(moves, corner->move + 1, w);
     for (int c = 0; c < 3; c++) {
         position[c] = vertex[c] + d * (tau * tau * w[c] - (1.0 - tau) * (1.0 - tau) * u[c]);
         bend.first[c] = (1.0 - tau) * u[c] + tau * w[c];
@@ -198,7 +203,7 @@ static Bend on_line(const Moves *moves, int64_t i, const double *u, double insid
 }
 
 /* Turn speed, acceleration and jerk along the planned path into their magnitudes in space. */
-static void to_space(const Bend *bend, double *speed, double *acceleration, double *jerk) {
+static inline void to_space(const Bend *bend, double *speed, double *acceleration, double *jerk) {
     const double v = *speed, a = *acceleration, j = *jerk;
     double speed2 = 0.0, acceleration2 = 0.0, jerk2 = 0.0;
     for (int c = 0; c < 3; c++) {
@@ -237,7 +242,7 @@ EXPORT void krc4_place(Ints move, Floats start, Floats end, Floats lengths, Floa
         if (AT(in_corner, row)) {
             const int64_t vertex = leaves ? i : i - 1;
             if (corner.move != vertex)
-                corner = corner_of(&moves, vertex);
+                set_corner(&corner, &moves, vertex);
             const double since = leaves ? inside - length + d_end : inside + d_start, tau = since / (2.0 * corner.d);
             const double to_vertex = AT(way_to, i) + (leaves ? length * share : 0.0) - AT(saved_to, vertex);
             AT(path, row) = to_vertex - short_of_vertex(&corner, tau);
