@@ -4,8 +4,8 @@
     GCODE2KRL_CORE=checked python benchmarks/fuzz_krl.py --count 20000 --seed 1
 
 With the checked build an index outside the text or a table ends the process, which is a failure. Besides, the
-rows must lie in the text in order, be the same in short chunks as in one piece, and a line alone must be read as
-it is among others.
+rows must lie in the text in order and be the same in short chunks as in one piece, and a line alone must be
+read as it is among others.
 """
 
 import re
