@@ -129,3 +129,12 @@ MALFORMED = -1
 """Stands for the blending of a statement that cannot be read."""
 ASSIGNS, CALLS = 1, 2
 """What a trigger does: write one number to a variable, or call with four and ``PRIO=-1``."""
+
+# --- columns of statements, for the compiled scanner -------------------------------------------------
+
+STATEMENT_COLUMNS = len(POSE_KEYS) + len(STATUS_TURN)
+"""X, Y, Z, A, B, C, S, T, or A1 to A6; a lone number stands in column 0."""
+TRIGGER_DISTANCE, TRIGGER_DELAY, TRIGGER_WRITTEN, TRIGGER_NAME = 0, 1, 2, 6
+"""Of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
+TRIGGER_NUMBERS = 4
+"""Numbers that a trigger writes when it calls."""

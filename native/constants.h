@@ -8,23 +8,6 @@
 
 #include "core.h"
 
-/* gcode2krl.units */
-#define U_MM_PER_INCH 25.4
-#define U_MM_PER_M 1000.0
-#define U_S_PER_MIN 60.0
-#define U_S_PER_H 3600.0
-#define U_MS_PER_S 1000.0
-#define U_US_PER_S 1000000.0
-#define U_UM_PER_MM 1000.0
-#define U_NMM_PER_NM 1000.0
-#define U_N_PER_KN 1000.0
-#define U_RAD_PER_MRAD 0.001
-#define U_RAD_PER_DEG 0.017453292519943295
-#define U_DEG_PER_RAD 57.29577951308232
-#define U_RAD_PER_REV 6.283185307179586
-#define U_BYTES_PER_MB 1000000
-#define U_GRAVITY_M_S2 9.80665
-
 /* gcode2krl.ascii_codes */
 #define CH_TAB 9
 #define CH_NEWLINE 10
@@ -149,6 +132,29 @@
 #define W_MALFORMED (-1)
 #define W_ASSIGNS 1
 #define W_CALLS 2
+#define W_STATEMENT_COLUMNS 8
+#define W_TRIGGER_DISTANCE 0
+#define W_TRIGGER_DELAY 1
+#define W_TRIGGER_WRITTEN 2
+#define W_TRIGGER_NAME 6
+#define W_TRIGGER_NUMBERS 4
+
+/* gcode2krl.units */
+#define U_MM_PER_INCH 25.4
+#define U_MM_PER_M 1000.0
+#define U_S_PER_MIN 60.0
+#define U_S_PER_H 3600.0
+#define U_MS_PER_S 1000.0
+#define U_US_PER_S 1000000.0
+#define U_UM_PER_MM 1000.0
+#define U_NMM_PER_NM 1000.0
+#define U_N_PER_KN 1000.0
+#define U_RAD_PER_MRAD 0.001
+#define U_RAD_PER_DEG 0.017453292519943295
+#define U_DEG_PER_RAD 57.29577951308232
+#define U_RAD_PER_REV 6.283185307179586
+#define U_BYTES_PER_MB 1000000
+#define U_GRAVITY_M_S2 9.80665
 
 /* gcode2krl.gcode.vocabulary */
 #define V_CASE_BIT 32

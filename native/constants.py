@@ -21,9 +21,9 @@ from gcode2krl.compiled import core
 
 HEADER = Path(__file__).resolve().parent / "constants.h"
 MODULES = {
-    "U": "gcode2krl.units",
     "CH": "gcode2krl.ascii_codes",
     "W": "gcode2krl.krl_words",
+    "U": "gcode2krl.units",
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",

@@ -1,8 +1,5 @@
 """KRL: written, read back, verified."""
 
-from pathlib import Path
-
-from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.krl.names import suggested_name
 from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.read import read_krl
@@ -20,7 +17,3 @@ __all__ = [
     "verify_krl",
     "write_krl",
 ]
-
-drop_stale(
-    Path(__file__).parent, "../ascii_codes.py", "../krl_words.py", "../units.py"
-)  # compiled kernels are looked up when they are first called

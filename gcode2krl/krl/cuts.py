@@ -6,10 +6,10 @@ much as the look-ahead needs to see in order not to brake.
 """
 
 import numpy as np
-from numba import njit
 
-from gcode2krl.arrays import Bools, Floats, Rows
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.core import FLOATS, INT, INTS, OUT_FLOATS, core_function
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import view
 from gcode2krl.krl.pieces import Pieces
@@ -26,6 +26,12 @@ _ROOM = 1.25
 """Length of a piece over what a change of speed at its end needs."""
 _EARLIER_S = 0.8
 """How long before the instant of a trigger a motion is still cut for it."""
+
+_cut = core_function(
+    "krl_cut",
+    *(INTS, FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS, FLOATS, INT, INT, OUT_FLOATS),
+    returns=INT,
+)
 
 
 def cut_for(
@@ -58,92 +64,6 @@ def cut_for(
         cuts,
     )
     return _pieces(cuts[:count], windows, targets, cell) if count else None
-
-
-@njit(cache=True, nogil=True)
-def _cut(
-    row: Rows,
-    here: Floats,
-    before: Floats,
-    window: Rows,
-    begin: Floats,
-    low: Floats,
-    high: Floats,
-    apart: Floats,
-    most: int,
-    in_view: int,
-    cuts: Floats,
-) -> int:
-    """Write paths at which to cut, in order; return how many.
-
-    A cut lies between two triggers, where a motion may be cut, as far from others as can be.
-    """
-    count = 0
-    for first in range(len(row) - most):
-        last = first + most
-        missing = in_view - (row[last] - row[first])
-        if missing <= 0:
-            continue
-        start, end = (here[first] + here[first + 1]) / 2.0, (here[last - 1] + here[last]) / 2.0
-        missing -= np.searchsorted(cuts[:count], end) - np.searchsorted(cuts[:count], start)
-        earliest = np.searchsorted(begin, before[first], side="right") - 1
-        while missing > 0:
-            at = _farthest(cuts[:count], start, end, low, high, apart, window[first], window[last])
-            if np.isnan(at):
-                at = _latest(
-                    cuts[:count], before[first], end, low, high, apart, max(earliest, 0), window[last]
-                )
-            if np.isnan(at) or count == len(cuts):
-                break
-            place = np.searchsorted(cuts[:count], at)
-            for i in range(count, place, -1):
-                cuts[i] = cuts[i - 1]
-            cuts[place] = at
-            count += 1
-            missing -= 1
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _farthest(
-    cuts: Floats, start: float, end: float, low: Floats, high: Floats, apart: Floats, first: int, last: int
-) -> float:
-    """Return the path farthest from all cuts between two others, within motions; NaN where it is too near."""
-    best, room = np.nan, 0.0
-    for w in range(first, last + 1):
-        a, b = max(low[w], start), min(high[w], end)
-        if a >= b:
-            continue
-        i, j = np.searchsorted(cuts, a), np.searchsorted(cuts, b)
-        for k in range(i, j + 1):  # between two cuts, or an end of the zone and the next cut
-            left = cuts[k - 1] if k > 0 else -np.inf
-            right = cuts[k] if k < len(cuts) else np.inf
-            if left >= a and right <= b:
-                at = (left + right) / 2.0
-            elif left >= a or (left < a and right > b and b - left > right - a):
-                at = b
-            else:
-                at = a
-            distance = min(at - left, right - at)
-            if distance >= apart[w] and distance > room:
-                best, room = at, distance
-    return best
-
-
-@njit(cache=True, nogil=True)
-def _latest(
-    cuts: Floats, start: float, end: float, low: Floats, high: Floats, apart: Floats, first: int, last: int
-) -> float:
-    """Return the last path between two others, within motions, that cuts leave free; NaN without any."""
-    for w in range(last, first - 1, -1):
-        a, at = max(low[w], start), min(high[w], end)
-        k = np.searchsorted(cuts, at + apart[w]) - 1
-        while k >= 0 and at - cuts[k] < apart[w]:
-            at = min(at, cuts[k] - apart[w])
-            k -= 1
-        if at > a:
-            return float(at)
-    return np.nan
 
 
 def _zones(windows: Windows, chain: Chain, cell: Cell) -> tuple[Floats, Floats, Floats]:

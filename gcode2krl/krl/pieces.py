@@ -4,13 +4,15 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.tables import Joints, Table, Targets
+
+_align = core_function("krl_align", FLOATS, BOOLS, FLOATS, FLOATS, BOOLS, FLOATS, FLOAT, OUT_INTS, OUT_FLOATS)
 
 
 @dataclass(frozen=True)
@@ -70,40 +72,9 @@ def pieces_in(
     start_mm, _ = motion_starts(targets, cell)
     row = np.full(len(position_mm), -1, dtype=np.int64)
     share = np.zeros(len(position_mm))
-    _align(position_mm, ptp, cdis_mm, targets.position_mm, targets.ptp, start_mm, limit_mm, row, share)
+    position, target, start = (
+        np.ascontiguousarray(each) for each in (position_mm, targets.position_mm, start_mm)
+    )
+    _align(position, ptp, cdis_mm, target, targets.ptp, start, limit_mm, row, share)
     more = np.flatnonzero(row >= 0)
     return Pieces(row[more], share[more], cdis_mm[more])
-
-
-@njit(cache=True, nogil=True)
-def _align(
-    position: Floats,
-    ptp: Bools,
-    cdis: Floats,
-    target: Floats,
-    target_ptp: Bools,
-    start: Floats,
-    limit: float,
-    row: Rows,
-    share: Floats,
-) -> None:
-    """Walk both in step; a motion that ends on the way to the next target belongs to it."""
-    at, before = 0, 0.0
-    for i in range(len(position)):
-        if at >= len(target):
-            return
-        off2, along, way2, beside2 = 0.0, 0.0, 0.0, 0.0
-        for c in range(3):
-            off2 += (position[i, c] - target[at, c]) ** 2
-            way2 += (target[at, c] - start[at, c]) ** 2
-            along += (position[i, c] - start[at, c]) * (target[at, c] - start[at, c])
-        if not (ptp[i] or target_ptp[at] or off2 <= limit * limit) and way2 > 0.0 and cdis[i] > 0.0:
-            along /= way2
-            for c in range(3):
-                beside2 += (start[at, c] + along * (target[at, c] - start[at, c]) - position[i, c]) ** 2
-            if before < along < 1.0 and beside2 <= limit * limit:
-                row[i], share[i] = at, along
-                before = along
-                continue
-        at += 1
-        before = 0.0

@@ -146,7 +146,7 @@ class _Reader:
         line = np.concatenate([self.scanned[f].line[a:b] for f, a, b in runs])
         value = np.concatenate([self.scanned[f].value[a:b] for f, a, b in runs])
         blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
-        file_of = np.concatenate([np.full(b - a, f, dtype=np.int32) for f, a, b in runs])
+        file_of = np.repeat(np.array([f for f, _, _ in runs], dtype=np.int32), [b - a for _, a, b in runs])
         where = np.concatenate([np.arange(a, b) for _, a, b in runs])
         axes = kind == w.KIND_PTP_AXES
         motion = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | axes
@@ -168,13 +168,13 @@ class _Reader:
             for row in np.flatnonzero((kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC))
         )
         rows = np.flatnonzero(motion)
-        speed = _in_force(np.where(kind == w.KIND_VEL_CP, value[:, 0], np.nan))[rows] * MM_PER_M
-        cdis = np.where(
-            blend[rows] == 1, _in_force(np.where(kind == w.KIND_APO_CDIS, value[:, 0], np.nan))[rows], 0.0
-        )
+        speed = _in_force(np.flatnonzero(kind == w.KIND_VEL_CP), value[:, 0], rows) * MM_PER_M
+        cdis = _in_force(np.flatnonzero(kind == w.KIND_APO_CDIS), value[:, 0], rows)
+        cdis[blend[rows] != 1] = 0.0
         ptp = kind[rows] != w.KIND_LIN
+        speed[ptp] = np.nan
         joint_rows = np.flatnonzero(axes[rows])
-        pose = value[rows]
+        pose = value.take(rows, axis=0)
         q_deg = np.full((len(rows), 6), np.nan)
         q_deg[joint_rows] = pose[joint_rows, :6]
         pose[joint_rows] = np.nan
@@ -186,7 +186,7 @@ class _Reader:
             status_turn=pose[:, 6:8],
             q_deg=q_deg,
             ptp=ptp,
-            speed_mm_s=np.where(ptp, np.nan, speed),
+            speed_mm_s=speed,
             cdis_mm=cdis,
             wait_s=_dwells((kind == w.KIND_WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
             line=line[rows],
@@ -219,11 +219,11 @@ class _Reader:
         values = value[rows]
         return ReadTriggers(
             motion=before[rows].astype(np.int64),
-            distance=values[:, sc.DISTANCE],
-            delay_ms=values[:, sc.DELAY],
-            written=values[:, sc.WRITTEN : sc.WRITTEN + sc.NUMBERS],
+            distance=values[:, w.TRIGGER_DISTANCE],
+            delay_ms=values[:, w.TRIGGER_DELAY],
+            written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
             calls=blend[rows] == w.CALLS,
-            names=self._names_written(values[:, sc.NAME :].astype(np.int64), file_of[rows]),
+            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of[rows]),
             line=line[rows],
             file_of=file_of[rows],
         )
@@ -341,10 +341,11 @@ class _Reader:
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
 
 
-def _in_force(values: Floats) -> Floats:
-    """Fill NaN with the last value before it."""
-    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
-    return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
+def _in_force(settings: Ints, values: Floats, rows: Ints) -> Floats:
+    """Return what is in force at rising rows: the value of the last setting before, NaN before the first."""
+    valid = settings[~np.isnan(values[settings])]
+    borders = [0, *np.searchsorted(rows, valid), len(rows)]
+    return np.repeat(np.concatenate([[np.nan], values[valid]]), np.diff(borders))
 
 
 def _dwells(marked: Bools, seconds: Floats, motions_before: Ints, count: int) -> Floats:

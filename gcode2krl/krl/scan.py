@@ -3,25 +3,26 @@
 It knows nothing of the writer: it reads any spacing, any order of components, upper and lower case.
 """
 
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gcode2krl import ascii_codes as ch
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import in_chunks
+from gcode2krl.compiled.core import BYTES, INT, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, core_function
 
-DISTANCE, DELAY, WRITTEN, NAME = 0, 1, 2, 6
-"""Columns of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
-NUMBERS = 4
-"""Numbers that a trigger writes when it calls."""
-COLUMNS = len(w.POSE_KEYS) + len(w.STATUS_TURN)
-_MOST_DIGITS = 15
-_AXIS_BITS = COLUMNS
-"""Components A1 to A6 have the bits from here on, the others those of their columns."""
-_CARTESIAN = (1 << COLUMNS) - 1
+CHUNK_BYTES = 1 << 20
+"""Bytes that a thread scans at a time, and whole lines more."""
+
+_count = core_function("krl_count", BYTES, INT, INT, OUT_INTS)
+_scan = core_function(
+    "krl_scan",
+    *(BYTES, INT, INT, INT),
+    *(OUT_BYTES, OUT_INTS32, OUT_INTS, OUT_FLOATS, OUT_BYTES, OUT_INTS),
+)
 
 
 class Scanned(NamedTuple):
@@ -33,7 +34,7 @@ class Scanned(NamedTuple):
     """(k, 2) first and last byte of the statement."""
     value: Floats
     """(k, 8) components X, Y, Z, A, B, C, S, T, or A1 to A6, NaN where absent; a lone number stands in
-    column 0. The columns of a trigger are named above; any other trigger is `KIND_OTHER`."""
+    column 0. The columns of a trigger are named in `krl_words`; any other trigger is `KIND_OTHER`."""
     blend: NDArray[np.int8]
     """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
     too_long: int
@@ -44,321 +45,44 @@ class Scanned(NamedTuple):
     """``;FOLD`` less ``;ENDFOLD``."""
 
 
-def scan_krl(text: bytes) -> Scanned:
+def scan_krl(text: bytes, chunk_bytes: int = CHUNK_BYTES) -> Scanned:
     """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
-    data = np.frombuffer(text, dtype=np.uint8)
-    most = text.count(b"\n") + 2
-    kind, blend = np.empty(most, dtype=np.int8), np.empty(most, dtype=np.int8)
-    line, span = np.empty(most, dtype=np.int32), np.empty((most, 2), dtype=np.int64)
-    value = np.empty((most, COLUMNS))
-    count, too_long, not_ascii, folds = _scan(data, kind, line, span, value, blend)
-    rows = slice(count)
-    return Scanned(kind[rows], line[rows], span[rows], value[rows], blend[rows], too_long, not_ascii, folds)
+    data, borders = np.frombuffer(text, dtype=np.uint8), _borders(text, chunk_bytes)
+
+    def counted(start: int, end: int) -> Ints:
+        lines_statements = np.empty(2, dtype=np.int64)
+        _count(data, start, end, lines_statements)
+        return lines_statements
+
+    before = list(accumulate(in_chunks(counted, borders), initial=np.zeros(2, dtype=np.int64)))
+    begins = {start: (int(lines), int(rows)) for start, (lines, rows) in zip(borders, before, strict=True)}
+    count = int(before[-1][1])
+    kind, blend = np.empty(count, dtype=np.int8), np.empty(count, dtype=np.int8)
+    line, span = np.empty(count, dtype=np.int32), np.empty((count, 2), dtype=np.int64)
+    value = np.empty((count, w.STATEMENT_COLUMNS))
+    kinds, blends = kind.view(np.uint8), blend.view(np.uint8)
+
+    def scanned(start: int, end: int) -> Ints:
+        lines, first = begins[start]
+        rows, found = slice(first, begins[end][1]), np.zeros(3, dtype=np.int64)
+        _scan(data, start, end, lines, kinds[rows], line[rows], span[rows], value[rows], blends[rows], found)
+        return found
+
+    too_long, not_ascii, folds = np.transpose(in_chunks(scanned, borders)).tolist()
+    return Scanned(kind, line, span, value, blend, _first(too_long), _first(not_ascii), sum(folds))
 
 
-def _bytes(word: str) -> NDArray[np.uint8]:
-    return np.frombuffer(word.encode("ascii"), dtype=np.uint8).copy()
-
-
-_LIN_WORD, _PTP_WORD, _BLEND_WORD = _bytes(w.LIN), _bytes(w.PTP), _bytes(w.C_DIS)
-_VEL_WORD, _CDIS_WORD = _bytes(w.VEL_CP), _bytes(w.APO_CDIS)
-_WAIT_WORD, _SEC_WORD, _DWELL_WORD = _bytes(w.WAIT), _bytes(w.SEC), _bytes(w.DWELL.upper())
-_DISTANCE_WORDS = tuple(_bytes(word) for word in (w.TRIGGER, w.WHEN, w.DISTANCE, "="))
-_DELAY_WORDS = tuple(_bytes(word) for word in (w.DELAY, "="))
-_DO_WORDS = (_bytes(w.DO),)
-_PRIO_WORDS = tuple(_bytes(word) for word in (w.PRIO, "="))
-_FOLD_WORD, _ENDFOLD_WORD = _bytes(w.FOLD), _bytes(w.ENDFOLD)
-
-
-@njit(cache=True)
-def _starts(data, at, end, word):
-    """Tell whether a word of capitals stands at a place, in capitals or small letters."""
-    if at + len(word) > end:
-        return False
-    for k in range(len(word)):
-        c = data[at + k]
-        if c >= ch.SMALL_A and c <= ch.SMALL_Z:
-            c -= ch.CASE_BIT
-        if c != word[k]:
-            return False
-    return True
-
-
-@njit(cache=True)
-def _is_blank(c):
-    return c == ch.SPACE or c == ch.TAB
-
-
-@njit(cache=True)
-def _is_digit(c):
-    return c >= ch.DIGIT_0 and c <= ch.DIGIT_9
-
-
-@njit(cache=True)
-def _blank(data, at, end):
-    """Return the place behind blanks."""
-    while at < end and _is_blank(data[at]):
-        at += 1
-    return at
-
-
-@njit(cache=True)
-def _is(data, at, end, c):
-    return at < end and data[at] == c
-
-
-@njit(cache=True)
-def _ends_here(data, at, end):
-    """Tell whether nothing but a comment follows."""
-    return at >= end or data[at] == ch.SEMICOLON
-
-
-@njit(cache=True)
-def _number(data, at, end):
-    """Return (position behind the number, value); NaN where there is none."""
-    sign = 1.0
-    if at < end and (data[at] == ch.MINUS or data[at] == ch.PLUS):
-        if data[at] == ch.MINUS:
-            sign = -1.0
-        at += 1
-    mantissa = 0.0
-    scale = 1.0
-    digits = 0
-    point = False
-    while at < end:
-        c = data[at]
-        if _is_digit(c):
-            mantissa = mantissa * 10.0 + (c - ch.DIGIT_0)
-            if point:
-                scale *= 10.0
-            digits += 1
-        elif c == ch.POINT and not point:
-            point = True
-        else:
+def _borders(text: bytes, chunk_bytes: int) -> list[int]:
+    """Return where chunks of whole lines begin, and the end."""
+    borders = [0]
+    while len(text) - borders[-1] > chunk_bytes:
+        behind = text.find(b"\n", borders[-1] + chunk_bytes - 1) + 1
+        if behind in (0, len(text)):
             break
-        at += 1
-    if digits == 0 or digits > _MOST_DIGITS:
-        return at, np.nan
-    return at, sign * mantissa / scale
+        borders.append(behind)
+    return [*borders, len(text)]
 
 
-@njit(cache=True)
-def _component(data, at, end):
-    """Return (position behind the name of a component, its bit), -1 for no such component."""
-    letter = data[at] - ch.CASE_BIT if data[at] >= ch.SMALL_A else data[at]
-    at += 1
-    if letter >= ch.LETTER_X and letter <= ch.LETTER_Z:
-        return at, letter - ch.LETTER_X
-    if letter == ch.LETTER_A and at < end and data[at] >= ch.DIGIT_1 and data[at] <= ch.DIGIT_6:
-        return at + 1, _AXIS_BITS + data[at] - ch.DIGIT_1
-    if letter >= ch.LETTER_A and letter <= ch.LETTER_C:
-        return at, 3 + letter - ch.LETTER_A
-    if letter == ch.LETTER_S:
-        return at, 6
-    return at, 7 if letter == ch.LETTER_T else -1
-
-
-@njit(cache=True)
-def _components(data, at, end, value):
-    """Read ``{X 1.0,Y 2.0,…}`` into value; return (position behind the brace or -1, components as bits)."""
-    found = 0
-    if not _is(data, at, end, ch.BRACE_OPEN):
-        return -1, found
-    at += 1
-    while True:
-        at = _blank(data, at, end)
-        if at >= end:
-            return -1, found
-        at, bit = _component(data, at, end)
-        if bit < 0 or at >= end or not _is_blank(data[at]):
-            return -1, found
-        at, number = _number(data, _blank(data, at, end), end)
-        if np.isnan(number) or found & (1 << bit):
-            return -1, found
-        found |= 1 << bit
-        value[bit - _AXIS_BITS if bit >= _AXIS_BITS else bit] = number
-        at = _blank(data, at, end)
-        if _is(data, at, end, ch.BRACE_CLOSE):
-            return at + 1, found
-        if not _is(data, at, end, ch.COMMA):
-            return -1, found
-        at += 1
-
-
-@njit(cache=True)
-def _behind(data, at, end, words):
-    """Return the place behind words and the blanks after each, -1 where they do not stand there."""
-    for k in range(len(words)):
-        if at < 0 or not _starts(data, at, end, words[k]):
-            return -1
-        at = _blank(data, at + len(words[k]), end)
-    return at
-
-
-@njit(cache=True)
-def _number_behind(data, at, end, words):
-    """Return (place behind words and a number, the number), (-1, NaN) where they do not stand there."""
-    at = _behind(data, at, end, words)
-    if at < 0:
-        return -1, np.nan
-    at, number = _number(data, at, end)
-    return (-1 if np.isnan(number) else _blank(data, at, end)), number
-
-
-@njit(cache=True)
-def _written_name(data, at, end, value):
-    """Read the name that is assigned to or called; return the place of the ``=`` or ``(``, -1 without one."""
-    first = at
-    while at < end and data[at] not in (ch.EQUALS, ch.PAREN_OPEN, ch.SEMICOLON):
-        at += 1
-    last = at
-    while last > first and _is_blank(data[last - 1]):
-        last -= 1
-    value[NAME], value[NAME + 1] = first, last - first
-    return -1 if _ends_here(data, at, end) or last == first else at
-
-
-@njit(cache=True)
-def _arguments(data, at, end, value):
-    """Read the numbers of a call from its ``(`` on; return the place behind ``)``, -1 where it is another."""
-    for k in range(NUMBERS):
-        at, number = _number(data, _blank(data, at + 1, end), end)
-        at = _blank(data, at, end)
-        value[WRITTEN + k] = number
-        if np.isnan(number) or not _is(data, at, end, ch.COMMA if k < NUMBERS - 1 else ch.PAREN_CLOSE):
-            return -1
-    return _blank(data, at + 1, end)
-
-
-@njit(cache=True)
-def _trigger(data, at, end, value):
-    """Read ``TRIGGER WHEN DISTANCE=0 DELAY=7 DO …`` into value; return what it does, 0 for anything else."""
-    at, value[DISTANCE] = _number_behind(data, at, end, _DISTANCE_WORDS)
-    at, value[DELAY] = _number_behind(data, at, end, _DELAY_WORDS)
-    at = _behind(data, at, end, _DO_WORDS)
-    at = _written_name(data, at, end, value) if at >= 0 else -1
-    if at < 0:
-        return 0
-    calls = data[at] == ch.PAREN_OPEN
-    if calls:
-        at = _arguments(data, at, end, value)
-        at, prio = _number_behind(data, at, end, _PRIO_WORDS)
-        if at < 0 or prio != w.PRIO_BY_CONTROLLER:
-            return 0
-    else:
-        at, value[WRITTEN] = _number(data, _blank(data, at + 1, end), end)
-        at = _blank(data, at, end)
-        if np.isnan(value[WRITTEN]):
-            return 0
-    if not _ends_here(data, at, end):
-        return 0
-    return w.CALLS if calls else w.ASSIGNS
-
-
-@njit(cache=True)
-def _motion(data, begin, end, value):
-    """Read a LIN or PTP into value; return its kind (-1 for no motion) and its blending."""
-    if _starts(data, begin, end, _LIN_WORD):
-        kind = w.KIND_LIN
-    elif _starts(data, begin, end, _PTP_WORD):
-        kind = w.KIND_PTP
-    else:
-        return -1, 0
-    at, found = _components(data, _blank(data, begin + 3, end), end, value)
-    axes = found > _CARTESIAN
-    linear = kind == w.KIND_LIN
-    if axes and not linear:
-        kind = w.KIND_PTP_AXES
-    if at < 0 or (axes and (linear or found & _CARTESIAN)):
-        return kind, w.MALFORMED
-    at = _blank(data, at, end)
-    blend = 0
-    if _starts(data, at, end, _BLEND_WORD):
-        blend = 1
-        at = _blank(data, at + len(_BLEND_WORD), end)
-    return kind, blend if _ends_here(data, at, end) else w.MALFORMED
-
-
-@njit(cache=True)
-def _setting(data, begin, end):
-    """Return (kind, place behind the words) of $VEL.CP, $APO.CDIS and WAIT SEC; the kind is -1 for others."""
-    if _starts(data, begin, end, _VEL_WORD):
-        return w.KIND_VEL_CP, begin + len(_VEL_WORD)
-    if _starts(data, begin, end, _CDIS_WORD):
-        return w.KIND_APO_CDIS, begin + len(_CDIS_WORD)
-    if _starts(data, begin, end, _WAIT_WORD):
-        behind = begin + len(_WAIT_WORD)
-        second = _blank(data, behind, end)
-        if second > behind and _starts(data, second, end, _SEC_WORD):
-            return w.KIND_WAIT_SEC, second + len(_SEC_WORD)
-    return -1, begin
-
-
-@njit(cache=True)
-def _set_to(data, at, end, kind, value):
-    """Read what a setting is set to into value; return its blending: 1 for a dwell, `MALFORMED`, else 0."""
-    blend = 0
-    at = _blank(data, at, end)
-    if kind != w.KIND_WAIT_SEC:
-        if not _is(data, at, end, ch.EQUALS):
-            blend = w.MALFORMED
-        at = _blank(data, at + 1, end)
-    at, value[0] = _number(data, at, end)
-    at = _blank(data, at, end)
-    if np.isnan(value[0]) or not _ends_here(data, at, end):
-        return w.MALFORMED
-    if kind == w.KIND_WAIT_SEC and at < end:
-        return int(_starts(data, _blank(data, at + 1, end), end, _DWELL_WORD))
-    return blend
-
-
-@njit(cache=True)
-def _statement(data, begin, end, value):
-    """Read a statement into value; return its kind and its blending."""
-    kind, blend = _motion(data, begin, end, value)
-    if kind >= 0:
-        return kind, blend
-    kind, at = _setting(data, begin, end)
-    if kind >= 0:
-        return kind, _set_to(data, at, end, kind, value)
-    does = _trigger(data, begin, end, value)
-    return (w.KIND_TRIGGER, does) if does > 0 else (w.KIND_OTHER, 0)
-
-
-@njit(cache=True)
-def _fold(data, begin, end):
-    """Return 1 for a comment that opens a fold, -1 for one that closes it, else 0."""
-    if _starts(data, begin, end, _FOLD_WORD):
-        return 1
-    return -1 if _starts(data, begin, end, _ENDFOLD_WORD) else 0
-
-
-@njit(cache=True)
-def _scan(data, kind, line, span, value, blend):
-    """Fill the columns; return (statements, first line too long, first that is not ASCII, open folds)."""
-    n = len(data)
-    at = 0
-    number = 0
-    count = 0
-    too_long, not_ascii, folds = 0, 0, 0
-    while at < n:
-        number += 1
-        end = at
-        while end < n and data[end] != ch.NEWLINE:
-            if data[end] >= ch.FIRST_FOREIGN and not_ascii == 0:
-                not_ascii = number
-            end += 1
-        if end - at > w.LONGEST_LINE + 1 and too_long == 0:
-            too_long = number
-        begin = _blank(data, at, end)
-        at = end + 1
-        while end > begin and (data[end - 1] == ch.RETURN or _is_blank(data[end - 1])):
-            end -= 1
-        if begin == end or data[begin] == ch.SEMICOLON or data[begin] == ch.AMPERSAND:
-            folds += _fold(data, begin, end)
-            continue
-        line[count], span[count, 0], span[count, 1] = number, begin, end
-        value[count, :] = np.nan
-        kind[count], blend[count] = _statement(data, begin, end, value[count])
-        count += 1
-    return count, too_long, not_ascii, folds
+def _first(lines: list[int]) -> int:
+    """Return the first line that is one, 0 without any."""
+    return next((line for line in lines if line), 0)

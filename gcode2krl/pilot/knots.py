@@ -9,11 +9,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.compiled.core import FLOAT, FLOATS, INTS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Table, _column
 
@@ -25,6 +25,10 @@ FORCE_DECIMALS, DEFLECTION_DECIMALS = 2, 5
 TIME_DECIMALS, PATH_DECIMALS, LEAD_DECIMALS = 6, 6, 4
 _WRITTEN_N = 0.1
 """Part of the tolerance reserved for rounding to the decimals in which knots are written."""
+
+_mark_spaced = core_function("pilot_spaced", FLOATS, FLOAT, OUT_BOOLS)
+_thin = core_function("pilot_thin", FLOATS, FLOATS, FLOATS, INTS, FLOAT, FLOAT, OUT_INTS, OUT_BOOLS)
+_errors = core_function("pilot_errors", FLOATS, FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS, OUT_FLOATS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +93,8 @@ def knots_of(
     kept = _always_kept(time_s, acting, np.zeros(0, dtype=np.int64) if breaks is None else breaks, least_s)
     inner_N = tolerance_N - min(_WRITTEN_N, 0.05 * tolerance_N)
     force = np.ascontiguousarray(force_N)
-    _thin(time_s, path_mm, force, kept, inner_N, least_s)
+    ends = np.empty(len(time_s), dtype=np.int64)
+    _thin(time_s, path_mm, force, np.flatnonzero(kept), inner_N, least_s, ends, kept)
     rows = np.flatnonzero(kept)
     knot_force = _rounded(force[rows], FORCE_DECIMALS)
     knot_time, knot_path = _rounded(time_s[rows], TIME_DECIMALS), _rounded(path_mm[rows], PATH_DECIMALS)
@@ -188,103 +193,8 @@ def _always_kept(time_s: Floats, acting: Bools, breaks: Rows, least_s: float) ->
     return kept
 
 
-@njit(cache=True, nogil=True)
-def _spaced(time: Floats, least: float) -> Bools:
-    """Mark the times (k,) that are at least ``least`` after the last marked one."""
-    marked = np.zeros(len(time), dtype=np.bool_)
-    last = -np.inf
-    for i in range(len(time)):
-        if time[i] - last >= least:
-            marked[i] = True
-            last = time[i]
+def _spaced(time_s: Floats, least_s: float) -> Bools:
+    """Mark the times (k,) that are at least ``least_s`` after the last marked one."""
+    marked = np.empty(len(time_s), dtype=np.bool_)
+    _mark_spaced(time_s, least_s, marked)
     return marked
-
-
-@njit(cache=True, nogil=True)
-def _thin(time: Floats, path: Floats, force: Floats, kept: Bools, tolerance: float, least: float) -> None:
-    """Ramer-Douglas-Peucker between kept samples: marks the further samples that the polyline needs.
-
-    The right ends of the open spans wait on a stack; a span is split at its farthest sample that is a cycle
-    away from both ends.
-    """
-    rows = np.flatnonzero(kept)
-    ends = np.empty(len(time), dtype=np.int64)
-    for k in range(len(rows) - 1):
-        a, depth = rows[k], 1
-        ends[0] = rows[k + 1]
-        while depth > 0:
-            b = ends[depth - 1]
-            worst, at = tolerance * tolerance, -1
-            for i in range(a + 1, b):
-                if time[i] - time[a] < least or time[b] - time[i] < least:
-                    continue
-                off = _off2(time, path, force, i, time[a], time[b], path[a], path[b], force[a], force[b])
-                if off > worst:
-                    worst, at = off, i
-            if at >= 0:
-                kept[at] = True
-                ends[depth] = at
-                depth += 1
-            else:
-                a = b
-                depth -= 1
-
-
-@njit(cache=True, nogil=True)
-def _errors(
-    time: Floats,
-    path: Floats,
-    force: Floats,
-    rows: Rows,
-    knot_time: Floats,
-    knot_path: Floats,
-    knot_force: Floats,
-    error: Floats,
-) -> None:
-    """Write the distance (m,) of each sample to the polyline; outside the knots the pilot is zero."""
-    k, last = -1, len(rows) - 1
-    for i in range(len(time)):
-        while k < last and rows[k + 1] <= i:
-            k += 1
-        if k < 0 or k >= last:
-            size = 0.0
-            at_last = k >= 0 and rows[last] == i
-            for c in range(3):
-                size += (force[i, c] - (knot_force[last, c] if at_last else 0.0)) ** 2
-        else:
-            size = _off2(
-                time,
-                path,
-                force,
-                i,
-                knot_time[k],
-                knot_time[k + 1],
-                knot_path[k],
-                knot_path[k + 1],
-                knot_force[k],
-                knot_force[k + 1],
-            )
-        error[i] = math.sqrt(size)
-
-
-@njit(cache=True, nogil=True)
-def _off2(
-    time: Floats,
-    path: Floats,
-    force: Floats,
-    i: int,
-    ta: float,
-    tb: float,
-    sa: float,
-    sb: float,
-    fa: Floats,
-    fb: Floats,
-) -> float:
-    """Return the square of a sample's distance to the chord, linear in time or in the path, the larger."""
-    by_time = min(max((time[i] - ta) / (tb - ta), 0.0), 1.0)
-    by_path = min(max((path[i] - sa) / (sb - sa), 0.0), 1.0) if sb - sa > 1e-6 else by_time
-    first, second = 0.0, 0.0
-    for c in range(3):
-        first += (force[i, c] - fa[c] - by_time * (fb[c] - fa[c])) ** 2
-        second += (force[i, c] - fa[c] - by_path * (fb[c] - fa[c])) ** 2
-    return max(first, second)

@@ -11,7 +11,6 @@ what else comes from Python are declared in gcode2krl/cutting/sweep.py. */
 
 /* Material thinner than this is rounding of the path, not material. */
 #define FEEL_MM 1e-3
-#define PI 3.141592653589793
 #define TURN (2.0 * PI)
 
 /* A row of Path.outlines: the cutter's lower outline; the corner arc ends at (arc_radius, arc_top), above it the

@@ -24,7 +24,7 @@ Fit radii_fit(double start_mm, double end_mm, double unit_mm) {
     const double bound = unit_mm == 1.0 ? SPIRAL_MM : SPIRAL_INCH_MM;
     if (difference > SPIRAL_MOST * bound)
         return MISFIT;
-    return difference > bound && difference > SPIRAL_SHARE * larger(start_mm, end_mm) ? MISFIT : SPIRAL;
+    return difference > bound && difference > SPIRAL_SHARE * greater(start_mm, end_mm) ? MISFIT : SPIRAL;
 }
 
 /* Find the centre of an arc given by R, or return the finding; a negative R takes the longer way. */
@@ -66,7 +66,7 @@ double sweep_angle(Point start, Point end, Point centre, bool ccw, int64_t turns
 int64_t chord_count(double radius_mm, double sweep_rad, double tolerance_mm) {
     double step = 0.5 * PI;
     if (tolerance_mm < radius_mm)
-        step = smaller(step, 2.0 * acos(1.0 - tolerance_mm / radius_mm));
+        step = lesser(step, 2.0 * acos(1.0 - tolerance_mm / radius_mm));
     const double count = ceil(fabs(sweep_rad) / step - COUNT_SLACK); /* infinite where the step is lost */
-    return most(1, (int64_t)smaller(count, MOST_CHORDS + 1));
+    return most(1, (int64_t)lesser(count, MOST_CHORDS + 1));
 }

@@ -49,10 +49,10 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
     x = named & X_NAMED ? x * s->unit_mm + (s->absolute ? base_mm[0] : s->x) : s->x;
     y = named & Y_NAMED ? y * s->unit_mm + (s->absolute ? base_mm[1] : s->y) : s->y;
     z = named & Z_NAMED ? z * s->unit_mm + (s->absolute ? base_mm[2] : s->z) : s->z;
-    const double largest_mm = larger(larger(fabs(x), fabs(y)), fabs(z));
+    const double largest_mm = greater(greater(fabs(x), fabs(y)), fabs(z));
     if (largest_mm > FAR_MM)
         return false;
-    s->largest_mm = larger(s->largest_mm, largest_mm);
+    s->largest_mm = greater(s->largest_mm, largest_mm);
     s->x = x;
     s->y = y;
     s->z = z;

@@ -18,7 +18,7 @@ static void stand_at(State *s, const double position_mm[3]) {
 }
 
 static double largest_coordinate_mm(const State *s) {
-    return larger(larger(fabs(s->x), fabs(s->y)), fabs(s->z));
+    return greater(greater(fabs(s->x), fabs(s->y)), fabs(s->z));
 }
 
 static void note_unknown_start(Block *b) {
@@ -37,7 +37,7 @@ static int feed_speed(const Block *b, double length_mm, double *mm_s) {
             return F_NO_INVERSE_TIME;
         if (b->word[V_WORD_F] <= 0.0)
             return F_NO_FEED;
-        *mm_s = larger(length_mm * b->word[V_WORD_F], SLOWEST * s->unit_mm) / U_S_PER_MIN;
+        *mm_s = greater(length_mm * b->word[V_WORD_F], SLOWEST * s->unit_mm) / U_S_PER_MIN;
         return F_OK;
     }
     if (s->feed <= 0.0)
@@ -292,7 +292,7 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
     double angle, mm_s = 0.0;
     const bool ccw = b->state->motion == V_MOTION_ARC_CCW;
     const double sweep = sweep_angle(arc->from, arc->to, arc->centre, ccw, turns, &angle);
-    const double radius_mm = larger(arc->from_radius_mm, arc->to_radius_mm);
+    const double radius_mm = greater(arc->from_radius_mm, arc->to_radius_mm);
     const int64_t count = chord_count(radius_mm, sweep, machine->chord_tolerance_mm);
     if (count > MOST_CHORDS) {
         report_unless(b, arc->rests_on, F_ARC_TOO_LONG, (Says){.a = radius_mm});
@@ -328,7 +328,7 @@ static bool arc_move(Block *b, Arc *arc) {
     }
     arc->from_radius_mm = distance(arc->from, arc->centre);
     arc->to_radius_mm = distance(arc->to, arc->centre);
-    if (smaller(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM) {
+    if (lesser(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM) {
         report_unless(b, arc->rests_on, F_ARC_ZERO_RADIUS, (Says){0});
         return true;
     }
@@ -344,7 +344,7 @@ static bool arc_move(Block *b, Arc *arc) {
 static void check_distance(Block *b) {
     State *s = b->state;
     const double largest_mm = largest_coordinate_mm(s);
-    s->largest_mm = larger(s->largest_mm, largest_mm);
+    s->largest_mm = greater(s->largest_mm, largest_mm);
     if (largest_mm <= FAR_MM)
         return;
     report_unless(b, S_DOUBT_POSITION | S_DOUBT_UNIT | S_DOUBT_DISTANCE, F_TOO_FAR, (Says){.a = largest_mm});
