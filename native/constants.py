@@ -4,16 +4,21 @@ Run after a change of one of these modules; a test compares the file with what t
 
     python native/constants.py
 
-A whole number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, and a record
-of numpy a C struct with the same fields in the same places.
+A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of numbers an
+initialiser, an enumeration of whole numbers ``PREFIX_NAME_MEMBER``, and a record of numpy a C struct with the
+same fields in the same places.
 """
 
+import enum
+import math
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+
+from gcode2krl.compiled import core
 
 HEADER = Path(__file__).resolve().parent / "constants.h"
 MODULES = {
@@ -22,8 +27,12 @@ MODULES = {
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
+    "STANDING": "gcode2krl.robot.standing",
+    "CHAIN": "gcode2krl.compliance.chain",
+    "BLENDING": "gcode2krl.online.blending",
+    "PILOT": "gcode2krl.online.pilot_gate",
 }
-"""Prefix -> module whose whole numbers and words the core uses."""
+"""Prefix -> module whose numbers and words the core uses."""
 RECORDS = {"State": ("gcode2krl.gcode.state", "STATE")}
 """Name of the struct -> module and numpy record."""
 _TYPES = {"f8": "double", "i8": "int64_t", "i4": "int32_t", "i1": "int8_t", "u1": "uint8_t", "b1": "uint8_t"}
@@ -50,14 +59,22 @@ def header() -> str:
 def _constants(prefix: str, module: ModuleType) -> Iterator[str]:
     yield f"/* {module.__name__} */"
     for name, value in vars(module).items():
-        if name.isupper() and not name.startswith("_"):
-            if type(value) is int:
-                yield (
-                    f"#define {prefix}_{name} {value}" if value >= 0 else f"#define {prefix}_{name} ({value})"
-                )
-            elif type(value) is str and value.isascii() and value.isprintable():
-                text = value.replace("\\", "\\\\").replace('"', '\\"')
-                yield f'#define {prefix}_{name} "{text}"'
+        if name.isupper() and not name.startswith("_") and (text := _literal(value)):
+            yield f"#define {prefix}_{name} {text}"
+        elif isinstance(value, enum.EnumMeta) and value.__module__ == module.__name__:
+            yield from (f"#define {prefix}_{name.upper()}_{each.name} {int(each)}" for each in value)
+
+
+def _literal(value: object) -> str | None:
+    """Return how C writes a number, a word or a tuple of numbers; None of anything else."""
+    if type(value) is int or (type(value) is float and math.isfinite(value)):
+        return repr(value) if value >= 0 else f"({value!r})"
+    if type(value) is str and value.isascii() and value.isprintable():
+        text = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{text}"'
+    if type(value) is tuple and value and all(type(each) in (int, float) for each in value):
+        return f"{{{', '.join(map(repr, value))}}}"
+    return None
 
 
 def _struct(name: str, record: np.dtype) -> Iterator[str]:
@@ -74,4 +91,7 @@ def _struct(name: str, record: np.dtype) -> Iterator[str]:
 
 
 if __name__ == "__main__":
+    core.core_function = lambda *_, **__: (
+        None
+    )  # the constants are there before the core that is made with them
     HEADER.write_text(header(), encoding="ascii", newline="\n")
