@@ -335,6 +335,14 @@
 #define CHAIN_AXIS_SIGN {-1.0, 1.0, 1.0, -1.0, 1.0, -1.0}
 #define CHAIN_AXIS_ZERO {0.0, 0.0, -1.5707963267948966, 0.0, 0.0, 3.141592653589793}
 
+/* gcode2krl.online.feed */
+#define FEED_WINDOW_S 0.02
+#define FEED_LEAST_MM 0.02
+
+/* gcode2krl.online.limits */
+#define LIMITS_RAD_PER_DEG 0.017453292519943295
+#define LIMITS_NO_CORRECTION 1000000.0
+
 /* gcode2krl.online.blending */
 #define BLENDING_STEADY_SHARE 0.2
 #define BLENDING_WEIGHT 0
@@ -350,6 +358,16 @@
 #define PILOT_JITTER_S 0.012
 #define PILOT_REST_MM 0.002
 #define PILOT_REST_S 0.05
+#define PILOT_STARTED 0
+#define PILOT_NEXT 1
+#define PILOT_PROVEN 2
+#define PILOT_REASON 3
+#define PILOT_SYNCED 4
+#define PILOT_OFFSET 5
+#define PILOT_REAL 6
+#define PILOT_PLANNED 7
+#define PILOT_STILL 8
+#define PILOT_POSITION 9
 #define PILOT_GATE_OPEN 0
 #define PILOT_GATE_NO_PILOT 1
 #define PILOT_GATE_NOT_STARTED 2

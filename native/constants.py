@@ -29,6 +29,8 @@ MODULES = {
     "S": "gcode2krl.gcode.state",
     "STANDING": "gcode2krl.robot.standing",
     "CHAIN": "gcode2krl.compliance.chain",
+    "FEED": "gcode2krl.online.feed",
+    "LIMITS": "gcode2krl.online.limits",
     "BLENDING": "gcode2krl.online.blending",
     "PILOT": "gcode2krl.online.pilot_gate",
 }

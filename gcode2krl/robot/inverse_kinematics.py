@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
 from gcode2krl.compiled.core import FLOATS, INT, OUT_FLOATS, core_function
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.inputs import shaped
 
 _POSES = (FLOATS, FLOATS, FLOATS)
 """Positions (n, 3), rotations (n, 3, 3) or one for all, geometry (6,)."""
@@ -50,10 +50,10 @@ def all_branches(position_mm: npt.ArrayLike, rotation: npt.ArrayLike, geometry: 
     ValueError
         If an array has the wrong shape.
     """
-    position = read_only("position_mm", position_mm, -1, 3)
-    axes = read_only("rotation", rotation, len(position), 3, 3)
+    position = shaped("position_mm", position_mm, -1, 3)
+    axes = shaped("rotation", rotation, len(position), 3, 3)
     q_rad = np.empty((len(position), 8, 6))
-    _all_branches(position, axes, read_only("geometry", geometry, 6), q_rad)
+    _all_branches(position, axes, shaped("geometry", geometry, 6), q_rad)
     return q_rad
 
 
@@ -96,12 +96,12 @@ def one_branch(
     """
     if branch not in range(8):
         raise ValueError(f"branch is {branch}, not 0 to 7")
-    reference = read_only("q_reference_rad", q_reference_rad, 6)
+    reference = shaped("q_reference_rad", q_reference_rad, 6)
     if not np.isfinite(reference).all():
         raise ValueError("q_reference_rad is not finite")
-    position = read_only("position_mm", position_mm, -1, 3)
-    axes = read_only("rotation", rotation, 1 if np.shape(rotation)[0] == 1 else len(position), 3, 3)
-    shape = read_only("geometry", geometry, 6)
+    position = shaped("position_mm", position_mm, -1, 3)
+    axes = shaped("rotation", rotation, 1 if np.shape(rotation)[0] == 1 else len(position), 3, 3)
+    shape = shaped("geometry", geometry, 6)
     q_rad = np.empty((len(position), 6))
     room = np.empty((2, 6 * _BLOCK))
     for first in range(0, len(position), _BLOCK):
@@ -114,5 +114,5 @@ def one_branch(
             _path(position[rows], turned, shape, int(branch), reference, q_part)
         reached = np.flatnonzero(q_part[:, 0] == q_part[:, 0])
         if len(reached):
-            reference = read_only("q_reference_rad", q_part[reached[-1]], 6)
+            reference = shaped("q_reference_rad", q_part[reached[-1]], 6)
     return q_rad

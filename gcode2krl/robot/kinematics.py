@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, OUT_INTS32, core_function
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.inputs import shaped
 
 _flange = core_function("robot_flange", FLOATS, FLOATS, OUT_FLOATS, OUT_FLOATS)
 _status_turn = core_function("robot_status_turn", FLOATS, FLOATS, FLOAT, OUT_INTS32, OUT_INTS32)
@@ -42,10 +42,10 @@ def flange_pose(q_rad: npt.ArrayLike, geometry: npt.ArrayLike) -> tuple[Floats, 
     ValueError
         If an array has the wrong shape.
     """
-    q = read_only("q_rad", q_rad, -1, 6)
+    q = shaped("q_rad", q_rad, -1, 6)
     position_mm = np.empty((len(q), 3))
     rotation = np.empty((len(q), 3, 3))
-    _flange(q, read_only("geometry", geometry, 6), position_mm, rotation)
+    _flange(q, shaped("geometry", geometry, 6), position_mm, rotation)
     return position_mm, rotation
 
 
@@ -80,7 +80,7 @@ def status_turn(
     ValueError
         If an array has the wrong shape.
     """
-    q = read_only("q_rad", q_rad, -1, 6)
+    q = shaped("q_rad", q_rad, -1, 6)
     status, turn = np.empty(len(q), dtype=np.int32), np.empty(len(q), dtype=np.int32)
-    _status_turn(q, read_only("geometry", geometry, 6), grid_rad, status, turn)
+    _status_turn(q, shaped("geometry", geometry, 6), grid_rad, status, turn)
     return status, turn

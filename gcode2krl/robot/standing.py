@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.core import FLOATS, INTS32, OUT_FLOATS, ArrayOf, core_function
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.units import RAD_PER_DEG
 
 Bits = NDArray[np.uint16]
@@ -57,16 +57,16 @@ def speed_share_of_rows(qd_rad_s: Floats, row: Ints32, count: int, cell: Cell) -
     if speeds is None:
         return None
     share = np.zeros(count)
-    most = read_only("most", np.array(speeds) * RAD_PER_DEG, 6)
-    _speed_share(read_only("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
+    most = shaped("most", np.array(speeds) * RAD_PER_DEG, 6)
+    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
     return share
 
 
 def _judged(q_rad: Floats, duration_s: Floats, cell: Cell) -> tuple[Floats, Bits]:
-    q = read_only("q_rad", q_rad, -1, 6)
+    q = shaped("q_rad", q_rad, -1, 6)
     speeds = cell.robot.speeds.qd_deg_s
     most = np.empty(0) if speeds is None else np.array(speeds) * RAD_PER_DEG
     margin, wrong = np.empty(len(q)), np.zeros(len(duration_s), dtype=np.uint16)
-    limits, most = read_only("limits", limits_rad(cell), 6, 2), read_only("most", most, -1)
-    _judge(q, read_only("duration_s", duration_s, -1), limits, most, margin, wrong)
+    limits, most = shaped("limits", limits_rad(cell), 6, 2), shaped("most", most, -1)
+    _judge(q, shaped("duration_s", duration_s, -1), limits, most, margin, wrong)
     return margin, wrong

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
 from gcode2krl.compiled.core import FLOATS, OUT_FLOATS, core_function
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.inputs import shaped
 
 _jacobian = core_function("robot_jacobian", FLOATS, FLOATS, FLOATS, OUT_FLOATS)
 _smallest_singular_value = core_function("robot_smallest_singular_value", FLOATS, FLOATS, FLOATS, OUT_FLOATS)
@@ -37,10 +37,10 @@ def jacobian(q_rad: npt.ArrayLike, geometry: npt.ArrayLike, tool_position_mm: np
     ValueError
         If an array has the wrong shape.
     """
-    q = read_only("q_rad", q_rad, -1, 6)
-    tool = read_only("tool_position_mm", tool_position_mm, 3)
+    q = shaped("q_rad", q_rad, -1, 6)
+    tool = shaped("tool_position_mm", tool_position_mm, 3)
     columns = np.empty((len(q), 6, 6))
-    _jacobian(q, read_only("geometry", geometry, 6), tool, columns)
+    _jacobian(q, shaped("geometry", geometry, 6), tool, columns)
     return columns
 
 
@@ -73,8 +73,8 @@ def smallest_singular_value(
     ValueError
         If an array has the wrong shape.
     """
-    q = read_only("q_rad", q_rad, -1, 6)
-    tool = read_only("tool_position_mm", tool_position_mm, 3)
+    q = shaped("q_rad", q_rad, -1, 6)
+    tool = shaped("tool_position_mm", tool_position_mm, 3)
     sigma_min = np.empty(len(q))
-    _smallest_singular_value(q, read_only("geometry", geometry, 6), tool, sigma_min)
+    _smallest_singular_value(q, shaped("geometry", geometry, 6), tool, sigma_min)
     return sigma_min
