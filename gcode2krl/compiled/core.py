@@ -28,9 +28,6 @@ _NATIVE: Final = Path(__file__).parents[2] / "native"
 BUILD_VARIABLE = "GCODE2KRL_CORE"
 """In the environment: ``checked`` takes the build that checks every index, ``plain`` the plain one."""
 
-_address_of, _FIRST = ctypes.addressof, ctypes.c_char.from_buffer
-"""The quick way to the address of an array's first byte, open where it may be written to."""
-
 INT, FLOAT = ctypes.c_int64, ctypes.c_double
 
 
@@ -54,7 +51,11 @@ class ArrayOf:
         if array.dtype != self.dtype or not flags.c_contiguous or (self.written and not flags.writeable):
             raise TypeError(f"the core takes a contiguous array of {self.dtype}, not {_described(array)}")
         rows = len(array)
-        address = _address_of(_FIRST(array)) if flags.writeable and array.size else array.ctypes.data
+        if flags.writeable and array.size:  # the quick way, which is open to such arrays only
+            buffer: Any = array  # not known as one to the checker of types
+            address = ctypes.addressof(ctypes.c_char.from_buffer(buffer))
+        else:
+            address = array.ctypes.data
         return View(address, rows, array.size // rows if rows else 1)
 
 

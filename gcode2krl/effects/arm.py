@@ -109,7 +109,9 @@ def bend(
     tips = model.tips(cell, tool, len(q_rad))
     base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
     chain.displaced_rows(
-        *(np.ascontiguousarray(each, dtype=np.float64) for each in (q_rad, force_N, moment_Nmm)),
+        np.ascontiguousarray(q_rad, dtype=np.float64),
+        np.ascontiguousarray(force_N, dtype=np.float64),
+        np.ascontiguousarray(moment_Nmm, dtype=np.float64),
         model.frames(cell),
         softness,
         base,

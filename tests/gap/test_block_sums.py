@@ -1,5 +1,7 @@
 """Sums over blocks of rows."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from gcode2krl.gap.fit.block_sums import block_sums
@@ -9,7 +11,7 @@ def test_each_block_is_summed_by_itself():
     values = np.random.default_rng(1).normal(size=(40, 3))
     edges = np.array([0, 1, 9, 40])
     sums = block_sums(values, edges)
-    for block, (first, last) in enumerate(zip(edges, edges[1:], strict=False)):
+    for block, (first, last) in enumerate(pairwise(edges)):
         assert np.allclose(sums[block], values[first:last].sum(axis=0), rtol=0.0, atol=1e-13)
 
 
