@@ -16,9 +16,14 @@ enum { BRANCHES = 8, OVERHEAD = 1, ELBOW = 2, WRIST = 4 };
 
 /* A1 to A6 as directions, and whether A1 and A4 are free. */
 typedef struct {
-    double y[AXES], x[AXES];
+    double sin_1, sin_2, sin_3, sin_4, sin_5, sin_6;
+    double cos_1, cos_2, cos_3, cos_4, cos_5, cos_6;
     bool free_1, free_4;
 } Directions;
+
+/* The same as columns: y and x of A1 to A6. */
+#define SINES(to) {to.sin_1, to.sin_2, to.sin_3, to.sin_4, to.sin_5, to.sin_6}
+#define COSINES(to) {to.cos_1, to.cos_2, to.cos_3, to.cos_4, to.cos_5, to.cos_6}
 
 /* What A1 and A4 are where they are free. */
 typedef struct {
@@ -78,10 +83,8 @@ static inline Directions directions(const double *p, const double *r, Arm arm, i
     /* rows 1 and 2 of Rx(A4) m = Ry(A5) Rx(-A6): exact for the A4 taken, at the singularity too */
     const double sin_6 = cos_4 * m_12 - sin_4 * m_22, cos_6 = cos_4 * m_11 - sin_4 * m_21;
     const Directions found = {
-        {sin_1, sin_2, sin_3, sin_4, free_4 ? 0.0 : sin_5, sin_6},
-        {cos_1, cos_2, cos_3, cos_4, m_00, cos_6},
-        free_1,
-        free_4,
+        sin_1, sin_2, sin_3, sin_4, free_4 ? 0.0 : sin_5, sin_6, cos_1, cos_2, cos_3, cos_4, m_00, cos_6,
+        free_1, free_4,
     };
     return found;
 }
@@ -111,13 +114,45 @@ EXPORT void robot_all_branches(Floats position_mm, Floats rotation, Floats geome
         double *q = &CELL(q_rad, i, 0);
         for (int64_t branch = 0; branch < BRANCHES; branch++) {
             const Directions to = directions(p, r, arm, branch, ZERO);
+            const double y[AXES] = SINES(to), x[AXES] = COSINES(to);
             for (int j = 0; j < AXES; j++) {
                 /* the wrist does not change A1 to A3 */
                 const bool is_known = branch >= WRIST && j < 3;
                 q[AXES * branch + j] =
-                    is_known ? q[AXES * (branch - WRIST) + j] : main_value(atan2(to.y[j], to.x[j]));
+                    is_known ? q[AXES * (branch - WRIST) + j] : main_value(atan2(y[j], x[j]));
             }
         }
+    }
+}
+
+/* Directions of several rows; as columns of a fixed length, so that a loop over them becomes vector
+   instructions. */
+enum { TOGETHER = 32 };
+typedef struct {
+    double y[AXES][TOGETHER], x[AXES][TOGETHER];
+    int64_t irregular[TOGETHER];
+} Columns;
+
+/* Find the directions of rows of poses: inputs (12) are p and r as columns. */
+static void fill(double in[12][TOGETHER], Arm arm, int64_t branch, Columns *restrict out) {
+    for (int i = 0; i < TOGETHER; i++) {
+        const double p[3] = {in[0][i], in[1][i], in[2][i]};
+        const double r[9] = {in[3][i], in[4][i], in[5][i], in[6][i], in[7][i],
+                             in[8][i], in[9][i], in[10][i], in[11][i]};
+        const Directions to = directions(p, r, arm, branch, ZERO);
+        out->y[0][i] = to.sin_1;
+        out->y[1][i] = to.sin_2;
+        out->y[2][i] = to.sin_3;
+        out->y[3][i] = to.sin_4;
+        out->y[4][i] = to.sin_5;
+        out->y[5][i] = to.sin_6;
+        out->x[0][i] = to.cos_1;
+        out->x[1][i] = to.cos_2;
+        out->x[2][i] = to.cos_3;
+        out->x[3][i] = to.cos_4;
+        out->x[4][i] = to.cos_5;
+        out->x[5][i] = to.cos_6;
+        out->irregular[i] = to.free_1 | to.free_4 | (to.sin_6 != to.sin_6);
     }
 }
 
@@ -126,17 +161,28 @@ EXPORT void robot_all_branches(Floats position_mm, Floats rotation, Floats geome
 EXPORT int64_t robot_directions(Floats position_mm, Floats rotation, Floats geometry, int64_t branch, Floats y,
                                 Floats x) {
     const Arm arm = arm_of(geometry);
-    const int64_t n = position_mm.rows, step = rotation.rows > 1 ? 9 : 0;
-    const double *restrict position = position_mm.at, *restrict turned = rotation.at;
-    double *restrict to_y = y.at, *restrict to_x = x.at;
+    const int64_t n = position_mm.rows;
+    double in[12][TOGETHER] = {{0.0}};
+    Columns out;
     int64_t irregular = 0;
-    for (int64_t i = 0; i < n; i++) {
-        const Directions to = directions(position + 3 * i, turned + step * i, arm, branch, ZERO);
-        for (int j = 0; j < AXES; j++) {
-            to_y[n * j + i] = to.y[j];
-            to_x[n * j + i] = to.x[j];
+    for (int64_t first = 0; first < n; first += TOGETHER) {
+        const int64_t rows = least(TOGETHER, n - first);
+        for (int64_t i = 0; i < rows; i++) {
+            const double *p = &CELL(position_mm, first + i, 0);
+            const double *r = &CELL(rotation, rotation.rows > 1 ? first + i : 0, 0);
+            for (int k = 0; k < 3; k++)
+                in[k][i] = p[k];
+            for (int k = 0; k < 9; k++)
+                in[3 + k][i] = r[k];
         }
-        irregular |= to.free_1 | to.free_4 | (to.y[5] != to.y[5]);
+        fill(in, arm, branch, &out);
+        for (int64_t i = 0; i < rows; i++)
+            irregular |= out.irregular[i];
+        for (int j = 0; j < AXES; j++)
+            for (int64_t i = 0; i < rows; i++) {
+                CELL(y, j, first + i) = out.y[j][i];
+                CELL(x, j, first + i) = out.x[j][i];
+            }
     }
     return !irregular;
 }
@@ -163,11 +209,12 @@ EXPORT void robot_path(Floats position_mm, Floats rotation, Floats geometry, int
         const double *r = &CELL(rotation, rotation.rows > 1 ? i : 0, 0);
         const Given given = {cos(before[0]), sin(before[0]), cos(before[3]), sin(before[3])};
         const Directions to = directions(&CELL(position_mm, i, 0), r, arm, branch, given);
-        const bool reached = !isnan(to.y[5]); /* NaN as soon as any part of the pose is */
+        const double y[AXES] = SINES(to), x[AXES] = COSINES(to);
+        const bool reached = !isnan(y[5]); /* NaN as soon as any part of the pose is */
         for (int j = 0; j < AXES; j++) {
             const bool stays = (j == 0 && to.free_1) || (j == 3 && to.free_4);
             if (reached && !stays)
-                before[j] = nearest_turn(atan2(to.y[j], to.x[j]), before[j]);
+                before[j] = nearest_turn(atan2(y[j], x[j]), before[j]);
             CELL(q_rad, i, j) = reached ? before[j] : NAN;
         }
     }
