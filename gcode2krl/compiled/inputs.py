@@ -1,7 +1,8 @@
-"""Arrays that cannot be written to, in the one type for which a kernel is compiled.
+"""Arrays for compiled code: contiguous floats of the wanted shape, and read-only for what numba compiles.
 
 numba compiles a kernel anew for another element type, another order in memory, and for an array that may be
-written to. So every input is a contiguous, read-only array of floats, whatever table it came from.
+written to. So every input of such a kernel is read-only, whatever table it came from. The core in C takes any
+contiguous array, and more quickly one that may be written to.
 """
 
 from typing import Any, TypeVar

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.gap.beside.stretches import stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.block_sums import block_sums
+from gcode2krl.gap.fit.block_sums import sums_between
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -79,7 +79,7 @@ class Rows:
         if len(starts) == len(white):
             return white
         edges = np.append(starts, len(white))
-        return block_sums(white, edges) / np.sqrt(np.diff(edges))[:, None]
+        return sums_between(white, edges) / np.sqrt(np.diff(edges))[:, None]
 
     def _of_values(self, numbers: Ints) -> Ints:
         """Return the number (v,) of each block's first value."""

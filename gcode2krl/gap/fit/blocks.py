@@ -8,7 +8,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.block_sums import block_sums
+from gcode2krl.gap.fit.block_sums import sums_between
 from gcode2krl.gap.fit.explaining import explaining_columns
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.slow_noise import BlockMeans
@@ -42,7 +42,7 @@ class _Blocks:
     def means(self, values: Floats) -> Floats:
         """Return the means (b, …) of values (n, …) over the blocks that are kept."""
         wide = values if values.ndim == 2 else values[:, None]
-        sums = block_sums(wide, np.append(self.starts, len(values)))
+        sums = sums_between(wide, np.append(self.starts, len(values)))
         means: Floats = (sums / self.counts[:, None])[self.kept]
         return means if values.ndim == 2 else means[:, 0]
 

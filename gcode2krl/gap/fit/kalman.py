@@ -66,12 +66,12 @@ def innovations(
 ) -> Floats:
     """Return e_t/√S_t of columns (n, c), each segment by itself."""
     feedback, poles = _parts(a, slow)
-    values = np.ascontiguousarray(values, dtype=np.float64)
+    values, rows = np.ascontiguousarray(values, dtype=np.float64), np.ascontiguousarray(segments, np.int64)
     out, columns = np.empty_like(values), values.shape[1]
     states = np.empty((len(feedback) + 1, columns)), np.empty((len(poles), columns)), np.empty((2, columns))
     if out.size:
         weights = 1.0 / np.sqrt(s)
-        _innovations(values, np.ascontiguousarray(segments), feedback, poles, gains, weights, *states, out)
+        _innovations(values, rows, feedback, poles, gains, weights, *states, out)
     return out
 
 
