@@ -370,6 +370,64 @@
 #define LAW_THIN_CHIP_MM 0.005
 #define LAW_THICK_CHIP_MM 0.2
 
+/* gcode2krl.robot.standing */
+#define STANDING_RAD_PER_DEG 0.017453292519943295
+#define STANDING_UNREACHED 64
+#define STANDING_FAST 128
+#define STANDING_WRIST 256
+#define STANDING_ALL_BITS {1, 2, 4, 8, 16, 32, 64, 128, 256}
+#define STANDING_WRIST_ZONE_RAD 0.08726646259971647
+
+/* gcode2krl.compliance.chain */
+#define CHAIN_FRAMES 10
+#define CHAIN_AXIS_FRAME {0, 1, 3, 5, 6, 7}
+#define CHAIN_AXIS_SIGN {-1.0, 1.0, 1.0, -1.0, 1.0, -1.0}
+#define CHAIN_AXIS_ZERO {0.0, 0.0, -1.5707963267948966, 0.0, 0.0, 3.141592653589793}
+
+/* gcode2krl.online.feed */
+#define FEED_WINDOW_S 0.02
+#define FEED_LEAST_MM 0.02
+
+/* gcode2krl.online.limits */
+#define LIMITS_RAD_PER_DEG 0.017453292519943295
+#define LIMITS_NO_CORRECTION 1000000.0
+
+/* gcode2krl.online.blending */
+#define BLENDING_STEADY_SHARE 0.2
+#define BLENDING_WEIGHT 0
+#define BLENDING_BEYOND_S 1
+#define BLENDING_DISTRUSTED 2
+#define BLENDING_ANCHOR 3
+#define BLENDING_LAST 6
+
+/* gcode2krl.online.pilot_gate */
+#define PILOT_NO_KNOT_YET (-1)
+#define PILOT_SPEED_SHARE 0.05
+#define PILOT_PROOF_S 0.5
+#define PILOT_JITTER_S 0.012
+#define PILOT_REST_MM 0.002
+#define PILOT_REST_S 0.05
+#define PILOT_STARTED 0
+#define PILOT_NEXT 1
+#define PILOT_PROVEN 2
+#define PILOT_REASON 3
+#define PILOT_SYNCED 4
+#define PILOT_OFFSET 5
+#define PILOT_REAL 6
+#define PILOT_PLANNED 7
+#define PILOT_STILL 8
+#define PILOT_POSITION 9
+#define PILOT_GATE_OPEN 0
+#define PILOT_GATE_NO_PILOT 1
+#define PILOT_GATE_NOT_STARTED 2
+#define PILOT_GATE_CHECKSUM 3
+#define PILOT_GATE_OVERRIDE 4
+#define PILOT_GATE_MODE 5
+#define PILOT_GATE_ORDER 6
+#define PILOT_GATE_SPEED 7
+#define PILOT_GATE_UNPROVEN 8
+#define PILOT_GATE_STANDS 9
+
 typedef struct {
     double x;
     double y;

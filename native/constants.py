@@ -4,11 +4,12 @@ Run after a change of one of these modules; a test compares the file with what t
 
     python native/constants.py
 
-A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of whole
-numbers what an array begins with, a record of numpy a C struct with the same fields in the same places, and a
-`StructOf` the C struct that the core gets.
+A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of numbers
+what an array begins with, an enumeration of whole numbers ``PREFIX_NAME_MEMBER``, a record of numpy a C struct
+with the same fields in the same places, and a `StructOf` the C struct that the core gets.
 """
 
+import enum
 import math
 from collections.abc import Iterator
 from importlib import import_module
@@ -30,6 +31,12 @@ MODULES = {
     "SW": "gcode2krl.cutting.sweep",
     "RD": "gcode2krl.cutting.reading",
     "LAW": "gcode2krl.cutting.law",
+    "STANDING": "gcode2krl.robot.standing",
+    "CHAIN": "gcode2krl.compliance.chain",
+    "FEED": "gcode2krl.online.feed",
+    "LIMITS": "gcode2krl.online.limits",
+    "BLENDING": "gcode2krl.online.blending",
+    "PILOT": "gcode2krl.online.pilot_gate",
 }
 """Prefix -> module whose numbers and words the core uses."""
 RECORDS = {
@@ -87,6 +94,8 @@ def _constants(prefix: str, module: ModuleType) -> Iterator[str]:
     for name, value in vars(module).items():
         if name.isupper() and not name.startswith("_") and (text := _literal(value)):
             yield f"#define {prefix}_{name} {text}"
+        elif isinstance(value, enum.EnumMeta) and value.__module__ == module.__name__:
+            yield from (f"#define {prefix}_{name.upper()}_{each.name} {int(each)}" for each in value)
 
 
 def _literal(value: object) -> str:
@@ -96,8 +105,8 @@ def _literal(value: object) -> str:
     if type(value) is str and value.isascii() and value.isprintable():
         text = value.replace("\\", "\\\\").replace('"', '\\"')
         return f'"{text}"'
-    if type(value) is tuple and value and all(type(each) is int for each in value):
-        return f"{{{', '.join(map(str, value))}}}"
+    if type(value) is tuple and value and all(type(each) in (int, float) for each in value):
+        return f"{{{', '.join(map(repr, value))}}}"
     return ""
 
 

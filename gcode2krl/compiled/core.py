@@ -52,7 +52,12 @@ class ArrayOf:
         if array.dtype != self.dtype or not flags.c_contiguous or (self.written and not flags.writeable):
             raise TypeError(f"the core takes a contiguous array of {self.dtype}, not {_described(array)}")
         rows = len(array)
-        return View(array.ctypes.data, rows, array.size // rows if rows else 1)
+        if flags.writeable and array.size:  # the quick way, which is open to such arrays only
+            buffer: Any = array  # not known as one to the checker of types
+            address = ctypes.addressof(ctypes.c_char.from_buffer(buffer))
+        else:
+            address = array.ctypes.data
+        return View(address, rows, array.size // rows if rows else 1)
 
 
 def _described(array: NDArray[Any]) -> str:

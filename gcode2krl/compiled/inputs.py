@@ -1,7 +1,8 @@
-"""Arrays that cannot be written to, in the one type for which a kernel is compiled.
+"""Arrays for compiled code: contiguous floats of the wanted shape, and read-only for what numba compiles.
 
 numba compiles a kernel anew for another element type, another order in memory, and for an array that may be
-written to. So every input is a contiguous, read-only array of floats, whatever table it came from.
+written to. So every input of such a kernel is read-only, whatever table it came from. The core in C takes any
+contiguous array, and more quickly one that may be written to.
 """
 
 from typing import Any, TypeVar
@@ -26,6 +27,34 @@ def contiguous(values: ArrayLike) -> Floats:
     return locked(np.ascontiguousarray(values, dtype=np.float64))
 
 
+def shaped(name: str, values: ArrayLike, *shape: int) -> Floats:
+    """Return the values of an argument contiguous, in the wanted shape; a copy only where they are not.
+
+    Parameters
+    ----------
+    name : str
+        The argument's name, for the error.
+    values : array_like
+        The numbers.
+    *shape : int
+        The wanted shape, -1 for any length.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another one.
+    """
+    array: Floats = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim == len(shape):
+        for found, length in zip(array.shape, shape, strict=True):
+            if found != length and length != -1:
+                break
+        else:
+            return array
+    wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
+    raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
+
+
 def read_only(name: str, values: ArrayLike, *shape: int) -> Floats:
     """Return the values of an argument contiguous and read-only, in the wanted shape.
 
@@ -43,9 +72,4 @@ def read_only(name: str, values: ArrayLike, *shape: int) -> Floats:
     ValueError
         If the shape is another one.
     """
-    array = contiguous(values)
-    lengths = zip(array.shape, shape, strict=False)
-    if array.ndim != len(shape) or any(length not in (-1, found) for found, length in lengths):
-        wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
-        raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
-    return array
+    return locked(shaped(name, values, *shape))

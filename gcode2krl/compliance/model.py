@@ -82,7 +82,10 @@ def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
     """
     if tool is None:
         tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=0)
-    numbers, index = np.unique(np.asarray(tool), return_inverse=True)
+    if np.ndim(tool) == 0:  # a cycle of the online side has no time to sort
+        numbers, index = np.array([tool]), np.array(0)
+    else:
+        numbers, index = np.unique(np.asarray(tool), return_inverse=True)
     for number in numbers:
         if int(number) not in cell.tool:
             known = ", ".join(str(name) for name in sorted(cell.tool)) or "none"

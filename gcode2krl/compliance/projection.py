@@ -1,11 +1,13 @@
 """Projection of a correction into the plane normal to the feed: eq. 10-11 of Haehn & Weigold 2020."""
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compliance.rows import rows_of
+
+_project = core_function("compliance_project", FLOATS, FLOATS, FLOAT, OUT_FLOATS)
 
 
 def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
@@ -37,17 +39,6 @@ def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
     return normal
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
 def project_rows(r: Floats, v: Floats, factor: float, normal: Floats) -> None:
     """Write ``factor`` times the component of each row of r (n, 3) normal to that of v (n, 3)."""
-    for i in range(len(r)):
-        rx, ry, rz = r[i]
-        vx, vy, vz = v[i]
-        largest = max(abs(vx), abs(vy), abs(vz))
-        if largest != 0.0:
-            vx, vy, vz = vx / largest, vy / largest, vz / largest  # eq. 11
-            along = (rx * vx + ry * vy + rz * vz) / (vx * vx + vy * vy + vz * vz)
-            rx, ry, rz = rx - along * vx, ry - along * vy, rz - along * vz  # eq. 10
-        normal[i, 0] = factor * rx + 0.0  # + 0.0: never a negative zero
-        normal[i, 1] = factor * ry + 0.0
-        normal[i, 2] = factor * rz + 0.0
+    _project(r, v, factor, normal)

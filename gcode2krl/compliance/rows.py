@@ -4,11 +4,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gcode2krl.arrays import Floats
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.inputs import shaped
 
 
 def rows_of(name: str, values: npt.ArrayLike, width: int, count: int | None = None) -> Floats:
-    """Return (n, width) contiguous and read-only; a single row is repeated ``count`` times.
+    """Return (n, width) contiguous; a single row is repeated ``count`` times.
 
     Raises
     ------
@@ -16,6 +16,6 @@ def rows_of(name: str, values: npt.ArrayLike, width: int, count: int | None = No
         If the shape is another one.
     """
     array = np.asarray(values, dtype=np.float64)
-    if count is not None and array.shape in ((width,), (1, width)):
+    if count is not None and array.shape in ((width,), (1, width)) and array.shape != (count, width):
         array = np.broadcast_to(array, (count, width))
-    return read_only(name, array, -1 if count is None else count, width)
+    return shaped(name, array, -1 if count is None else count, width)

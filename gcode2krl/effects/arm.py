@@ -109,9 +109,9 @@ def bend(
     tips = model.tips(cell, tool, len(q_rad))
     base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
     chain.displaced_rows(
-        _frozen(q_rad),
-        _frozen(force_N),
-        _frozen(moment_Nmm),
+        np.ascontiguousarray(q_rad, dtype=np.float64),
+        np.ascontiguousarray(force_N, dtype=np.float64),
+        np.ascontiguousarray(moment_Nmm, dtype=np.float64),
         model.frames(cell),
         softness,
         base,
@@ -121,10 +121,3 @@ def bend(
         turn if turned else turn[:0],
     )
     return shift, turn
-
-
-def _frozen(values: Floats) -> Floats:
-    """Return a contiguous read-only view, the one array type for which the kernel is compiled."""
-    array = np.ascontiguousarray(values, dtype=np.float64).view()
-    array.flags.writeable = False
-    return array

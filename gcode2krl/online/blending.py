@@ -11,17 +11,24 @@ an event. It is then not used until both agree again.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, OUT_BOOLS, OUT_FLOATS, core_function
+from gcode2krl.compiled.inputs import shaped
 
 STEADY_SHARE = 0.2
 """An estimate is steady while it changes by less than this fraction of the threshold; our choice."""
 WEIGHT, BEYOND_S, DISTRUSTED = 0, 1, 2
 ANCHOR, LAST = 3, 6
+
+_blend = core_function(
+    "online_blend",
+    *(FLOATS, FLOATS, BOOLS, OUT_FLOATS),
+    *(FLOAT, FLOAT, FLOAT, FLOAT),
+    *(OUT_FLOATS, OUT_FLOATS, OUT_BOOLS),
+)
 
 
 class BlendState(NamedTuple):
@@ -56,11 +63,11 @@ def blended(
     ``known`` (n,) is False where there is no estimate; the last one is then blended out as above.
     The estimate has no moment: its part of the load has none.
     """
-    values = read_only("measured", measured, -1, 6)
+    values = shaped("measured", measured, -1, 6)
     after = BlendState(state.values.copy())
     blend = Blend(np.empty(values.shape), np.empty(len(values)), np.zeros(len(values), dtype=np.bool_))
     patience_s = settings.pilot_lead_s + settings.blend_s + 2.0 * settings.filter_s
-    estimate = read_only("estimate_N", estimate_N, len(values), 3)
+    estimate = shaped("estimate_N", estimate_N, len(values), 3)
     _blend(
         values,
         estimate,
@@ -75,46 +82,3 @@ def blended(
         blend.distrusted,
     )
     return after, blend
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blend(
-    measured: Floats,
-    estimate: Floats,
-    known: Bools,
-    state: Floats,
-    cycle: float,
-    threshold: float,
-    blend_s: float,
-    patience: float,
-    load: Floats,
-    weight: Floats,
-    distrusted: Bools,
-) -> None:
-    for i in range(len(measured)):
-        difference2, moved = 0.0, 0.0
-        for c in range(3):
-            difference2 += (estimate[i, c] - measured[i, c]) ** 2
-            moved += (estimate[i, c] - state[ANCHOR + c]) ** 2
-        beyond = known[i] and difference2 >= threshold * threshold
-        if not beyond or moved > (STEADY_SHARE * threshold) ** 2:
-            state[BEYOND_S] = 0.0
-            for c in range(3):
-                state[ANCHOR + c] = estimate[i, c]
-        else:
-            state[BEYOND_S] += cycle
-        if not beyond:
-            state[DISTRUSTED] = 0.0
-        elif state[BEYOND_S] > patience:
-            state[DISTRUSTED] = 1.0
-        step = cycle / blend_s
-        towards = beyond and state[DISTRUSTED] == 0.0
-        state[WEIGHT] = min(state[WEIGHT] + step, 1.0) if towards else max(state[WEIGHT] - step, 0.0)
-        w = state[WEIGHT]
-        for c in range(3):
-            if known[i]:
-                state[LAST + c] = estimate[i, c]
-            load[i, c] = (1.0 - w) * measured[i, c] + w * state[LAST + c]
-            load[i, c + 3] = (1.0 - w) * measured[i, c + 3]
-        weight[i] = w
-        distrusted[i] = state[DISTRUSTED] > 0.0

@@ -7,15 +7,22 @@ the same stream sample by sample give the same bits.
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import FLOAT, FLOATS, INT, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import shaped
 
 WIDTH = 6
 """Force x, y, z in N and moment x, y, z in N·mm."""
+
+_filter = core_function(
+    "online_filter",
+    *(FLOATS, OUT_FLOATS, OUT_FLOATS, OUT_INTS),
+    *(FLOAT, INT, FLOAT),
+    *(OUT_FLOATS, OUT_BOOLS),
+)
 
 
 class FilterState(NamedTuple):
@@ -43,49 +50,10 @@ def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[Filter
     more of them in a row than ``sensor_hold_s`` mean a lost sensor, and so does, at once, a force that is too
     large for a cut.
     """
-    values = read_only("load", load, -1, WIDTH)
+    values = shaped("load", load, -1, WIDTH)
     after = FilterState(state.low.copy(), state.window.copy(), state.counts.copy())
     out, lost = np.empty(values.shape), np.zeros(len(values), dtype=np.bool_)
     share = -math.expm1(-2.0 * math.pi * settings.lowpass_hz * settings.cycle_s)
     allowed = round(settings.sensor_hold_s / settings.cycle_s)
     _filter(values, after.low, after.window, after.counts, share, allowed, settings.most_force_N, out, lost)
     return after, out, lost
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _filter(
-    values: Floats,
-    low: Floats,
-    window: Floats,
-    count: Ints,
-    share: float,
-    allowed: int,
-    most: float,
-    out: Floats,
-    lost: Bools,
-) -> None:
-    length = window.shape[0]
-    for i in range(len(values)):
-        finite, size = True, 0.0
-        for c in range(6):
-            finite = finite and np.isfinite(values[i, c])
-        for c in range(3):
-            size += values[i, c] * values[i, c]
-        if finite and size <= most * most:
-            first = count[0] == 0
-            at = count[0] % length
-            for c in range(6):
-                low[c] = values[i, c] if first else low[c] + share * (values[i, c] - low[c])
-                if first:
-                    window[:, c] = low[c]
-                window[at, c] = low[c]
-            count[0] += 1
-            count[1] = 0
-        else:
-            count[1] += 1
-            lost[i] = count[1] > allowed or finite
-        for c in range(6):
-            total = 0.0
-            for k in range(length):
-                total += window[k, c]
-            out[i, c] = total / length

@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.cutting.law import feed_per_tooth
 from gcode2krl.prediction import Prediction
 
@@ -18,6 +18,8 @@ DEEPER_MM = 0.05
 LEAST_CHIP_MM = 0.005
 """Below this the bottom edges plough; the force law is not valid there (docs/cutting.md)."""
 _SINKS = 1e-3
+
+_lower = core_function("online_lower", FLOATS, FLOATS, FLOATS, FLOAT, OUT_FLOATS)
 
 
 class Judged(NamedTuple):
@@ -81,9 +83,9 @@ def floor_over(position_mm: Floats, radius_mm: Floats, low_mm: Floats, shape: tu
     """Return the lowest tip over each cell (ny, nx) in mm; inf where nothing cuts."""
     floor = np.full(shape, np.inf)
     _lower(
-        read_only("position_mm", position_mm, -1, 3),
-        read_only("radius_mm", radius_mm, -1),
-        read_only("low_mm", low_mm, 2),
+        shaped("position_mm", position_mm, -1, 3),
+        shaped("radius_mm", radius_mm, -1),
+        shaped("low_mm", low_mm, 2),
         CELL_MM,
         floor,
     )
@@ -105,19 +107,3 @@ def _stays(position_mm: Floats, radius_mm: Floats, cuts: Bools) -> Bools:
     column, row = np.clip(cell[:, 0], 0, floor.shape[1] - 1), np.clip(cell[:, 1], 0, floor.shape[0] - 1)
     stays: Bools = position_mm[:, 2] <= floor[row, column] + DEEPER_MM
     return stays
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _lower(position: Floats, radius: Floats, low: Floats, cell: float, floor: Floats) -> None:
-    """Lower the floor below a flat bottom at each position; a row of cells at a time."""
-    for k in range(len(position)):
-        x, y, r = position[k, 0] - low[0], position[k, 1] - low[1], radius[k]
-        first, last = max(int(np.ceil((y - r) / cell)), 0), min(int((y + r) / cell), floor.shape[0] - 1)
-        for i in range(first, last + 1):
-            half = np.sqrt(max(r * r - (i * cell - y) ** 2, 0.0))
-            left, right = (
-                max(int(np.ceil((x - half) / cell)), 0),
-                min(int((x + half) / cell), floor.shape[1] - 1),
-            )
-            for j in range(left, right + 1):
-                floor[i, j] = min(floor[i, j], position[k, 2])

@@ -1,18 +1,25 @@
 """The limits of every correction (sum, rate, step) and the PID controller before them."""
 
-import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell.sections.online import Gains, Online
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, INT, OUT_FLOATS, core_function
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.units import RAD_PER_DEG
 
 NO_CORRECTION = 1e6
 """mm or rad: a wanted value of this size or more is treated as invalid."""
+
+_limit = core_function(
+    "online_limit",
+    *(FLOATS, BOOLS, OUT_FLOATS, OUT_FLOATS, OUT_FLOATS),
+    *(FLOATS, FLOATS, INT, FLOATS, FLOAT),
+    OUT_FLOATS,
+)
+_shrink = core_function("online_shrink", OUT_FLOATS, FLOATS, INT)
 
 
 class Bounds(NamedTuple):
@@ -73,7 +80,7 @@ def limited(state: LimitState, wanted: Floats, held: Bools, bounds: Bounds) -> t
     the correction does not change.
     """
     width = len(bounds.most)
-    values = read_only("wanted", wanted, -1, width)
+    values = shaped("wanted", wanted, -1, width)
     after = LimitState(*(part.copy() for part in state))
     out = np.empty(values.shape)
     _limit(
@@ -95,55 +102,3 @@ def towards(sent: Floats, wanted: Floats, bounds: Bounds) -> Floats:
     change = wanted - sent
     _shrink(change, bounds.step, bounds.is_vector)
     return sent + change
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _limit(
-    wanted: Floats,
-    held: Bools,
-    sent: Floats,
-    integral: Floats,
-    before: Floats,
-    most: Floats,
-    step: Floats,
-    is_vector: bool,
-    gains: Floats,
-    cycle: float,
-    out: Floats,
-) -> None:
-    width = len(most)
-    r, u = np.empty(width), np.empty(width)
-    for i in range(len(wanted)):
-        finite = True
-        for c in range(width):
-            finite = finite and abs(wanted[i, c]) < NO_CORRECTION  # False for NaN
-        if held[i] or not finite:
-            out[i] = sent
-            before[:] = np.nan  # no derivative over the gap
-            continue
-        r[:] = wanted[i]
-        _shrink(r, most, is_vector)
-        for c in range(width):
-            slope = (r[c] - before[c]) / cycle if before[c] == before[c] else 0.0
-            u[c] = gains[c, 0] * r[c] + gains[c, 1] * integral[c] + gains[c, 2] * slope
-            before[c] = r[c]
-        _shrink(u, most, is_vector)
-        for c in range(width):
-            u[c] -= sent[c]
-        _shrink(u, step, is_vector)
-        for c in range(width):
-            sent[c] += u[c]
-            integral[c] += (r[c] - sent[c]) * cycle
-        out[i] = sent
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _shrink(u: Floats, most: Floats, is_vector: bool) -> None:
-    """Scale a vector into its bounds, keeping its direction."""
-    share = 0.0
-    for c in range(len(u)):
-        share = share + (u[c] / most[c]) ** 2 if is_vector else max(share, abs(u[c]) / most[c])
-    share = math.sqrt(share) if is_vector else share
-    if share > 1.0:
-        for c in range(len(u)):
-            u[c] /= share

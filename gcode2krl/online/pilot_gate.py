@@ -9,12 +9,12 @@ mismatch closes the gate until the program starts again. The first knots of a pr
 import enum
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.pilot import Knots, PilotHeader
 
 NO_KNOT_YET = -1
@@ -28,8 +28,15 @@ REST_MM = 0.002
 """The robot stands while it moves less than this from one sample to the next …"""
 REST_S = 0.050
 """… for so long. A reversal of direction takes less."""
-_STARTED, _NEXT, _PROVEN, _REASON, _SYNCED, _OFFSET, _REAL, _PLANNED, _STILL = range(9)
-_POSITION = 9
+STARTED, NEXT, PROVEN, REASON, SYNCED, OFFSET, REAL, PLANNED, STILL = range(9)
+POSITION = 9
+
+_track = core_function(
+    "online_track",
+    *(FLOATS,) * 9,
+    *(FLOAT, FLOAT),
+    *(OUT_FLOATS, OUT_FLOATS, OUT_BOOLS, OUT_INTS),
+)
 
 
 class Gate(enum.IntEnum):
@@ -48,10 +55,6 @@ class Gate(enum.IntEnum):
     """The first knots have yet to prove the speed."""
     STANDS = 9
     """The robot stood still unexpectedly: the next knot tells where the program is."""
-
-
-_OPEN, _CHECKSUM, _OVERRIDE, _MODE = int(Gate.OPEN), int(Gate.CHECKSUM), int(Gate.OVERRIDE), int(Gate.MODE)
-_ORDER, _SPEED, _UNPROVEN, _STANDS = int(Gate.ORDER), int(Gate.SPEED), int(Gate.UNPROVEN), int(Gate.STANDS)
 
 
 class GateState(NamedTuple):
@@ -91,8 +94,8 @@ def pilot_table(knots: Knots | None, header: PilotHeader | None) -> PilotTable:
 def gate_start() -> GateState:
     """Return the state before the first sample: closed, no program start seen."""
     state = np.zeros(12)
-    state[_REASON] = Gate.NOT_STARTED
-    state[_POSITION:] = np.nan
+    state[REASON] = Gate.NOT_STARTED
+    state[POSITION:] = np.nan
     return GateState(state)
 
 
@@ -116,15 +119,15 @@ def estimate(
     after = GateState(state.values.copy())
     if len(table.time_s):
         _track(
-            read_only("time_s", time_s, count),
-            read_only("position_mm", position_mm, count, 3),
-            read_only("knot", told.knot, count),
-            read_only("checksum", told.checksum, count),
-            read_only("override_percent", told.override_percent, count),
-            read_only("t1", told.t1, count),
-            read_only("time_s", table.time_s, -1),
-            read_only("lead_s", table.lead_s, -1),
-            read_only("force_N", table.force_N, -1, 3),
+            shaped("time_s", time_s, count),
+            shaped("position_mm", position_mm, count, 3),
+            shaped("knot", told.knot, count),
+            shaped("checksum", told.checksum, count),
+            shaped("override_percent", told.override_percent, count),
+            shaped("t1", told.t1, count),
+            shaped("time_s", table.time_s, -1),
+            shaped("lead_s", table.lead_s, -1),
+            shaped("force_N", table.force_N, -1, 3),
             float(table.checksum),
             settings.pilot_lead_s,
             after.values,
@@ -133,95 +136,3 @@ def estimate(
             reason,
         )
     return after, force, known, reason
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _track(
-    time: Floats,
-    position: Floats,
-    knot: Floats,
-    checksum: Floats,
-    override: Floats,
-    t1: Floats,
-    knot_time: Floats,
-    knot_lead: Floats,
-    knot_force: Floats,
-    wanted: float,
-    lead: float,
-    state: Floats,
-    force: Floats,
-    known: Bools,
-    reason: Ints,
-) -> None:
-    for i in range(len(time)):
-        _watch_rest(position[i], time[i], state)
-        wrong = 0
-        if checksum[i] != wanted:  # a NaN too
-            wrong = _CHECKSUM
-        elif override[i] != 100.0:
-            wrong = _OVERRIDE
-        elif t1[i] != 0.0:
-            wrong = _MODE
-        if wrong > 0:
-            state[_REASON], state[_STARTED] = wrong, 0.0
-        elif knot[i] == NO_KNOT_YET:
-            state[_STARTED], state[_NEXT], state[_PROVEN], state[_SYNCED] = 1.0, 0.0, 0.0, 0.0
-            state[_REASON] = _UNPROVEN
-        elif state[_STARTED] > 0.0 and knot[i] != state[_NEXT] - 1.0:
-            _announce(time[i], knot[i], knot_time, knot_lead, state)
-        if state[_STARTED] == 0.0 or state[_PROVEN] == 0.0:
-            reason[i] = int(state[_REASON])
-        elif state[_SYNCED] == 0.0:
-            reason[i] = _STANDS
-        else:
-            reason[i], known[i] = _OPEN, True
-            following = min(int(state[_NEXT]), len(knot_time) - 1)
-            _force_at(
-                min(time[i] + lead - state[_OFFSET], knot_time[following]), knot_time, knot_force, force[i]
-            )
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _announce(now: float, knot: float, knot_time: Floats, knot_lead: Floats, state: Floats) -> None:
-    """Take the next knot; close the gate if it is another one or comes at another time."""
-    k = int(state[_NEXT])
-    if knot != state[_NEXT] or k >= len(knot_time):  # a NaN too
-        state[_STARTED], state[_REASON] = 0.0, _ORDER
-        return
-    planned = knot_time[k] - knot_lead[k]
-    if state[_SYNCED] == 0.0:
-        state[_REAL], state[_PLANNED] = now, planned
-    took, expected = now - state[_REAL], planned - state[_PLANNED]
-    if abs(took - expected) > SPEED_SHARE * expected + JITTER_S:
-        state[_STARTED], state[_REASON] = 0.0, _SPEED
-        return
-    if expected >= PROOF_S:
-        state[_PROVEN] = 1.0
-        state[_REAL], state[_PLANNED] = now, planned
-    state[_SYNCED], state[_OFFSET] = 1.0, now + knot_lead[k] - knot_time[k]
-    state[_NEXT] += 1.0
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _watch_rest(position: Floats, now: float, state: Floats) -> None:
-    """Forget the place in the program once the robot has stood still: pauses are not predicted."""
-    moved = 0.0
-    for c in range(3):
-        moved += (position[c] - state[_POSITION + c]) ** 2
-        state[_POSITION + c] = position[c]
-    if moved > REST_MM * REST_MM:
-        state[_STILL] = now
-    if now - state[_STILL] > REST_S:
-        state[_SYNCED] = 0.0
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _force_at(now: float, time: Floats, values: Floats, out: Floats) -> None:
-    """Write the polyline at a time: linear between knots, zero before the first and after the last."""
-    k = np.searchsorted(time, now, side="right")
-    if k == 0 or k == len(time):
-        out[:] = 0.0
-        return
-    share = (now - time[k - 1]) / (time[k] - time[k - 1])
-    for c in range(3):
-        out[c] = values[k - 1, c] + share * (values[k, c] - values[k - 1, c])

@@ -1,8 +1,5 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
-from pathlib import Path
-
-from gcode2krl.compiled.kernel_cache import drop_stale
 from gcode2krl.robot.joints import (
     angles_near,
     follow,
@@ -33,5 +30,3 @@ __all__ = [
     "speed_share",
     "target_angles",
 ]
-
-drop_stale(Path(__file__).parent, "../units.py")  # compiled kernels are looked up when they are first called

@@ -1,14 +1,12 @@
 """The poses of the arm, row by row: distance to the limits, and what is not allowed."""
 
-import math
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.inputs import read_only
+from gcode2krl.compiled.core import FLOATS, INTS32, OUT_FLOATS, ArrayOf, core_function
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.units import RAD_PER_DEG
 
 Bits = NDArray[np.uint16]
@@ -18,7 +16,11 @@ UNREACHED, FAST, WRIST = 64, 128, 256
 ALL_BITS = tuple(1 << bit for bit in range(9))
 WRIST_ZONE_RAD = 5.0 * RAD_PER_DEG
 """|A5| below which an excessive joint speed is called a wrist singularity."""
-_SPEED_ROOM = 1.0 + 1e-6
+
+_judge = core_function(
+    "robot_judge", *(FLOATS, FLOATS, FLOATS, FLOATS), OUT_FLOATS, ArrayOf(np.uint16, written=True)
+)
+_speed_share = core_function("robot_speed_share", FLOATS, FLOATS, INTS32, OUT_FLOATS)
 
 
 def limits_rad(cell: Cell) -> Floats:
@@ -55,58 +57,16 @@ def speed_share_of_rows(qd_rad_s: Floats, row: Ints32, count: int, cell: Cell) -
     if speeds is None:
         return None
     share = np.zeros(count)
-    most = read_only("most", np.array(speeds) * RAD_PER_DEG, 6)
-    _share_rows(read_only("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
+    most = shaped("most", np.array(speeds) * RAD_PER_DEG, 6)
+    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
     return share
 
 
 def _judged(q_rad: Floats, duration_s: Floats, cell: Cell) -> tuple[Floats, Bits]:
-    q = read_only("q_rad", q_rad, -1, 6)
+    q = shaped("q_rad", q_rad, -1, 6)
     speeds = cell.robot.speeds.qd_deg_s
     most = np.empty(0) if speeds is None else np.array(speeds) * RAD_PER_DEG
     margin, wrong = np.empty(len(q)), np.zeros(len(duration_s), dtype=np.uint16)
-    limits, most = read_only("limits", limits_rad(cell), 6, 2), read_only("most", most, -1)
-    _judge_rows(q, read_only("duration_s", duration_s, -1), limits, most, margin, wrong)
+    limits, most = shaped("limits", limits_rad(cell), 6, 2), shaped("most", most, -1)
+    _judge(q, shaped("duration_s", duration_s, -1), limits, most, margin, wrong)
     return margin, wrong
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _judge_rows(
-    q: Floats,
-    duration_s: Floats,
-    limits: Floats,
-    most_rad_s: Floats,
-    margin: Floats,
-    wrong: Bits,
-) -> None:
-    """Without durations only the margin is written; without ``most_rad_s`` the wrist is checked."""
-    for i in range(q.shape[0]):
-        nearest, bits = math.inf, 0
-        if math.isnan(q[i, 0]):  # a pose out of reach has no angle at all
-            nearest, bits = math.nan, UNREACHED
-        else:
-            for j in range(6):
-                room = min(q[i, j] - limits[j, 0], limits[j, 1] - q[i, j])
-                nearest = min(nearest, room)
-                if room < 0.0:
-                    bits |= 1 << j
-        margin[i] = nearest
-        if i >= wrong.shape[0]:
-            continue
-        if most_rad_s.shape[0] == 0:
-            if abs(math.sin(q[i, 4])) < math.sin(WRIST_ZONE_RAD):
-                bits |= WRIST
-        elif i > 0:
-            for j in range(6):  # NaN, where there is no row before, is not too fast
-                if abs(q[i, j] - q[i - 1, j]) > most_rad_s[j] * duration_s[i] * _SPEED_ROOM:
-                    bits |= FAST
-        wrong[i] = bits
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _share_rows(qd: Floats, most_rad_s: Floats, row: Ints32, share: Floats) -> None:
-    for i in range(qd.shape[0]):
-        for j in range(6):
-            ratio = abs(qd[i, j]) / most_rad_s[j]
-            if ratio > share[row[i]]:  # NaN is not
-                share[row[i]] = ratio

@@ -3,10 +3,10 @@
 import math
 from typing import Literal, NamedTuple
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.compiled.core import BOOLS, FLOATS, INT, OUT_BOOLS, OUT_FLOATS, core_function
 from gcode2krl.units import DEG_PER_RAD, MM_PER_INCH, MM_PER_M, RAD_PER_DEG
 
 LENGTH_FACTORS = {
@@ -27,9 +27,9 @@ _FACTOR_SLACK = 0.1
 _RCOND = 1e-10
 """Of normal equations: four digits are plenty, and they are solved once for each offset."""
 
-
-_STILL = 1e-12
-"""A smaller share of a signal's power is rounding: it does not move."""
+_fill_products = core_function(
+    "runs_products", *(FLOATS, FLOATS, BOOLS, INT, INT), *(OUT_FLOATS, OUT_BOOLS), *(OUT_FLOATS,) * 3
+)
 
 
 class Odd(NamedTuple):
@@ -165,44 +165,15 @@ def _shares(reference: Floats, measured: Floats, inside: Bools, every: int, leas
     return shares
 
 
-@numba.njit(cache=True, nogil=True)
 def _products(
     reference: Floats, measured: Floats, inside: Bools, every: int, least: int
 ) -> tuple[Bools, Floats, Floats, Floats]:
     """Return for each offset whether rows are enough, and rᵀ·m, rᵀ·r and the sum of m² about their means."""
-    n, k = reference.shape
-    j, offsets = measured.shape[1], len(measured) - n + 1
-    enough = np.zeros(offsets, dtype=np.bool_)
-    products, squares, total = np.zeros((offsets, k, j)), np.zeros((offsets, k, k)), np.zeros(offsets)
-    for step in range(offsets):
-        r, m, seen, count = np.zeros(k), np.zeros(j), 0, 0
-        for t in range(n):
-            if not inside[step + t]:
-                continue
-            seen += 1
-            if (seen - 1) % every != 0:
-                continue
-            count += 1
-            for a in range(k):
-                r[a] += reference[t, a]
-                for b in range(j):
-                    products[step, a, b] += reference[t, a] * measured[step + t, b]
-                for b in range(k):
-                    squares[step, a, b] += reference[t, a] * reference[t, b]
-            for b in range(j):
-                m[b] += measured[step + t, b]
-                total[step] += measured[step + t, b] ** 2
-        enough[step] = seen >= least
-        for a in range(k):
-            for b in range(j):
-                products[step, a, b] -= r[a] * m[b] / max(count, 1)
-            for b in range(k):
-                squares[step, a, b] -= r[a] * r[b] / max(count, 1)
-        power = total[step]
-        for b in range(j):
-            total[step] -= m[b] ** 2 / max(count, 1)
-        if total[step] <= _STILL * power:
-            total[step] = 0.0
+    k, j, offsets = reference.shape[1], measured.shape[1], len(measured) - len(reference) + 1
+    enough, total = np.zeros(offsets, dtype=np.bool_), np.zeros(offsets)
+    products, squares = np.zeros((offsets, k, j)), np.zeros((offsets, k, k))
+    r, m = np.ascontiguousarray(reference), np.ascontiguousarray(measured)
+    _fill_products(r, m, inside, every, least, np.empty(k + j), enough, products, squares, total)
     return enough, products, squares, total
 
 

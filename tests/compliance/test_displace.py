@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from gcode2krl import frames as fr
 from gcode2krl.cell import resolve_cell
+from gcode2krl.compiled.core import FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compliance import displace, missing_stiffness, tip_position
-from gcode2krl.compliance.chain import _sin_cos, _sin_cos_near_zero
 from gcode2krl.errors import NotUnderstoodError
 from tests.compliance import independent
 from tests.compliance.loads import (
@@ -236,20 +236,20 @@ def compliance(cell, q):
 class TestSinCos:
     @pytest.mark.parametrize("reach", [1e-8, 1.0, 10.0, 1e5])
     def test_any_quadrant(self, reach):
-        for angle in np.random.default_rng(19).uniform(-reach, reach, 3000):
-            sine, cosine = _sin_cos(angle)
-            assert abs(sine - math.sin(angle)) < 3e-16
-            assert abs(cosine - math.cos(angle)) < 3e-16
+        self.agrees("compliance_sin_cos", np.random.default_rng(19).uniform(-reach, reach, 3000), 3e-16)
 
     @pytest.mark.parametrize("quarters", range(-9, 10))
     def test_borders_of_the_quadrants(self, quarters):
-        for angle in (quarters * math.pi / 4, np.nextafter(quarters * math.pi / 4, 100.0)):
-            sine, cosine = _sin_cos(angle)
-            assert abs(sine - math.sin(angle)) < 3e-16
-            assert abs(cosine - math.cos(angle)) < 3e-16
+        border = quarters * math.pi / 4
+        self.agrees("compliance_sin_cos", np.array([border, np.nextafter(border, 100.0)]), 3e-16)
 
     def test_series_up_to_a_quarter_turn(self):
         for angle, tolerance in ((math.pi / 4, 3e-16), (-1.0, 1e-14), (math.pi / 2, 1e-11)):
-            sine, cosine = _sin_cos_near_zero(angle)
-            assert abs(sine - math.sin(angle)) < tolerance
-            assert abs(cosine - math.cos(angle)) < tolerance
+            self.agrees("compliance_sin_cos_near_zero", np.array([angle]), tolerance)
+
+    def agrees(self, function, angles, tolerance):
+        sine, cosine = np.full_like(angles, np.nan), np.full_like(angles, np.nan)
+        core_function(function, FLOATS, OUT_FLOATS, OUT_FLOATS)(angles, sine, cosine)
+        for angle, s, c in zip(angles, sine, cosine, strict=True):
+            assert abs(s - math.sin(angle)) < tolerance
+            assert abs(c - math.cos(angle)) < tolerance

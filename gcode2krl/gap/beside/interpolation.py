@@ -1,10 +1,14 @@
 """Signals between their samples."""
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.compiled.core import FLOATS, INTS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.effects import Signals
+
+_fill_place = core_function("gap_place", FLOATS, FLOATS, OUT_INTS, OUT_FLOATS)
+_fill_lines = core_function("gap_lines", INTS, FLOATS, FLOATS, OUT_FLOATS)
+_fill_cubics = core_function("gap_cubics", INTS, FLOATS, FLOATS, FLOATS, OUT_FLOATS)
 
 _PATHS = {
     "tcp_base_mm": "position_mm",
@@ -62,7 +66,8 @@ def interpolate(signals: Signals, name: str, times_s: Floats, last: LastPath | N
 def linear(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
     """Return the columns (m, c) at other times, linearly; the ends are held."""
     row, share = _place(times_s, own_s)
-    found: Floats = _lines(row, share, np.ascontiguousarray(values, dtype=np.float64))
+    found = np.empty((len(row), values.shape[1]))
+    _fill_lines(row, share, np.ascontiguousarray(values, dtype=np.float64), found)
     return found
 
 
@@ -72,44 +77,9 @@ def cubic(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
         raise ValueError("a cubic needs two samples at least")
     row, share = _place(times_s, own_s)
     own_s, values = (np.ascontiguousarray(each, dtype=np.float64) for each in (own_s, values))
-    found: Floats = _cubics(row, share, own_s, values)
-    return found
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _lines(row: Ints, share: Floats, values: Floats) -> Floats:
     found = np.empty((len(row), values.shape[1]))
-    for i in range(len(row)):
-        for c in range(values.shape[1]):
-            a, b = values[row[i], c], values[row[i] + 1, c]
-            found[i, c] = a + share[i] * (b - a)
+    _fill_cubics(row, share, own_s, values, found)
     return found
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _cubics(row: Ints, share: Floats, own_s: Floats, values: Floats) -> Floats:
-    found = np.empty((len(row), values.shape[1]))
-    for i in range(len(row)):
-        at, u = row[i], share[i]
-        width = own_s[at + 1] - own_s[at]
-        for c in range(values.shape[1]):
-            a, b = values[at, c], values[at + 1, c]
-            da, db = _slope(own_s, values, at, c) * width, _slope(own_s, values, at + 1, c) * width
-            bend = 3.0 * (b - a) - 2.0 * da - db + u * (2.0 * (a - b) + da + db)
-            found[i, c] = a + u * (da + u * bend)
-    return found
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _slope(own_s: Floats, values: Floats, at: int, c: int) -> float:
-    """Return the slope at a row to second order in uneven steps, that of the only step at an end."""
-    last = len(own_s) - 1
-    if at in (0, last):
-        low = 0 if at == 0 else last - 1
-        return float((values[low + 1, c] - values[low, c]) / (own_s[low + 1] - own_s[low]))
-    before, after = own_s[at] - own_s[at - 1], own_s[at + 1] - own_s[at]
-    to, off = values[at + 1, c] - values[at, c], values[at, c] - values[at - 1, c]
-    return float((before / after * to + after / before * off) / (before + after))
 
 
 def nearest_rows(own_s: Floats, times_s: Floats) -> Ints:
@@ -121,19 +91,6 @@ def nearest_rows(own_s: Floats, times_s: Floats) -> Ints:
 def _place(times_s: Floats, own_s: Floats) -> tuple[Ints, Floats]:
     """Return the row (n,) before each time, the last but one at most, and the share (n,) of the way on."""
     times_s, own_s = (np.ascontiguousarray(each, dtype=np.float64) for each in (times_s, own_s))
-    place: tuple[Ints, Floats] = _placed(times_s, own_s)
-    return place
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _placed(times_s: Floats, own_s: Floats) -> tuple[Ints, Floats]:
-    rows, shares = np.empty(len(times_s), dtype=np.int64), np.empty(len(times_s))
-    row, last = 0, len(own_s) - 2
-    for i in range(len(times_s)):
-        if own_s[row] > times_s[i] or (row < last and own_s[min(row + 8, last)] <= times_s[i]):
-            row = min(max(np.searchsorted(own_s, times_s[i], side="right") - 1, 0), last)
-        while row < last and own_s[row + 1] <= times_s[i]:  # times mostly follow each other
-            row += 1
-        share = (times_s[i] - own_s[row]) / (own_s[row + 1] - own_s[row])
-        rows[i], shares[i] = row, min(max(share, 0.0), 1.0)
-    return rows, shares
+    row, share = np.empty(len(times_s), dtype=np.int64), np.empty(len(times_s))
+    _fill_place(times_s, own_s, row, share)
+    return row, share

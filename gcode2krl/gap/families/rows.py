@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.gap.beside.stretches import stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.fit.block_sums import sums_between
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -76,7 +76,10 @@ class Rows:
     def _averaged(self, number: int, component: int, values: Floats) -> Floats:
         starts, trace = self.starts[number], self.traces[number]
         white = self.likelihood.noise[component].whiten(values, trace.segments)
-        return white if len(starts) == len(white) else _sums(white, np.append(starts, len(white)))
+        if len(starts) == len(white):
+            return white
+        edges = np.append(starts, len(white))
+        return sums_between(white, edges) / np.sqrt(np.diff(edges))[:, None]
 
     def _of_values(self, numbers: Ints) -> Ints:
         """Return the number (v,) of each block's first value."""
@@ -86,21 +89,6 @@ class Rows:
             n, k = trace.shape
             parts.append(own.reshape(k, n)[:, starts].ravel())
         return np.concatenate(parts)
-
-
-@numba.njit(cache=True, nogil=True)
-def _sums(values: Floats, edges: Ints) -> Floats:
-    """Return the sum of values (n, c) between edges, each over the root of their number."""
-    count, columns = len(edges) - 1, values.shape[1]
-    sums = np.zeros((count, columns))
-    for block in range(count):
-        for i in range(edges[block], edges[block + 1]):
-            for c in range(columns):
-                sums[block, c] += values[i, c]
-        root = np.sqrt(edges[block + 1] - edges[block])
-        for c in range(columns):
-            sums[block, c] /= root
-    return sums
 
 
 def _block_starts(trace: Trace) -> Ints:

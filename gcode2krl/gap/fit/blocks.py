@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.fit.block_sums import sums_between
 from gcode2krl.gap.fit.explaining import explaining_columns
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.slow_noise import BlockMeans
@@ -42,22 +42,9 @@ class _Blocks:
     def means(self, values: Floats) -> Floats:
         """Return the means (b, …) of values (n, …) over the blocks that are kept."""
         wide = values if values.ndim == 2 else values[:, None]
-        means: Floats = _means(wide, np.append(self.starts, len(values)))[self.kept]
+        sums = sums_between(wide, np.append(self.starts, len(values)))
+        means: Floats = (sums / self.counts[:, None])[self.kept]
         return means if values.ndim == 2 else means[:, 0]
-
-
-@numba.njit(cache=True, nogil=True)
-def _means(values: Floats, edges: Ints) -> Floats:
-    """Return the means (b, c) of values (n, c) between edges (b + 1,)."""
-    count, columns = len(edges) - 1, values.shape[1]
-    means = np.zeros((count, columns))
-    for block in range(count):
-        for i in range(edges[block], edges[block + 1]):
-            for c in range(columns):
-                means[block, c] += values[i, c]
-        for c in range(columns):
-            means[block, c] /= edges[block + 1] - edges[block]
-    return means
 
 
 def block_means(

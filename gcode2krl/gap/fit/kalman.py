@@ -8,14 +8,15 @@ first row on, and Σ log S_t is the log determinant of the covariance (Schweppe 
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
+from gcode2krl.compiled.core import FLOATS, INT, INTS, OUT_FLOATS, core_function
 
-_SETTLED = 1e-13
-"""Relative change of the innovations' variance from which the gain is taken as steady."""
-_LEAST_VARIANCE = 1e-300
+_gains = core_function("gap_gains", *(FLOATS, FLOATS, OUT_FLOATS, FLOATS), *(OUT_FLOATS,) * 3, returns=INT)
+_innovations = core_function(
+    "gap_innovations", *(FLOATS, INTS, FLOATS, FLOATS, FLOATS, FLOATS), *(OUT_FLOATS,) * 4
+)
 
 
 def innovation_gains(
@@ -34,11 +35,19 @@ def innovation_gains(
     for i, (pole, sigma) in enumerate(slow, start=order):
         variance[i, i] = sigma**2
         driven[i, i] = sigma**2 * (1.0 - pole**2)
-    seen = np.zeros(len(transition))
-    seen[0] = 1.0
-    seen[order:] = 1.0
-    gains: tuple[Floats, Floats] = _riccati(transition, seen, variance, driven, count)
-    return gains
+    states = len(transition)
+    gains, variances = np.empty((count, states)), np.empty(count)
+    feedback, poles = _parts(a, slow)
+    work = np.empty((states + 1, states))
+    steady = _gains(feedback, poles, variance, driven, work, gains, variances)
+    return gains[:steady].copy(), variances[:steady].copy()
+
+
+def _parts(a: Floats, slow: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
+    """Return the feedback, one zero where there is none, and the poles of the slow parts."""
+    feedback = np.zeros(max(len(a), 1))
+    feedback[: len(a)] = a
+    return feedback, np.array([pole for pole, _ in slow])
 
 
 def transition_of(a: Floats, slow: Sequence[tuple[float, float]]) -> Floats:
@@ -56,10 +65,13 @@ def innovations(
     values: Floats, segments: Ints, a: Floats, slow: Sequence[tuple[float, float]], gains: Floats, s: Floats
 ) -> Floats:
     """Return e_t/√S_t of columns (n, c), each segment by itself."""
-    poles = np.array([pole for pole, _ in slow])
-    feedback = np.zeros(max(len(a), 1))
-    feedback[: len(a)] = a
-    out: Floats = _filtered(np.ascontiguousarray(values), segments, feedback, poles, gains, 1.0 / np.sqrt(s))
+    feedback, poles = _parts(a, slow)
+    values, rows = np.ascontiguousarray(values, dtype=np.float64), np.ascontiguousarray(segments, np.int64)
+    out, columns = np.empty_like(values), values.shape[1]
+    states = np.empty((len(feedback) + 1, columns)), np.empty((len(poles), columns)), np.empty((2, columns))
+    if out.size:
+        weights = 1.0 / np.sqrt(s)
+        _innovations(values, rows, feedback, poles, gains, weights, *states, out)
     return out
 
 
@@ -70,52 +82,3 @@ def _stationary(transition: Floats, scale: float) -> Floats:
     driven[0] = scale**2
     system = np.eye(count * count) - np.kron(transition, transition)
     return np.asarray(np.linalg.solve(system, driven), dtype=np.float64).reshape(count, count)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _riccati(f: Floats, seen: Floats, p: Floats, q: Floats, count: int) -> tuple[Floats, Floats]:
-    m = len(f)
-    gains, variances = np.empty((count, m)), np.empty(count)
-    for t in range(count):
-        ph = p @ seen
-        s = float(seen @ ph) + _LEAST_VARIANCE
-        k = (f @ ph) / s
-        gains[t], variances[t] = k, s
-        if t > m and abs(s - variances[t - 1]) <= _SETTLED * s:
-            return gains[: t + 1].copy(), variances[: t + 1].copy()
-        p = f @ p @ f.T + q - s * np.outer(k, k)
-        p = 0.5 * (p + p.T)
-    return gains, variances
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _filtered(
-    values: Floats, segments: Ints, a: Floats, poles: Floats, gains: Floats, weights: Floats
-) -> Floats:
-    n, columns = values.shape
-    order, slow, steady = len(a), len(poles), len(weights) - 1
-    out = np.empty((n, columns))
-    u = np.zeros((order + 1, columns))
-    v = np.zeros((slow, columns))
-    e, first = np.empty(columns), np.empty(columns)
-    for segment in range(len(segments)):
-        u[:], v[:] = 0.0, 0.0
-        for t in range(segments[segment, 0], segments[segment, 1]):
-            at = min(t - segments[segment, 0], steady)
-            k, weight = gains[at], weights[at]
-            # column after column innermost: loops that the compiler turns into vectors
-            for c in range(columns):
-                e[c] = values[t, c] - u[0, c]
-                first[c] = u[0, c]
-            for i in range(slow):
-                for c in range(columns):
-                    e[c] -= v[i, c]
-            for c in range(columns):
-                out[t, c] = e[c] * weight
-            for j in range(order):
-                for c in range(columns):
-                    u[j, c] = a[j] * first[c] + u[j + 1, c] + k[j] * e[c]
-            for i in range(slow):
-                for c in range(columns):
-                    v[i, c] = poles[i] * v[i, c] + k[order + i] * e[c]
-    return out
