@@ -2,7 +2,6 @@
 
 import contextlib
 import copy
-import difflib
 import re
 import tomllib
 from functools import lru_cache
@@ -117,6 +116,8 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
     by_folded_name = {_fold(name): file for name, file in known.items()}
     file = by_folded_name.get(_fold(model))
     if file is None:
+        import difflib
+
         near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
         meant = [name for name in known if _fold(name) in near]
         remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"
