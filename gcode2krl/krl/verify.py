@@ -23,7 +23,7 @@ from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.pilot import knot_rows, read_pilot
-from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
+from gcode2krl.pipeline import plan_motion, set_targets, solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, S_PER_MIN
@@ -94,7 +94,7 @@ def verify_krl(
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
-    joints = solve_joints(targets, cell)
+    joints = solve_ptp_joints(targets, cell)
     issues: list[Issue] = []
     pilot, announced = _pilot_of(program, Path(path), cell)
     case: PilotCase | None = None
