@@ -3,7 +3,9 @@
 It knows nothing of the writer: it reads any spacing, any order of components, upper and lower case.
 """
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from itertools import accumulate, pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,12 +14,15 @@ from numpy.typing import NDArray
 from gcode2krl import ascii_codes as ch
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import in_chunks
 
 DISTANCE, DELAY, WRITTEN, NAME = 0, 1, 2, 6
 """Columns of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
 NUMBERS = 4
 """Numbers that a trigger writes when it calls."""
 COLUMNS = len(w.POSE_KEYS) + len(w.STATUS_TURN)
+CHUNK_BYTES = 1 << 20
+"""Bytes of a chunk, to the end of the line."""
 _MOST_DIGITS = 15
 _AXIS_BITS = COLUMNS
 """Components A1 to A6 have the bits from here on, the others those of their columns."""
@@ -44,16 +49,74 @@ class Scanned(NamedTuple):
     """``;FOLD`` less ``;ENDFOLD``."""
 
 
+class _Part(NamedTuple):
+    """What the scan of a chunk returns; places are those in the whole text."""
+
+    rows: slice
+    too_long: int
+    not_ascii: int
+    folds: int
+
+
 def scan_krl(text: bytes) -> Scanned:
     """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
     data = np.frombuffer(text, dtype=np.uint8)
-    most = text.count(b"\n") + 2
+    borders = _borders(text)
+    lines_before = dict(zip(borders, accumulate(_lines_of(text, borders), initial=0), strict=True))
+    most = lines_before[borders[-1]] + 1
     kind, blend = np.empty(most, dtype=np.int8), np.empty(most, dtype=np.int8)
     line, span = np.empty(most, dtype=np.int32), np.empty((most, 2), dtype=np.int64)
     value = np.empty((most, COLUMNS))
-    count, too_long, not_ascii, folds = _scan(data, kind, line, span, value, blend)
-    rows = slice(count)
-    return Scanned(kind[rows], line[rows], span[rows], value[rows], blend[rows], too_long, not_ascii, folds)
+    columns = kind, line, span, value, blend
+
+    def scan(start: int, end: int) -> _Part:
+        first = lines_before[start]
+        own = [column[first : lines_before[end] + (end == len(text))] for column in columns]
+        count, too_long, not_ascii, folds = _scan(data[start:end], *own)
+        rows = slice(first, first + count)
+        line[rows] += first
+        span[rows] += start
+        value[rows, NAME][kind[rows] == w.KIND_TRIGGER] += start
+        return _Part(rows, too_long and first + too_long, not_ascii and first + not_ascii, folds)
+
+    parts = in_chunks(scan, borders)
+    rows = _moved_together(columns, [part.rows for part in parts])
+    return Scanned(
+        kind[rows],
+        line[rows],
+        span[rows],
+        value[rows],
+        blend[rows],
+        too_long=next((part.too_long for part in parts if part.too_long), 0),
+        not_ascii=next((part.not_ascii for part in parts if part.not_ascii), 0),
+        open_folds=sum(part.folds for part in parts),
+    )
+
+
+def _borders(text: bytes) -> list[int]:
+    """Return the borders of chunks of whole lines."""
+    borders = [0]
+    while borders[-1] < len(text):
+        line_end = text.find(b"\n", borders[-1] + CHUNK_BYTES)
+        borders.append(line_end + 1 if line_end >= 0 else len(text))
+    return borders
+
+
+def _lines_of(text: bytes, borders: list[int]) -> Iterator[int]:
+    """Yield the line ends in each chunk."""
+    return (text.count(b"\n", start, end) for start, end in pairwise(borders))
+
+
+def _moved_together(columns: tuple[NDArray[Any], ...], parts: list[slice]) -> slice:
+    """Close the gaps between parts of columns and return the rows that are left."""
+    count = 0
+    for part in parts:
+        rows = slice(count, count + part.stop - part.start)
+        if rows != part:
+            for column in columns:
+                column[rows] = column[part]
+        count = rows.stop
+    return slice(count)
 
 
 def _bytes(word: str) -> NDArray[np.uint8]:
@@ -333,7 +396,7 @@ def _fold(data, begin, end):
     return -1 if _starts(data, begin, end, _ENDFOLD_WORD) else 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan(data, kind, line, span, value, blend):
     """Fill the columns; return (statements, first line too long, first that is not ASCII, open folds)."""
     n = len(data)
