@@ -4,6 +4,8 @@ Values are first rounded to 1e-9 and then, as integers, to their decimals (half 
 floating-point formatting is involved.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from gcode2krl import ascii_codes as ch
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 
 BYTES_PER_TARGET = 240
 NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
@@ -26,19 +29,61 @@ def motion_lines(
     comment_every: int,
     before: tuple[NDArray[np.uint8], Ints] = NOTHING_BEFORE,
 ) -> bytes:
-    """Return the KRL text (CRLF) of a run of LIN motions.
+    """Return the KRL text (CRLF) of a run of LIN motions; chunks of it are written at once.
 
     Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
     only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
     last comment; it is updated. ``before`` is text to stand right before motions, and where in it that of
     each motion begins (p + 1,).
     """
-    text, start = before
-    buffer = np.empty(BYTES_PER_TARGET * len(position_mm) + len(text), dtype=np.uint8)
-    size = _lines(
-        position_mm, abc_deg, speed_m_s, cdis_mm, source_line, state, comment_every, text, start, buffer
-    )
-    return buffer[:size].tobytes()
+    text, begins = before
+    borders = chunk_borders(len(position_mm))
+    in_force = {0: state.copy()}
+    for start, end in pairwise(borders):
+        part = slice(start, end)
+        in_force[end] = _state_behind(
+            speed_m_s[part], cdis_mm[part], source_line[part], in_force[start], comment_every
+        )
+    state[:] = in_force[borders[-1]]
+
+    def write(start: int, end: int) -> bytes:
+        part = slice(start, end)
+        own = text[begins[start] : begins[end]] if len(text) else text
+        buffer = np.empty(BYTES_PER_TARGET * (end - start) + len(own), dtype=np.uint8)
+        size = _lines(
+            position_mm[part],
+            abc_deg[part],
+            speed_m_s[part],
+            cdis_mm[part],
+            source_line[part],
+            in_force[start],
+            comment_every,
+            own,
+            begins[start : end + 1] - begins[start] if len(text) else begins,
+            buffer,
+        )
+        return buffer[:size].tobytes()
+
+    return b"".join(in_chunks(write, borders))
+
+
+def _state_behind(
+    speed_m_s: Floats, cdis_mm: Floats, source_line: Ints32, state: Floats, comment_every: int
+) -> Floats:
+    """Return the ``state`` of `motion_lines` behind a chunk that begins with ``state``."""
+    blended = np.flatnonzero(cdis_mm > 0)
+    cdis = cdis_mm[blended[-1]] if len(blended) else state[1]
+    count, rows = int(state[2]), len(speed_m_s)
+    first = max(comment_every - 1 - count, 0)
+    if not comment_every or first >= rows:
+        since = count + rows
+    elif (source_line > 0).all():
+        since = (rows - 1 - first) % comment_every
+    else:
+        since = count
+        for line in source_line.tolist():
+            since = 0 if since + 1 >= comment_every and line > 0 else since + 1
+    return np.array([speed_m_s[-1], cdis, since])
 
 
 def fixed(value: float, decimals: int) -> str:
@@ -125,7 +170,7 @@ _KEYS = np.stack([_bytes(f",{key} ") for key in w.POSE_KEYS[1:]])
 _CRLF = _bytes("\r\n")
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lines(position, abc, speed, cdis, source_line, state, comment_every, text, start, buffer):
     at = 0
     for i in range(len(position)):
