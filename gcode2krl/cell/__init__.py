@@ -1,16 +1,19 @@
 """The cell file and the model library: everything the planner knows about robot, tools and program."""
 
-from gcode2krl.cell.definition import (
-    CODES_WITHOUT_SIGNALS,
-    Cell,
-    as_toml,
-    cell_from_resolved,
-    cell_schema,
-    controller_axes,
-    load_cell,
-    plain_view,
-    resolve_cell,
-)
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gcode2krl.cell.definition import (
+        CODES_WITHOUT_SIGNALS,
+        Cell,
+        as_toml,
+        cell_from_resolved,
+        cell_schema,
+        controller_axes,
+        load_cell,
+        plain_view,
+        resolve_cell,
+    )
 
 __all__ = [
     "CODES_WITHOUT_SIGNALS",
@@ -23,3 +26,12 @@ __all__ = [
     "plain_view",
     "resolve_cell",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use: the model library is read without the definition of a cell."""
+    if name not in __all__:
+        raise AttributeError(f"module 'gcode2krl.cell' has no attribute {name!r}")
+    from gcode2krl.cell import definition
+
+    return getattr(definition, name)

@@ -1,7 +1,7 @@
 """The model library: finds and reads the TOML files of ``models/``, from a checkout and from a wheel."""
 
+import contextlib
 import copy
-import difflib
 import re
 import tomllib
 from functools import lru_cache
@@ -16,6 +16,9 @@ MOST_LEVELS = 32
 """The deepest table of a cell has 5 levels; the time of `tomllib` grows with the square of a key's parts."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"]*+"|'[^']*+')"""
 _MANY_DOTS = re.compile(rf"(?<![A-Za-z0-9_\-\"'])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
+_PLAIN_MODEL = re.compile(r'model = "([^"\\\x00-\x1f\x7f\ufffd]*)"\n')
+"""A first line that TOML could not read otherwise."""
+_LONGEST_LINE = 1000
 KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
@@ -33,7 +36,16 @@ def names(kind: str) -> dict[str, Path]:
 
 @lru_cache(maxsize=len(KINDS))
 def _names(folder: Path) -> dict[str, Path]:
-    return {str(read_toml(file).get("model", file.stem)): file for file in sorted(folder.glob("*.toml"))}
+    return {_model_of(file): file for file in sorted(folder.glob("*.toml"))}
+
+
+def _model_of(file: Path) -> str:
+    """Return the model that a file of the library is; it is parsed only if its first key does not say it."""
+    first_line = ""
+    with contextlib.suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
+        first_line = stream.readline(_LONGEST_LINE)
+    stated = _PLAIN_MODEL.fullmatch(first_line)
+    return stated[1] if stated else str(_of_library(file).get("model", file.stem))
 
 
 @lru_cache(maxsize=256)
@@ -104,6 +116,8 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
     by_folded_name = {_fold(name): file for name, file in known.items()}
     file = by_folded_name.get(_fold(model))
     if file is None:
+        import difflib
+
         near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
         meant = [name for name in known if _fold(name) in near]
         remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"

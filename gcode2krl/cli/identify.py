@@ -1,25 +1,17 @@
 """``gcode2krl identify``: fits the cell to measurements; a file for each kind."""
 
-from importlib import import_module
-
 import click
 
-_WHAT = ("controller", "stiffness", "sensor", "force")
+from gcode2krl.cli.on_use import CommandsOnUse
+
+_WHAT = {
+    "controller": "Fit how the controller plans to a recorded trace: k, effective CDIS, the law.",
+    "stiffness": "Fit the stiffness of the robot's joints and links to distances of measuring cubes.",
+    "sensor": "Fit weight, centre of gravity and offsets to readings of the unloaded force sensor.",
+    "force": "Fit the six coefficients of the linear edge law to the measured force of a run.",
+}
 
 
-class _Identify(click.Group):
-    """Subcommands imported on use."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_WHAT)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _WHAT:
-            return None
-        command: click.Command = import_module(f"gcode2krl.cli.identify_{cmd_name}").command
-        return command
-
-
-@click.command("identify", cls=_Identify)
+@click.command("identify", cls=CommandsOnUse, summaries=_WHAT, module="gcode2krl.cli.identify_{}")
 def command() -> None:
     """Fit the cell to measurements: controller, stiffness, sensor, cutting force."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from gcode2krl.cell import Cell
     from gcode2krl.identify.controller import CornerFit, Estimate, Identification, Section
     from gcode2krl.runs import ControllerTrace
 
@@ -77,7 +77,7 @@ def command(
 
 
 def _identify(
-    trace_path: str, part: str | None, cell: Cell, tolerance_mm: float | None, console: Console
+    trace_path: str, part: str | None, cell: "Cell", tolerance_mm: float | None, console: Console
 ) -> "Identification":
     from gcode2krl.identify.controller import identify_controller
     from gcode2krl.pipeline import set_targets
@@ -91,7 +91,7 @@ def _identify(
         return identify_controller(trace, targets, cell)
 
 
-def _identify_test(trace: "ControllerTrace", cell: Cell, console: Console) -> "Identification":
+def _identify_test(trace: "ControllerTrace", cell: "Cell", console: Console) -> "Identification":
     """Fit a trace of the test program: with the lines that turn the tool if it has them, else without."""
     from gcode2krl.identify.controller import identify_controller
     from gcode2krl.pipeline import controller_test_targets
@@ -245,7 +245,7 @@ def _corner_record(corner: "CornerFit") -> dict[str, Any]:
 # --- the cell file --------------------------------------------------------------------------------------
 
 
-def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path:
+def _apply(result: "Identification", file: Path, trace: str, cell: "Cell") -> Path:
     """Write k, CDIS and law into a cell file and keep its other keys; comments are lost.
 
     CDIS is the value that programs *write*; it goes into the cell only if the corners of the trace were
@@ -253,7 +253,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
     """
     import tomli_w
 
-    from gcode2krl.cell import library
+    from gcode2krl.cell import library, resolve_cell
     from gcode2krl.files import write_together
 
     data = library.read_toml(file) if file.exists() else {}
@@ -279,7 +279,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: Cell) -> Path
     return file
 
 
-def _is_own_cdis(result: "Identification", cell: Cell) -> bool:
+def _is_own_cdis(result: "Identification", cell: "Cell") -> bool:
     """Tell whether the corners of the trace were programmed with the cell's CDIS."""
     return result.cdis_programmed_mm == cell.controller.cdis_mm
 

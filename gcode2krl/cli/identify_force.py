@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.prediction import Prediction
 from gcode2krl.units import MS_PER_S
 
 if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
     from gcode2krl.identify.force import ForceFit
+    from gcode2krl.prediction import Prediction
     from gcode2krl.runs import Run
 
 
@@ -68,6 +68,7 @@ def command(
 
 
 def _inputs(run_folder: str, prediction: str | None) -> "tuple[Run, Prediction]":
+    from gcode2krl.prediction import Prediction
     from gcode2krl.runs import load_run
 
     run = load_run(run_folder)
@@ -88,7 +89,7 @@ def _inputs(run_folder: str, prediction: str | None) -> "tuple[Run, Prediction]"
     return run, predicted
 
 
-def _fit(run: "Run", predicted: Prediction) -> "ForceFit":
+def _fit(run: "Run", predicted: "Prediction") -> "ForceFit":
     from gcode2krl import frames as fr
     from gcode2krl.cutting import force_basis
     from gcode2krl.identify.force import fit_force
@@ -141,11 +142,11 @@ def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
     }
 
 
-def _apply(fit: "ForceFit", file: Path, run: "Run", cell: Cell) -> Path:
+def _apply(fit: "ForceFit", file: Path, run: "Run", cell: "Cell") -> Path:
     """Write the coefficients as ``[material]`` into a cell file, keep its other keys; comments are lost."""
     import tomli_w
 
-    from gcode2krl.cell import library
+    from gcode2krl.cell import library, resolve_cell
     from gcode2krl.files import write_together
     from gcode2krl.identify.force import NAMES
 

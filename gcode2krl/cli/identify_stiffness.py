@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cell import Cell
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import UM_PER_MM
 
 if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
     from gcode2krl.identify.estimate import Estimate
     from gcode2krl.identify.stiffness import JointFit, StiffnessIdentification
 
@@ -82,7 +82,7 @@ def _run(
 # --- words ----------------------------------------------------------------------------------------------
 
 
-def _say(result: "StiffnessIdentification", cell: Cell, console: Console) -> None:
+def _say(result: "StiffnessIdentification", cell: "Cell", console: Console) -> None:
     console.say(f"{result.source}: stiffness in N·mm/rad, {result.level:.0%} intervals")
     console.say("  joint       about  stiffness    interval                 in the cell  readings  noise µm")
     for fit in result.joints:
@@ -92,7 +92,7 @@ def _say(result: "StiffnessIdentification", cell: Cell, console: Console) -> Non
         console.say(f"  {name} taken as known, {origin}: k_c {k.k_c:.3g}, k_b {k.k_b:.3g}, k_a {k.k_a:.3g}")
 
 
-def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -> str:
+def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: "Cell") -> str:
     from gcode2krl.identify.stiffness import AXES, KEYS, in_cell
 
     in_file = in_cell(cell, fit.joint, KEYS[axis])
@@ -107,7 +107,7 @@ def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: Cell) -
 _KEYS = ("joints", "known", "level", "stated_noise_mm")
 
 
-def _record(result: "StiffnessIdentification", files: list[Path], cell: Cell) -> dict[str, Any]:
+def _record(result: "StiffnessIdentification", files: list[Path], cell: "Cell") -> dict[str, Any]:
     known = {
         name: {"k_c": value.k_c, "k_b": value.k_b, "k_a": value.k_a, "source": origin}
         for name, (value, origin) in result.known.items()
@@ -117,7 +117,7 @@ def _record(result: "StiffnessIdentification", files: list[Path], cell: Cell) ->
     return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
 
 
-def _joint_record(fit: "JointFit", cell: Cell) -> dict[str, Any]:
+def _joint_record(fit: "JointFit", cell: "Cell") -> dict[str, Any]:
     from gcode2krl.identify.stiffness import KEYS, in_cell
 
     record: dict[str, Any] = {"readings": len(fit.row), "noise_mm": fit.noise_mm, "known": list(fit.known)}
@@ -135,7 +135,7 @@ def _joint_record(fit: "JointFit", cell: Cell) -> dict[str, Any]:
 # --- the figure -----------------------------------------------------------------------------------------
 
 
-def _save_figure(result: "StiffnessIdentification", file: Path, cell: Cell) -> Path:
+def _save_figure(result: "StiffnessIdentification", file: Path, cell: "Cell") -> Path:
     from gcode2krl.cli.stiffness_figure import figure
     from gcode2krl.files import write_together
     from gcode2krl.report.drawing import look

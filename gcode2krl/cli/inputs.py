@@ -3,16 +3,16 @@
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cell import Cell, load_cell
-from gcode2krl.cell.library import read_toml
 from gcode2krl.cli.console import Console
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.files import refuse_inputs
-from gcode2krl.tables import Toolpath
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
+    from gcode2krl.tables import Toolpath
 
 STANDARD = "-"
 FIGURES = ("png", "svg", "pdf")
@@ -53,8 +53,8 @@ def gcode_options(function: Any) -> Any:
 
 
 def read_part(
-    part: str, cell: Cell, console: Console, chord_tolerance_mm: float, block_delete: bool
-) -> Toolpath:
+    part: str, cell: "Cell", console: Console, chord_tolerance_mm: float, block_delete: bool
+) -> "Toolpath":
     """Read the G-code of a command, from a file or from standard input."""
     from gcode2krl.gcode import read_gcode, read_stream
 
@@ -80,8 +80,10 @@ def read_part(
         )
 
 
-def read_cell(path: str | None) -> Cell:
+def read_cell(path: str | None) -> "Cell":
     """Read the cell of a command."""
+    from gcode2krl.cell import load_cell
+
     return load_cell(path)
 
 
@@ -92,6 +94,8 @@ def require_other(output: Path, *inputs: str | Path | None) -> None:
 
 def require_outputs(outputs: list[Path], *inputs: str | Path | None) -> None:
     """Refuse an output that is an input, another output or a folder, or whose folder does not exist."""
+    from gcode2krl.files import refuse_inputs
+
     for output in outputs:
         if not output.parent.is_dir():
             sentence = f"cannot write: the folder {str(output.parent)!r} does not exist"
@@ -168,6 +172,8 @@ def cell_files(path: str | None) -> list[Path]:
 
 def _names_in(file: Path) -> list[str]:
     """Return the texts of a TOML file that may be names of files."""
+    from gcode2krl.cell.library import read_toml
+
     try:
         values: list[Any] = [read_toml(file)]
     except (Gcode2KrlError, RecursionError):

@@ -1,47 +1,37 @@
 """Entry point ``gcode2krl``: the commands, the default command, and how errors leave the program."""
 
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.on_use import CommandsOnUse
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
 
 _COMMANDS = {
-    name: name.replace("-", "_")
-    for name in (
-        "translate",
-        "predict",
-        "verify",
-        "diagnose",
-        "identify",
-        "online",
-        "stiffness-map",
-        "make-test",
-        "models",
-        "explain",
-    )
+    "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
+    "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
+    "verify": "Read a KRL program back and compare it with its G-code.",
+    "diagnose": "Say where measured runs differ from their prediction, which effects explain it, "
+    "and how far it shrinks.",
+    "identify": "Fit the cell to measurements: controller, stiffness, sensor, cutting force.",
+    "online": "Compensate online: the twin, the RSI server, replay.",
+    "stiffness-map": "Draw how far the robot bends under a load: over $BASE's plane, over the spin, "
+    "and joint by joint.",
+    "make-test": "Write a test program of air moves.",
+    "models": "Robots, controllers, tools and cells: list, show, check, schema.",
+    "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",
 }
 _OWN_OPTIONS = ("-h", "--help", "--version")
 
 
-class _Commands(click.Group):
-    """Commands imported on use; anything else is a part to translate."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _COMMANDS:
-            return None
-        command: click.Command = import_module(f"gcode2krl.cli.{_COMMANDS[cmd_name]}").command
-        return command
+class _Commands(CommandsOnUse):
+    """The commands; a first word that is none of them is a part to translate."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if args and args[0] not in _COMMANDS and args[0] not in _OWN_OPTIONS:
@@ -68,7 +58,13 @@ def _is_there(word: str) -> bool:
         return False
 
 
-@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
+@click.command(
+    cls=_Commands,
+    summaries=_COMMANDS,
+    module="gcode2krl.cli.{}",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    no_args_is_help=True,
+)
 @click.version_option(__version__, prog_name="gcode2krl")
 def commands() -> None:
     """G-code in, a verified KUKA KRL program out.

@@ -1,12 +1,12 @@
 """``gcode2krl make-test controller|reversals|circle|… -o test.nc``."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
@@ -92,7 +92,7 @@ def command(
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
-        if at and not np.isfinite(at).all():
+        if at and not all(map(math.isfinite, at)):
             raise input_error("option-value", f"--at {at}: found no numbers", "give X Y Z in mm")
         cell = read_cell(cell_path)
         test = _test_of(what, part, cell, at, size, speed)

@@ -1,12 +1,16 @@
 """``gcode2krl models``: what is in the library, and what a person must confirm of a cell."""
 
 import json
+from typing import TYPE_CHECKING
 
 import click
 
-from gcode2krl.cell import Cell, cell_schema, library, load_cell
+from gcode2krl.cell import library
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.errors import Gcode2KrlError, input_error
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
 
 
 @click.group("models")
@@ -45,6 +49,8 @@ def show(name: str) -> None:
 @command.command("schema")
 def schema() -> None:
     """Print the JSON schema of a cell file, for editors."""
+    from gcode2krl.cell import cell_schema
+
     click.echo(json.dumps(cell_schema(), indent=2))
 
 
@@ -53,6 +59,7 @@ def schema() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def check(cell_path: str | None, as_json: bool) -> int:
     """Check a cell file and list what a person must confirm at the real cell."""
+    from gcode2krl.cell import load_cell
     from gcode2krl.cli.cell_list import findings, missing_keys, to_confirm
     from gcode2krl.krl.provenance import default_values
 
@@ -91,7 +98,7 @@ def check(cell_path: str | None, as_json: bool) -> int:
     return 1 if wrong else 0
 
 
-def _say_verified(console: Console, cell: Cell) -> None:
+def _say_verified(console: Console, cell: "Cell") -> None:
     if cell.is_confirmed and cell.verified is not None:
         console.say(f"verified by {cell.verified.by} on {cell.verified.date}")
     elif cell.verified is not None:
@@ -103,7 +110,7 @@ def _say_verified(console: Console, cell: Cell) -> None:
         console.say('  verified = { by = "your name", date = "YYYY-MM-DD" }')
 
 
-def _say_provenance(console: Console, cell: Cell, lacking: list[str]) -> None:
+def _say_provenance(console: Console, cell: "Cell", lacking: list[str]) -> None:
     """List values taken over and their cells, defaults that nobody stated, and what is missing."""
     from gcode2krl.krl.provenance import default_values
 

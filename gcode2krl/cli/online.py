@@ -1,13 +1,11 @@
 """``gcode2krl online``: the twin, the RSI server, and the replay of a recorded run."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
-from gcode2krl.cell import Cell
-from gcode2krl.cell.sections.online import Online
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     cell_files,
@@ -20,8 +18,11 @@ from gcode2krl.cli.inputs import (
     require_other,
 )
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.files import make_folder, write_together
-from gcode2krl.prediction import Prediction
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
+    from gcode2krl.cell.sections.online import Online
+    from gcode2krl.prediction import Prediction
 
 TEST_PIECE_STOCK = ((0.0, -100.0, -30.0), (300.0, 100.0, 0.0))
 """Stock of the test piece, as its file states it."""
@@ -116,7 +117,7 @@ _WORDS = {
 }
 
 
-def _changed(settings: Online, options: dict[str, Any]) -> Online:
+def _changed(settings: "Online", options: dict[str, Any]) -> "Online":
     """Return the settings with the options of the command line laid over them."""
     changes: dict[str, Any] = {}
     for name, key in (("lead_ms", "lead_s"), ("blend_ms", "blend_s")):
@@ -134,8 +135,10 @@ def _changed(settings: Online, options: dict[str, Any]) -> Online:
     return _valid(settings, changes)
 
 
-def _valid(settings: Online, changes: dict[str, Any]) -> Online:
+def _valid(settings: "Online", changes: dict[str, Any]) -> "Online":
     from pydantic import ValidationError
+
+    from gcode2krl.cell.sections.online import Online
 
     try:
         return Online.model_validate({**settings.model_dump(), **changes})
@@ -166,14 +169,16 @@ def _world_values(options: dict[str, Any]) -> dict[str, Any]:
 
 def _predicted(
     part: str | None,
-    cell: Cell,
-    settings: Online,
+    cell: "Cell",
+    settings: "Online",
     console: Console,
     tolerance: float | None,
     chord_tolerance: float,
     block_delete: bool,
-) -> Prediction:
+) -> "Prediction":
     """Predict a part at the cycle of the settings; a prediction's folder is loaded unchanged."""
+    from gcode2krl.prediction import Prediction
+
     if part is not None and Path(part).is_dir():
         return Prediction.load(part)
     if part is None:
@@ -206,7 +211,7 @@ def _test_piece() -> Path:
 
 
 def _draw(
-    prediction: Prediction,
+    prediction: "Prediction",
     twin: Any,
     runs: Any,
     judged: Any,
@@ -260,6 +265,8 @@ def replay_command(
     output: str | None,
 ) -> int:
     """Run the compensator on a recorded run: which corrections would it have sent?"""
+    from gcode2krl.files import write_together
+
     console = Console(quiet, as_json)
     inputs = existing(run, sidecar, *cell_files(cell_path))
     if output is not None:
@@ -408,7 +415,7 @@ def _pilot(sidecar: str | None) -> Any:
     return read_pilot(sidecar)
 
 
-def _calibration(settings: Online) -> Any:
+def _calibration(settings: "Online") -> Any:
     """Return weight and offset of the sensor, None where the section names no file."""
     if settings.calibration is None:
         return None
@@ -421,7 +428,7 @@ def _gates(cycles: dict[str, int]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in cycles.items())
 
 
-def _link_changed(settings: Online, options: dict[str, Any]) -> Online:
+def _link_changed(settings: "Online", options: dict[str, Any]) -> "Online":
     """Return the settings with the options of `serve` laid over them."""
     keys = ("address", "robot_address", "port")
     link = {key: options[key] for key in keys if options[key] is not None}
@@ -444,8 +451,9 @@ def _say_files(files: list[Path], address: str, console: Console, as_json: bool)
         console.say(str(file))
 
 
-def _controller_files(cell: Cell, form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:
+def _controller_files(cell: "Cell", form: Any, name: str, folder: Path, inputs: list[Path]) -> list[Path]:
     """Write the files for the controller's folder ``SensorInterface``."""
+    from gcode2krl.files import make_folder, write_together
     from gcode2krl.krl.rsi_files import rsi_texts
 
     if cell.online.link.address == "0.0.0.0":

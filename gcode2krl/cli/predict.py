@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.arrays import Floats
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     STANDARD,
@@ -21,14 +20,13 @@ from gcode2krl.cli.inputs import (
     require_other,
     require_part,
 )
-from gcode2krl.cli.loads import largest, load_lines
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.files import write_together
-from gcode2krl.prediction import RECORD, Prediction, refuse_foreign
-from gcode2krl.prediction.limits import cycle_acceleration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from gcode2krl.arrays import Floats
+    from gcode2krl.prediction import Prediction
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
@@ -86,6 +84,9 @@ def command(
 
     Findings that would refuse a program are only reported here.
     """
+    from gcode2krl.cli.loads import largest, load_lines
+    from gcode2krl.prediction.limits import cycle_acceleration
+
     console = Console(quiet, as_json)
     try:
         require_part(part)
@@ -156,6 +157,8 @@ def command(
 
 def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) -> None:
     """Raise where an output is an input, has no folder, or its folder has foreign files."""
+    from gcode2krl.prediction import RECORD, refuse_foreign
+
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
     names = [*tables, RECORD, _CORNERS, *(f"{name}.png" for name in _FIGURES)]
@@ -169,10 +172,11 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
     require_other(file, *inputs)
 
 
-def _save_part(prediction: Prediction, file: Path, inputs: list[Path]) -> Path:
+def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path:
     """Write the machined stock as a mesh."""
     from gcode2krl.cutting import remove
     from gcode2krl.cutting.raw_part import to_mesh
+    from gcode2krl.files import write_together
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
@@ -186,12 +190,14 @@ def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> 
     """Write the table of corners as CSV."""
     import polars as pl
 
+    from gcode2krl.files import write_together
+
     file = folder / _CORNERS
     write_together({file: pl.DataFrame(corners).write_csv}, inputs)
     return file
 
 
-def _draw(prediction: Prediction, folder: Path, inputs: list[Path]) -> list[Path]:
+def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Path]:
     """Draw path, speed and joints; returns the files."""
     from gcode2krl.report import figures as fig
 
@@ -220,7 +226,7 @@ def _folder(part: str, output: str | None) -> Path:
     return folder
 
 
-def _load_figures(prediction: Prediction) -> "dict[str, Figure]":
+def _load_figures(prediction: "Prediction") -> "dict[str, Figure]":
     """Return the figures of forces and deflection, where they are known."""
     from gcode2krl.report import load_figures as fig
 
@@ -247,7 +253,7 @@ def _load_figures(prediction: Prediction) -> "dict[str, Figure]":
     }
 
 
-def _shares(prediction: Prediction) -> "tuple[tuple[str, ...], Floats]":
+def _shares(prediction: "Prediction") -> "tuple[tuple[str, ...], Floats]":
     """Return the virtual joints and how much each adds along the deflection (m, 10)."""
     from gcode2krl.cell.sections import VIRTUAL_JOINTS
     from gcode2krl.compliance import joint_shares

@@ -2,19 +2,19 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.cell import Cell
-from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
-from gcode2krl.files import write_together
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
 
 Three = tuple[float, float, float]
 MOST_LOAD_N = 1e6
@@ -112,13 +112,13 @@ def command(
 class Case:
     """Cell, tool and load of the maps."""
 
-    cell: Cell
+    cell: "Cell"
     tool: int
     load_N: Floats | None
     feed: Floats
 
     @classmethod
-    def of(cls, cell: Cell, load: Three | None, feed: Three | None, tool: int | None) -> "Case":
+    def of(cls, cell: "Cell", load: Three | None, feed: Three | None, tool: int | None) -> "Case":
         """Return the case of a command's options; raises `NotUnderstoodError` for an impossible option."""
         number = tool if tool is not None else cell.mounted_tool
         number = number if number is not None else min(cell.tool)
@@ -255,6 +255,7 @@ def pose_cost(case: Case, at_mm: Three) -> tuple[dict[str, Any], dict[str, float
 
     Raises `RefusedError` where the robot cannot be there.
     """
+    from gcode2krl.cell.sections import VIRTUAL_JOINTS
     from gcode2krl.compliance import joint_shares, project_normal
 
     q, margin = case.poses(np.array([at_mm], dtype=float), np.array([case.spin_deg]))
@@ -289,6 +290,7 @@ def _save(
     """Write figures and CSV; returns the files."""
     import polars as pl
 
+    from gcode2krl.files import write_together
     from gcode2krl.report.figures import save_figures
     from gcode2krl.report.stiffness_figures import joint_cost_figure, spin_figure, workspace_figure
 

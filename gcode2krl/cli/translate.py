@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from gcode2krl.arrays import Floats
-from gcode2krl.cell import Cell
-from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import (
     STANDARD,
@@ -23,14 +20,15 @@ from gcode2krl.cli.inputs import (
     require_outputs,
     require_part,
 )
-from gcode2krl.cli.loads import largest
 from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
-from gcode2krl.prediction import Prediction
-from gcode2krl.tables import Targets
 
 if TYPE_CHECKING:
+    from gcode2krl.arrays import Floats
+    from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
+    from gcode2krl.prediction import Prediction
+    from gcode2krl.tables import Targets
 
 
 @click.command("translate")
@@ -124,6 +122,7 @@ def command(
         require_figure(compensate_plot)
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        from gcode2krl.cell.confirmation import future_confirmation
         from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.pipeline import corner_errors, predict_toolpath, solve_joints, targets_and_joints
 
@@ -239,7 +238,7 @@ def _place(part: str, output: str | None, name: str | None) -> Path | None:
 
 
 def _outputs(
-    place: Path | None, name: str | None, part: str, cell: Cell, online: str | None, plot: str | None
+    place: Path | None, name: str | None, part: str, cell: "Cell", online: str | None, plot: str | None
 ) -> list[Path]:
     """Return the files to write, without the parts of a long program; raises where a name is bad."""
     from gcode2krl.krl import output_files, program_file
@@ -251,7 +250,7 @@ def _outputs(
     return outputs
 
 
-def _with_options(cell: Cell, max_lines: int | None, comment_every: int | None) -> Cell:
+def _with_options(cell: "Cell", max_lines: int | None, comment_every: int | None) -> "Cell":
     given = {"max_lines": max_lines, "comment_every": comment_every}
     program = cell.program.model_copy(
         update={key: value for key, value in given.items() if value is not None}
@@ -267,7 +266,7 @@ def _words(**options: Any) -> str:
     )
 
 
-def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: str | None) -> None:
+def _refuse_early(targets: "Targets", cell: "Cell", allow: tuple[str, ...], online: str | None) -> None:
     """Refuse targets that cannot move, or not be corrected online, before their motion is planned."""
     from gcode2krl.krl.release import matching, released
     from gcode2krl.krl.rsi_refusals import online_issues
@@ -277,8 +276,10 @@ def _refuse_early(targets: Targets, cell: Cell, allow: tuple[str, ...], online: 
         released(issues, matching(issues, allow))
 
 
-def _figures(prediction: Prediction, corner_mm: Floats) -> dict[str, Any]:
+def _figures(prediction: "Prediction", corner_mm: "Floats") -> dict[str, Any]:
     """Return the figures of the JSON contract that the stages compute."""
+    from gcode2krl.cli.loads import largest
+
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     return {
         "moves": len(prediction.toolpath) - 1,

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.tables import Forces
@@ -39,6 +41,8 @@ class Cut:
 
     source_line: Ints32
     rapid: Bools
+    engaged: Bools
+    """(m,) True in material."""
     spindle_rad_s: Floats
     f_z_mm: Floats
     ramp_rad: Floats
@@ -127,7 +131,7 @@ def _grazes(cut: Cut, depth: Floats) -> Bools:
 
 
 def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) -> Iterator[Issue]:
-    engaged = np.isfinite(forces.phi_rad[:, 0]) & ~cut.rapid
+    engaged = cut.engaged & ~cut.rapid
     for row in _starts(engaged & (cut.spindle_rad_s == 0.0)):
         sentence = f"T{forces.tool[row]} cuts material while the spindle is stopped"
         yield Issue(severity, "spindle-off", int(cut.source_line[row]), sentence, "M3 with S before the cut")
@@ -233,37 +237,41 @@ def _beyond(
 
 def _chips(cut: Cut, forces: Forces) -> Iterator[Issue]:
     """Yield chips outside the range of the coefficients: once each, with the fraction of the time in cut."""
-    cutting = np.flatnonzero(np.isfinite(forces.phi_rad[:, 0]) & (cut.f_z_mm > 0.0))
-    if not len(cutting):
-        return
-    chip = largest_chip(forces.phi_rad[cutting], cut.f_z_mm[cutting], cut.ramp_rad[cutting])
+    cutting = cut.engaged & (cut.f_z_mm > 0.0)
+    thin, thick = np.zeros((2, len(cutting)), dtype=np.bool_)
+
+    def judge(start: int, end: int) -> None:
+        rows = start + np.flatnonzero(cutting[start:end])
+        chip = largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
+        thin[rows], thick[rows] = chip < THIN_CHIP_MM, chip > THICK_CHIP_MM
+
+    in_chunks(judge, chunk_borders(len(cutting)))
+    in_cut = np.count_nonzero(cutting)
     for wrong, code, words in (
-        (
-            chip < THIN_CHIP_MM,
-            "chip-thin",
-            f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut",
-        ),
-        (chip > THICK_CHIP_MM, "chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
+        (thin, "chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut"),
+        (thick, "chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
     ):
-        if np.count_nonzero(wrong) * cut.cycle_s < max(_SHORT_S, 0.05 * len(cutting) * cut.cycle_s):
+        count = np.count_nonzero(wrong)
+        if count * cut.cycle_s < max(_SHORT_S, 0.05 * in_cut * cut.cycle_s):
             continue
-        row = int(cutting[np.argmax(wrong)])
-        fraction = np.count_nonzero(wrong) / len(cutting)
-        sentence = f"{words}, in {fraction:.0%} of the time in cut, first at this line"
-        yield Issue("note", code, int(cut.source_line[row]), sentence, "change F or the spindle speed")
+        sentence = f"{words}, in {count / in_cut:.0%} of the time in cut, first at this line"
+        line = int(cut.source_line[np.argmax(wrong)])
+        yield Issue("note", code, line, sentence, "change F or the spindle speed")
 
 
 def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
     """A note where spindle or tooth passing meets a structural mode; stability itself is not predicted."""
-    cutting = np.isfinite(forces.phi_rad[:, 0])
-    pairs = np.unique(np.stack([np.abs(cut.spindle_rad_s[cutting]), forces.tool[cutting]], axis=1), axis=0)
-    for speed, number in pairs:
+    begins = _runs(cut.spindle_rad_s, forces.tool)
+    begins = begins[np.logical_or.reduceat(cut.engaged, begins)]
+    speeds = np.abs(cut.spindle_rad_s[begins])
+    for speed, number in np.unique(np.stack([speeds, forces.tool[begins]], axis=1), axis=0):
         teeth = cell.tool[int(number)].teeth
         turns_hz = float(speed) / RAD_PER_REV
         for mode in cell.compliance.modes_hz:
             for order in sorted({*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}):
                 if abs(order * turns_hz - mode) <= _NEAR_MODE * mode:
-                    row = int(np.argmax(cutting & (np.abs(cut.spindle_rad_s) == speed)))
+                    begin = int(begins[np.argmax(speeds == speed)])
+                    row = begin + int(np.argmax(cut.engaged[begin:]))
                     what = "the spindle" if order % teeth else "tooth passing"
                     yield Issue(
                         "note",
@@ -277,7 +285,15 @@ def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
 
 
 def _tools(forces: Forces) -> Ints32:
-    return np.unique(forces.tool)
+    return np.unique(forces.tool[_runs(forces.tool)])
+
+
+def _runs(*columns: NDArray[Any]) -> Ints:
+    """Return where stretches of rows (m,) begin in which no column changes."""
+    begins = np.arange(len(columns[0])) == 0
+    for column in columns:
+        begins[1:] |= column[1:] != column[:-1]
+    return np.flatnonzero(begins)
 
 
 def _starts(wrong: Bools) -> list[int]:

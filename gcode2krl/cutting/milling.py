@@ -138,6 +138,7 @@ def remove(
     seen = Cut(
         source_line=toolpath.source_line[row],
         rapid=rapid,
+        engaged=np.isfinite(forces.phi_rad[:, 0]),
         spindle_rad_s=spindle,
         f_z_mm=f_z_mm,
         ramp_rad=engaged.ramp_rad,
@@ -156,10 +157,9 @@ def remove(
         source_line=seen.source_line,
         feed=~rapid & ~toolpath.machine[row] & (motion.move > 0),
     )
-    met = np.isfinite(forces.phi_rad[:, 0])
     issues = (
         *findings_of(seen, forces, cell, field.guessed),
-        *stock_findings(work, cell.stock, before, met & work.feed),
+        *stock_findings(work, cell.stock, before, seen.engaged & work.feed),
         *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))

@@ -4,10 +4,13 @@ Values are first rounded to 1e-9 and then, as integers, to their decimals (half 
 floating-point formatting is involved.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import (
     BYTES,
     FLOAT,
@@ -43,18 +46,62 @@ def motion_lines(
     comment_every: int,
     before: tuple[NDArray[np.uint8], Ints] = NOTHING_BEFORE,
 ) -> bytes:
-    """Return the KRL text (CRLF) of a run of LIN motions.
+    """Return the KRL text (CRLF) of a run of LIN motions; chunks of it are written at once.
 
     Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
     only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
     last comment; it is updated. ``before`` is text to stand right before motions, and where in it that of
     each motion begins (p + 1,).
     """
-    text, start = before
-    buffer = np.empty(BYTES_PER_TARGET * len(position_mm) + len(text), dtype=np.uint8)
+    text, begins = before
+    borders = chunk_borders(len(position_mm))
     position, abc = np.ascontiguousarray(position_mm), np.ascontiguousarray(abc_deg)
-    size = _lines(position, abc, speed_m_s, cdis_mm, source_line, state, comment_every, text, start, buffer)
-    return buffer[:size].tobytes()
+    in_force = {0: state.copy()}
+    for start, end in pairwise(borders):
+        part = slice(start, end)
+        in_force[end] = _state_behind(
+            speed_m_s[part], cdis_mm[part], source_line[part], in_force[start], comment_every
+        )
+    state[:] = in_force[borders[-1]]
+
+    def write(start: int, end: int) -> bytes:
+        part = slice(start, end)
+        own = text[begins[start] : begins[end]] if len(text) else text
+        buffer = np.empty(BYTES_PER_TARGET * (end - start) + len(own), dtype=np.uint8)
+        size = _lines(
+            position[part],
+            abc[part],
+            speed_m_s[part],
+            cdis_mm[part],
+            source_line[part],
+            in_force[start],
+            comment_every,
+            own,
+            begins[start : end + 1] - begins[start] if len(text) else begins,
+            buffer,
+        )
+        return buffer[:size].tobytes()
+
+    return b"".join(in_chunks(write, borders))
+
+
+def _state_behind(
+    speed_m_s: Floats, cdis_mm: Floats, source_line: Ints32, state: Floats, comment_every: int
+) -> Floats:
+    """Return the ``state`` of `motion_lines` behind a chunk that begins with ``state``."""
+    blended = np.flatnonzero(cdis_mm > 0)
+    cdis = cdis_mm[blended[-1]] if len(blended) else state[1]
+    count, rows = int(state[2]), len(speed_m_s)
+    first = max(comment_every - 1 - count, 0)
+    if not comment_every or first >= rows:
+        since = count + rows
+    elif (source_line > 0).all():
+        since = (rows - 1 - first) % comment_every
+    else:
+        since = count
+        for line in source_line.tolist():
+            since = 0 if since + 1 >= comment_every and line > 0 else since + 1
+    return np.array([speed_m_s[-1], cdis, since])
 
 
 def fixed(value: float, decimals: int) -> str:

@@ -18,7 +18,8 @@ from gcode2krl.units import MM_PER_M
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
 _DECLARATION = re.compile(rf"(?:{'|'.join(w.DECLARING)})\b", re.IGNORECASE)
-_EXTERNAL = re.compile(rf"^\s*{w.EXT}\s+([A-Z_][A-Z0-9_]*)\s*\(", re.IGNORECASE | re.MULTILINE)
+_EXT = w.EXT.encode("ascii")
+_EXTERNAL = re.compile(rb"\s*%b\s+([A-Z_][A-Z0-9_]*)\s*\(" % _EXT, re.IGNORECASE)
 _COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
 _COUNTED = ("WHILE", "IF", "FOR", "LOOP")
 """Blocks whose ends are counted in a file."""
@@ -93,7 +94,7 @@ def read_krl(path: str | Path) -> KrlProgram:
     main = Path(path)
     texts = {main.name: _read_bytes(main)}
     beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
-    for name in _EXTERNAL.findall(texts[main.name].decode("ascii", "replace")):
+    for name in _externals(texts[main.name]):
         file = beside.get(name.upper())
         if file is not None and file.name not in texts:
             texts[file.name] = _read_bytes(file)
@@ -105,6 +106,18 @@ def _read_bytes(file: Path) -> bytes:
         return file.read_bytes()
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
+
+
+def _externals(text: bytes) -> Iterator[str]:
+    """Yield the names that a program declares by EXT, at the beginning of a line."""
+    upper = text.upper()
+    at = upper.find(_EXT)
+    while at >= 0:
+        found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
+        if found:
+            yield found[1].decode("ascii")
+        line_end = upper.find(b"\n", at)
+        at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
 
 def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:

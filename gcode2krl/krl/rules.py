@@ -1,11 +1,14 @@
 """Rules that a controller would enforce on any program, whatever it was made from."""
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
 from gcode2krl import krl_words as w
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram
@@ -54,32 +57,45 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
         return [*issues, Issue("error", "krl-no-motion", 0, "the program has no motion")]
     if not program.ptp[0]:
         issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
-    cartesian = np.isnan(program.q_deg).all(axis=1)
-    incomplete = cartesian & (
-        np.isnan(program.position_mm).any(axis=1) | np.isnan(program.abc_deg).any(axis=1)
-    )
-    incomplete |= ~cartesian & np.isnan(program.q_deg).any(axis=1)
-    incomplete |= cartesian & program.ptp & np.isnan(program.status_turn).any(axis=1)
-    for row in np.flatnonzero(incomplete)[:MOST_PLACES]:
-        issues.append(
-            Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
-        )
-    speed = program.speed_mm_s / MM_PER_M
-    for row in np.flatnonzero(
-        ~program.ptp & ~((speed > 0) & (speed <= cell.controller.vel_cp_m_s * (1 + 1e-6)))
-    )[:MOST_PLACES]:
-        issues.append(
-            Issue(
-                "error",
-                "krl-velocity",
-                int(program.line[row]),
-                f"$VEL.CP is {speed[row]:g} m/s, allowed above 0 to {cell.controller.vel_cp_m_s:g}",
-            )
-        )
+    issues += _motion_issues(program, cell)
     issues += _statement_rules(program, cell)
     issues += _setting_issues(program, cell)
     issues += rsi_issues(program, cell)
     return [*issues, *_blend_issues(program)]
+
+
+def _motion_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
+    """Yield targets that lack a component, then speeds that are missing or too high."""
+    fastest_m_s = cell.controller.vel_cp_m_s
+
+    def wrong(start: int, end: int) -> tuple[Ints, Ints]:
+        rows = slice(start, end)
+        ptp, no_angle = program.ptp[rows], np.isnan(program.q_deg[rows])
+        cartesian = no_angle.all(axis=1)
+        incomplete = cartesian & _lacks(program.position_mm[rows], program.abc_deg[rows])
+        incomplete |= ~cartesian & no_angle.any(axis=1)
+        incomplete |= cartesian & ptp & _lacks(program.status_turn[rows])
+        speed_m_s = program.speed_mm_s[rows] / MM_PER_M
+        allowed = (speed_m_s > 0) & (speed_m_s <= fastest_m_s * (1 + 1e-6))
+        return start + np.flatnonzero(incomplete), start + np.flatnonzero(~ptp & ~allowed)
+
+    parts = in_chunks(wrong, chunk_borders(len(program.ptp)))
+    incomplete, not_allowed = (np.concatenate(rows)[:MOST_PLACES] for rows in zip(*parts, strict=True))
+    for row in incomplete:
+        yield Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
+    for row in not_allowed:
+        speed_m_s = program.speed_mm_s[row] / MM_PER_M
+        sentence = f"$VEL.CP is {speed_m_s:g} m/s, allowed above 0 to {fastest_m_s:g}"
+        yield Issue("error", "krl-velocity", int(program.line[row]), sentence)
+
+
+def _lacks(*columns: Floats) -> Bools:
+    """Return (n,) where one of the columns (n, k) has no number."""
+    numbers = [column for part in columns for column in part.T]
+    result: Bools = np.isnan(numbers[0])
+    for column in numbers[1:]:
+        result |= np.isnan(column)
+    return result
 
 
 def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:

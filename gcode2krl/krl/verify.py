@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Floats
-from gcode2krl.cell import Cell, controller_axes
-from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue
 from gcode2krl.krl.announce import pilot_forces
-from gcode2krl.krl.composition import Layout, compose, turn_bits
+from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import PilotText
@@ -23,18 +22,10 @@ from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.pilot import knot_rows, read_pilot
-from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
+from gcode2krl.pipeline import plan_motion, set_targets, solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets, Toolpath
-from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, S_PER_MIN
-
-POSITION_LIMIT_MM = 0.002
-ROTATION_LIMIT_DEG = 0.001
-SPEED_LIMIT_MM_S = 0.1 / S_PER_MIN
-JOINT_LIMIT_DEG = 0.001
-CDIS_LIMIT_MM = 0.0006
-WAIT_LIMIT_S = 0.0006
-_REMEDY = "translate again"
+from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
 
 
 @dataclass(frozen=True)
@@ -94,7 +85,7 @@ def verify_krl(
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
-    joints = solve_joints(targets, cell)
+    joints = solve_ptp_joints(targets, cell)
     issues: list[Issue] = []
     pilot, announced = _pilot_of(program, Path(path), cell)
     case: PilotCase | None = None
@@ -181,10 +172,10 @@ def compare(
     if not paired:  # behind the first difference every motion would be compared with another
         count, line = _first_difference(program, targets)
         text = f"{len(program.ptp)} motions read, {len(targets)} intended; they differ from this line on"
-        issues.append(Issue("error", "verify-count", line, text, _REMEDY))
-    deviation, rotation_deg, speed = _differences(program, targets, joints, cell, count)
+        issues.append(Issue("error", "verify-count", line, text, REMEDY))
+    differences = differences_of(program, targets, joints, cell, count)
     issues += _home_issues(program, targets, joints, count)
-    issues += _difference_issues(program, targets, joints, count, deviation, rotation_deg, speed)
+    issues += differences.issues
     if intended is not None:
         read, wished = (
             tuple(s for s in p.statements if paired or s.motion <= count) for p in (program, intended)
@@ -197,50 +188,26 @@ def compare(
     if pilot is not None and paired:
         figures, found = check_pilot(program, pilot, targets, cell)
         issues += found
-    order = np.argsort(-np.nan_to_num(deviation, nan=np.inf), kind="stable")[:10]
     worst = tuple(
         {
             "file": program.file[program.file_of[row]],
             "line": int(program.line[row]),
             "gcode_line": int(targets.source_line[row]),
-            "deviation_mm": _number(float(deviation[row])),
+            "deviation_mm": _number(deviation_mm),
         }
-        for row in order
+        for row, deviation_mm in differences.worst
     )
+    deviation_mm, rotation_deg, speed_mm_s = differences.largest if paired else (float("nan"),) * 3
     return VerifyReport(
-        max_deviation_mm=_largest(deviation, paired),
-        max_rotation_deg=_largest(rotation_deg, paired),
-        max_speed_difference_mm_min=_largest(speed, paired) * S_PER_MIN,
+        max_deviation_mm=deviation_mm,
+        max_rotation_deg=rotation_deg,
+        max_speed_difference_mm_min=speed_mm_s * S_PER_MIN,
         motions=len(program.ptp),
         intended=len(targets),
         worst=worst,
         issues=tuple(issues),
         pilot=figures,
     )
-
-
-def _differences(
-    program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int
-) -> tuple[Floats, Floats, Floats]:
-    """Return differences per motion: position (mm), rotation (deg), speed (mm/s); PTP HOME by its joints."""
-    home = targets.home[:count]
-    deviation = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
-    rotation = np.zeros(count)
-    for number in np.unique(targets.tool[:count]):
-        rows = np.flatnonzero(targets.tool[:count] == number)
-        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
-        both = np.column_stack([program.abc_deg[rows], targets.rotation[rows]])
-        first, run = fr.equal_runs(both)
-        abc = both[first]
-        read = fr.rotation_from_abc(np.nan_to_num(abc[:, :3]) * RAD_PER_DEG) @ turn
-        angle = fr.angle_between(fr.quaternion_from_rotation(read), abc[:, 3:])
-        rotation[rows] = angle[run] * DEG_PER_RAD
-    rotation[np.isnan(program.abc_deg[:count]).any(axis=1)] = np.nan
-    deviation[home], rotation[home] = 0.0, 0.0  # judged by its joints
-    speed = np.where(
-        targets.ptp[:count], 0.0, np.abs(program.speed_mm_s[:count] - targets.speed_mm_s[:count])
-    )
-    return deviation, rotation, speed
 
 
 def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: int) -> list[Issue]:
@@ -260,46 +227,7 @@ def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: i
                 for k in wrong
             )
         text = in_file(program, program.file[program.file_of[row]]) + text
-        issues.append(Issue("error", "verify-position", int(program.line[row]), text, _REMEDY))
-    return issues
-
-
-def _difference_issues(
-    program: KrlProgram,
-    targets: Targets,
-    joints: Joints,
-    count: int,
-    deviation: Floats,
-    rotation_deg: Floats,
-    speed: Floats,
-) -> list[Issue]:
-    cdis = np.abs(program.cdis_mm[:count] - targets.cdis_mm[:count])
-    wait = np.abs(program.wait_s[:count] - targets.wait_s[:count])
-    other_kind = program.ptp[:count] != targets.ptp[:count]
-    pose = targets.ptp[:count] & ~targets.home[:count]
-    turn = np.zeros(count)
-    turn[pose] = [turn_bits(q) for q in joints.q_rad[:count][pose]]
-    status = pose & (program.status_turn[:count, 0] != joints.status[:count])
-    status |= pose & (program.status_turn[:count, 1] != turn)
-    checks = (
-        ("verify-motion", other_kind, "PTP and LIN exchanged", None),
-        ("verify-position", deviation > POSITION_LIMIT_MM, "{:.4f} mm off", deviation),
-        ("verify-position", np.isnan(deviation), "X, Y or Z is missing", None),
-        ("verify-rotation", rotation_deg > ROTATION_LIMIT_DEG, "{:.4f} deg off", rotation_deg),
-        ("verify-rotation", np.isnan(rotation_deg), "A, B or C is missing", None),
-        ("verify-speed", speed > SPEED_LIMIT_MM_S, "speed {:.3f} mm/s off", speed),
-        ("verify-speed", np.isnan(speed) & ~other_kind, "no $VEL.CP is set before it", None),
-        ("verify-cdis", ~(cdis <= CDIS_LIMIT_MM), "approximation {:.3f} mm off", cdis),
-        ("verify-wait", ~(wait <= WAIT_LIMIT_S), "dwell {:.3f} s off", wait),
-        ("verify-status", status, "S or T differs from the predicted branch", None),
-    )
-    issues = []
-    for code, wrong, sentence, amount in checks:
-        for row in np.flatnonzero(wrong)[:MOST_PLACES]:
-            text = sentence.format(amount[row]) if amount is not None else sentence
-            gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
-            text = in_file(program, program.file[program.file_of[row]]) + text + gcode
-            issues.append(Issue("error", code, int(program.line[row]), text, _REMEDY))
+        issues.append(Issue("error", "verify-position", int(program.line[row]), text, REMEDY))
     return issues
 
 
@@ -348,7 +276,7 @@ def _uncalled_issues(program: KrlProgram, intended: KrlProgram) -> list[Issue]:
         {(key.split("/")[-1], texts) for key, texts in p.uncalled.items()} for p in (program, intended)
     )
     return [
-        Issue("error", "verify-statement", program.def_line, f"subprogram {name} is not as intended", _REMEDY)
+        Issue("error", "verify-statement", program.def_line, f"subprogram {name} is not as intended", REMEDY)
         for name, _ in sorted(found ^ wanted)
     ]
 
@@ -366,10 +294,6 @@ def _first_difference(program: KrlProgram, targets: Targets) -> tuple[int, int]:
 
 def _normal(text: str) -> str:
     return re.sub(r"\s+", "", text).upper()
-
-
-def _largest(values: Floats, paired: bool) -> float:
-    return float(values.max(initial=0.0)) if paired and not np.isnan(values).any() else float("nan")
 
 
 def _number(value: float) -> float | None:

@@ -1,0 +1,106 @@
+"""Findings on chips and modes, against a plain loop over all samples."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.cell import resolve_cell
+from gcode2krl.cutting.findings import Cut, _chips, _modes
+from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip
+from gcode2krl.tables import Forces
+
+SPEEDS_RPM = np.array([0.0, -600.0, 600.0, 590.0, 6000.0, 12000.0])
+CYCLE_S = 0.012
+
+
+def cell_with_modes():
+    return resolve_cell({"based_on": "demonstration", "compliance": {"modes_hz": [10.0, 21.0, 100.0]}})
+
+
+def random_cut(seed, count, cell):
+    """Samples in runs of one spindle speed and tool; some arcs are missing, some rows have no feed."""
+    random = np.random.default_rng(seed)
+    run = np.cumsum(random.random(count) < 5.0 / max(count, 1))
+    speeds = random.choice(SPEEDS_RPM, count + 1) * (2.0 * np.pi / 60.0)
+    tools = random.choice(sorted(cell.tool), count + 1).astype(np.int32)
+    phi = np.sort(random.uniform(0.0, np.pi, (count, 4)), axis=1)
+    phi[random.random(count) < random.random()] = np.nan
+    phi[random.random(count) < 0.5, 2:] = np.nan
+    zero = np.zeros(count)
+    feed = random.choice([0.0, 0.5 * THIN_CHIP_MM, 0.05, 3.0 * THICK_CHIP_MM], count)
+    cut = Cut(
+        source_line=np.arange(10, count + 10, dtype=np.int32),
+        rapid=zero > 0,
+        engaged=np.isfinite(phi[:, 0]),
+        spindle_rad_s=speeds[run],
+        f_z_mm=feed,
+        ramp_rad=random.uniform(-0.5, 0.5, count),
+        cycle_s=CYCLE_S,
+        centre_mm=zero,
+        overlap_mm=np.zeros((count, 3)),
+        step_mm=zero,
+        descent_mm=zero,
+        blend_mm=0.0,
+    )
+    three = np.zeros((count, 3))
+    forces = Forces(
+        force_base_N=three,
+        moment_base_Nmm=three,
+        peak_N=zero,
+        torque_Nmm=zero,
+        a_p_mm=zero,
+        a_e_mm=zero,
+        phi_rad=phi,
+        tool=tools[run],
+    )
+    return cut, forces
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("count", [1, 300, 40_000])
+def test_chips_are_counted_as_one_by_one(seed, count):
+    cut, forces = random_cut(seed, count, cell_with_modes())
+    rows = [row for row in range(count) if np.isfinite(forces.phi_rad[row, 0]) and cut.f_z_mm[row] > 0.0]
+    chip = largest_chip(forces.phi_rad, cut.f_z_mm, cut.ramp_rad)
+    expected = []
+    for code, wrong in (
+        ("chip-thin", [row for row in rows if chip[row] < THIN_CHIP_MM]),
+        ("chip-thick", [row for row in rows if chip[row] > THICK_CHIP_MM]),
+    ):
+        if wrong and len(wrong) * CYCLE_S >= 0.1 and len(wrong) >= 0.05 * len(rows):
+            expected.append((code, wrong[0] + 10, f"in {len(wrong) / len(rows):.0%} of the time"))
+    found = list(_chips(cut, forces))
+    assert [(issue.code, issue.line) for issue in found] == [(code, line) for code, line, _ in expected]
+    for issue, (_, _, words) in zip(found, expected, strict=True):
+        assert words in issue.message
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("count", [0, 1, 300, 40_000])
+def test_modes_are_found_for_each_speed_and_tool_at_the_first_cut_with_it(seed, count):
+    cell = cell_with_modes()
+    cut, forces = random_cut(seed, count, cell)
+    first_of_speed, pairs = {}, set()
+    for row in np.flatnonzero(np.isfinite(forces.phi_rad[:, 0])).tolist():
+        speed = abs(float(cut.spindle_rad_s[row]))
+        first_of_speed.setdefault(speed, row)
+        pairs.add((speed, int(forces.tool[row])))
+    expected = []
+    for speed, tool in sorted(pairs):
+        turns_hz = speed / (2.0 * np.pi)
+        teeth = cell.tool[tool].teeth
+        for mode in (10.0, 21.0, 100.0):
+            orders = {1, 2, 3, teeth, 2 * teeth, 3 * teeth}
+            if any(abs(order * turns_hz - mode) <= 0.15 * mode for order in orders):
+                expected.append((first_of_speed[speed] + 10, f" of T{tool} (", f" {mode:g} Hz"))
+    found = list(_modes(cut, forces, cell))
+    assert [issue.line for issue in found] == [line for line, _, _ in expected]
+    for issue, (_, tool_words, mode_words) in zip(found, expected, strict=True):
+        assert tool_words in issue.message
+        assert mode_words in issue.message
+
+
+def test_the_constructed_cuts_meet_modes_and_wrong_chips():
+    cell = cell_with_modes()
+    cuts = [random_cut(seed, 40_000, cell) for seed in range(8)]
+    assert sum(len(list(_modes(*cut, cell))) for cut in cuts) >= 8
+    assert {issue.code for cut in cuts for issue in _chips(*cut)} == {"chip-thin", "chip-thick"}
