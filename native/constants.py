@@ -5,8 +5,8 @@ Run after a change of one of these modules; a test compares the file with what t
     python native/constants.py
 
 A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of numbers
-what an array begins with, an enumeration of whole numbers ``PREFIX_NAME_MEMBER``, a record of numpy a C struct
-with the same fields in the same places, and a `StructOf` the C struct that the core gets.
+what an array begins with, an enumeration of whole numbers ``PREFIX_NAME_MEMBER``, a record of numpy a C
+struct with the same fields in the same places, and a `StructOf` the C struct that the core gets.
 """
 
 import enum

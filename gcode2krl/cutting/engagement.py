@@ -89,7 +89,7 @@ def engage(
     is_short = outlines[:, -1] == OTHER
     columns = (position, way_mm, first, rapid, tool)
     mark_corners(*columns, _LONGEST_OF_LAG * cutters.lag_mm, is_short, corner)
-    path = Path(*(each[corner] for each in (position, way_mm, tool, rapid, first)), outlines)
+    path = Path(position[corner], way_mm[corner], tool[corner], rapid[corner], first[corner], outlines)
     apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter
     samples = Samples(
         position[rows],
