@@ -5,7 +5,7 @@
 #include "cutting/rings.h"
 
 #define COARSE_JUMP 0.25 /* change of a band's engaged fraction at which an arc is split */
-#define NO_CHIP 1e-6
+#define THIN 1e-6 /* chip over feed per tooth below which there is none */
 #define QUARTER (0.25 * TURN)
 
 enum { NOT_TURNED = -1 };
@@ -51,8 +51,8 @@ static int turn_to(const Work *work, const Sample *sample, int which, int64_t bi
 /* Return the angle at which the chip of a band begins; it ends at 180° minus that. 90° = no chip. */
 static double first_angle(const Band *band, const Chip *chip) {
     const double swing = band->sin_kappa * chip->cos_gamma, offset = band->cos_kappa * chip->sin_gamma;
-    if (swing <= NO_CHIP)
-        return offset > NO_CHIP ? -QUARTER : QUARTER;
+    if (swing <= THIN)
+        return offset > THIN ? -QUARTER : QUARTER;
     if (offset == 0.0)
         return 0.0;
     return -asin(lesser(greater(offset / swing, -1.0), 1.0));
@@ -138,9 +138,11 @@ static Force integrated(const Strip *strip, const Sample *sample, const Band *ba
     const Chip chip = sample->chip;
     if (arc.one > 0.0 && chip.f_z_mm > 0.0) {
         arc.one = arc.one * TURN / (double)all;
-        const double swing = chip.f_z_mm * band->sin_kappa * chip.cos_gamma;
-        const double offset = chip.f_z_mm * band->cos_kappa * chip.sin_gamma;
-        add_linear_edge(&arc, band->sin_kappa, band->cos_kappa, swing, offset, strip->law, &part);
+        const Facet facet = {.sin_kappa = band->sin_kappa,
+                             .cos_kappa = band->cos_kappa,
+                             .swing_mm = chip.f_z_mm * band->sin_kappa * chip.cos_gamma,
+                             .offset_mm = chip.f_z_mm * band->cos_kappa * chip.sin_gamma};
+        add_linear_edge(&arc, &facet, strip->law, &part);
     }
     return part;
 }
@@ -148,6 +150,7 @@ static Force integrated(const Strip *strip, const Sample *sample, const Band *ba
 /* Return the force of a band arc by arc: any law. */
 static Force by_arcs(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
                      const double *share) {
+    const Facet facet = facet_of(band->sin_kappa, band->cos_kappa, &sample->chip);
     Force part = {0.0, 0.0, 0.0, 0.0};
     for (int64_t at = bins.first, end; at < bins.after; at = most(end, at + 1)) {
         double added = 0.0;
@@ -156,8 +159,7 @@ static Force by_arcs(const Strip *strip, const Sample *sample, const Band *band,
         if (end == at)
             continue;
         Force one = {0.0, 0.0, 0.0, 0.0};
-        add_arc_force(bin_angle((double)at, all), bin_angle((double)end, all), band->sin_kappa, band->cos_kappa,
-                      &sample->chip, strip->law, &one);
+        add_arc_force(bin_angle((double)at, all), bin_angle((double)end, all), &facet, strip->law, &one);
         const double mean = added / (double)(end - at);
         part.feed += mean * one.feed;
         part.normal += mean * one.normal;

@@ -14,9 +14,10 @@ enum {
     STEPS_PER_TURN = 24,
 };
 
-/* A piece of the edge: its angle, contact width, lowest and highest z. */
+/* A piece of the edge: its contact width, lowest and highest z. */
 typedef struct {
-    double sin_kappa, cos_kappa, width, low, high;
+    Facet facet;
+    double width, low, high;
 } Edge;
 
 /* The teeth in the arcs of a sample; an edge lags behind the tip by an angle per mm of height. */
@@ -31,7 +32,7 @@ typedef struct {
 } Teeth;
 
 static void put_edge(Teeth *teeth, double sin_kappa, double cos_kappa, double width, double low, double high) {
-    teeth->edges[teeth->edge_count++] = (Edge){sin_kappa, cos_kappa, width, low, high};
+    teeth->edges[teeth->edge_count++] = (Edge){facet_of(sin_kappa, cos_kappa, &teeth->chip), width, low, high};
 }
 
 /* List the edges below a depth. */
@@ -65,8 +66,7 @@ static void add_in_arc(const Teeth *teeth, const Edge *edge, double low, double 
     double ahead = (double)(int64_t)ceil((low - end) / pitch) * pitch; /* of the first that has not left the arc */
     for (; start + ahead < high; ahead += pitch) {
         Force part = {0.0, 0.0, 0.0, 0.0};
-        add_arc_force(greater(low - ahead, start), lesser(high - ahead, end), edge->sin_kappa, edge->cos_kappa,
-                      &teeth->chip, teeth->law, &part);
+        add_arc_force(greater(low - ahead, start), lesser(high - ahead, end), &edge->facet, teeth->law, &part);
         force[0] += density * part.feed;
         force[1] += density * part.normal;
         force[2] += density * part.axial;

@@ -56,7 +56,8 @@ static void add_arc(const Strip *strip, const Sample *sample, const Band *band, 
                     double foot, Reading *reading) {
     const double width = lesser(deep, band->high - foot);
     Force part = {0.0, 0.0, 0.0, 0.0};
-    add_arc_force(a, b, band->sin_kappa, band->cos_kappa, &sample->chip, strip->law, &part);
+    const Facet facet = facet_of(band->sin_kappa, band->cos_kappa, &sample->chip);
+    add_arc_force(a, b, &facet, strip->law, &part);
     add_force(reading, &part, width, band->r_high, foot + 0.5 * width);
     reading->a_p_mm = greater(reading->a_p_mm, deep + foot - greater(sample->bottom, 0.0));
     reading->most_mm = greater(reading->most_mm, band->r_high * cos(a));

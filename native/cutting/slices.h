@@ -27,15 +27,24 @@ typedef struct {
     double one, sin, cos, sin_sin, sin_cos;
 } Integrals;
 
-/* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of contact
-   width, N·rad/mm. An empty or NaN arc adds nothing; cos gamma >= 0. The contact width is dz/sin kappa; the mean
-   over a revolution is teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
-void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
-                   const double *law, Force *out);
+typedef enum { NO_CHIP, WHOLE_TURN, PART_OF_TURN } Engaged;
 
-/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip
-   h = swing·sin phi + offset is not negative. */
-void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, double swing_mm,
-                     double offset_mm, const double *law, Force *out);
+/* An edge at an angle kappa under a feed: its chip h = swing·sin phi + offset, and where it is not negative: from
+   `start` to `stop`, every turn. */
+typedef struct {
+    double sin_kappa, cos_kappa, swing_mm, offset_mm, start, stop;
+    Engaged engaged;
+} Facet;
+
+Facet facet_of(double sin_kappa, double cos_kappa, const Chip *chip);
+
+/* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of contact
+   width, N·rad/mm. An empty or NaN arc adds nothing. The contact width is dz/sin kappa; the mean over a revolution is
+   teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
+void add_arc_force(double phi_a, double phi_b, const Facet *facet, const double *law, Force *out);
+
+/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip is not
+   negative. */
+void add_linear_edge(const Integrals *arc, const Facet *facet, const double *law, Force *out);
 
 #endif
