@@ -38,7 +38,8 @@ void fill_turn(const Work *work, int64_t rim_bins, int64_t ring_bins) {
 static int turn_to(const Work *work, const Sample *sample, int which, int64_t bins, int turned) {
     if (turned == which)
         return turned;
-    const double *restrict sine = &CELL(work->turn, which, 0), *restrict cosine = &CELL(work->turn, which + 1, 0);
+    const double *restrict sine = &CELL(work->turn, which, 0);
+    const double *restrict cosine = &CELL(work->turn, which + 1, 0);
     double *restrict east = &CELL(work->heading, 0, 0), *restrict north = &CELL(work->heading, 1, 0);
     const double fx = sample->fx, fy = sample->fy;
     for (int64_t j = 0; j < bins; j++) {
@@ -66,7 +67,8 @@ static Bins bins_from(double start, int64_t bins) {
 }
 
 /* Write the material's top and its thickness above the cutter on a ring. */
-static void read_ring(const Strip *strip, const Sample *sample, double r, Bins bins, double *tops, double *above) {
+static void read_ring(const Strip *strip, const Sample *sample, double r, Bins bins, double *tops,
+                      double *above) {
     const Ring ring = {.r = r,
                        .level = sample->z + outline_height(r, sample->outline),
                        .first = bins.first,
@@ -154,7 +156,8 @@ static Force by_arcs(const Strip *strip, const Sample *sample, const Band *band,
     Force part = {0.0, 0.0, 0.0, 0.0};
     for (int64_t at = bins.first, end; at < bins.after; at = most(end, at + 1)) {
         double added = 0.0;
-        for (end = at; end < bins.after && share[end] > 0.0 && fabs(share[end] - share[at]) < COARSE_JUMP; end++)
+        for (end = at; end < bins.after && share[end] > 0.0 && fabs(share[end] - share[at]) < COARSE_JUMP;
+             end++)
             added += share[end];
         if (end == at)
             continue;

@@ -1,9 +1,9 @@
 /* Cut a motion out of a grid and read every sample.
 
-The engagement of a sample is read at its own position, before its sweep is removed. The field lags a little behind
-the cutter (Cutters.lag_mm): cells near the rim of the last sweeps would be read as cut or as uncut by chance. The
-sweeps that the field does not show yet are evaluated exactly at each point that is read. On a straight path there
-are none: no point in front of a convex cutter was inside it before. */
+The engagement of a sample is read at its own position, before its sweep is removed. The field lags a little
+behind the cutter (Cutters.lag_mm): cells near the rim of the last sweeps would be read as cut or as uncut by
+chance. The sweeps that the field does not show yet are evaluated exactly at each point that is read. On a
+straight path there are none: no point in front of a convex cutter was inside it before. */
 
 #include "cutting/edge.h"
 #include "cutting/removal.h"
@@ -12,7 +12,8 @@ are none: no point in front of a convex cutter was inside it before. */
 #define STRAIGHT 0.03 /* sine of the angle in plan below which a path counts as straight */
 #define LEVEL 0.15    /* the same up or down, where it only moves the angle at which the chip begins */
 
-/* A row of Cutters.above: what stands above the edge, and the height of its lower end; radius 0 = not checked. */
+/* A row of Cutters.above: what stands above the edge, and the height of its lower end; radius 0 = not
+   checked. */
 typedef struct {
     double radius, level;
 } Above;
@@ -36,8 +37,8 @@ static void set_heading(Sample *sample, const double *direction) {
 
 /* Return the last point whose sweep the edge at sample i finds cut: a feed per tooth before it.
 
-   What an edge meets is what the tooth before has left. A step of the sampling or of the path's shape in its place
-   would make the force depend on how densely points lie. */
+   What an edge meets is what the tooth before has left. A step of the sampling or of the path's shape in its
+   place would make the force depend on how densely points lie. */
 static int64_t met_at(const Motion *motion, int64_t i, int64_t lag) {
     int64_t met = i - 1;
     while (met > lag && AT(motion->way_mm, met) > AT(motion->way_mm, i) - AT(motion->f_z_mm, i))
@@ -59,7 +60,8 @@ static void list_recent(const Path *path, int64_t i, int64_t lag, int64_t met, S
         const double back = ax * dx + ay * dy + az * dz, aside = ax * dy - ay * dx;
         const double off = ax * ax + ay * ay + az * az - back * back;
         if (back < 0.0 || off > squared(LEVEL * back) + 1e-12 || fabs(aside) > STRAIGHT * back)
-            sample->recent[sample->recent_count++] = way_between(there, place_of(path, least(start + stride, met)));
+            sample->recent[sample->recent_count++] =
+                way_between(there, place_of(path, least(start + stride, met)));
     }
 }
 
@@ -115,7 +117,8 @@ static void write_row(Reading *reading, const Sample *sample, double teeth, int6
 }
 
 /* Read the engagement at sample i and write its row. */
-static void read_sample(const Strip *strip, const Motion *motion, int64_t i, int64_t lag, const Result *result) {
+static void read_sample(const Strip *strip, const Motion *motion, int64_t i, int64_t lag,
+                        const Result *result) {
     const Grid *grid = strip->grid;
     const double *position = place_of(strip->path, i);
     Sample sample = {.x = position[0], .y = position[1], .z = position[2], .tool = AT(strip->path->tool, i)};
@@ -170,12 +173,12 @@ static void apply(const Strip *strip, int64_t k, Range near, Floats rapid_mm) {
 
 /* Cut all samples one after the other; read those whose coordinate along `axis` lies in [low, high).
 
-   Sweeps farther than `reach_mm` from there are left out: the field outside is another strip's. The reading of a
-   sample depends only on the samples before it, not on how the field is divided. rapid_mm (n) gets the height that
-   rapids cut off. */
-EXPORT void cutting_cut_strip(const Grid *grid, const Path *path, const Cutters *cutters, Floats law, Floats f_z_mm,
-                              Floats way_mm, double low, double high, int64_t axis, double reach_mm,
-                              const Work *work, Floats rapid_mm, const Result *result) {
+   Sweeps farther than `reach_mm` from there are left out: the field outside is another strip's. The reading
+   of a sample depends only on the samples before it, not on how the field is divided. rapid_mm (n) gets the
+   height that rapids cut off. */
+EXPORT void cutting_cut_strip(const Grid *grid, const Path *path, const Cutters *cutters, Floats law,
+                              Floats f_z_mm, Floats way_mm, double low, double high, int64_t axis,
+                              double reach_mm, const Work *work, Floats rapid_mm, const Result *result) {
     const Strip strip = {grid, path, cutters, work, law.at};
     const Motion motion = {f_z_mm, way_mm};
     const Range near = {axis, low - reach_mm, high + reach_mm};

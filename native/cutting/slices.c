@@ -1,4 +1,5 @@
-/* Force of one tooth while it sweeps an arc, per mm of engaged edge, and the mean over a revolution made of it. */
+/* Force of one tooth while it sweeps an arc, per mm of engaged edge, and the mean over a revolution made of
+   it. */
 
 #include "cutting/slices.h"
 
@@ -17,9 +18,9 @@ static const double NODE[NODES] = {
     0.755404408355003,   0.8656312023878318,   0.9445750230732326,  0.9894009349916499,
 };
 static const double WEIGHT[NODES] = {
-    0.027152459411754176, 0.062253523938647456, 0.0951585116824926,  0.12462897125553407,
-    0.1495959888165767,   0.16915651939500265,  0.18260341504492364, 0.18945061045506864,
-    0.18945061045506864,  0.18260341504492364,  0.16915651939500265, 0.1495959888165767,
+    0.027152459411754176, 0.062253523938647456, 0.0951585116824926,   0.12462897125553407,
+    0.1495959888165767,   0.16915651939500265,  0.18260341504492364,  0.18945061045506864,
+    0.18945061045506864,  0.18260341504492364,  0.16915651939500265,  0.1495959888165767,
     0.12462897125553407,  0.0951585116824926,   0.062253523938647456, 0.027152459411754176,
 };
 
@@ -143,7 +144,8 @@ static void add_corner(Mean *mean, double kappa_a, double kappa_b, const Shape *
 
 /* Add the integral over a turn of one tooth: bottom, corner arc, side and cylinder below a depth. */
 static void add_tooth(Mean *mean, double a_p_mm, double tilt, const Shape *shape) {
-    const double bottom = shape->bottom_mm, corner = shape->corner_mm, kappa = shape->kappa_rad, side = shape->side_mm;
+    const double bottom = shape->bottom_mm, corner = shape->corner_mm, kappa = shape->kappa_rad,
+                 side = shape->side_mm;
     const double depth = lesser(a_p_mm, shape->flute_mm), sin_kappa = sin(kappa), cos_kappa = cos(kappa);
     if (bottom > 0.0 && mean->chip.sin_gamma > 0.0)
         add_edge(mean, 0.0, 1.0, bottom, 0.5 * bottom);

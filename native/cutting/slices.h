@@ -1,10 +1,11 @@
 /* Force of one tooth while it sweeps an arc, per mm of engaged edge: the integral behind all means.
 
-The angle phi runs from the feed normal in the sense of rotation of a right-hand cutter (clockwise seen from the
-holder): the tooth stands at (sin phi, cos phi) in (feed, normal). The edge angle kappa is 90° on a cylinder and 0
-on a flat bottom; gamma is the angle of descent. The chip is the feed seen along the outward normal of the edge,
-h = f_z·(sin phi·sin kappa·cos gamma + cos kappa·sin gamma), cut at 0. After Altintas, Manufacturing Automation,
-2nd ed. 2012, ch. 2 (linear edge forces), with the edge angle as in Engin and Altintas 2001 (general end mills). */
+The angle phi runs from the feed normal in the sense of rotation of a right-hand cutter (clockwise seen from
+the holder): the tooth stands at (sin phi, cos phi) in (feed, normal). The edge angle kappa is 90° on a
+cylinder and 0 on a flat bottom; gamma is the angle of descent. The chip is the feed seen along the outward
+normal of the edge, h = f_z·(sin phi·sin kappa·cos gamma + cos kappa·sin gamma), cut at 0. After Altintas,
+Manufacturing Automation, 2nd ed. 2012, ch. 2 (linear edge forces), with the edge angle as in Engin and
+Altintas 2001 (general end mills). */
 
 #ifndef CUTTING_SLICES_H
 #define CUTTING_SLICES_H
@@ -29,8 +30,8 @@ typedef struct {
 
 typedef enum { NO_CHIP, WHOLE_TURN, PART_OF_TURN } Engaged;
 
-/* An edge at an angle kappa under a feed: its chip h = swing·sin phi + offset, and where it is not negative: from
-   `start` to `stop`, every turn. */
+/* An edge at an angle kappa under a feed: its chip h = swing·sin phi + offset, and where it is not negative:
+   from `start` to `stop`, every turn. */
 typedef struct {
     double sin_kappa, cos_kappa, swing_mm, offset_mm, start, stop;
     Engaged engaged;
@@ -38,13 +39,13 @@ typedef struct {
 
 Facet facet_of(double sin_kappa, double cos_kappa, const Chip *chip);
 
-/* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of contact
-   width, N·rad/mm. An empty or NaN arc adds nothing. The contact width is dz/sin kappa; the mean over a revolution is
-   teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
+/* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of
+   contact width, N·rad/mm. An empty or NaN arc adds nothing. The contact width is dz/sin kappa; the mean over
+   a revolution is teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */
 void add_arc_force(double phi_a, double phi_b, const Facet *facet, const double *law, Force *out);
 
-/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip is not
-   negative. */
+/* The same of linear edge forces, dF_q = (K_qc·h + K_qe)·db, from integrals over an arc on which the chip is
+   not negative. */
 void add_linear_edge(const Integrals *arc, const Facet *facet, const double *law, Force *out);
 
 #endif
