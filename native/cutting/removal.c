@@ -114,8 +114,7 @@ static inline float bound_any(const Sweep32 *sweep, float along, float beside) {
     return sweep->lowest;
 }
 
-/* Write the height below a sweep over SW_LANES cells, the first `from` cells after the row's begin.
- */
+/* Write the height below a sweep over SW_LANES cells, the first `from` cells after the row's begin. */
 static inline void heights_below(const Row *row, const Sweep32 *sweep, Below *below, int32_t from,
                                  float *lows) {
     const float along = (float)row->along, along_step = (float)row->along_step;

@@ -11,8 +11,7 @@ Loops over bins have no branches, so that the compiler takes several bins at onc
 
 enum { CHUNK = 32 }; /* bins that are worked on together */
 
-/* Write the indices of the cells of a range of bins; the cells at the border, and those beyond, are empty.
- */
+/* Write the indices of the cells of a range of bins; the cells at the border, and those beyond, are empty. */
 static void list_cells(const Grid *grid, const Sample *sample, const Ring *ring, int64_t first, int64_t count,
                        int32_t *columns, int32_t *rows) {
     const double ax = (sample->x - grid->x_mm) / grid->dx_mm, ay = (sample->y - grid->y_mm) / grid->dy_mm;
