@@ -143,10 +143,12 @@ static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 *sw
         int32_t *wall = &CELL(grid->wall, row->i, j);
         (void)INSIDE(j + SW_LANES - 1, grid->height.columns);
         const int32_t from = (int32_t)(j - row->begin), left = (int32_t)least(row->cells.after - j, SW_LANES);
-        heights_below(row, sweep, bound_any, from, lows);
-        if (!any_above(height, lows))
-            continue;
-        if (bound != bound_any) {
+        if (bound) {
+            heights_below(row, sweep, bound_any, from, lows);
+            if (!any_above(height, lows))
+                continue;
+        }
+        if (bound && bound != bound_any) {
             heights_below(row, sweep, bound, from, lows);
             if (!any_above(height, lows))
                 continue;
@@ -290,7 +292,7 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
 static void lower(const Grid *grid, const Row *row, const Sweep *sweep, const Sweep32 *single, double y) {
     const double kind = sweep->outline->kind;
     if (kind == SW_BALL)
-        lower_row(grid, row, single, below_ball, bound_any);
+        lower_row(grid, row, single, below_ball, NULL); /* hardly a cell is below its tip */
     else if (kind == SW_FLAT && sweep->slope == 0.0)
         lower_flat(grid, row, sweep, y);
     else if (kind == SW_FLAT)
