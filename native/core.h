@@ -48,7 +48,7 @@ int64_t core_inside(int64_t index, int64_t count, const char *file, int line);
 static inline int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 static inline int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }
 
-/* The lesser and the greater of two numbers, the first where they are equal; NaN as in Python's min and max. */
+/* The lesser and the greater of two numbers, the first where they are equal, as Python's min and max. */
 static inline double lesser(double a, double b) { return b < a ? b : a; }
 static inline double greater(double a, double b) { return b > a ? b : a; }
 static inline double squared(double x) { return x * x; }

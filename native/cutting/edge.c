@@ -5,7 +5,7 @@
 #include "cutting/rings.h"
 
 #define COARSE_JUMP 0.25 /* change of a band's engaged fraction at which an arc is split */
-#define NO_CHIP 1e-6
+#define THIN 1e-6 /* chip over feed per tooth below which there is none */
 #define QUARTER (0.25 * TURN)
 
 enum { NOT_TURNED = -1 };
@@ -38,7 +38,8 @@ void fill_turn(const Work *work, int64_t rim_bins, int64_t ring_bins) {
 static int turn_to(const Work *work, const Sample *sample, int which, int64_t bins, int turned) {
     if (turned == which)
         return turned;
-    const double *restrict sine = &CELL(work->turn, which, 0), *restrict cosine = &CELL(work->turn, which + 1, 0);
+    const double *restrict sine = &CELL(work->turn, which, 0);
+    const double *restrict cosine = &CELL(work->turn, which + 1, 0);
     double *restrict east = &CELL(work->heading, 0, 0), *restrict north = &CELL(work->heading, 1, 0);
     const double fx = sample->fx, fy = sample->fy;
     for (int64_t j = 0; j < bins; j++) {
@@ -51,8 +52,8 @@ static int turn_to(const Work *work, const Sample *sample, int which, int64_t bi
 /* Return the angle at which the chip of a band begins; it ends at 180° minus that. 90° = no chip. */
 static double first_angle(const Band *band, const Chip *chip) {
     const double swing = band->sin_kappa * chip->cos_gamma, offset = band->cos_kappa * chip->sin_gamma;
-    if (swing <= NO_CHIP)
-        return offset > NO_CHIP ? -QUARTER : QUARTER;
+    if (swing <= THIN)
+        return offset > THIN ? -QUARTER : QUARTER;
     if (offset == 0.0)
         return 0.0;
     return -asin(lesser(greater(offset / swing, -1.0), 1.0));
@@ -66,7 +67,8 @@ static Bins bins_from(double start, int64_t bins) {
 }
 
 /* Write the material's top and its thickness above the cutter on a ring. */
-static void read_ring(const Strip *strip, const Sample *sample, double r, Bins bins, double *tops, double *above) {
+static void read_ring(const Strip *strip, const Sample *sample, double r, Bins bins, double *tops,
+                      double *above) {
     const Ring ring = {.r = r,
                        .level = sample->z + outline_height(r, sample->outline),
                        .first = bins.first,
@@ -135,11 +137,14 @@ static Parts integrated(const Strip *strip, const Sample *sample, const Band *ba
         arc.sin_cos += share[j] * sin_cos[j];
     }
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
-    if (arc.one > 0.0) {
+    const Chip chip = sample->chip;
+    if (arc.one > 0.0 && chip.f_z_mm > 0.0) {
         arc.one = arc.one * TURN / (double)all;
-        const double swing = band->sin_kappa * sample->chip.cos_gamma;
-        const double offset = band->cos_kappa * sample->chip.sin_gamma;
-        add_linear_edge(&arc, band->sin_kappa, band->cos_kappa, swing, offset, strip->law, &parts);
+        const Facet facet = {.sin_kappa = band->sin_kappa,
+                             .cos_kappa = band->cos_kappa,
+                             .swing_mm = chip.f_z_mm * band->sin_kappa * chip.cos_gamma,
+                             .offset_mm = chip.f_z_mm * band->cos_kappa * chip.sin_gamma};
+        add_linear_edge(&arc, &facet, strip->law, &parts);
     }
     return parts;
 }
@@ -154,16 +159,17 @@ static void add_share(Force *force, const Force *one, double share) {
 /* Return the force of a band arc by arc: any law. */
 static Parts by_arcs(const Strip *strip, const Sample *sample, const Band *band, Bins bins, int64_t all,
                      const double *share) {
+    const Facet facet = facet_of(band->sin_kappa, band->cos_kappa, &sample->chip);
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
     for (int64_t at = bins.first, end; at < bins.after; at = most(end, at + 1)) {
         double added = 0.0;
-        for (end = at; end < bins.after && share[end] > 0.0 && fabs(share[end] - share[at]) < COARSE_JUMP; end++)
+        for (end = at; end < bins.after && share[end] > 0.0 && fabs(share[end] - share[at]) < COARSE_JUMP;
+             end++)
             added += share[end];
         if (end == at)
             continue;
         Parts one = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
-        add_arc_parts(bin_angle((double)at, all), bin_angle((double)end, all), band->sin_kappa, band->cos_kappa,
-                      &sample->chip, strip->law, &one);
+        add_arc_force(bin_angle((double)at, all), bin_angle((double)end, all), &facet, strip->law, &one);
         const double mean = added / (double)(end - at);
         add_share(&parts.chip, &one.chip, mean);
         add_share(&parts.edge, &one.edge, mean);
@@ -206,7 +212,7 @@ static void add_band(const Strip *strip, const Sample *sample, const Band *band,
     extend(sample->z, band->r_high, bins, rows[SHARE], rows[LOWER_TOP], rows[UPPER], rows[UPPER_TOP],
            &CELL(work->reach, 0, 0), &CELL(work->reach, 1, 0));
     const Parts parts = is_linear ? integrated(strip, sample, band, bins, all, rows[SHARE])
-                                  : by_arcs(strip, sample, band, bins, all, rows[SHARE]);
+                                 : by_arcs(strip, sample, band, bins, all, rows[SHARE]);
     const double lever = 0.5 * (band->low + greater(sample->bottom - band->low, 0.0) + band->high);
     add_force(reading, &parts, band->width, 0.5 * (band->r_low + band->r_high), lever);
 }

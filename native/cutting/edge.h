@@ -1,9 +1,9 @@
 /* The force along the cutter's edge at one sample, from the material in front of it.
 
 The edge is divided into bands; the material is read on the rings between them, and between two rings its
-thickness changes linearly. An upright band (a cylinder) is read along its rim. Angles phi run from the feed normal
-in the sense of rotation; their bins start at -90°, so that the front of the cutter, 0 to 180°, lies in the
-middle. */
+thickness changes linearly. An upright band (a cylinder) is read along its rim. Angles phi run from the feed
+normal in the sense of rotation; their bins start at -90°, so that the front of the cutter, 0 to 180°, lies in
+the middle. */
 
 #ifndef CUTTING_EDGE_H
 #define CUTTING_EDGE_H
@@ -17,11 +17,12 @@ typedef struct {
     double low, high, r_low, r_high, sin_kappa, cos_kappa, width;
 } Band;
 
-/* Rows of Work.turn: sine and cosine in the middle of the bins of the rim and of a ring; integrals over a ring's bins
-   of sin, cos, sin², sin·cos. */
+/* Rows of Work.turn: sine and cosine in the middle of the bins of the rim and of a ring; integrals over a
+   ring's bins of sin, cos, sin², sin·cos. */
 enum { RIM_SIN, RIM_COS, RING_SIN, RING_COS, BIN_SIN, BIN_COS, BIN_SIN_SIN, BIN_SIN_COS };
 
-/* Rows of Work.rows: thickness above a band's lower and upper ring, each with the material's top; engaged fraction. */
+/* Rows of Work.rows: thickness above a band's lower and upper ring, each with the material's top; engaged
+   fraction. */
 enum { LOWER, LOWER_TOP, UPPER, UPPER_TOP, SHARE };
 
 /* What does not change along a strip. */
@@ -38,8 +39,8 @@ typedef struct {
     double feed, normal, axial, about_feed, about_normal, torque;
 } Load;
 
-/* What is read at a sample: the load of the chip at 1 mm a tooth and that of the edge; depth in mm, extent to the
-   right and left of the feed in mm; arcs. */
+/* What is read at a sample: the load of the chip and that of the edge; depth in mm, extent to the right and left
+   of the feed in mm; arcs. */
 typedef struct {
     Load chip, edge;
     double a_p_mm, least_mm, most_mm;

@@ -14,9 +14,10 @@ enum {
     STEPS_PER_TURN = 24,
 };
 
-/* A piece of the edge: its angle, contact width, lowest and highest z. */
+/* A piece of the edge: its contact width, lowest and highest z. */
 typedef struct {
-    double sin_kappa, cos_kappa, width, low, high;
+    Facet facet;
+    double width, low, high;
 } Edge;
 
 /* The teeth in the arcs of a sample; an edge lags behind the tip by an angle per mm of height. */
@@ -30,8 +31,10 @@ typedef struct {
     Edge edges[EDGES];
 } Teeth;
 
-static void put_edge(Teeth *teeth, double sin_kappa, double cos_kappa, double width, double low, double high) {
-    teeth->edges[teeth->edge_count++] = (Edge){sin_kappa, cos_kappa, width, low, high};
+static void put_edge(Teeth *teeth, double sin_kappa, double cos_kappa, double width, double low,
+                     double high) {
+    teeth->edges[teeth->edge_count++] =
+        (Edge){facet_of(sin_kappa, cos_kappa, &teeth->chip), width, low, high};
 }
 
 /* List the edges below a depth. */
@@ -59,22 +62,23 @@ static void list_edges(Teeth *teeth, double depth, double gamma, const Shape *sh
 }
 
 /* Add the force on an edge of all teeth in an arc; that of the first one lies between two angles. */
-static void add_in_arc(const Teeth *teeth, const Edge *edge, double low, double high, double start, double end,
-                       double force[3]) {
+static void add_in_arc(const Teeth *teeth, const Edge *edge, double low, double high, double start,
+                       double end, double force[3]) {
     const double density = edge->width / (high - low), pitch = teeth->pitch;
-    double ahead = (double)(int64_t)ceil((low - end) / pitch) * pitch; /* of the first that has not left the arc */
+    const int64_t left = (int64_t)ceil((low - end) / pitch); /* teeth that have left the arc */
+    double ahead = (double)left * pitch;
     for (; start + ahead < high; ahead += pitch) {
-        Force part = {0.0, 0.0, 0.0, 0.0};
-        add_arc_force(greater(low - ahead, start), lesser(high - ahead, end), edge->sin_kappa, edge->cos_kappa,
-                      &teeth->chip, teeth->law, &part);
+        Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+        add_arc_force(greater(low - ahead, start), lesser(high - ahead, end), &edge->facet, teeth->law, &parts);
+        const Force part = total_of(&parts);
         force[0] += density * part.feed;
         force[1] += density * part.normal;
         force[2] += density * part.axial;
     }
 }
 
-/* Return the square of the force on all teeth, one tip at an angle, the others a pitch apart; each edge spreads over
-   the arc of its lag. */
+/* Return the square of the force on all teeth, one tip at an angle, the others a pitch apart; each edge
+   spreads over the arc of its lag. */
 static double square_at(const Teeth *teeth, double angle) {
     double force[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < teeth->edge_count; i++) {
@@ -105,10 +109,11 @@ static double largest_square(const Teeth *teeth, double depth, int64_t steps) {
 
 /* Write the largest force in N, `out` (n), sampled every 15° or closer.
 
-   phi_rad (n, 2k) arcs, NaN pairs are none; a_p_mm, f_z_mm, ramp_rad (n); lag_rad_mm: how much an edge lags behind
-   the tip per mm of height. */
-EXPORT void cutting_peak_rows(Floats phi_rad, Floats a_p_mm, Floats f_z_mm, Floats ramp_rad, int64_t teeth_count,
-                              double lag_rad_mm, const Shape *shape, Floats law, Floats out) {
+   phi_rad (n, 2k) arcs, NaN pairs are none; a_p_mm, f_z_mm, ramp_rad (n); lag_rad_mm: how much an edge lags
+   behind the tip per mm of height. */
+EXPORT void cutting_peak_rows(Floats phi_rad, Floats a_p_mm, Floats f_z_mm, Floats ramp_rad,
+                              int64_t teeth_count, double lag_rad_mm, const Shape *shape, Floats law,
+                              Floats out) {
     const double per_pitch = ceil((double)STEPS_PER_TURN / (double)teeth_count);
     const int64_t steps = most(FEWEST_STEPS, (int64_t)per_pitch);
     for (int64_t row = 0; row < out.rows; row++) {

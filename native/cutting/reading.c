@@ -114,6 +114,7 @@ static Sample sample_at(const Strip *strip, const Samples *samples, int64_t i, c
     const Grid *grid = strip->grid;
     const double *position = &CELL(samples->position_mm, i, 0);
     Sample sample = {.x = position[0], .y = position[1], .z = position[2], .tool = AT(samples->tool, i)};
+    sample.chip.f_z_mm = 1.0; /* what is read holds for any feed, see feed_scale */
     sample.outline = outline_of(strip->path, sample.tool);
     sample.bottom = grid->bottom_mm - sample.z;
     set_heading(&sample, &CELL(samples->direction, i, 0));

@@ -72,8 +72,8 @@ static inline float height_at_way(const Sweep32 *sweep, float along, float besid
 
 static inline float min32(float a, float b) { return a < b ? a : b; }
 
-/* Below any cutter. Along the sweep the height over a cell is convex: the lowest of both ends of the contact, the
-   nearest point in plan, and the lowest point of a parabola. */
+/* Below any cutter. Along the sweep the height over a cell is convex: the lowest of both ends of the contact,
+   the nearest point in plan, and the lowest point of a parabola. */
 static inline float below_other(const Sweep32 *sweep, float along, float beside) {
     const float square = beside * beside, reach = root32(sweep->square - square);
     float a = along - reach, b = along + reach;
@@ -90,7 +90,8 @@ static inline float below_other(const Sweep32 *sweep, float along, float beside)
     return sweep->z + min32(min32(min32(min32(at_lowest, near), at_a), at_b), at_middle);
 }
 
-/* The same where all heights along the way are alike: on the level, as higher radii are not lower, or upright. */
+/* The same where all heights along the way are alike: on the level, as larger radii are not lower,
+   or upright. */
 static inline float below_level(const Sweep32 *sweep, float along, float beside) {
     const float square = beside * beside, reach = root32(sweep->square - square);
     float a = along - reach, b = along + reach;
@@ -113,8 +114,9 @@ static inline float bound_any(const Sweep32 *sweep, float along, float beside) {
     return sweep->lowest;
 }
 
-/* Write the height below a sweep over SW_LANES cells, the first of them `from` cells after the row's begin. */
-static inline void heights_below(const Row *row, const Sweep32 *sweep, Below *below, int32_t from, float *lows) {
+/* Write the height below a sweep over SW_LANES cells, the first `from` cells after the row's begin. */
+static inline void heights_below(const Row *row, const Sweep32 *sweep, Below *below, int32_t from,
+                                 float *lows) {
     const float along = (float)row->along, along_step = (float)row->along_step;
     const float beside = (float)row->beside, beside_step = (float)row->beside_step;
     for (int32_t lane = 0; lane < SW_LANES; lane++) {
@@ -130,20 +132,23 @@ static inline bool any_above(const float *heights, const float *lows) {
     return is_above;
 }
 
-/* Lower the cells of a row, SW_LANES at once: without branches and with as many spare cells behind a row, so that
-   the compiler takes eight together. Where a cell is lowered, older walls end. Cells that are all below a bound of
-   the sweep are left out; most were cut by the sweep before. */
-static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 *sweep, Below *below, Below *bound) {
+/* Lower the cells of a row, SW_LANES at once: without branches and with as many spare cells behind a row, so
+   that the compiler takes eight together. Where a cell is lowered, older walls end. Cells that are all below
+   a bound of the sweep are left out; most were cut by the sweep before. */
+static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 *sweep, Below *below,
+                             Below *bound) {
     float lows[SW_LANES];
     for (int64_t j = row->cells.first; j < row->cells.after; j += SW_LANES) {
         float *height = &CELL(grid->height, row->i, j);
         int32_t *wall = &CELL(grid->wall, row->i, j);
         (void)INSIDE(j + SW_LANES - 1, grid->height.columns);
         const int32_t from = (int32_t)(j - row->begin), left = (int32_t)least(row->cells.after - j, SW_LANES);
-        heights_below(row, sweep, bound_any, from, lows);
-        if (!any_above(height, lows))
-            continue;
-        if (bound != bound_any) {
+        if (bound) {
+            heights_below(row, sweep, bound_any, from, lows);
+            if (!any_above(height, lows))
+                continue;
+        }
+        if (bound && bound != bound_any) {
             heights_below(row, sweep, bound, from, lows);
             if (!any_above(height, lows))
                 continue;
@@ -287,7 +292,7 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
 static void lower(const Grid *grid, const Row *row, const Sweep *sweep, const Sweep32 *single, double y) {
     const double kind = sweep->outline->kind;
     if (kind == SW_BALL)
-        lower_row(grid, row, single, below_ball, bound_any);
+        lower_row(grid, row, single, below_ball, NULL); /* hardly a cell is below its tip */
     else if (kind == SW_FLAT && sweep->slope == 0.0)
         lower_flat(grid, row, sweep, y);
     else if (kind == SW_FLAT)
@@ -321,8 +326,13 @@ double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
             continue;
         const int64_t begin = (int64_t)ceil((cut.left + sweep.ax - grid->x_mm) / dx - 0.5) - grid->column;
         const double x = grid->x_mm + ((double)(begin + grid->column) + 0.5) * dx - sweep.ax;
-        const Row row = {i,     begin, cells, x * sweep.ex + y * sweep.ey, y * sweep.ex - x * sweep.ey, dx * sweep.ex,
-                         -dx * sweep.ey};
+        const Row row = {.i = i,
+                         .begin = begin,
+                         .cells = cells,
+                         .along = x * sweep.ex + y * sweep.ey,
+                         .beside = y * sweep.ex - x * sweep.ey,
+                         .along_step = dx * sweep.ex,
+                         .beside_step = -dx * sweep.ey};
         if (AT(path->rapid, k))
             worst = greater(worst, measure(grid, &row, &sweep));
         lower(grid, &row, &sweep, &single, y);

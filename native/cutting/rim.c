@@ -8,9 +8,13 @@
 
 enum { HALVINGS = 4 };
 
-static bool jumps(double a, double b) { return fabs(a - b) > JUMP * greater(a, b) || (a == 0.0) != (b == 0.0); }
+static bool jumps(double a, double b) {
+    return fabs(a - b) > JUMP * greater(a, b) || (a == 0.0) != (b == 0.0);
+}
 
-static double depth_above(double height, double foot) { return height - foot > FEEL_MM ? height - foot : 0.0; }
+static double depth_above(double height, double foot) {
+    return height - foot > FEEL_MM ? height - foot : 0.0;
+}
 
 /* Return the angle between bins j - 1 and j at which the depth above a foot jumps. */
 static double edge_between(const Strip *strip, const Sample *sample, const Ring *rim, int64_t j, int64_t bins,
@@ -20,7 +24,8 @@ static double edge_between(const Strip *strip, const Sample *sample, const Ring 
     for (int halving = 0; halving < HALVINGS; halving++) {
         const double middle = 0.5 * (low + high);
         const double x = sample->x + rim->r * (rim->east[j - 1] + middle * (rim->east[j] - rim->east[j - 1]));
-        const double y = sample->y + rim->r * (rim->north[j - 1] + middle * (rim->north[j] - rim->north[j - 1]));
+        const double y =
+            sample->y + rim->r * (rim->north[j - 1] + middle * (rim->north[j] - rim->north[j - 1]));
         double height = height_at(strip->grid, strip->path, x, y);
         for (int past = 0; past < sample->recent_count; past++)
             height = lesser(height, sweep_height(&sample->recent[past], sample->outline, x, y, 0.0));
@@ -52,11 +57,12 @@ static void read_tops(const Strip *strip, const Sample *sample, const Ring *rim)
 }
 
 /* Add the force over an arc of one depth above the band's foot. */
-static void add_arc(const Strip *strip, const Sample *sample, const Band *band, double a, double b, double deep,
-                    double foot, Reading *reading) {
+static void add_arc(const Strip *strip, const Sample *sample, const Band *band, double a, double b,
+                    double deep, double foot, Reading *reading) {
     const double width = lesser(deep, band->high - foot);
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
-    add_arc_parts(a, b, band->sin_kappa, band->cos_kappa, &sample->chip, strip->law, &parts);
+    const Facet facet = facet_of(band->sin_kappa, band->cos_kappa, &sample->chip);
+    add_arc_force(a, b, &facet, strip->law, &parts);
     add_force(reading, &parts, width, band->r_high, foot + 0.5 * width);
     reading->a_p_mm = greater(reading->a_p_mm, deep + foot - greater(sample->bottom, 0.0));
     reading->most_mm = greater(reading->most_mm, band->r_high * cos(a));
@@ -84,7 +90,8 @@ void add_rim(const Strip *strip, const Sample *sample, const Band *band, Reading
         double added = 0.0;
         for (end = at; end < rim.after && !jumps(depths[at], depths[end]); end++)
             added += depths[end];
-        const double b = end < rim.after ? edge_between(strip, sample, &rim, end, bins, sample->z + foot) : 0.5 * TURN;
+        const double b =
+            end < rim.after ? edge_between(strip, sample, &rim, end, bins, sample->z + foot) : 0.5 * TURN;
         if (depths[at] > 0.0 && b > a)
             add_arc(strip, sample, band, a, b, added / (double)(end - at), foot, reading);
         a = b;

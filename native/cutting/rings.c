@@ -11,7 +11,7 @@ Loops over bins have no branches, so that the compiler takes several bins at onc
 
 enum { CHUNK = 32 }; /* bins that are worked on together */
 
-/* Write the indices of the cells of a range of bins; the cells at the border are empty, those beyond as well. */
+/* Write the indices of the cells of a range of bins; the cells at the border, and those beyond, are empty. */
 static void list_cells(const Grid *grid, const Sample *sample, const Ring *ring, int64_t first, int64_t count,
                        int32_t *columns, int32_t *rows) {
     const double ax = (sample->x - grid->x_mm) / grid->dx_mm, ay = (sample->y - grid->y_mm) / grid->dy_mm;
@@ -42,8 +42,8 @@ bool tops_on_ring(const Grid *grid, const Sample *sample, const Ring *ring) {
 }
 
 void stand_above_cutter(const Grid *grid, const Sample *sample, const Ring *ring) {
-    /* A cell's height is that of its middle, so it is compared with the cutter's surface there. This is also better
-       for a layer so thin that it is parallel to the cutter. */
+    /* A cell's height is that of its middle, so it is compared with the cutter's surface there. This is also
+       better for a layer so thin that it is parallel to the cutter. */
     const Outline outline = *sample->outline;
     const double dx = grid->dx_mm, dy = grid->dy_mm, z = sample->z, level = ring->level;
     const double ax = (sample->x - grid->x_mm) / dx, ay = (sample->y - grid->y_mm) / dy;
@@ -86,7 +86,8 @@ static bool may_lower(const Way *sweep, const Ring *ring, int64_t first, int64_t
 static void take_off(const Way *sweep, const Sample *sample, const Ring *ring, int64_t first, int64_t after) {
     const Way way = *sweep;
     const Outline outline = *sample->outline;
-    const double x = sample->x, y = sample->y, r = ring->r, *east = ring->east + first, *north = ring->north + first;
+    const double *east = ring->east + first, *north = ring->north + first;
+    const double x = sample->x, y = sample->y, r = ring->r;
     double cuts[CHUNK];
     for (int64_t j = 0; j < after - first; j++)
         cuts[j] = sweep_height(&way, &outline, x + r * east[j], y + r * north[j], 0.0);

@@ -10,7 +10,7 @@ enum { MOST_RECENT = 8 };
 
 typedef struct {
     double x, y, z;
-    double top; /* no material is higher above the tip */
+    double top;    /* no material is higher above the tip */
     double bottom; /* the material's bottom above the tip */
     double fx, fy; /* heading in plan */
     Chip chip;
@@ -21,9 +21,9 @@ typedef struct {
     int recent_count;
 } Sample;
 
-/* A ring of the cutter: the circle on which a point of the edge turns, read in bins from `first` on. For each bin
-   its direction in plan, the top of the material, and how far it stands above a level or the cutter. `tops` and
-   `above` may be the same. */
+/* A ring of the cutter: the circle on which a point of the edge turns, read in bins from `first` on. For each
+   bin its direction in plan, the top of the material, and how far it stands above a level or the cutter.
+   `tops` and `above` may be the same. */
 typedef struct {
     double r, level;
     int64_t first, after;

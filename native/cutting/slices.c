@@ -1,4 +1,5 @@
-/* Force of one tooth while it sweeps an arc, per mm of engaged edge, and the mean over a revolution made of it. */
+/* Force of one tooth while it sweeps an arc, per mm of engaged edge, and the mean over a revolution made of
+   it. */
 
 #include "cutting/slices.h"
 
@@ -17,17 +18,17 @@ static const double NODE[NODES] = {
     0.755404408355003,   0.8656312023878318,   0.9445750230732326,  0.9894009349916499,
 };
 static const double WEIGHT[NODES] = {
-    0.027152459411754176, 0.062253523938647456, 0.0951585116824926,  0.12462897125553407,
-    0.1495959888165767,   0.16915651939500265,  0.18260341504492364, 0.18945061045506864,
-    0.18945061045506864,  0.18260341504492364,  0.16915651939500265, 0.1495959888165767,
+    0.027152459411754176, 0.062253523938647456, 0.0951585116824926,   0.12462897125553407,
+    0.1495959888165767,   0.16915651939500265,  0.18260341504492364,  0.18945061045506864,
+    0.18945061045506864,  0.18260341504492364,  0.16915651939500265,  0.1495959888165767,
     0.12462897125553407,  0.0951585116824926,   0.062253523938647456, 0.027152459411754176,
 };
 
-void add_linear_edge(const Integrals *arc, double sin_kappa, double cos_kappa, double swing_mm,
-                     double offset_mm, const double *law, Parts *out) {
-    const double h = swing_mm * arc->sin + offset_mm * arc->one;
-    const double h_sin = swing_mm * arc->sin_sin + offset_mm * arc->sin;
-    const double h_cos = swing_mm * arc->sin_cos + offset_mm * arc->cos;
+void add_linear_edge(const Integrals *arc, const Facet *facet, const double *law, Parts *out) {
+    const double sin_kappa = facet->sin_kappa, cos_kappa = facet->cos_kappa;
+    const double h = facet->swing_mm * arc->sin + facet->offset_mm * arc->one;
+    const double h_sin = facet->swing_mm * arc->sin_sin + facet->offset_mm * arc->sin;
+    const double h_cos = facet->swing_mm * arc->sin_cos + facet->offset_mm * arc->cos;
     const double radial_c = sin_kappa * law[2] + cos_kappa * law[3];
     const double radial_e = sin_kappa * law[5] + cos_kappa * law[6];
     const double axial_c = sin_kappa * law[3] - cos_kappa * law[2];
@@ -49,75 +50,67 @@ static Integrals integrals_of(double a, double b) {
 }
 
 /* F_t = kc11·h^(1 - mc)·db by quadrature; radial and axial are fractions of it. */
-static void add_kienzle(double a, double b, double sin_kappa, double cos_kappa, double swing_mm,
-                        double offset_mm, const double *law, Force *out) {
+static void add_kienzle(double a, double b, const Facet *facet, const double *law, Force *out) {
     const double half = 0.5 * (b - a), middle = 0.5 * (b + a);
     double one = 0.0, sine = 0.0, cosine = 0.0;
     for (int node = 0; node < NODES; node++) {
         const double phi = middle + half * NODE[node], sin_phi = sin(phi);
-        const double h = greater(swing_mm * sin_phi + offset_mm, 0.0);
+        const double h = greater(facet->swing_mm * sin_phi + facet->offset_mm, 0.0);
         const double force = WEIGHT[node] * pow(h, 1.0 - law[2]);
         one += force;
         sine += force * sin_phi;
         cosine += force * cos(phi);
     }
     const double tangential = half * law[1];
-    const double radial = sin_kappa * law[3] + cos_kappa * law[4];
-    const double axial = sin_kappa * law[4] - cos_kappa * law[3];
+    const double radial = facet->sin_kappa * law[3] + facet->cos_kappa * law[4];
+    const double axial = facet->sin_kappa * law[4] - facet->cos_kappa * law[3];
     out->feed -= tangential * (cosine + radial * sine);
     out->normal += tangential * (sine - radial * cosine);
     out->axial += tangential * axial * one;
     out->tangential += tangential * one;
 }
 
-/* Add the integral over an arc on which h = swing·sin phi + offset is not negative. */
-static void add(double a, double b, double sin_kappa, double cos_kappa, double swing_mm, double offset_mm,
-                const double *law, Parts *out) {
+/* Add the integral over an arc on which the chip is not negative. */
+static void add(double a, double b, const Facet *facet, const double *law, Parts *out) {
     if (law[0] == LAW_LINEAR_EDGE) {
         const Integrals arc = integrals_of(a, b);
-        add_linear_edge(&arc, sin_kappa, cos_kappa, swing_mm, offset_mm, law, out);
+        add_linear_edge(&arc, facet, law, out);
     } else {
-        add_kienzle(a, b, sin_kappa, cos_kappa, swing_mm, offset_mm, law, &out->chip);
+        add_kienzle(a, b, facet, law, &out->chip);
     }
 }
 
-void add_arc_parts(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
-                   const double *law, Parts *out) {
-    if (!(phi_b > phi_a))
-        return;
+Facet facet_of(double sin_kappa, double cos_kappa, const Chip *chip) {
     const double swing = sin_kappa * chip->cos_gamma, offset = cos_kappa * chip->sin_gamma;
-    if (swing < NOT_ENGAGED) {
-        if (offset > NOT_ENGAGED)
-            add(phi_a, phi_b, sin_kappa, cos_kappa, 0.0, offset, law, out);
+    const bool is_flat = swing < NOT_ENGAGED;
+    Facet facet = {.sin_kappa = sin_kappa, .cos_kappa = cos_kappa, .engaged = WHOLE_TURN};
+    facet.swing_mm = is_flat ? 0.0 : chip->f_z_mm * swing;
+    facet.offset_mm = chip->f_z_mm * offset;
+    if (!(chip->f_z_mm > 0.0) || (is_flat ? !(offset > NOT_ENGAGED) : offset <= -swing))
+        facet.engaged = NO_CHIP;
+    else if (!is_flat && offset < swing) {
+        facet.engaged = PART_OF_TURN;
+        facet.start = -asin(offset / swing);
+        facet.stop = PI - facet.start;
+    }
+    return facet;
+}
+
+void add_arc_force(double phi_a, double phi_b, const Facet *facet, const double *law, Parts *out) {
+    if (!(phi_b > phi_a) || facet->engaged == NO_CHIP)
+        return;
+    const bool is_in_front = facet->offset_mm >= 0.0 && phi_a >= 0.0 && phi_b <= PI;
+    if (is_in_front || facet->engaged == WHOLE_TURN) {
+        add(phi_a, phi_b, facet, law, out);
         return;
     }
-    if (offset <= -swing)
-        return;
-    const bool is_in_front = offset >= 0.0 && phi_a >= 0.0 && phi_b <= PI;
-    if (is_in_front || offset >= swing) {
-        add(phi_a, phi_b, sin_kappa, cos_kappa, swing, offset, law, out);
-        return;
-    }
-    const double start = -asin(offset / swing), stop = PI - start; /* a chip from here to there, every turn */
+    const double start = facet->start, stop = facet->stop;
     double turn = (double)(int64_t)floor((phi_a - stop) / TURN) * TURN + TURN;
     for (; start + turn < phi_b; turn += TURN) {
         const double a = greater(phi_a, start + turn), b = lesser(phi_b, stop + turn);
         if (b > a)
-            add(a, b, sin_kappa, cos_kappa, swing, offset, law, out);
+            add(a, b, facet, law, out);
     }
-}
-
-void add_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, const Chip *chip,
-                   const double *law, Force *out) {
-    if (!(chip->f_z_mm > 0.0))
-        return;
-    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
-    add_arc_parts(phi_a, phi_b, sin_kappa, cos_kappa, chip, law, &parts);
-    const double scale = feed_scale(law, chip->f_z_mm);
-    out->feed += scale * parts.chip.feed + parts.edge.feed;
-    out->normal += scale * parts.chip.normal + parts.edge.normal;
-    out->axial += scale * parts.chip.axial + parts.edge.axial;
-    out->tangential += scale * parts.chip.tangential + parts.edge.tangential;
 }
 
 /* What the mean of a sample is made of. arcs: pairs of angles, NaN pairs are none. */
@@ -131,10 +124,11 @@ typedef struct {
 
 /* Add an edge of a contact width at a mean radius, in mm, over all arcs. */
 static void add_edge(Mean *mean, double sin_kappa, double cos_kappa, double width, double radius) {
-    Force part = {0.0, 0.0, 0.0, 0.0};
+    const Facet facet = facet_of(sin_kappa, cos_kappa, &mean->chip);
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
     for (int64_t arc = 0; arc < mean->arc_count; arc++)
-        add_arc_force(mean->arcs[2 * arc], mean->arcs[2 * arc + 1], sin_kappa, cos_kappa, &mean->chip, mean->law,
-                      &part);
+        add_arc_force(mean->arcs[2 * arc], mean->arcs[2 * arc + 1], &facet, mean->law, &parts);
+    const Force part = total_of(&parts);
     mean->total[0] += width * part.feed;
     mean->total[1] += width * part.normal;
     mean->total[2] += width * part.axial;
@@ -155,7 +149,8 @@ static void add_corner(Mean *mean, double kappa_a, double kappa_b, const Shape *
 
 /* Add the integral over a turn of one tooth: bottom, corner arc, side and cylinder below a depth. */
 static void add_tooth(Mean *mean, double a_p_mm, double tilt, const Shape *shape) {
-    const double bottom = shape->bottom_mm, corner = shape->corner_mm, kappa = shape->kappa_rad, side = shape->side_mm;
+    const double bottom = shape->bottom_mm, corner = shape->corner_mm, kappa = shape->kappa_rad,
+                 side = shape->side_mm;
     const double depth = lesser(a_p_mm, shape->flute_mm), sin_kappa = sin(kappa), cos_kappa = cos(kappa);
     if (bottom > 0.0 && mean->chip.sin_gamma > 0.0)
         add_edge(mean, 0.0, 1.0, bottom, 0.5 * bottom);
@@ -194,20 +189,29 @@ EXPORT void cutting_mean_rows(Floats phi_rad, Floats a_p_mm, Floats f_z_mm, Floa
     }
 }
 
+static void add_to(Floats out, const Parts *parts) {
+    const Force total = total_of(parts);
+    AT(out, 0) += total.feed;
+    AT(out, 1) += total.normal;
+    AT(out, 2) += total.axial;
+    AT(out, 3) += total.tangential;
+}
+
 /* Add the force of an arc to `out` (4). */
 EXPORT void cutting_arc_force(double phi_a, double phi_b, double sin_kappa, double cos_kappa, double f_z_mm,
                               double sin_gamma, double cos_gamma, Floats law, Floats out) {
     const Chip chip = {f_z_mm, sin_gamma, cos_gamma};
-    add_arc_force(phi_a, phi_b, sin_kappa, cos_kappa, &chip, law.at, (Force *)&AT(out, 0));
+    const Facet facet = facet_of(sin_kappa, cos_kappa, &chip);
+    Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
+    add_arc_force(phi_a, phi_b, &facet, law.at, &parts);
+    add_to(out, &parts);
 }
 
 /* For tests: the same of linear edge forces, from the integrals (5) over the arc. */
 EXPORT void cutting_linear_edge(Floats integrals, double sin_kappa, double cos_kappa, double swing_mm,
                                 double offset_mm, Floats law, Floats out) {
+    const Facet facet = {sin_kappa, cos_kappa, swing_mm, offset_mm, 0.0, TURN, WHOLE_TURN};
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
-    add_linear_edge((const Integrals *)&AT(integrals, 0), sin_kappa, cos_kappa, swing_mm, offset_mm, law.at, &parts);
-    AT(out, 0) += parts.chip.feed + parts.edge.feed;
-    AT(out, 1) += parts.chip.normal + parts.edge.normal;
-    AT(out, 2) += parts.chip.axial + parts.edge.axial;
-    AT(out, 3) += parts.chip.tangential + parts.edge.tangential;
+    add_linear_edge((const Integrals *)&AT(integrals, 0), &facet, law.at, &parts);
+    add_to(out, &parts);
 }

@@ -13,8 +13,8 @@ what else comes from Python are declared in gcode2krl/cutting/sweep.py. */
 #define FEEL_MM 1e-3
 #define TURN (2.0 * PI)
 
-/* A row of Path.outlines: the cutter's lower outline; the corner arc ends at (arc_radius, arc_top), above it the
-   side is steep (0 = upright), kind is SW_FLAT, SW_BALL or SW_OTHER. Lengths in mm. */
+/* A row of Path.outlines: the cutter's lower outline; the corner arc ends at (arc_radius, arc_top), above it
+   the side is steep (0 = upright), kind is SW_FLAT, SW_BALL or SW_OTHER. Lengths in mm. */
 typedef struct {
     double radius, bottom, corner, arc_radius, arc_top, steep, kind;
 } Outline;
@@ -24,8 +24,8 @@ typedef struct {
     double distance, share, z;
 } Nearest;
 
-/* The straight way of a sweep from a to b; of an upright one the nearest point is the lower end: its square in plan is
-   taken as infinite, so that the share is 0, and it dips. */
+/* The straight way of a sweep from a to b; of an upright one the nearest point is the lower end: its square
+   in plan is taken as infinite, so that the share is 0, and it dips. */
 typedef struct {
     const double *a, *b;
     double ux, uy, uz, square, dip;
@@ -68,14 +68,15 @@ static inline Nearest nearest(const Way *way, double x, double y) {
 }
 
 /* Return how deep the cutter at a place cuts at a point, inf beside it. */
-static inline double height_from(const double *place, const Outline *outline, double x, double y, double slack) {
+static inline double height_from(const double *place, const Outline *outline, double x, double y,
+                                 double slack) {
     const double r = sqrt(squared(x - place[0]) + squared(y - place[1]));
     const double height = place[2] + outline_height(lesser(r, outline->radius), outline);
     return r < outline->radius + slack ? height : INFINITY;
 }
 
-/* Return how deep a sweep cuts at a point, inf beside it. Without branches: the compiler takes several points at
-   once. */
+/* Return how deep a sweep cuts at a point, inf beside it. Without branches: the compiler takes several points
+   at once. */
 static inline double sweep_height(const Way *way, const Outline *outline, double x, double y, double slack) {
     const Nearest point = nearest(way, x, y);
     double lowest = point.z + outline_height(lesser(point.distance, outline->radius), outline);
@@ -86,7 +87,8 @@ static inline double sweep_height(const Way *way, const Outline *outline, double
 }
 
 static inline bool is_inside(const Grid *grid, Cell cell) {
-    return cell.column >= 0 && cell.row >= 0 && cell.column < grid->height.columns && cell.row < grid->height.rows;
+    return cell.column >= 0 && cell.row >= 0 && cell.column < grid->height.columns &&
+           cell.row < grid->height.rows;
 }
 
 /* Return the cell at a point; it may lie outside the grid. */

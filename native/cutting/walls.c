@@ -59,7 +59,8 @@ static bool is_deeper(const Drawing *drawing, int64_t old, double x, double y) {
     return new_gap < old_gap - 0.5 * WALL_SLACK * drawing->grid->dx_mm;
 }
 
-/* Note the wall in a cell of the whole field, unless there is no material behind it or a deeper wall is there. */
+/* Note the wall in a cell of the whole field, unless there is no material behind it or a deeper wall is
+   there. */
 static void draw_cell(const Drawing *drawing, Cell whole, double nx, double ny) {
     const Grid *grid = drawing->grid;
     const Cell cell = {whole.row - grid->row, whole.column - grid->column};
@@ -87,7 +88,8 @@ static void draw_line(const Drawing *drawing, double nx, double ny) {
     const double ux = (b[0] - a[0]) / dx, uy = (b[1] - a[1]) / dy;
     Cell cell = {(int64_t)floor(y), (int64_t)floor(x)};
     const int64_t step_x = ux > 0.0 ? 1 : -1, step_y = uy > 0.0 ? 1 : -1;
-    const double over_x = ux != 0.0 ? fabs(1.0 / ux) : INFINITY, over_y = uy != 0.0 ? fabs(1.0 / uy) : INFINITY;
+    const double over_x = ux != 0.0 ? fabs(1.0 / ux) : INFINITY,
+                 over_y = uy != 0.0 ? fabs(1.0 / uy) : INFINITY;
     double next_x = ux != 0.0 ? ((double)(cell.column + (ux > 0.0)) - x) / ux : INFINITY;
     double next_y = uy != 0.0 ? ((double)(cell.row + (uy > 0.0)) - y) / uy : INFINITY;
     double at = 0.0;
@@ -119,8 +121,8 @@ static void draw_round(const Drawing *drawing, const double *middle, double star
     }
 }
 
-/* Draw the round at the end of the sweep, towards the side from which the next one turns away; `next` is b where
-   there is none. */
+/* Draw the round at the end of the sweep, towards the side from which the next one turns away; `next` is b
+   where there is none. */
 static void draw_end(const Drawing *drawing, const double *next) {
     const double *a = drawing->a, *b = drawing->b;
     const double ux = b[0] - a[0], uy = b[1] - a[1], vx = next[0] - b[0], vy = next[1] - b[1];

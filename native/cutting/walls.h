@@ -1,7 +1,8 @@
 /* Walls inside cells: drawn by the sweeps that leave them, read to a small fraction of a cell.
 
 A cell holds only the height over its middle; where the upright wall of a sweep runs through it, the number of
-that sweep is noted in Grid.wall, and a point of the cell is looked up on the side of the wall where it lies. */
+that sweep is noted in Grid.wall, and a point of the cell is looked up on the side of the wall where it lies.
+*/
 
 #ifndef CUTTING_WALLS_H
 #define CUTTING_WALLS_H

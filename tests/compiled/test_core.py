@@ -5,13 +5,14 @@ import importlib.util
 import os
 import subprocess
 import sys
+from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gcode2krl.compiled import core
-from gcode2krl.compiled.core import FLOATS, OUT_FLOATS
+from gcode2krl.compiled.core import FLOAT, FLOATS, INT, OUT_FLOATS, StructOf
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,6 +47,16 @@ def test_an_array_that_must_not_be_written_to_is_no_output():
     assert FLOATS.from_param(array).rows == 3
     with pytest.raises(TypeError, match="not writeable"):
         OUT_FLOATS.from_param(array)
+
+
+def test_a_named_tuple_becomes_a_struct_of_views_and_numbers():
+    record = namedtuple("Record", "last values first")(2.5, np.zeros((4, 3)), 7)
+    taken = StructOf(first=INT, values=FLOATS, last=FLOAT).from_param(record)._obj
+    assert (taken.first, taken.values.rows, taken.values.columns, taken.last) == (7, 4, 3, 2.5)
+    assert taken.values.at == record.values.ctypes.data
+    locked = record._replace(values=np.frombuffer(bytes(8)))
+    with pytest.raises(TypeError, match="not writeable"):
+        StructOf(values=OUT_FLOATS).from_param(locked)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,10 @@
 import functools
 import itertools
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled import core
 from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.cutting.cutter import outline
 from gcode2krl.cutting.engagement import engage, outlines_of
@@ -25,6 +30,7 @@ BALL = Tool(kind="ball", diameter_mm=16, teeth=3, corner_radius_mm=8, flute_leng
 TAPERED = Tool(kind="tapered", diameter_mm=6, taper_deg=10, corner_radius_mm=1, teeth=3, flute_length_mm=15)
 DRILL = Tool(kind="drill", diameter_mm=8, point_deg=118, teeth=2, flute_length_mm=40)
 COEFFICIENTS = LAW[1:7]
+ROOT = Path(__file__).parents[2]
 
 linear_edge = core_function("cutting_linear_edge", FLOATS, *(FLOAT,) * 4, FLOATS, OUT_FLOATS)
 outline_height = core_function("cutting_outline_height", FLOAT, FLOATS, returns=FLOAT)
@@ -336,6 +342,50 @@ def test_outline_is_that_of_the_cutter(tool):
     r, z = outline(tool)
     own = outlines_of([tool])[0]
     assert [outline_height(radius, own) for radius in r] == pytest.approx(z, abs=1e-6)
+
+
+# --- builds ----------------------------------------------------------------------------------------------
+
+DIGEST = """
+import hashlib
+import numpy as np
+from tests.cutting.test_removal import BALL, BULL, FLAT, TAPERED, bits
+print(hashlib.sha256(b"".join(bits(tool) for tool in (FLAT, BULL, BALL, TAPERED))).hexdigest())
+"""
+
+
+def bits(tool):
+    """Every result along a path of steep, level and upright moves, and the field that is left."""
+    corners = [
+        (-30, -5, 2),
+        (25, 3, -5),
+        (25, 3, -6),
+        (-20, 9.3, -5),
+        (-20, 9.3, 5),
+        (0, -8, -3),
+        (14, 6, -7),
+    ]
+    points = [straight(a, b, 0.7) for a, b in itertools.pairwise(np.array(corners, float))]
+    field, position = block((-40, -20, -20), (40, 20, 0), 0.2), np.concatenate(points)
+    result = run(field, position, tool)
+    return b"".join(column.tobytes() for column in (*result, field.height_mm))
+
+
+def test_every_build_gives_the_same_bits():
+    """That for any processor and the one for processors with wider registers."""
+    environments = [os.environ | {core.BUILD_VARIABLE: build} for build in ("plain", "")]
+    plain, chosen = (
+        subprocess.run(
+            [sys.executable, "-c", DIGEST],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=True,
+            cwd=ROOT,
+        ).stdout
+        for environment in environments
+    )
+    assert plain == chosen
 
 
 # --- threads ---------------------------------------------------------------------------------------------
