@@ -11,8 +11,6 @@
 /* A difference of path that is rounding. */
 #define ROUNDING_MM 1e-9
 
-static inline double cubed(double x) { return x * (x * x); }
-
 /* Write the upper bound (n + 1) of the speed at each vertex: programmed, stops, look-ahead.
 
    Look-ahead (an assumption, the controller's planning is not published): at the end of a move only the next
@@ -104,9 +102,9 @@ static void slow_down_before_slow_places(const Runs *runs) {
 
 /* Write head, tail and top of each run: the lengths at the speeds of its ends, and its own top speed.
 
-   Slowing down ends where the corner begins, speeding up begins where it ends; v·k/2 is the length over which
-   the last average spreads that point. A margin longer than the run reaches into the next; `vertex` is lowered
-   there. bound: the vertex speeds as they come; head and tail come as zeros, top as the programmed speeds. */
+   Slowing down ends where the corner begins, speeding up begins where it ends; v·k/2 is the length over
+   which the last average spreads that point. A margin longer than the run reaches into the next; `vertex` is
+   lowered there. bound: the vertex speeds as they come; head and tail come as zeros, top as the programmed speeds. */
 EXPORT void krc4_margins(Floats length, Floats blend, Bools stop, Floats bound, double k_s, Floats vertex,
                          Floats head, Floats tail, Floats top) {
     const Runs runs = {length, blend, stop, bound, vertex, head, tail, top, k_s};
@@ -158,8 +156,8 @@ static Phases phases(double length, double v, double u0, double u1, double a, bo
     return (Phases){(top - u0) / a, greater(0.0, (length - ramps - brakes) / top), (top - u1) / a};
 }
 
-/* The end of the pieces written so far: their number, time, path and its integral over time; the last one's speed
-   and acceleration. */
+/* The end of the pieces written so far: their number, time, path and its integral over time; the last one's
+   speed and acceleration. */
 typedef struct {
     Floats out;
     int64_t used;
@@ -183,11 +181,13 @@ static void write_piece(Pieces *pieces, double speed, double acceleration) {
 static void go_on(Pieces *pieces, double duration, double v, double acceleration) {
     if (duration <= 0.0)
         return;
-    const bool same = pieces->used > 0 && acceleration == 0.0 && pieces->acceleration == 0.0 && pieces->speed == v;
+    const bool constant = acceleration == 0.0 && pieces->acceleration == 0.0;
+    const bool same = pieces->used > 0 && constant && pieces->speed == v;
     if (!same)
         write_piece(pieces, v, acceleration);
-    pieces->area += pieces->s * duration + v * squared(duration) / 2.0 + acceleration * cubed(duration) / 6.0;
-    pieces->s += v * duration + acceleration * squared(duration) / 2.0;
+    const double duration2 = squared(duration), duration3 = duration * duration2;
+    pieces->area += pieces->s * duration + v * duration2 / 2.0 + acceleration * duration3 / 6.0;
+    pieces->s += v * duration + acceleration * duration2 / 2.0;
     pieces->t += duration;
 }
 
@@ -199,10 +199,11 @@ static void rest(Pieces *pieces, double duration) {
     pieces->t += duration;
 }
 
-/* Write the pieces of all runs as rows time, path, speed, acceleration, integral; return how many, and the total
-   time. */
+/* Write the pieces of all runs as rows time, path, speed, acceleration, integral, and the total time; return
+   how many pieces. */
 EXPORT int64_t krc4_pieces(Floats length, Floats speed, Bools stop, Floats wait_s, Floats vertex, Floats head,
-                           Floats tail, Floats a_mm_s2, double k_s, int64_t averages, Floats out, Floats total_s) {
+                           Floats tail, Floats a_mm_s2, double k_s, int64_t averages, Floats out,
+                           Floats total_s) {
     Pieces pieces = {.out = out};
     const int64_t count = length.rows;
     for (int64_t i = 0; i < count; i++) {

@@ -9,7 +9,6 @@
 
 enum { NO_MOVE = -1 };
 
-static inline double cubed(double x) { return x * (x * x); }
 static inline double product(const double *a, const double *b) {
     double sum = 0.0;
     for (int c = 0; c < 3; c++)
@@ -45,7 +44,7 @@ static inline Instant instant(const Pieces *pieces, int64_t piece, double t) {
         .path = s + v * dt + 0.5 * a * dt * dt,
         .speed = v + a * dt,
         .acceleration = a,
-        .integral = AT(pieces->integral, piece) + s * dt + 0.5 * v * dt * dt + a * cubed(dt) / 6.0,
+        .integral = AT(pieces->integral, piece) + s * dt + 0.5 * v * dt * dt + a * (dt * squared(dt)) / 6.0,
     };
 }
 
@@ -97,9 +96,9 @@ static inline void way_of(const Moves *moves, int64_t i, double *way) {
         way[c] = end[c] - start[c];
 }
 
-/* The parabola at the end of a move: d before and after it, the tangents u and w there. Over tau from 0 to 1 the
-   square of its speed, in units of 2·d, is bend²·((tau + middle)² + q²); x0_r0 and asinh0 are terms of the length
-   at tau = 0. */
+/* The parabola at the end of a move: d before and after it, the tangents u and w there. Over tau from 0 to 1
+   the square of its speed, in units of 2·d, is bend²·((tau + middle)² + q²); x0_r0 and asinh0 are terms of the
+   length at tau = 0. */
 typedef struct {
     int64_t move;
     double u[3], w[3], d, speed, bend, middle, q2, q, x0_r0, asinh0;
@@ -146,8 +145,8 @@ static inline double short_of_vertex(const Corner *corner, double tau) {
     return corner->d * (corner->speed - 2.0 * arc_length(corner, tau));
 }
 
-/* Write the length of moves `first` up to `behind` in space (0 for a turn on the spot), and how much the corners
-   at their ends shorten it. */
+/* Write the length of moves `first` up to `behind` in space (0 for a turn on the spot), and how much the
+   corners at their ends shorten it. */
 EXPORT void krc4_savings(Floats start, Floats end, Floats length, Floats blend, int64_t first, int64_t behind,
                          Floats size, Floats saving) {
     const Moves moves = {start, end, length, blend};
@@ -216,13 +215,13 @@ static inline void to_space(const Bend *bend, double *speed, double *acceleratio
     *jerk = sqrt(jerk2);
 }
 
-/* Write position, tangent, part of the move and corner of samples; over speed, acceleration, jerk and planned path
-   write their magnitudes in space and the arc length.
+/* Write position, tangent, part of the move and corner of samples; over speed, acceleration, jerk and planned
+   path write their magnitudes in space and the arc length.
 
-   begins, way_to, saved_to: planned path, length in space, and what corners have saved of it before each move. */
+   begins, way_to, saved_to: planned path, length in space, and what corners have saved of it, before each move. */
 EXPORT void krc4_place(Ints move, Floats start, Floats end, Floats lengths, Floats blend, Floats begins,
-                       Floats way_to, Floats saved_to, Floats speed, Floats acceleration, Floats jerk, Floats path,
-                       Floats position, Floats direction, Floats part, Bools in_corner) {
+                       Floats way_to, Floats saved_to, Floats speed, Floats acceleration, Floats jerk,
+                       Floats path, Floats position, Floats direction, Floats part, Bools in_corner) {
     const Moves moves = {start, end, lengths, blend};
     Corner corner = {.move = NO_MOVE};
     double u[3] = {0.0, 0.0, 0.0}, share = 0.0;
@@ -243,7 +242,8 @@ EXPORT void krc4_place(Ints move, Floats start, Floats end, Floats lengths, Floa
             const int64_t vertex = leaves ? i : i - 1;
             if (corner.move != vertex)
                 set_corner(&corner, &moves, vertex);
-            const double since = leaves ? inside - length + d_end : inside + d_start, tau = since / (2.0 * corner.d);
+            const double since = leaves ? inside - length + d_end : inside + d_start;
+            const double tau = since / (2.0 * corner.d);
             const double to_vertex = AT(way_to, i) + (leaves ? length * share : 0.0) - AT(saved_to, vertex);
             AT(path, row) = to_vertex - short_of_vertex(&corner, tau);
             bend = on_parabola(&moves, &corner, tau, &CELL(position, row, 0));

@@ -69,8 +69,8 @@ static void insert(Cuts *cuts, double at) {
 
    row: of each trigger; here, before: its path and an earlier one; window: its motion, of those that begin at
    `begin`. A cut lies between two triggers, where a motion may be cut, as far from others as can be. */
-EXPORT int64_t krl_cut(Ints row, Floats here, Floats before, Ints window, Floats begin, Floats low, Floats high,
-                       Floats apart, int64_t most_waiting, int64_t in_view, Floats cuts_mm) {
+EXPORT int64_t krl_cut(Ints row, Floats here, Floats before, Ints window, Floats begin, Floats low,
+                       Floats high, Floats apart, int64_t most_waiting, int64_t in_view, Floats cuts_mm) {
     const Zones zones = {low, high, apart};
     Cuts cuts = {cuts_mm, 0};
     for (int64_t first = 0; first + most_waiting < row.rows; first++) {

@@ -1,7 +1,7 @@
 /* KRL text to columns: motion lines, settings and triggers by their numbers, everything else by its line.
 
-It knows nothing of the writer. A place is a pointer into the text; the byte there is read with HERE, which says
-before which end it has to lie, and a build with CHECKED proves it. */
+It knows nothing of the writer. A place is a pointer into the text; the byte there is read with HERE, which
+says before which end it has to lie, and a build with CHECKED proves it. */
 
 #include "core.h"
 
@@ -34,6 +34,7 @@ typedef struct {
 
 static inline bool is_blank(uint8_t c) { return c == CH_SPACE || c == CH_TAB; }
 static inline bool is_digit(uint8_t c) { return c >= CH_DIGIT_0 && c <= CH_DIGIT_9; }
+static inline bool is_axis(uint8_t c) { return c >= CH_DIGIT_1 && c <= CH_DIGIT_6; }
 static inline uint8_t capital(uint8_t c) { return c >= CH_SMALL_A && c <= CH_SMALL_Z ? c - CH_CASE_BIT : c; }
 static inline bool is(Place at, Place end, uint8_t c) { return at < end && HERE(at, end) == c; }
 
@@ -95,7 +96,7 @@ static inline Place component(Place at, Place end, int *bit) {
     at++;
     if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
         *bit = COLUMN_X + letter - CH_LETTER_X;
-    else if (letter == CH_LETTER_A && at < end && HERE(at, end) >= CH_DIGIT_1 && HERE(at, end) <= CH_DIGIT_6) {
+    else if (letter == CH_LETTER_A && at < end && is_axis(HERE(at, end))) {
         *bit = AXIS_BITS + HERE(at, end) - CH_DIGIT_1;
         at++;
     } else if (letter >= CH_LETTER_A && letter <= CH_LETTER_C)

@@ -37,8 +37,8 @@ static int64_t motion_at(Floats begin, double instant) {
 
    row: that of each motion; most_waiting triggers may be in view at a time, of in_view motions (0 = any).
    Where the trigger would be before the start of its section, the motion stays NO_MOTION. */
-EXPORT void krl_place_latest(Floats deadline, Floats earliest, Ints row, Floats begin, Floats end, double cycle,
-                             int64_t most_waiting, int64_t in_view, Ints motion, Ints delay_ms) {
+EXPORT void krl_place_latest(Floats deadline, Floats earliest, Ints row, Floats begin, Floats end,
+                             double cycle, int64_t most_waiting, int64_t in_view, Ints motion, Ints delay_ms) {
     const int64_t count = deadline.rows;
     double limit = INFINITY;
     int64_t behind = NO_MOTION;

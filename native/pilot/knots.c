@@ -1,4 +1,4 @@
-/* A polyline through forces: which samples it needs (Douglas & Peucker 1973), and how far the others are off. */
+/* A polyline through forces: which samples it needs (Douglas & Peucker 1973), how far the others are off. */
 
 #include "core.h"
 
@@ -16,7 +16,8 @@ typedef struct {
     double time, path, force[3], seconds, way, change[3];
 } Chord;
 
-static Chord chord(double time_a, double time_b, double path_a, double path_b, const double *a, const double *b) {
+static Chord chord(double time_a, double time_b, double path_a, double path_b, const double *a,
+                   const double *b) {
     Chord made = {.time = time_a, .path = path_a, .seconds = time_b - time_a, .way = path_b - path_a};
     for (int c = 0; c < 3; c++) {
         made.force[c] = a[c];
@@ -54,13 +55,14 @@ static void offs2(const Chord *to, const double *restrict time, const double *re
             off[i] = distance2(&chord, clipped((time[i] - chord.time) / chord.seconds), force + 3 * i);
 }
 
-/* Return the sample from `first` up to `behind` that is farthest from the chord, -1 if none is beyond `most2`. */
+/* Return the sample from `first` up to `behind` that is farthest from the chord, -1 if none is beyond most2. */
 static int64_t farthest(Samples samples, const Chord *chord, int64_t first, int64_t behind, double most2) {
     double off[BLOCK];
     int64_t at = -1;
     for (; first < behind; first += BLOCK) {
         const int64_t count = least(BLOCK, behind - first);
-        offs2(chord, &AT(samples.time, first), &AT(samples.path, first), &CELL(samples.force, first, 0), count, off);
+        const double *time = &AT(samples.time, first), *path = &AT(samples.path, first);
+        offs2(chord, time, path, &CELL(samples.force, first, 0), count, off);
         for (int64_t i = 0; i < count; i++)
             if (off[i] > most2) {
                 most2 = off[i];
@@ -121,9 +123,9 @@ EXPORT void pilot_thin(Floats time, Floats path, Floats force, Ints rows, double
     }
 }
 
-/* Write the distance of each sample to the polyline through knots at `rows`; outside them the pilot is zero. */
-EXPORT void pilot_errors(Floats time, Floats path, Floats force, Ints rows, Floats knot_time, Floats knot_path,
-                         Floats knot_force, Floats error) {
+/* Write the distance of each sample to the polyline through knots at `rows`; outside it the pilot is zero. */
+EXPORT void pilot_errors(Floats time, Floats path, Floats force, Ints rows, Floats knot_time,
+                         Floats knot_path, Floats knot_force, Floats error) {
     static const double NO_FORCE[3] = {0.0, 0.0, 0.0};
     const Samples knots = {knot_time, knot_path, knot_force};
     const int64_t last = rows.rows - 1;

@@ -1,4 +1,4 @@
-/* CDIS at each corner, from a tolerance or the cell's; the formula stands in gcode2krl/program/blending.py. */
+/* CDIS at each corner, from a tolerance or the cell's; formula and source stand in program/blending.py. */
 
 #include "core.h"
 
@@ -11,7 +11,8 @@ typedef struct {
 } Corner;
 
 static Corner corner_at(Floats position, int64_t i) {
-    const double *last = &CELL(position, i - 1, 0), *here = &CELL(position, i, 0), *next = &CELL(position, i + 1, 0);
+    const double *here = &CELL(position, i, 0);
+    const double *last = &CELL(position, i - 1, 0), *next = &CELL(position, i + 1, 0);
     Corner corner = {0.0, 0.0, 0.0};
     for (int c = 0; c < 3; c++) {
         const double a = here[c] - last[c], b = next[c] - here[c];
@@ -33,9 +34,10 @@ static double level_within(Floats levels, double largest, double half_line) {
     return level;
 }
 
-/* Write the CDIS in mm of the corners `first` up to `behind`; the first and the last of all positions are none.
+/* Write the CDIS in mm of the corners `first` up to `behind`; the first and the last of all positions are
+   none.
 
-   tolerance: NaN where the cell's cdis applies. reversal_cos: cosine of the angle from which on the way reverses. */
+   tolerance: NaN where the cell's cdis applies. reversal_cos: cosine of the interior angle of a reversal. */
 EXPORT void program_corner_cdis(Floats position, Floats tolerance, double cdis, Bools exact, Floats levels,
                                 double reversal_cos, int64_t first, int64_t behind, Floats result) {
     double current = 0.0;
