@@ -312,6 +312,7 @@
 #define F_DWELL_WITH_ARC 48
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
+#define F_ARC_TOO_LONG 51
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 

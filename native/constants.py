@@ -89,5 +89,5 @@ def _struct(name: str, record: np.dtype) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    core.core_function = lambda *_, **__: None  # the modules are asked before there is a core of their constants
+    core.core_function = lambda *_, **__: None  # what is asked here comes before the core that has it
     HEADER.write_text(header(), encoding="ascii", newline="\n")

@@ -1,4 +1,4 @@
-"""Reading the inputs that several commands share: the part, the cell, and the hint on the first run."""
+"""Reading the inputs that several commands share: the part and the cell."""
 
 import sys
 from collections.abc import Iterable
@@ -58,7 +58,6 @@ def read_part(
     """Read the G-code of a command, from a file or from standard input."""
     from gcode2krl.gcode import read_gcode, read_stream
 
-    _say_first_run(console)
     size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else None
     with console.progress("reading", size) as advance:
         if part == STANDARD:
@@ -84,15 +83,6 @@ def read_part(
 def read_cell(path: str | None) -> Cell:
     """Read the cell of a command."""
     return load_cell(path)
-
-
-def _say_first_run(console: Console) -> None:
-    """Print a line if the kernels are not compiled on this machine yet."""
-    from gcode2krl.gcode import machine
-
-    folder = machine.run.stats.cache_path
-    if folder and not any(Path(folder).glob("machine.run-*.nbi")):
-        console.hint("first run on this machine: compiling, once (some seconds)")
 
 
 def require_other(output: Path, *inputs: str | Path | None) -> None:

@@ -26,6 +26,7 @@ def drop_stale(folder: Path, *used: str) -> int:
     """
     import hashlib
 
+    load_numba()
     digest = hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in used)).hexdigest()
     for cache in cache_folders(folder):
         with contextlib.suppress(OSError):  # not writable: numba takes the next folder, too

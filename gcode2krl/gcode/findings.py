@@ -77,7 +77,8 @@ class Finding(NamedTuple):
     DWELL_WITH_ARC,
     BAD_LINE_NUMBER,
     UNKNOWN_START,
-) = range(51)
+    ARC_TOO_LONG,
+) = range(52)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -240,6 +241,12 @@ FINDINGS: dict[int, Finding] = {
     ),
     TOO_FAR: Finding(
         "error", "too-far", "a coordinate of {a:g} mm is beyond 1000 m", "check the number and the unit"
+    ),
+    ARC_TOO_LONG: Finding(
+        "error",
+        "too-far",
+        "the arc of radius {a:g} mm takes more than ten million chords",
+        "check the number, the unit and --chord-tolerance",
     ),
     TOOL_UNDECLARED: Finding(
         "warning",

@@ -61,10 +61,12 @@ double sweep_angle(Point start, Point end, Point centre, bool ccw, int64_t turns
     return ccw ? sweep : -sweep;
 }
 
-/* Return how many equal chords keep within the tolerance of an arc: error = r·(1 - cos(step/2)). */
+/* Return how many equal chords keep within the tolerance of an arc, MOST_CHORDS + 1 where they are more:
+   error = r·(1 - cos(step/2)). */
 int64_t chord_count(double radius_mm, double sweep_rad, double tolerance_mm) {
     double step = 0.5 * PI;
     if (tolerance_mm < radius_mm)
         step = smaller(step, 2.0 * acos(1.0 - tolerance_mm / radius_mm));
-    return most(1, (int64_t)ceil(fabs(sweep_rad) / step - COUNT_SLACK));
+    const double count = ceil(fabs(sweep_rad) / step - COUNT_SLACK); /* infinite where the step is lost */
+    return most(1, (int64_t)smaller(count, MOST_CHORDS + 1));
 }

@@ -11,6 +11,9 @@
 /* LinuxCNC's 0.00005 inch: a smaller radius is zero, and R may miss half the chord by as much. */
 #define SMALLEST_RADIUS_MM 0.00127
 
+/* An arc of more chords is refused: a gigabyte of rows. */
+enum { MOST_CHORDS = 10000000 };
+
 typedef enum { FITS, SPIRAL, MISFIT } Fit;
 typedef struct {
     double u, v;

@@ -292,6 +292,10 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
     const double sweep = sweep_angle(arc->from, arc->to, arc->centre, ccw, turns, &angle);
     const double radius_mm = larger(arc->from_radius_mm, arc->to_radius_mm);
     const int64_t count = chord_count(radius_mm, sweep, machine->chord_tolerance_mm);
+    if (count > MOST_CHORDS) {
+        report_unless(b, arc->rests_on, F_ARC_TOO_LONG, (Says){.a = radius_mm});
+        return true;
+    }
     if (b->counts->rows + count > machine->rows.feed_mm_s.rows) {
         b->counts->rows_wanted = b->counts->rows + count;
         return false;

@@ -210,7 +210,7 @@ def test_every_file_that_kernels_of_other_files_use_is_named():
 
 QUICK_START = """
 import sys
-import gcode2krl.gcode
+import gcode2krl.krl.scan
 assert "numba.np.arraymath" in sys.modules
 assert "scipy.linalg" not in sys.modules, "SciPy's linear algebra costs every start 0.2 s"
 import numpy as np
