@@ -32,8 +32,10 @@ def place_of(file):
 
 @cache
 def names_in(path):
-    """Return the functions, classes, methods and assigned names of a file."""
+    """Return the functions, classes, methods and assigned names of a file, of one in C its functions."""
     names = set()
+    if path.suffix in (".c", ".h"):
+        return set(re.findall(r"^\w[\w *]*?(\w+)\(", path.read_text(encoding="utf-8"), re.M))
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ClassDef):
             names |= {f"{node.name}.{part.name}" for part in node.body if isinstance(part, ast.FunctionDef)}
@@ -60,8 +62,8 @@ def resolved(dotted):
     return False
 
 
-FILES = [case for case in found_in(r"[\w./-]+\.py\b") if not case[1].startswith(OF_A_USER)]
-NAMED = list(found_in(r"([\w./-]+\.py):([A-Za-z_][\w.]*)"))
+FILES = [case for case in found_in(r"[\w./-]+\.(?:py|[ch])\b") if not case[1].startswith(OF_A_USER)]
+NAMED = list(found_in(r"([\w./-]+\.(?:py|[ch])):([A-Za-z_][\w.]*)"))
 DOTTED = list(found_in(r"`(gcode2krl(?:\.\w+)+)`"))
 FOLDERS = list(found_in(r"`([\w./-]+/)`"))
 
@@ -105,6 +107,8 @@ def test_what_does_not_exist_is_found():
     assert place_of("gcode/reader.py") is None
     assert place_of("gcode/read.py") == PACKAGE / "gcode" / "read.py"
     assert {"read_gcode", "_Interpreter.feed", "_PIECE_BYTES"} <= names_in(PACKAGE / "gcode" / "read.py")
+    assert "move" in names_in(ROOT / "native" / "gcode" / "motion.c")
+    assert "moves" not in names_in(ROOT / "native" / "gcode" / "motion.c")
     assert resolved("gcode2krl.gap.diagnosis.diagnose")
     assert not resolved("gcode2krl.gap.diagnosis.nothing")
     assert not resolved("gcode2krl.nothing")

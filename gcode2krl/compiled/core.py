@@ -84,7 +84,7 @@ class Struct(ctypes.Structure):
 
 
 def core_struct(name: str, **fields: Any) -> type[Struct]:
-    """Return a struct of the core, declared by the types of its fields; a function takes it by `pointer_to`."""
+    """Return a struct of the core, declared by the types of its fields; it is passed by `pointer_to`."""
     parts = [(field, View if isinstance(kind, ArrayOf) else kind) for field, kind in fields.items()]
     return type(name, (Struct,), {"_fields_": parts, "declared": fields})
 

@@ -66,7 +66,8 @@ def found_issues(
     issues = [issue for k, issue in enumerate(issues) if k not in misfits[1:]]
     severity: Severity = "error" if any(issue.severity == "error" for issue in issues) else "warning"
     if counts["dropped"]:
-        issues.append(Issue(severity, "more", 0, f"{int(counts['dropped'])} more findings", "mend these first"))
+        dropped = int(counts["dropped"])
+        issues.append(Issue(severity, "more", 0, f"{dropped} more findings", "mend these first"))
     if counts["consequences"]:
         count = int(counts["consequences"])
         rest = "1 more finding rests" if count == 1 else f"{count} more findings rest"

@@ -1,4 +1,4 @@
-"""The modal interpreter: words in, rows of straight moves out, one block at a time (``native/gcode/machine.c``).
+"""The modal interpreter: words in, rows of straight moves out (``native/gcode/machine.c``).
 
 What of the state a block may change is in `state`, what it hands over beside rows in `reporting`.
 """

@@ -64,9 +64,8 @@ def scan(text: NDArray[np.uint8], first_line: int) -> Words:
     letter, value, line = np.empty(room, np.uint8), np.empty(room), np.empty(room, np.int32)
     extra = np.zeros(_MOST_EXTRAS)
     span = np.empty((int(np.count_nonzero(text == PAREN_OPEN)), 2), dtype=np.int64)
-    done = _Scan(
-        text=text, letter=letter, value=value, line=line, extra=extra, message_span=span, first_line=first_line
-    )
+    columns = {"letter": letter, "value": value, "line": line, "extra": extra, "message_span": span}
+    done = _Scan(text=text, first_line=first_line, **columns)
     _fill(done)
     count = done.words
     return Words(
