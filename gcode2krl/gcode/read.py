@@ -4,11 +4,11 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
@@ -34,7 +34,7 @@ from gcode2krl.gcode.state import (
 )
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
 from gcode2krl.gcode.vocabulary import LINE_LIMIT
-from gcode2krl.gcode.words import Words, scan
+from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
@@ -143,9 +143,9 @@ def read_stream(
     diameters: list[NamedDiameter] = []
     for first_line, text, words in _scanned(_pieces(stream, name)):
         if not interpreter.ended:
-            head = head or text[:4000].tobytes()
+            head = head or text[:4000]
             interpreter.feed(words, text, first_line, size)
-            diameters += named_diameters(text.tobytes(), first_line)
+            diameters += named_diameters(text, first_line)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
@@ -159,13 +159,14 @@ def read_stream(
 
 
 def _scanned(
-    pieces: Iterator[tuple[int, NDArray[np.uint8]]],
-) -> Iterator[tuple[int, NDArray[np.uint8], Words]]:
+    pieces: Iterator[tuple[int, bytes]],
+) -> Iterator[tuple[int, bytes, Words]]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
+    scanners = cycle((Scanner(), Scanner()))  # one's words are read while the other writes
 
-    def scan_next() -> tuple[int, NDArray[np.uint8], Words] | None:
+    def scan_next() -> tuple[int, bytes, Words] | None:
         piece = next(pieces, None)
-        return None if piece is None else (*piece, scan(piece[1], piece[0]))
+        return None if piece is None else (*piece, next(scanners).scan(piece[1], piece[0]))
 
     with ThreadPoolExecutor(1) as pool:
         scanned = scan_next()
@@ -194,8 +195,8 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
     return offsets, known
 
 
-def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-    """Yield (first line, whole lines as uint8) with bounded memory, whatever the file holds."""
+def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
+    """Yield (first line, whole lines) with bounded memory, whatever the file holds."""
     line, rest, first = 1, b"", True
     while True:
         block = stream.read(_PIECE_BYTES)
@@ -219,12 +220,17 @@ def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, NDArray[np.uint8
                 source=name,
             )
         if end:
-            whole = np.frombuffer(text, dtype=np.uint8, count=end)
+            whole = text[:end]
             yield line, whole
-            line += text.count(b"\n", 0, end)
+            line += _line_count(whole)
         rest = text[end:]
         if not block:
             return
+
+
+def _line_count(text: bytes) -> int:
+    """Return the number of line ends; for lines as short as these `bytes.count` takes five times as long."""
+    return int(np.count_nonzero(np.frombuffer(text, np.uint8) == NEWLINE))
 
 
 def _reject_binary(block: bytes, name: str) -> None:
@@ -289,7 +295,7 @@ class _Interpreter:
     def _count(self, what: str) -> int:
         return int(self.counts[what][0])
 
-    def feed(self, words: Words, text: NDArray[np.uint8], first_line: int, size: int) -> None:
+    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> None:
         """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
         found_before = self._count("findings")
         if self._count("rows") == 1 and len(words.line):
@@ -298,11 +304,11 @@ class _Interpreter:
         self._execute(words, text)
         self._remember_lines(text, first_line, found_before)
 
-    def _execute(self, words: Words, text: NDArray[np.uint8]) -> None:
+    def _execute(self, words: Words, text: bytes) -> None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
-        first_message = len(self.messages)
-        words.value[words.letter == PAREN_OPEN] += first_message
-        self.messages += [_decode(text[a:b]) for a, b in words.message_span]
+        if len(words.message_span):
+            words.value[words.letter == PAREN_OPEN] += len(self.messages)
+            self.messages += [_decode(text[a:b]) for a, b in words.message_span]
         self.counts["marks"] = 0
         at = 0
         while True:
@@ -311,18 +317,14 @@ class _Interpreter:
                 return
             self._make_room()
 
-    def _remember_lines(self, text: NDArray[np.uint8], first_line: int, found_before: int) -> None:
+    def _remember_lines(self, text: bytes, first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
         new = self.found[found_before : self._count("findings")]
         wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
         if not wanted:
             return
-        ends = np.flatnonzero(text == NEWLINE)
-        starts = np.concatenate([[0], ends + 1])
-        for number in wanted:
-            row = number - first_line
-            if row < len(ends):
-                self.texts[number] = text[starts[row] : ends[row]].tobytes()
+        lines = text.split(b"\n")[:-1]
+        self.texts |= {n: lines[n - first_line] for n in wanted if n - first_line < len(lines)}
 
     def _make_room(self) -> None:
         """Make the room that the next block wants."""
@@ -336,9 +338,9 @@ class _Interpreter:
         self.columns.reserve(rows, self._count("rows"))
         self.machine.rows = self.columns.views()
 
-    def check_rest(self, text: NDArray[np.uint8], first_line: int) -> bool:
+    def check_rest(self, text: bytes, first_line: int) -> bool:
         """Remember the first line of code behind the program's end, so that it is reported; tell if any."""
-        lines = text.tobytes().splitlines()
+        lines = text.splitlines()
         behind = max(0, int(self.state["end_line"][0]) - first_line + 1)
         for number, line in enumerate(lines[behind:], start=first_line + behind):
             if line.strip() not in (b"", b"%", b"\x1a"):
@@ -415,6 +417,6 @@ class _Interpreter:
                 yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
 
 
-def _decode(span: NDArray[np.uint8]) -> str:
-    text = span.tobytes().decode("utf-8", errors="replace").strip()
+def _decode(span: bytes) -> str:
+    text = span.decode("utf-8", errors="replace").strip()
     return text[3:].lstrip(" ,").strip()

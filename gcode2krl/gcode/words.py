@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints, Ints32
-from gcode2krl.ascii_codes import PAREN_OPEN
 from gcode2krl.compiled.core import (
     BYTES,
     INT,
@@ -58,16 +57,38 @@ class Words(NamedTuple):
     """Largest number of decimals behind X, Y or Z."""
 
 
-def scan(text: NDArray[np.uint8], first_line: int) -> Words:
-    """Scan whole lines of text, uint8 (b,); ``first_line`` is the file line of the first."""
-    room = 2 * len(text) + 2  # a byte makes at most two words; pages never touched cost nothing
-    letter, value, line = np.empty(room, np.uint8), np.empty(room), np.empty(room, np.int32)
-    extra = np.zeros(_MOST_EXTRAS)
-    span = np.empty((int(np.count_nonzero(text == PAREN_OPEN)), 2), dtype=np.int64)
-    columns = {"letter": letter, "value": value, "line": line, "extra": extra, "message_span": span}
-    done = _Scan(text=text, first_line=first_line, **columns)
-    _fill(done)
-    count = done.words
-    return Words(
-        letter[:count], value[:count], extra, line[:count], span[: done.messages], done.most_decimals
-    )
+class Scanner:
+    """Scans pieces of text; the words of a piece are overwritten by those of the next."""
+
+    def __init__(self) -> None:
+        self._reserve(0)
+
+    def _reserve(self, words: int) -> None:
+        """Make room; pages that no word reaches cost nothing."""
+        self._letter, self._value = np.empty(words, np.uint8), np.empty(words)
+        self._line, self._extra = np.empty(words, np.int32), np.empty(_MOST_EXTRAS)
+
+    def scan(self, text: bytes, first_line: int) -> Words:
+        """Scan whole lines of text; ``first_line`` is the file line of the first."""
+        if len(self._letter) < 2 * len(text):  # a byte makes at most two words
+            self._reserve(2 * len(text))
+        span = np.empty((text.count(b"("), 2), dtype=np.int64)
+        done = _Scan(
+            text=np.frombuffer(text, np.uint8),
+            letter=self._letter,
+            value=self._value,
+            line=self._line,
+            extra=self._extra,
+            message_span=span,
+            first_line=first_line,
+        )
+        _fill(done)
+        count = done.words
+        return Words(
+            self._letter[:count],
+            self._value[:count],
+            self._extra[: done.marks],
+            self._line[:count],
+            span[: done.messages],
+            done.most_decimals,
+        )

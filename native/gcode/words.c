@@ -154,9 +154,9 @@ static Item comment(Bytes text, int64_t i) {
 
 /* --- numbers -------------------------------------------------------------------------------------------- */
 
-/* Read the number from i on. Blanks inside it mean nothing; digits beyond what a float holds are dropped
-   behind the point. */
-static inline Number number(Bytes text, int64_t i) {
+/* Read the number from i on, whatever it looks like. Blanks inside it mean nothing; digits beyond what a float
+   holds are dropped behind the point. */
+static Number any_number(Bytes text, int64_t i) {
     Number read = {F_OK, 0.0, 0, 0, false, i};
     int64_t mantissa = 0, significant = 0;
     bool negative = false, point = false, started = false;
@@ -186,6 +186,37 @@ static inline Number number(Bytes text, int64_t i) {
     read.plain = !point && !negative;
     read.end = i;
     return read;
+}
+
+/* Add the digits from i on to a mantissa; return the place behind. */
+static inline int64_t add_digits(Bytes text, int64_t i, int64_t *mantissa) {
+    for (; i < text.rows && is_digit(AT(text, i)); i++)
+        *mantissa = (int64_t)((uint64_t)*mantissa * 10 + (AT(text, i) - CH_DIGIT_0));
+    return i;
+}
+
+/* Read the number from i on: at once what most look like, a sign, digits, a point, digits. */
+static inline Number number(Bytes text, int64_t i) {
+    const int64_t start = i;
+    int64_t mantissa = 0, decimals = 0;
+    const bool negative = i < text.rows && AT(text, i) == CH_MINUS;
+    const int64_t first_digit = i += negative;
+    i = add_digits(text, i, &mantissa);
+    int64_t digits = i - first_digit;
+    const bool point = i < text.rows && AT(text, i) == CH_POINT;
+    if (point) {
+        const int64_t behind = i + 1;
+        i = add_digits(text, behind, &mantissa);
+        decimals = i - behind;
+        digits += decimals;
+    }
+    while (i < text.rows && is_space(AT(text, i)))
+        i++;
+    const bool goes_on = i < text.rows && (is_digit(AT(text, i)) || AT(text, i) == CH_POINT);
+    if (digits == 0 || digits > MOST_DIGITS || goes_on)
+        return any_number(text, start);
+    const double value = (negative ? -(double)mantissa : (double)mantissa) / TEN_TO[decimals];
+    return (Number){F_OK, value, digits, decimals, !point && !negative, i};
 }
 
 /* Tell whether N is followed by digits, or digits.digits: what LinuxCNC reads as a line number. */
