@@ -1,4 +1,4 @@
-"""Fuzz inputs from outside: cells, prediction folders, run folders, meshes, telegrams.
+"""Fuzz inputs from outside: programs, cells, prediction folders, run folders, meshes, telegrams.
 
 python benchmarks/fuzz.py predictions --count 10000 --seed 1
 """
@@ -7,7 +7,7 @@ import argparse
 import sys
 from importlib import import_module
 
-KINDS = ("cells", "predictions", "runs", "meshes", "telegrams")
+KINDS = ("gcode", "cells", "predictions", "runs", "meshes", "telegrams")
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -245,7 +245,7 @@ FINDINGS: dict[int, Finding] = {
     ARC_TOO_LONG: Finding(
         "error",
         "too-far",
-        "the arc of radius {a:g} mm takes more than ten million chords",
+        "the arc of radius {a:g} mm takes more than a million chords",
         "check the number, the unit and --chord-tolerance",
     ),
     TOOL_UNDECLARED: Finding(

@@ -11,8 +11,8 @@
 /* LinuxCNC's 0.00005 inch: a smaller radius is zero, and R may miss half the chord by as much. */
 #define SMALLEST_RADIUS_MM 0.00127
 
-/* An arc of more chords is refused: a gigabyte of rows. */
-enum { MOST_CHORDS = 10000000 };
+/* An arc of more chords is a mistake: at 0.01 mm one of 1000 m radius takes 22,000 a turn. */
+enum { MOST_CHORDS = 1000000 };
 
 typedef enum { FITS, SPIRAL, MISFIT } Fit;
 typedef struct {

@@ -41,6 +41,13 @@ def test_an_arc_longer_than_the_buffer_keeps_its_dwell():
     np.testing.assert_allclose(radius, 50, rtol=0, atol=1e-9)
 
 
+def test_a_line_may_have_more_messages_than_there_is_room_for_events():
+    text = "G21\n" + "(MSG, a)" * 400 + "\nG0 X1\nM30\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
+    assert [event.values["text"] for event in toolpath.events[:400]] == ["a"] * 400
+    assert len(toolpath.events) == 401
+
+
 @pytest.mark.parametrize("piece_bytes", [30, 10**6])
 def test_lines_behind_the_end_are_noticed_in_a_later_piece(monkeypatch, piece_bytes):
     monkeypatch.setattr(read, "_PIECE_BYTES", piece_bytes)

@@ -24,6 +24,13 @@ def test_row_0_is_the_start_and_axes_not_programmed_stay():
     np.testing.assert_array_equal(toolpath.axis, [[0, 0, 1]] * 3)
 
 
+@pytest.mark.parametrize("radius", ["99999999999", "999999999999999"])
+def test_an_arc_of_more_than_a_million_chords_is_a_mistake(radius):
+    with pytest.raises(Gcode2KrlError, match="more than a million chords") as caught:
+        read(f"G21 G17 G90 G0 X0 Y0 Z0\nG2 I{radius} J0 F500\nM2\n")
+    assert [(issue.code, issue.line) for issue in caught.value.issues] == [("too-far", 2)]
+
+
 def test_incremental_moves_do_not_make_an_axis_known():
     toolpath = read("G21 G91 G0 X5\nG90 X1\nG91 X1\nM2\n")
     np.testing.assert_array_equal(toolpath.known[:, 0], [0, 0, 1, 1])

@@ -1,0 +1,125 @@
+"""Damaged and made-up G-code: the scanner and the interpreter of the core, in pieces and with little room.
+
+    python native/build.py --checked
+    GCODE2KRL_CORE=checked python benchmarks/fuzz_gcode.py --count 100000 --seed 1
+
+The checked core ends the process at the first index outside an array, and at what is undefined in C.
+"""
+
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+from fuzz_common import Try, main_of, mutated
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAD = b"G21 G17 G90 G94 F500\nT1 M6\nS1000 M3\nG0 X0 Y0 Z5\nG1 Z1\n"
+LINES = (
+    b"N10 G21 G90 G17 G94 (MSG, hello) (a comment)",
+    b"O1234",
+    b"G43 H1 Z20.",
+    b"G64 P0.05 Q.01",
+    b"G1 X1 Y2 F100 ; tail",
+    b"G2 X10 Y0 I5 J-1 P2",
+    b"G2 I5 P3",
+    b"G3 X10 Y10 R8",
+    b"G18 G2 X0 Z0 I-5 K-5",
+    b"G19 G3 Y4 Z3 R-6",
+    b"G91 G1 X1 Y1",
+    b"G90.1 G2 X3 Y3 I2 J2",
+    b"G28 G91 Z0.",
+    b"G30.1",
+    b"G53 G0 X0",
+    b"G4 P1.5",
+    b"M62 P1",
+    b"M3 M8 M7 M5",
+    b"G20 X1.0001 Y-.5",
+    b"G93 G1 X5 F2",
+    b"G95 G1 X6 F.1",
+    b"G59.3 Y2",
+    b"/G1 X100",
+    b"G0 A0 B1 X3",
+    b"#1 = [2 * ABS[#3]] X#<name>",
+    b"X[1+2] Y2 ATAN[1]/[2]",
+    b"G81 X1 Y1 Z-1 R2",
+    b"G80 M48 M60",
+    b"G1 X1 2 3 Y 4 . 5",
+    b"\xc3\xa9 X1 \xe2\x82\xac \xf0\x9f\x98\x80",
+    b"G1 X- Y X1 X2",
+    b"G99.95 M99999",
+    b"X123456789012345.1 Y.0000000000000000000001",
+    b"(unclosed",
+    b"(nested (a) b)",
+    b"G2 X20 Y0 I10 J0.01",
+    b"G2 I99999999999 J0",
+    b"(MSG,a)" * 300,
+    b"[" * 4097,
+    b"%",
+    b"M30",
+)
+"""What the interpreter takes, and what it has a finding for."""
+OPTIONS = ({}, {}, {"block_delete": True}, {"chord_tolerance_mm": 0.0005}, {"chord_tolerance_mm": 10.0})
+
+
+def prepare(place: Path) -> Try:
+    """Read the sound programs; return the function that tries a case."""
+    from gcode2krl import load_cell
+    from gcode2krl.errors import NotUnderstoodError, input_error
+    from gcode2krl.gcode import read
+
+    files = (*ROOT.glob("examples/*.nc"), *ROOT.glob("tests/golden/programs/*.nc"))
+    sound = [file.read_bytes()[:8000] for file in sorted(files)]
+    cells = (None, load_cell())
+
+    def attempt(rng: np.random.Generator, _: Path) -> str:
+        read._PIECE_BYTES = int(rng.choice((300, 5000, 1_000_000)))
+        read._FIRST_ROWS, read._FIRST_EVENTS = int(rng.choice((1, 20, 8192))), int(rng.choice((0, 17, 256)))
+        stream, cell = io.BytesIO(damaged(rng, sound)), cells[int(rng.integers(len(cells)))]
+        options = OPTIONS[int(rng.integers(len(OPTIONS)))]
+        try:
+            toolpath = read.read_stream(stream, "part.nc", cell, **options)
+        except NotUnderstoodError as error:
+            if any(len(str(issue).splitlines()) != 1 for issue in error.issues):
+                raise ValueError("a finding of several lines") from error
+            raise input_error(error.issues[0].code, error.issues[0].message) from None
+        assert np.isfinite(toolpath.position_mm).all()
+        assert (np.diff(toolpath.source_line) >= 0).all()
+        return f"{len(toolpath)} rows"
+
+    return attempt
+
+
+def damaged(rng: np.random.Generator, sound: list[bytes]) -> bytes:
+    """Return a program as it may come."""
+    kind = int(rng.integers(6))
+    data = sound[int(rng.integers(len(sound)))]
+    if kind == 0:
+        return mutated(rng, data, sound[int(rng.integers(len(sound)))])
+    if kind < 3:
+        return other_digits(rng, data)
+    lines = [LINES[k] for k in rng.integers(len(LINES), size=int(rng.integers(1, 30)))]
+    made_up = HEAD + b"\n".join(lines) + b"\n"
+    return made_up if kind == 3 else mutated(rng, made_up, data) if kind == 4 else with_line(rng, data)
+
+
+def other_digits(rng: np.random.Generator, data: bytes) -> bytes:
+    """Return a program with some digits changed: mostly one that is understood."""
+    text = bytearray(data)
+    places = [at for at, byte in enumerate(text) if byte in b"0123456789"]
+    for at in rng.choice(places, size=int(rng.integers(1, 6))):
+        text[at] = ord("0") + int(rng.integers(10))
+    return bytes(text)
+
+
+def with_line(rng: np.random.Generator, data: bytes) -> bytes:
+    """Return a program with one line more."""
+    lines = data.split(b"\n")
+    lines.insert(int(rng.integers(len(lines))), LINES[int(rng.integers(len(LINES)))])
+    return b"\n".join(lines)
+
+
+main = main_of("programs", prepare, __doc__, 20_000)
+
+if __name__ == "__main__":
+    sys.exit(main())
