@@ -36,7 +36,8 @@ FLAGS += [
     "-Wextra",
     "-Werror=implicit-function-declaration",
 ]
-CHECKING = ["-DCHECKED", "-g", "-O1"]
+CHECKING = ["-DCHECKED", "-g", "-O1", "-fsanitize=undefined,float-cast-overflow"]
+CHECKING += ["-fsanitize-undefined-trap-on-error"]  # no library of its own, for Python to load
 IS_X86 = platform.machine().lower() in ("x86_64", "amd64")
 
 

@@ -1,6 +1,7 @@
 """KRL words, ASCII codes and G numbers stand once; the read-back shares only words with the writer."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,8 @@ import gcode2krl
 from gcode2krl import krl_words
 
 PACKAGE = Path(gcode2krl.__file__).parent
-KERNELS = ["gcode/words.py", "gcode/block_words.py", "gcode/machine.py", "gcode/motion.py",
-           "gcode/settings.py", "krl/scan.py"]  # fmt: skip  # one list of files
+KERNELS = ["krl/scan.py"]
+CORE = sorted(PACKAGE.parent.glob("native/gcode/*.c"))
 WRITERS = {"composition", "number_text", "statements", "pilot_text", "rsi_text", "write", "provenance"}
 SHORTEST_WORD = 4
 
@@ -31,6 +32,12 @@ def test_kernels_compare_with_names_instead_of_codes(file):
         if isinstance(side, ast.Constant) and isinstance(side.value, int) and 10 <= side.value < 0x80
     ]
     assert bare == []
+
+
+@pytest.mark.parametrize("file", CORE, ids=lambda file: file.name)
+def test_the_core_compares_with_names_instead_of_codes(file):
+    compared = re.findall(r"(?:[=!<>]=|[^-<>][<>])\s*(\d+)\b(?!\.)", file.read_text(encoding="utf-8"))
+    assert [code for code in compared if 10 <= int(code) < 0x80] == []
 
 
 def words_of_krl():
