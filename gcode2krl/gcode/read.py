@@ -1,5 +1,6 @@
 """``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -386,35 +387,26 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
-        for event, plain in zip(self.events, self._plain_events(), strict=False):
-            dwell_s = float(event["dwell"])
-            yield plain._replace(values={**plain.values, "dwell_s": dwell_s}) if dwell_s > 0 else plain
+        for row, kind, line, a, b, dwell_s in self.events[: self._count("events")].tolist():
+            what, values = self._said(kind, line, a, b)
+            if dwell_s > 0:
+                values["dwell_s"] = dwell_s
+            yield Event(row, what, values)
 
-    def _plain_events(self) -> Iterator[Event]:
-        for event in self.events[: self._count("events")]:
-            row, kind, a, b, line = (
-                int(event["row"]),
-                int(event["kind"]),
-                float(event["a"]),
-                float(event["b"]),
-                int(event["line"]),
-            )
-            if kind == EVENT_TOOL:
-                yield Event(row, "tool", {"tool": int(a), "line": line})
-            elif kind == EVENT_SPINDLE:
-                spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
-                yield Event(row, "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle)
-            elif kind == EVENT_COOLANT:
-                yield Event(
-                    row,
-                    "coolant",
-                    {"mist": bool(int(b) & 1), "flood": bool(int(b) & 2), "m": int(a), "line": line},
-                )
-            elif kind == EVENT_M:
-                values = {"m": int(a), "text": "", "line": line}
-                yield Event(row, "message", values if np.isnan(b) else {**values, "p": b})
-            else:
-                yield Event(row, "message", {"m": -1, "text": self.messages[int(a)], "line": line})
+    def _said(self, kind: int, line: int, a: float, b: float) -> tuple[str, dict[str, Any]]:
+        """Return an event's name and what it says."""
+        if kind == EVENT_TOOL:
+            return "tool", {"tool": int(a), "line": line}
+        if kind == EVENT_SPINDLE:
+            spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
+            return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
+        if kind == EVENT_COOLANT:
+            mist, flood = bool(int(b) & 1), bool(int(b) & 2)
+            return "coolant", {"mist": mist, "flood": flood, "m": int(a), "line": line}
+        if kind == EVENT_M:
+            values: dict[str, Any] = {"m": int(a), "text": "", "line": line}
+            return "message", values if math.isnan(b) else {**values, "p": b}
+        return "message", {"m": -1, "text": self.messages[int(a)], "line": line}
 
 
 def _decode(span: bytes) -> str:
