@@ -34,8 +34,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
 
         def replaced(match: re.Match[str]) -> str:
-            printed = output_of(match["command"], folder).splitlines()
-            lines = [line for line in printed if not line.startswith("first run on this machine")]
+            lines = output_of(match["command"], folder).splitlines()
             if match["first"]:
                 lines = lines[int(match["first"]) - 1 : int(match["last"])]
             return match[1] + "```text\n" + "\n".join(line.rstrip() for line in lines) + "\n```"

@@ -1,6 +1,6 @@
 """Bytes of ASCII by name, for the compiled scanners of G-code and of KRL: a kernel has no characters.
 
-Plain module constants: numba puts their values into the compiled code.
+Plain module constants: the compiled code takes their values from here.
 """
 
 TAB, NEWLINE, RETURN, SPACE = 9, 10, 13, 32

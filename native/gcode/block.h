@@ -62,6 +62,8 @@ static const int OTHER_AXES[] = V_OTHER_AXES;
 enum { OTHER_AXES_COUNT = sizeof OTHER_AXES / sizeof *OTHER_AXES };
 
 /* Tool length offset in force, 0 under G49. */
-static inline double length_offset_of(const State *s) { return isnan(s->length_offset) ? 0.0 : s->length_offset; }
+static inline double length_offset_of(const State *s) {
+    return isnan(s->length_offset) ? 0.0 : s->length_offset;
+}
 
 #endif

@@ -90,7 +90,8 @@ static Taken take_m(Block *b, double value) {
     }
     for (int k = 0; k < count; k++)
         if (group > 0 && m_group(b->m_codes[k]) == group) {
-            report(b, F_SAME_GROUP_M, (Says){.a = b->m_codes[k] * V_TENFOLD, .b = (double)(code * V_TENFOLD)});
+            report(b, F_SAME_GROUP_M,
+                   (Says){.a = b->m_codes[k] * V_TENFOLD, .b = (double)(code * V_TENFOLD)});
             good = false;
         }
     b->m_codes[count] = (int32_t)code;

@@ -233,7 +233,8 @@ static bool has_room(Machine *machine, int64_t words) {
     Counts *counts = machine->counts.at;
     counts->rows_wanted = counts->rows + ROWS_PER_BLOCK;
     counts->events_wanted = counts->events + EVENTS_PER_BLOCK + words; /* each may be a message */
-    return counts->rows_wanted <= machine->rows.feed_mm_s.rows && counts->events_wanted <= machine->events.rows;
+    return counts->rows_wanted <= machine->rows.feed_mm_s.rows &&
+           counts->events_wanted <= machine->events.rows;
 }
 
 /* Execute blocks from a word on; return the word at which to go on, earlier where room is wanted. */

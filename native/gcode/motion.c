@@ -17,7 +17,9 @@ static void stand_at(State *s, const double position_mm[3]) {
     s->z = position_mm[2];
 }
 
-static double largest_coordinate_mm(const State *s) { return larger(larger(fabs(s->x), fabs(s->y)), fabs(s->z)); }
+static double largest_coordinate_mm(const State *s) {
+    return larger(larger(fabs(s->x), fabs(s->y)), fabs(s->z));
+}
 
 static void note_unknown_start(Block *b) {
     State *s = b->state;
