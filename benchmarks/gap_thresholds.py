@@ -33,7 +33,7 @@ KINDS = {"null": 0.15, "null_foreign_noise": 0.15, "single": 0.35, "open": 0.2, 
 """Shares of the stored cases."""
 MOST = 10
 ENVIRONMENT = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "GCODE2KRL_THREADS"), "1"
 )
 
 

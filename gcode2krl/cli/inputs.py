@@ -1,5 +1,6 @@
 """Reading the inputs that several commands share: the part and the cell."""
 
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
@@ -19,9 +21,22 @@ FIGURES = ("png", "svg", "pdf")
 _LONGEST_PATH = 1000
 
 
+def _use_threads(_context: click.Context, _option: click.Parameter, count: int | None) -> None:
+    """Let every stage use so many threads."""
+    if count is not None:
+        os.environ[THREADS_VARIABLE] = str(count)
+
+
 def common_options(function: Any) -> Any:
-    """Add --cell, --json, -q and -v to a command."""
+    """Add --cell, --json, --threads, -q and -v to a command."""
     for option in (
+        click.option(
+            "--threads",
+            type=click.IntRange(1, 1024),
+            expose_value=False,
+            callback=_use_threads,
+            help="Threads to use; default: one a core.",
+        ),
         click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error."),
         click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),

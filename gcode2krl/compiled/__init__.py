@@ -1,1 +1,1 @@
-"""What the compiled kernels and the long columns share: the cache of kernels, chunks, threads."""
+"""What stages share that work on long columns: the compiled core, its inputs, chunks, threads."""

@@ -1,9 +1,4 @@
-"""Arrays for compiled code: contiguous floats of the wanted shape, and read-only for what numba compiles.
-
-numba compiles a kernel anew for another element type, another order in memory, and for an array that may be
-written to. So every input of such a kernel is read-only, whatever table it came from. The core in C takes any
-contiguous array, and more quickly one that may be written to.
-"""
+"""Arrays for the compiled core, contiguous floats of the wanted shape, and views that cannot be written to."""
 
 from typing import Any, TypeVar
 
@@ -23,8 +18,8 @@ def locked(array: Array) -> Array:
 
 
 def contiguous(values: ArrayLike) -> Floats:
-    """Return the values contiguous and read-only; a copy only where they are not floats in this order."""
-    return locked(np.ascontiguousarray(values, dtype=np.float64))
+    """Return the values contiguous; a copy only where they are not floats in this order."""
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def shaped(name: str, values: ArrayLike, *shape: int) -> Floats:
@@ -44,7 +39,7 @@ def shaped(name: str, values: ArrayLike, *shape: int) -> Floats:
     ValueError
         If the shape is another one.
     """
-    array: Floats = np.ascontiguousarray(values, dtype=np.float64)
+    array = contiguous(values)
     if array.ndim == len(shape):
         for found, length in zip(array.shape, shape, strict=True):
             if found != length and length != -1:
@@ -53,23 +48,3 @@ def shaped(name: str, values: ArrayLike, *shape: int) -> Floats:
             return array
     wanted = ", ".join("n" if length == -1 else str(length) for length in shape)
     raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
-
-
-def read_only(name: str, values: ArrayLike, *shape: int) -> Floats:
-    """Return the values of an argument contiguous and read-only, in the wanted shape.
-
-    Parameters
-    ----------
-    name : str
-        The argument's name, for the error.
-    values : array_like
-        The numbers.
-    *shape : int
-        The wanted shape, -1 for any length.
-
-    Raises
-    ------
-    ValueError
-        If the shape is another one.
-    """
-    return locked(shaped(name, values, *shape))

@@ -1,5 +1,6 @@
-"""Work shared out to threads: numpy and the compiled kernels release the interpreter, so threads suffice."""
+"""Work shared out to threads: numpy and the compiled core release the interpreter, so threads suffice."""
 
+import multiprocessing
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,9 +10,22 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
+THREADS_VARIABLE = "GCODE2KRL_THREADS"
+"""In the environment: how many threads to use; ``--threads`` sets it."""
+
+
 def cores() -> int:
-    """Return how many threads to use: one a core, or what ``NUMBA_NUM_THREADS`` says in the environment."""
-    return int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+    """Return how many threads to use: what the environment says, one in a worker of a pool, else one a core."""
+    if named := os.environ.get(THREADS_VARIABLE):
+        return int(named)
+    return 1 if multiprocessing.parent_process() else _usable_cores()
+
+
+def _usable_cores() -> int:
+    """Return how many cores this process may use, where the system tells."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def in_threads(

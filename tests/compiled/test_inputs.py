@@ -1,9 +1,9 @@
-"""Input arrays of kernels: one type, not to be written to, and errors that name the argument."""
+"""Input arrays of the core: one type, contiguous, and errors that name the argument."""
 
 import numpy as np
 import pytest
 
-from gcode2krl.compiled.inputs import contiguous, locked, read_only
+from gcode2krl.compiled.inputs import contiguous, locked, shaped
 
 
 def test_locked_is_a_view_and_leaves_the_array_itself_open():
@@ -20,7 +20,6 @@ def test_contiguous_is_one_type_whatever_comes_in(values):
     found = contiguous(values)
     assert found.dtype == np.float64
     assert found.flags.c_contiguous
-    assert not found.flags.writeable
     assert found.tolist() == np.asarray(values).tolist()
 
 
@@ -29,8 +28,8 @@ def test_contiguous_does_not_copy_what_fits():
     assert np.shares_memory(contiguous(array), array)
 
 
-def test_read_only_takes_any_length_where_minus_one_stands():
-    assert read_only("force", np.zeros((5, 3)), -1, 3).shape == (5, 3)
+def test_shaped_takes_any_length_where_minus_one_stands():
+    assert shaped("force", np.zeros((5, 3)), -1, 3).shape == (5, 3)
 
 
 @pytest.mark.parametrize(
@@ -43,4 +42,4 @@ def test_read_only_takes_any_length_where_minus_one_stands():
 )
 def test_a_wrong_shape_is_named(shape, wanted, words):
     with pytest.raises(ValueError, match=words):
-        read_only("force", np.zeros(shape), *wanted)
+        shaped("force", np.zeros(shape), *wanted)

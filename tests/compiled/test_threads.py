@@ -1,11 +1,13 @@
 """Work in threads: results in the order of the tasks, no more threads than asked for, errors not lost."""
 
+import multiprocessing
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from gcode2krl.compiled.threads import cores, in_threads
+from gcode2krl.compiled.threads import THREADS_VARIABLE, cores, in_threads
 
 
 def test_results_come_in_the_order_of_the_tasks():
@@ -39,7 +41,13 @@ def test_no_tasks_no_results():
 
 def test_the_environment_says_how_many_threads(monkeypatch):
     """Several processes at once, each on a core of its own, do the same work in less time alone."""
-    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
-    assert cores() == 1
-    monkeypatch.delenv("NUMBA_NUM_THREADS")
+    monkeypatch.setenv(THREADS_VARIABLE, "3")
+    assert cores() == 3
+    monkeypatch.delenv(THREADS_VARIABLE)
     assert cores() >= 1
+
+
+def test_a_worker_of_a_pool_takes_one(monkeypatch):
+    monkeypatch.delenv(THREADS_VARIABLE, raising=False)
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert pool.submit(cores).result() == 1

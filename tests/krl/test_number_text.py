@@ -40,7 +40,7 @@ def test_the_chunks_do_not_matter(rows, threads, monkeypatch):
     runs = [random_run(seed) for seed in range(100)]
     whole = [written(run) for run in runs]
     monkeypatch.setattr(number_text, "chunk_borders", lambda count: chunk_borders(count, rows))
-    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    monkeypatch.setenv("GCODE2KRL_THREADS", threads)
     assert [written(run) for run in runs] == whole
     assert any(text.count(b"; line ") > 2 and text.count(b"$APO.CDIS=") > 2 for text, _ in whole)
 
