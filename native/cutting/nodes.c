@@ -4,7 +4,9 @@
 #include "core.h"
 
 #define TURN_COSINE 0.984807753012208 /* of 10 degrees: a node where the path has turned by more */
-#define STRAIGHT_SINE 1e-5 /* a sweep of 400 mm leaves a path that turns by less by half a micrometre */
+#define OFF_MM 5e-4 /* by which points of a path may lie beside the sweep that takes them together */
+
+enum { MOST_JOINED = 32 };
 
 typedef struct {
     double x, y, z;
@@ -58,33 +60,36 @@ EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart
     }
 }
 
-/* Tell whether two directions differ, by more than the path may be off. */
-static bool bends(Vector onward, Vector leaving) {
-    const double sizes = dot(onward, onward) * dot(leaving, leaving);
-    return squared_cross(onward, leaving) > squared(STRAIGHT_SINE) * sizes || dot(onward, leaving) < 0.0;
+/* Tell whether the points between two stay within `OFF_MM` of the straight line that joins them. */
+static bool is_straight(Floats position_mm, int64_t from, int64_t to) {
+    const Vector start = row_of(position_mm, from), chord = from_to(start, row_of(position_mm, to));
+    const double length2 = dot(chord, chord);
+    for (int64_t i = from + 1; i < to; i++) {
+        const Vector here = from_to(start, row_of(position_mm, i));
+        const double along = dot(here, chord);
+        if (along < 0.0 || along > length2 || squared_cross(here, chord) > squared(OFF_MM) * length2)
+            return false;
+    }
+    return true;
 }
 
-/* Mark the points of a path between which it is straight and no longer than longest_mm (a row a tool); every point of a
-   rapid, whose findings name it, and of a slope that a cutter goes whose sweeps are exact only if they are short. */
+/* Mark the points between which a path is one sweep: straight, no longer than longest_mm (a row a tool), of few points.
+   Every point of a rapid is one, as its findings name it, and of a slope that a cutter goes whose sweeps are exact
+   only if they are short. */
 EXPORT void cutting_mark_corners(Floats position_mm, Floats way_mm, Bools first, Bools rapid, Ints32 tool,
                                  Floats longest_mm, Bools is_short, Bools corner) {
-    Vector onward = {0.0, 0.0, 0.0}; /* from the last corner to the point after it */
-    double from_mm = 0.0;
+    int64_t last = 0;
     for (int64_t i = 0; i < corner.rows; i++) {
         const bool is_end = i == 0 || i == corner.rows - 1 || AT(first, i) || AT(first, i + 1);
-        bool is_corner = is_end || AT(rapid, i) || AT(rapid, i + 1);
+        bool is_corner = is_end || AT(rapid, i) || AT(rapid, i + 1) || i + 1 - last > MOST_JOINED;
         if (!is_corner) {
-            const Vector here = row_of(position_mm, i), leaving = from_to(here, row_of(position_mm, i + 1));
             const int64_t t = AT(tool, i);
-            if (dot(onward, onward) == 0.0)
-                onward = from_to(row_of(position_mm, i - 1), here);
-            is_corner = bends(onward, leaving) || AT(way_mm, i + 1) - from_mm > AT(longest_mm, t) ||
-                        (onward.z != 0.0 && AT(is_short, t));
+            const bool slopes = CELL(position_mm, i + 1, 2) != CELL(position_mm, last, 2);
+            is_corner = AT(way_mm, i + 1) - AT(way_mm, last) > AT(longest_mm, t) || (slopes && AT(is_short, t)) ||
+                        !is_straight(position_mm, last, i + 1);
         }
         AT(corner, i) = is_corner;
-        if (is_corner) {
-            onward = (Vector){0.0, 0.0, 0.0};
-            from_mm = AT(way_mm, i);
-        }
+        if (is_corner)
+            last = i;
     }
 }
