@@ -1,4 +1,4 @@
-"""Arrays for the compiled core, contiguous floats of the wanted shape, and views that cannot be written to."""
+"""Arrays for the compiled core, contiguous and of the wanted shape, and views that cannot be written to."""
 
 from typing import Any, TypeVar
 

@@ -15,7 +15,7 @@ THREADS_VARIABLE = "GCODE2KRL_THREADS"
 
 
 def cores() -> int:
-    """Return how many threads to use: what the environment says, one in a worker of a pool, else one a core."""
+    """Return how many threads to use: what the environment says, one in a pool's worker, else one a core."""
     if named := os.environ.get(THREADS_VARIABLE):
         return int(named)
     return 1 if multiprocessing.parent_process() else _usable_cores()
