@@ -5,6 +5,9 @@
 /* Room for rounding in a bound of the height below a sweep: ten times that of coordinates of a metre. */
 #define ROUNDING_MM 1e-3f
 
+#define NO_LENGTH_MM 1e-9
+#define LEAST_ONWARD 2.0 /* how far a sweep goes on for what it goes aside, if it follows the one before */
+
 enum { REFRESH = 48 }; /* visits after which the bound of a block is computed again */
 
 /* A sweep from (ax, ay, az): its direction and length in plan, its slope in plan and along the path. */
@@ -12,6 +15,7 @@ typedef struct {
     const Outline *outline;
     double ax, ay, az, ex, ey, length, slope, sink;
     double behind; /* cells farther back along it were cut when the cutter was at the start */
+    double ahead;  /* cells farther along it are cut by the next sweep */
     bool hollow;   /* the whole disc at the start was cut */
 } Sweep;
 
@@ -245,24 +249,38 @@ static Chord chord(double y, const Sweep *sweep) {
     return (Chord){ex * left - reach_left, ex * right + reach_right};
 }
 
-/* Leave out what lies behind the start: along >= behind. */
-static Chord in_front(Chord row, double y, const Sweep *sweep) {
-    if (sweep->behind == -INFINITY)
-        return row;
+/* Leave out what the sweeps before and after cut: behind <= along <= ahead. */
+static Chord in_slab(Chord row, double y, const Sweep *sweep) {
+    const double from = sweep->behind - y * sweep->ey, to = sweep->ahead - y * sweep->ey;
     if (fabs(sweep->ex) > 1e-9) {
-        const double edge = (sweep->behind - y * sweep->ey) / sweep->ex;
-        return sweep->ex > 0.0 ? (Chord){greater(row.left, edge), row.right}
-                               : (Chord){row.left, lesser(row.right, edge)};
+        const double near = from / sweep->ex, far = to / sweep->ex;
+        return sweep->ex > 0.0 ? (Chord){greater(row.left, near), lesser(row.right, far)}
+                               : (Chord){greater(row.left, far), lesser(row.right, near)};
     }
-    return y * sweep->ey < sweep->behind ? (Chord){INFINITY, -INFINITY} : row;
+    return from > 0.0 || to < 0.0 ? (Chord){INFINITY, -INFINITY} : row;
+}
+
+/* Return how far along a ball's sweep cells are not cut by the next one, which goes on at nearly the same heading. */
+static double ahead_of(const Path *path, int64_t k, const Sweep *sweep) {
+    const int64_t next = k + 1;
+    if (sweep->outline->kind != SW_BALL || next >= path->position_mm.rows || AT(path->first, next) ||
+        AT(path->rapid, k) || AT(path->rapid, next))
+        return INFINITY;
+    const double *b = &CELL(path->position_mm, k, 0), *c = &CELL(path->position_mm, next, 0);
+    const double x = c[0] - b[0], y = c[1] - b[1];
+    const double onward = x * sweep->ex + y * sweep->ey, aside = fabs(y * sweep->ex - x * sweep->ey);
+    if (!(onward > LEAST_ONWARD * aside) || !(onward > NO_LENGTH_MM))
+        return INFINITY;
+    /* between the planes across both sweeps at their joint lies a wedge, which the first one cuts */
+    return sweep->length + sweep->outline->radius * (greater(sweep->sink, 0.0) + aside / onward);
 }
 
 static Sweep sweep_to(const Path *path, int64_t k) {
     const double *a = &CELL(path->position_mm, k - 1, 0), *b = &CELL(path->position_mm, k, 0);
     const Outline *outline = outline_of(path, AT(path->tool, k));
-    Sweep sweep = {outline, a[0], a[1], a[2], 1.0, 0.0, 0.0, 0.0, 0.0, -INFINITY, false};
+    Sweep sweep = {outline, a[0], a[1], a[2], 1.0, 0.0, 0.0, 0.0, 0.0, -INFINITY, INFINITY, false};
     const double length = sqrt(squared(b[0] - a[0]) + squared(b[1] - a[1])), rise = b[2] - a[2];
-    if (!(length > 1e-9)) {
+    if (!(length > NO_LENGTH_MM)) {
         sweep.az = lesser(a[2], b[2]);
         return sweep;
     }
@@ -276,6 +294,7 @@ static Sweep sweep_to(const Path *path, int64_t k) {
         sweep.behind = sweep.slope >= 0.0 ? 0.0 : of_shape;
         sweep.hollow = outline->kind == SW_FLAT && sweep.slope >= 0.0;
     }
+    sweep.ahead = ahead_of(path, k, &sweep);
     return sweep;
 }
 
@@ -318,7 +337,7 @@ double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
     double worst = 0.0;
     for (int64_t i = rows.first; i < rows.after; i++) {
         const double y = grid->y_mm + ((double)(i + grid->row) + 0.5) * dy - sweep.ay;
-        const Chord cut = in_front(chord(y, &sweep), y, &sweep);
+        const Chord cut = in_slab(chord(y, &sweep), y, &sweep);
         if (cut.left > cut.right)
             continue;
         const Cells cells = columns_between(grid, cut.left + sweep.ax, cut.right + sweep.ax, columns);
