@@ -152,11 +152,13 @@ def test_serve_answers_until_the_peer_is_silent_and_records_a_run(online, tmp_pa
     port = free_port()
     krc = Krc(cell, stands_s=0.4)
     krc.load = np.zeros(6)
+    early = []  # asked before the server listened, or before it was quick enough
 
     def controller():
         wire = Wire(port, 1.0)
-        while (first := wire.ask(krc.telegram())) is None:  # not listening yet
+        while (first := wire.ask(krc.telegram())) is None:
             krc.take(None)
+            early.append(None)
         krc.take(first)
         wire.socket.settimeout(5.0)
         exchange(wire, krc, 149)
@@ -168,10 +170,10 @@ def test_serve_answers_until_the_peer_is_silent_and_records_a_run(online, tmp_pa
     assert outcome.code == 0, outcome.err
     found = json.loads(outcome.out)
     assert (found["phase"], found["reason"]) == ("closed", "silence")
-    assert found["answered"] == 150
+    assert 150 <= found["answered"] <= 150 + len(early)
     assert found["log_dropped"] == found["log_unwritten"] == 0
     from gcode2krl.runs import load_run
 
     run = load_run(tmp_path / "run")
-    assert len(run.controller) == len(run.force) == 150
+    assert len(run.controller) == len(run.force) == found["answered"]
     assert ",running,," in (tmp_path / "run" / "events.csv").read_text()
