@@ -1,4 +1,4 @@
-"""Bytes of ASCII by name, for the compiled scanners of G-code and of KRL: a kernel has no characters.
+"""Bytes of ASCII by name, for the scanners of G-code and of KRL, which are C and take their codes from here.
 
 Plain module constants: the compiled code takes their values from here.
 """

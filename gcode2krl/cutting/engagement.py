@@ -77,7 +77,7 @@ def engage(
     tool = np.ascontiguousarray(tool, dtype=np.int32)
     rows = np.arange(len(position)) if wanted is None else np.flatnonzero(wanted)
     result = _air(len(rows))
-    if len(position) == 0:
+    if len(rows) == 0:
         return result
     first = np.concatenate([[True], tool[1:] != tool[:-1]])
     tangents = _tangents(position, first) if direction is None else direction
@@ -173,7 +173,7 @@ def _outline(shape: Shape) -> tuple[float, ...]:
 
 
 def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
-    """Return what the kernels need of tools on a field of a cell size."""
+    """Return what the core needs of tools on a field of a cell size."""
     listed = [_bands(tool, cell_mm) for tool in tools]
     bands = np.zeros((len(tools), max(len(edge) for edge in listed), BAND_COLUMNS))
     for row, edge in zip(bands, listed, strict=True):

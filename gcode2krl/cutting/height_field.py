@@ -55,7 +55,7 @@ class HeightField:
         return int(low), int(high)
 
     def grid(self, axis: int, first: int, after: int) -> Grid:
-        """Return a copy of some columns (axis 0) or rows (axis 1) as the kernels take it."""
+        """Return a copy of some columns (axis 0) or rows (axis 1) as the core takes it."""
         part = self.height_mm[:, first:after] if axis == 0 else self.height_mm[first:after]
         height = np.full((part.shape[0] + 2, part.shape[1] + 1 + LANES), -np.inf, np.float32)
         height[1:-1, 1 : part.shape[1] + 1] = part

@@ -1,6 +1,6 @@
-"""What can be wrong with a line of G-code: number in the kernels, stable code, sentence, remedy.
+"""What can be wrong with a line of G-code: number in the core, stable code, sentence, remedy.
 
-The compiled kernels report a finding as (number, line, a, b, c); the sentence is made here. In a sentence
+The compiled core reports a finding as (number, line, a, b, c); the sentence is made here. In a sentence
 ``{a}``, ``{b}`` and ``{c}`` are numbers, ``{word}`` is the letter whose code is ``a``, ``{words}`` are the
 letters whose bits are set in ``a``, ``{g}`` and ``{h}`` are G or M numbers given as ten times their value,
 ``{state}`` names the modal state that led there.
@@ -359,7 +359,7 @@ def letters_of(bits: float) -> str:
 
 
 def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0, excerpt: str = "") -> Issue:
-    """Return the `Issue` for one row of the kernels' findings."""
+    """Return the `Issue` for one row of the core's findings."""
     finding = FINDINGS[number]
     reason, remedy = "", ""
     if number in (UNSUPPORTED_G, UNSUPPORTED_M):

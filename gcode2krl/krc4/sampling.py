@@ -82,7 +82,7 @@ def sample(
 
 
 class _Moves(NamedTuple):
-    """The moves (n) as the kernels see them."""
+    """The moves (n) as the core sees them."""
 
     start: Floats
     end: Floats

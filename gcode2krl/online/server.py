@@ -136,7 +136,7 @@ def serve(
 
 
 def warm_up(device: Compensator) -> None:
-    """Run each compiled kernel once, standing at HOME: the first call of one costs many cycles."""
+    """Take one step standing at HOME: the first of each function, with its imports, costs many cycles."""
     q_rad = device.cell.home_q_rad()
     position, _ = forward(q_rad[None], device.cell, device.tool)
     nothing = np.full(6, np.nan)
