@@ -1,6 +1,7 @@
 """Columns beside tangents and nuisance, by inner products: against the rows themselves."""
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from gcode2krl.gap.families.columns import Beside, Columns
 from gcode2krl.gap.families.steps import Steps
@@ -20,7 +21,7 @@ def beside():
     rows, plain, _ = view_of(traces, waves)
     tangents = [GENERATOR.standard_normal((*trace.shape[::-1], 3)) for trace in traces]
     view = View.of(rows, [trace.residual for trace in traces], tangents)
-    columns = Columns(GENERATOR.standard_normal((len(rows), 5)), view.nuisance)
+    columns = Columns(GENERATOR.standard_normal((len(rows), 5)))
     assert plain.nuisance.any()
     return Beside(view, columns), view.without_fixed(columns.values)
 
@@ -52,3 +53,17 @@ def test_blocks_of_steps_are_those_of_their_columns():
         moments = steps.coarse()
         expected = rows.of(steps.columns(moments), place.component)
         np.testing.assert_allclose(steps.blocks(moments), expected, atol=1e-12)
+
+
+def test_views_of_one_component_may_keep_different_nuisance():
+    count, joints = 200, 5
+    rate = np.tile(np.sin(0.05 * np.arange(count)), joints)
+    members = csr_array(np.ones((1, count * joints)))
+    nothing = np.zeros((count * joints, 0))
+    plain = View(rate, nothing, rate[:, None], members, np.repeat(np.arange(joints), count))
+    alike = plain.beside(rate, 50.0 * rate[:, None])
+    assert plain.at(2).kept == ()
+    assert alike.at(2).kept == (0,)
+    columns = Columns(GENERATOR.standard_normal((count, 3)))
+    for view in (plain.at(2), alike.at(2)):
+        np.testing.assert_allclose(Beside(view, columns).fixed, columns.values.T @ view.fixed, atol=1e-12)

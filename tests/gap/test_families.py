@@ -64,7 +64,7 @@ def test_the_evidence_is_that_of_dense_gaussians():
         place,
         Dependence.CONSTANT,
         [raw],
-        Columns(columns, view.nuisance),
+        Columns(columns),
         (np.eye(3),),
         np.ones((1, 2)),
     )

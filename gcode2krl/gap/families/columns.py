@@ -1,6 +1,6 @@
 """Columns beside what tangents and nuisance explain of them, by inner products: their rows are never made."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,10 +11,10 @@ from gcode2krl.gap.families.view import View
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Whitened columns (v, c) in blocks, and the nuisance N (v, m) that all views of these rows share."""
+    """Whitened columns (v, c) in blocks, for views of the same rows."""
 
     values: Floats
-    nuisance: Floats
+    _on_nuisance: dict[tuple[int, ...] | None, Floats] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
         return int(self.values.shape[1])
@@ -25,11 +25,11 @@ class Columns:
         gram: Floats = self.values.T @ self.values
         return gram
 
-    @cached_property
-    def on_nuisance(self) -> Floats:
-        """(c, m) Bᵀ·N."""
-        products: Floats = self.values.T @ self.nuisance
-        return products
+    def on_nuisance(self, view: View) -> Floats:
+        """Return Bᵀ·N (c, m); views that keep the same nuisance share it."""
+        if view.kept not in self._on_nuisance:
+            self._on_nuisance[view.kept] = self.values.T @ view.nuisance
+        return self._on_nuisance[view.kept]
 
 
 class Beside:
@@ -37,7 +37,9 @@ class Beside:
 
     def __init__(self, view: View, columns: Columns) -> None:
         self.view, self.columns = view, columns
-        self.fixed: Floats = np.concatenate([columns.values.T @ view.tangents, columns.on_nuisance], axis=1)
+        self.fixed: Floats = np.concatenate(
+            [columns.values.T @ view.tangents, columns.on_nuisance(view)], axis=1
+        )
         """(c, t + m) Bᵀ·F."""
         self.taken = view.solved(self.fixed.T)
         """(t + m, c) H⁻¹·Fᵀ·B."""

@@ -154,7 +154,7 @@ def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> E
     own, flipped = scan(view, steps, coarse, signs)
     finer = steps.finer(moments[int(np.argmax(own))])
     fine = steps.blocks(finer)
-    near, _ = scan(view, steps, Columns(fine, view.nuisance), signs[:0])
+    near, _ = scan(view, steps, Columns(fine), signs[:0])
     best = int(np.argmax(near))
     d = steps.place.units[0].shape[2]
     cost = float(np.max(own) - log_mean(own))
@@ -163,7 +163,7 @@ def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> E
         steps.place,
         Dependence.RUN_TIME_STEP,
         steps.columns(finer[best : best + 1]),
-        Columns(fine[:, best * d : (best + 1) * d], view.nuisance),
+        Columns(fine[:, best * d : (best + 1) * d]),
         (np.eye(d),),
         signs,
         at=finer[best],

@@ -40,7 +40,7 @@ def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> lis
     signs = [_signs(view, seed) for view in views]
     for family in grid.families():
         place = family.place
-        columns = Columns(rows.of(family.columns, place.component), views[0].at(place.component).nuisance)
+        columns = Columns(rows.of(family.columns, place.component))
         for view, own, sign in zip(views, found, signs, strict=True):
             at = view.at(place.component)
             _add(own, [evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)])
@@ -55,7 +55,7 @@ def _searched(
 ) -> Iterator[list[Evidence | None]]:
     """Yield for each view the families at a place whose moment or frequency the data must find."""
     steps = Steps(rows, place)
-    coarse = Columns(steps.blocks(steps.coarse()), views[0].at(place.component).nuisance)
+    coarse = Columns(steps.blocks(steps.coarse()))
     for view, sign in zip(views, signs, strict=True):
         at = view.at(place.component)
         yield [

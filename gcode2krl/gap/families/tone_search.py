@@ -29,7 +29,7 @@ def tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator[Evide
     hz, power, count = _spectrum(rows, view)
     for peak in _peaks(power):
         raw = list(_tone_columns(place, rows.traces, float(hz[peak])))
-        columns = Columns(rows.of(raw, place.component), view.nuisance)
+        columns = Columns(rows.of(raw, place.component))
         found = evidence_of(
             view,
             place,
@@ -104,7 +104,7 @@ def angle_tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator
         place,
         Dependence.MOTOR_ANGLE,
         raw,
-        Columns(rows.of(raw, place.component), view.nuisance),
+        Columns(rows.of(raw, place.component)),
         (np.eye(2),),
         signs,
         at=(-1, order),

@@ -31,6 +31,8 @@ class View:
     """(g, v) 1 where a block belongs to a stretch of time."""
     components: Ints
     """(v,) the component of each block."""
+    kept: tuple[int, ...] | None = None
+    """Which of the link's nuisance are in N; None: all."""
 
     @classmethod
     def of(cls, rows: Rows, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> "View":
@@ -74,6 +76,7 @@ class View:
             self.nuisance[np.ix_(rows, columns[t:])],
             self.members[:, np.flatnonzero(rows)],
             self.components[rows],
+            tuple(np.flatnonzero(columns[t:]).tolist()),
         )
 
     @cached_property
