@@ -428,6 +428,29 @@
 #define PILOT_GATE_UNPROVEN 8
 #define PILOT_GATE_STANDS 9
 
+/* gcode2krl.krl.differences */
+#define DIFF_MOST_PLACES 1000
+#define DIFF_DEG_PER_RAD 57.29577951308232
+#define DIFF_RAD_PER_DEG 0.017453292519943295
+#define DIFF_S_PER_MIN 60.0
+#define DIFF_POSITION_LIMIT_MM 0.002
+#define DIFF_ROTATION_LIMIT_DEG 0.001
+#define DIFF_SPEED_LIMIT_MM_S 0.0016666666666666668
+#define DIFF_JOINT_LIMIT_DEG 0.001
+#define DIFF_CDIS_LIMIT_MM 0.0006
+#define DIFF_WAIT_LIMIT_S 0.0006
+#define DIFF_REMEDY "translate again"
+#define DIFF_OTHER_KIND 0
+#define DIFF_POSITION 1
+#define DIFF_NO_POSITION 2
+#define DIFF_ROTATION 3
+#define DIFF_NO_ROTATION 4
+#define DIFF_SPEED 5
+#define DIFF_NO_SPEED 6
+#define DIFF_CDIS 7
+#define DIFF_WAIT 8
+#define DIFF_OTHER_BRANCH 9
+
 typedef struct {
     double x;
     double y;
@@ -654,5 +677,35 @@ typedef struct {
     Floats overlap_mm;
     Bools is_read;
 } Result;
+
+typedef struct {
+    Floats pose;
+    Bools ptp;
+    Floats speed_mm_s;
+    Floats cdis_mm;
+    Floats wait_s;
+} ReadMotions;
+
+typedef struct {
+    Floats position_mm;
+    Floats rotation;
+    Bools home;
+    Ints32 tool;
+    Bools ptp;
+    Floats speed_mm_s;
+    Floats cdis_mm;
+    Floats wait_s;
+} Wanted;
+
+typedef struct {
+    Floats largest;
+    Ints taken;
+    Ints row;
+    Floats size;
+    Ints worst_count;
+    Ints worst;
+    Floats worst_size;
+    Floats worst_key;
+} Noted;
 
 #endif

@@ -37,6 +37,7 @@ MODULES = {
     "LIMITS": "gcode2krl.online.limits",
     "BLENDING": "gcode2krl.online.blending",
     "PILOT": "gcode2krl.online.pilot_gate",
+    "DIFF": "gcode2krl.krl.differences",
 }
 """Prefix -> module whose numbers and words the core uses."""
 RECORDS = {
@@ -54,6 +55,9 @@ ARGUMENTS = {
     "Cutters": ("gcode2krl.cutting.edge", "CUTTERS"),
     "Work": ("gcode2krl.cutting.edge", "WORK"),
     "Result": ("gcode2krl.cutting.reading", "RESULT"),
+    "ReadMotions": ("gcode2krl.krl.differences", "READ"),
+    "Wanted": ("gcode2krl.krl.differences", "WANTED"),
+    "Noted": ("gcode2krl.krl.differences", "NOTED"),
 }
 """Name of the struct -> module and `StructOf`."""
 _VIEWS = {

@@ -17,6 +17,11 @@ def locked(array: Array) -> Array:
     return view
 
 
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the different values (k,) of a column (n,), in order; quick where all are the same."""
+    return values[:1] if len(values) and (values == values[0]).all() else np.unique(values)
+
+
 def contiguous(values: ArrayLike) -> Floats:
     """Return the values contiguous; a copy only where they are not floats in this order."""
     return np.ascontiguousarray(values, dtype=np.float64)

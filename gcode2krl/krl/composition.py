@@ -11,6 +11,8 @@ from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
@@ -108,13 +110,13 @@ class _Composer:
         most = self.cell.program.max_lines
         count = len(self.targets)
         body: list[bytes] = []
-        subprograms: list[tuple[str, bytes]] = []
+        subprograms: list[tuple[str, list[bytes]]] = []
         if count <= most and self.layout.split == "defs":
-            body.append(self._motions(0, count))
+            body += self._motions(0, count)
         else:
             for start, end, whole in self._chunks(most):
                 if not whole:
-                    body.append(self._motions(start, end))
+                    body += self._motions(start, end)
                     continue
                 part = part_name(self.name, len(subprograms) + 1)
                 body.append(_text(f"{part}( )"))
@@ -149,8 +151,8 @@ class _Composer:
             start = end
         return chunks
 
-    def _motions(self, start: int, end: int) -> bytes:
-        """Motions of rows start..end with their waits and events."""
+    def _motions(self, start: int, end: int) -> list[bytes]:
+        """Return the pieces of text of rows start..end, with their waits and events."""
         ptp, wait = self.targets.ptp, self.targets.wait_s
         special = np.zeros(end - start, dtype=bool)
         special |= ptp[start:end] | (wait[start:end] > 0)
@@ -161,15 +163,15 @@ class _Composer:
         for row in [*(np.flatnonzero(special) + start), end]:
             stop = min(row + 1, end) if row < end and not ptp[row] else row
             if stop > at:
-                pieces.append(self._lines(at, stop))
+                pieces += self._lines(at, stop)
             if row < end:
                 pieces.append(self._around(row))
                 at = row + 1
             else:
                 at = end
-        return b"".join(pieces)
+        return pieces
 
-    def _lines(self, start: int, end: int) -> bytes:
+    def _lines(self, start: int, end: int) -> list[bytes]:
         rows = slice(start, end)
         return motion_lines(
             self.position[rows],
@@ -234,8 +236,8 @@ class _Composer:
         turn = turn_bits(self.joints.q_rad[row])
         return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
-    def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
-        tools = sorted({int(number) for number in np.unique(self.targets.tool)})
+    def _head(self, subprograms: list[tuple[str, list[bytes]]]) -> bytes:
+        tools = [int(number) for number in distinct(self.targets.tool)]
         checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
         declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
@@ -273,16 +275,16 @@ class _Composer:
     def _foot(self) -> bytes:
         return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)
 
-    def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
+    def _assemble(self, main: list[bytes], subprograms: list[tuple[str, list[bytes]]]) -> dict[str, bytes]:
         parts: dict[str, bytes] = {}
         needs = f" {w.PILOT_SUBPROGRAM}(".encode("ascii")
         called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
         for name, motions in subprograms:
-            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
-            text = [_text(f"{w.DEF} {name}( )\n{needed}"), motions, _text(w.END)]
+            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if _has(motions, b"GK_MSG") else ""
+            text = [_text(f"{w.DEF} {name}( )\n{needed}"), *motions, _text(w.END)]
             if self.layout.split == "files":
                 head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
-                own = called if needs in motions else []  # a local subprogram is known in its file only
+                own = called if _has(motions, needs) else []  # a local subprogram is known in its file only
                 parts[f"{name}{w.SOURCE_SUFFIX}"] = b"".join([head, *text, *own])
             else:
                 main += [NEWLINE, *text]
@@ -298,6 +300,11 @@ class _Composer:
         return files
 
 
+def _has(pieces: list[bytes], word: bytes) -> bool:
+    """Tell whether a word of a line stands in a text of whole lines."""
+    return any(word in piece for piece in pieces)
+
+
 def turn_bits(q_rad: Floats) -> int:
     """Return KUKA's T of joint angles (6,): a bit for each angle that prints as negative."""
     return sum(1 << k for k, angle in enumerate(q_rad) if np.rint(angle / _T_GRID_RAD) < 0)
@@ -305,15 +312,18 @@ def turn_bits(q_rad: Floats) -> int:
 
 def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
     """Return positions (p, 3) in mm and A, B, C (p, 3) in degrees in the controller's tool axes."""
-    rotation = targets.rotation
     abc_deg = np.empty((len(targets), 3))
-    for number in np.unique(targets.tool):
-        rows = targets.tool == number if (targets.tool != number).any() else slice(None)
-        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
-        chosen = rotation[rows]
-        first, run = fr.equal_runs(chosen)
-        turned = fr.rotation_from_quaternion(chosen[first]) @ turn
-        abc_deg[rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
+
+    def part(start: int, end: int) -> None:
+        tool, rotation = targets.tool[start:end], targets.rotation[start:end]
+        for number in distinct(tool):
+            rows = slice(None) if tool[0] == number and (tool == number).all() else tool == number
+            turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
+            first, run = fr.equal_runs(rotation[rows])
+            turned = fr.rotation_from_quaternion(rotation[rows][first]) @ turn
+            abc_deg[start:end][rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
+
+    in_chunks(part, chunk_borders(len(targets)))
     return targets.position_mm, abc_deg
 
 

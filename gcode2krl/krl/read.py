@@ -1,10 +1,11 @@
 """KRL in: reads the subset that is written, in the order in which the controller would execute it."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
-from gcode2krl.units import MM_PER_M
+from gcode2krl.krl.columns import motion_columns
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
@@ -57,14 +58,12 @@ class KrlProgram:
     """A KRL program as executed: a row per motion, and the statements in between."""
 
     name: str
-    position_mm: Floats
-    """(p, 3), NaN where a component is missing."""
-    abc_deg: Floats
-    """(p, 3)"""
-    status_turn: Floats
-    """(p, 2) S and T, NaN where absent."""
-    q_deg: Floats
-    """(p, 6) joint targets, NaN on Cartesian motions."""
+    pose: Floats
+    """(p, 8) X, Y, Z in mm, A, B, C in degrees, S and T, NaN where absent and in motions to joint targets."""
+    joint_rows: Ints
+    """(j,) motions to joint targets."""
+    joint_deg: Floats
+    """(j, 6) A1 to A6 of these motions, NaN where absent."""
     ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
@@ -84,6 +83,28 @@ class KrlProgram:
     def_line: int = 0
     """Line of the main DEF."""
     texts: Mapping[str, bytes] = field(default_factory=dict)
+
+    @property
+    def position_mm(self) -> Floats:
+        """The positions (p, 3)."""
+        return self.pose[:, 0:3]
+
+    @property
+    def abc_deg(self) -> Floats:
+        """The angles A, B, C (p, 3)."""
+        return self.pose[:, 3:6]
+
+    @property
+    def status_turn(self) -> Floats:
+        """S and T (p, 2)."""
+        return self.pose[:, 6:8]
+
+    @cached_property
+    def q_deg(self) -> Floats:
+        """The joint targets (p, 6), NaN in Cartesian motions."""
+        q_deg = np.full((len(self.ptp), 6), np.nan)
+        q_deg[self.joint_rows] = self.joint_deg
+        return q_deg
 
 
 def read_krl(path: str | Path) -> KrlProgram:
@@ -133,11 +154,46 @@ class _Block(NamedTuple):
     end: int
 
 
+class _Executed(NamedTuple):
+    """The statements (k) of runs, one behind the other; the numbers of motions and of the others apart."""
+
+    files: Ints32
+    """(r,) file of each run."""
+    starts: Ints
+    """(r,) its first statement in that file."""
+    begins: Ints
+    """(r + 1,) its first statement here, and how many there are."""
+    kind: NDArray[np.int8]
+    blend: NDArray[np.int8]
+    line: Ints32
+    others: Ints
+    """(k - m,) statements that are no motion."""
+    pose: Floats
+    """(m, 8)"""
+    value: Floats
+    """(k - m, 8)"""
+
+    def places(self, rows: Ints) -> tuple[Ints32, Ints]:
+        """Return the file of each of the statements (s,), and its number there."""
+        run = np.searchsorted(self.begins, rows, side="right") - 1
+        return self.files[run], self.starts[run] + rows - self.begins[run]
+
+    def motions_before(self, rows: Ints) -> Ints:
+        """Return how many motions there are before each of the statements (s,)."""
+        return rows - np.searchsorted(self.others, rows)
+
+    def file_of_motions(self) -> Ints32:
+        """Return the file (m,) of each motion."""
+        return np.repeat(self.files, np.diff(self.motions_before(self.begins)))
+
+
 class _Reader:
     def __init__(self, texts: Mapping[str, bytes], main: str) -> None:
         self.texts, self.main = texts, main
         self.names = tuple(texts)
         self.scanned = [sc.scan_krl(text) for text in texts.values()]
+        self.others = [np.flatnonzero(~_is_motion(scanned.kind)) for scanned in self.scanned]
+        self.line_starts: dict[int, Ints] = {}
         self.issues: list[Issue] = []
         self.blocks: dict[tuple[int, str], _Block] = {}
         self.executed: set[tuple[int, str]] = set()
@@ -152,61 +208,31 @@ class _Reader:
         if not self.blocks:
             raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
         main = next(iter(self.blocks))
-        runs = list(self._execute(main, 0))
-        if not runs:
-            runs = [_Block(0, 0, 0)]
-        kind = np.concatenate([self.scanned[f].kind[a:b] for f, a, b in runs])
-        line = np.concatenate([self.scanned[f].line[a:b] for f, a, b in runs])
-        value = np.concatenate([self.scanned[f].value[a:b] for f, a, b in runs])
-        blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
-        file_of = np.repeat(np.array([f for f, _, _ in runs], dtype=np.int32), [b - a for _, a, b in runs])
-        where = np.concatenate([np.arange(a, b) for _, a, b in runs])
-        axes = kind == w.KIND_PTP_AXES
-        motion = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | axes
-        for row in np.flatnonzero(blend == w.MALFORMED)[:MOST_PLACES]:
-            self._issue(
-                "krl-malformed",
-                int(line[row]),
-                f"cannot read {self._statement(int(file_of[row]), int(where[row]))!r}",
-                int(file_of[row]),
-            )
-        before = np.cumsum(motion)
-        statements = tuple(
-            Statement(
-                int(before[row]),
-                self._statement(int(file_of[row]), int(where[row])),
-                self.names[file_of[row]],
-                int(line[row]),
-            )
-            for row in np.flatnonzero((kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC))
-        )
-        rows = np.flatnonzero(motion)
-        speed = _in_force(np.flatnonzero(kind == w.KIND_VEL_CP), value[:, 0], rows) * MM_PER_M
-        cdis = _in_force(np.flatnonzero(kind == w.KIND_APO_CDIS), value[:, 0], rows)
-        cdis[blend[rows] != 1] = 0.0
-        ptp = kind[rows] != w.KIND_LIN
-        speed[ptp] = np.nan
-        joint_rows = np.flatnonzero(axes[rows])
-        pose = value.take(rows, axis=0)
-        q_deg = np.full((len(rows), 6), np.nan)
-        q_deg[joint_rows] = pose[joint_rows, :6]
+        executed = self._executed(list(self._execute(main, 0)))
+        kind, others, value = executed.kind, executed.others, executed.value
+        other_kind = kind[others]
+        self._malformed(executed)
+        first_number = np.ascontiguousarray(value[:, 0])
+        ptp, speed, cdis, line = motion_columns(kind, executed.blend, executed.line, first_number)
+        dwells = np.flatnonzero((other_kind == w.KIND_WAIT_SEC) & (executed.blend[others] == 1))
+        joint_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_PTP_AXES))
+        pose, joint_deg = executed.pose, executed.pose[joint_rows, :6]
         pose[joint_rows] = np.nan
         guard = w.NO_GUARD.encode("ascii") not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
             name=main[1],
-            position_mm=pose[:, 0:3],
-            abc_deg=pose[:, 3:6],
-            status_turn=pose[:, 6:8],
-            q_deg=q_deg,
+            pose=pose,
+            joint_rows=joint_rows,
+            joint_deg=joint_deg,
             ptp=ptp,
             speed_mm_s=speed,
             cdis_mm=cdis,
-            wait_s=_dwells((kind == w.KIND_WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
-            line=line[rows],
+            wait_s=_dwells(others[dwells] - dwells, first_number[dwells], len(ptp)),
+            line=line,
             file=self.names,
-            file_of=file_of[rows],
-            statements=statements,
-            triggers=self._triggers(kind, value, blend, before, line, file_of),
+            file_of=executed.file_of_motions(),
+            statements=self._statements(executed),
+            triggers=self._triggers(executed),
             uncalled={
                 f"{self.names[key[0]]}/{key[1]}": self._texts_of(block)
                 for key, block in self.blocks.items()
@@ -219,26 +245,64 @@ class _Reader:
             texts=self.texts,
         )
 
-    def _triggers(
-        self,
-        kind: NDArray[np.int8],
-        value: Floats,
-        blend: NDArray[np.int8],
-        before: Ints,
-        line: Ints32,
-        file_of: Ints32,
-    ) -> ReadTriggers:
-        rows = np.flatnonzero(kind == w.KIND_TRIGGER)
-        values = value[rows]
+    def _statements(self, executed: "_Executed") -> tuple[Statement, ...]:
+        """Return what is neither motion nor setting nor a trigger that is understood."""
+        kind = executed.kind[executed.others]
+        rows = executed.others[(kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC)]
+        motions, line = executed.motions_before(rows).tolist(), executed.line[rows].tolist()
+        places = zip(*(column.tolist() for column in executed.places(rows)), strict=True)
+        return tuple(
+            Statement(motion, self._statement(*place), self.names[place[0]], number)
+            for motion, place, number in zip(motions, places, line, strict=True)
+        )
+
+    def _triggers(self, executed: "_Executed") -> ReadTriggers:
+        own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
+        rows, values = executed.others[own], executed.value[own]
+        file_of = executed.places(rows)[0]
         return ReadTriggers(
-            motion=before[rows].astype(np.int64),
+            motion=rows - own,
             distance=values[:, w.TRIGGER_DISTANCE],
             delay_ms=values[:, w.TRIGGER_DELAY],
             written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
-            calls=blend[rows] == w.CALLS,
-            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of[rows]),
-            line=line[rows],
-            file_of=file_of[rows],
+            calls=executed.blend[rows] == w.CALLS,
+            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of),
+            line=executed.line[rows],
+            file_of=file_of,
+        )
+
+    def _malformed(self, executed: "_Executed") -> None:
+        rows = np.flatnonzero(executed.blend == w.MALFORMED)[:MOST_PLACES]
+        for line, file, row in zip(executed.line[rows], *executed.places(rows), strict=True):
+            text = f"cannot read {self._statement(int(file), int(row))!r}"
+            self._issue("krl-malformed", int(line), text, int(file))
+
+    def _executed(self, runs: list["_Block"]) -> "_Executed":
+        """Return the statements of runs; those of one run are views of what was scanned."""
+        runs = [run for run in runs if run.end > run.start] or [_Block(0, 0, 0)]
+        others = [
+            tuple(np.searchsorted(self.others[run.file], (run.start, run.end)).tolist()) for run in runs
+        ]
+
+        def joined(column: str, rows: Iterable[tuple[int, int]]) -> NDArray[Any]:
+            parts = [
+                getattr(self.scanned[run.file], column)[first:behind]
+                for run, (first, behind) in zip(runs, rows, strict=True)
+            ]
+            return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+        statements = [(run.start, run.end) for run in runs]
+        kind, blend, line = (joined(column, statements) for column in ("kind", "blend", "line"))
+        motions = [
+            (start - first, end - behind)
+            for (start, end), (first, behind) in zip(statements, others, strict=True)
+        ]
+        pose, value = joined("pose", motions), joined("value", others)
+        files = np.array([run.file for run in runs], dtype=np.int32)
+        starts = np.array([run.start for run in runs])
+        begins = np.cumsum([0, *(run.end - run.start for run in runs)])
+        return _Executed(
+            files, starts, begins, kind, blend, line, np.flatnonzero(~_is_motion(kind)), pose, value
         )
 
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
@@ -258,9 +322,23 @@ class _Reader:
         return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
     def _statement(self, file: int, row: int) -> str:
-        a, b = self.scanned[file].span[row]
-        text = self.texts[self.names[file]][a:b].decode("ascii", "replace")
-        return _COMMENT.sub(r"\1", text).strip()
+        """Return the text of a statement, without its comment."""
+        scanned, others = self.scanned[file], self.others[file]
+        k = int(np.searchsorted(others, row))
+        if k < len(others) and others[k] == row:
+            start, end = scanned.span[k]
+        else:  # a motion, whose text is asked for where it cannot be read
+            start, end = self._lines(file)[scanned.line[row] - 1 : scanned.line[row] + 1]
+        text = self.texts[self.names[file]][start:end].decode("ascii", "replace")
+        return _COMMENT.sub(r"\1", text.strip()).strip()
+
+    def _lines(self, file: int) -> Ints:
+        """Return where each line of a file begins, and the end; found once it is asked for."""
+        if file not in self.line_starts:
+            text = self.texts[self.names[file]]
+            newline = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n"))
+            self.line_starts[file] = np.concatenate([[0], newline + 1, [len(text)]])
+        return self.line_starts[file]
 
     def _issue(self, code: str, line: int, message: str, file: int = 0, remedy: str = "") -> None:
         name = self.names[file]
@@ -354,16 +432,14 @@ class _Reader:
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
 
 
-def _in_force(settings: Ints, values: Floats, rows: Ints) -> Floats:
-    """Return what is in force at rising rows: the value of the last setting before, NaN before the first."""
-    valid = settings[~np.isnan(values[settings])]
-    borders = [0, *np.searchsorted(rows, valid), len(rows)]
-    return np.repeat(np.concatenate([[np.nan], values[valid]]), np.diff(borders))
+def _is_motion(kind: NDArray[np.int8]) -> Bools:
+    result: Bools = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | (kind == w.KIND_PTP_AXES)
+    return result
 
 
-def _dwells(marked: Bools, seconds: Floats, motions_before: Ints, count: int) -> Floats:
-    """Return the dwell (p,) behind each motion: the waits that are marked as such."""
+def _dwells(motions_before: Ints, seconds: Floats, count: int) -> Floats:
+    """Return the dwell (p,) behind each motion, from marked waits and the motions before each."""
     dwell = np.zeros(count)
-    rows = np.flatnonzero(marked & (motions_before > 0))
-    np.add.at(dwell, motions_before[rows] - 1, np.nan_to_num(seconds[rows]))
+    behind_motions = motions_before > 0
+    np.add.at(dwell, motions_before[behind_motions] - 1, np.nan_to_num(seconds[behind_motions]))
     return dwell

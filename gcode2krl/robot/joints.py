@@ -13,6 +13,7 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
@@ -202,7 +203,7 @@ def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool 
         rows = slice(start, end)
         margin[rows] = limit_margin(q[rows], cell)
         status[rows], turn[rows] = status_turn(q[rows], geometry, _ANGLE_GRID_RAD)
-        for number in np.unique(tool[rows]) if conditioning else ():
+        for number in distinct(tool[rows]) if conditioning else ():
             with_tool = start + np.flatnonzero(tool[rows] == number)
             tip = cell.tool_matrix(int(number))[:3, 3]
             sigma[with_tool] = smallest_singular_value(q[with_tool], geometry, tip)
