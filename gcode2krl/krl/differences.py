@@ -21,7 +21,7 @@ from gcode2krl.compiled.core import (
     StructOf,
     core_function,
 )
-from gcode2krl.compiled.inputs import contiguous
+from gcode2krl.compiled.inputs import contiguous, distinct
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.composition import turn_bits
 from gcode2krl.krl.read import KrlProgram
@@ -173,7 +173,7 @@ def differences_of(
 def _angles_deg(read: _Read, wanted: _Wanted, rows: Ints, cell: Cell) -> Floats:
     """Return the angles (r,) in deg between read and intended rotations; NaN where A, B or C is missing."""
     abc_deg, angle_deg = read.pose[rows, 3:6], np.empty(len(rows))
-    for number in np.unique(wanted.tool[rows]):
+    for number in distinct(wanted.tool[rows]):
         own = np.flatnonzero(wanted.tool[rows] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
         found = fr.rotation_from_abc(np.nan_to_num(abc_deg[own]) * RAD_PER_DEG) @ turn

@@ -82,7 +82,8 @@ def count_samples(targets: Targets, cell: Cell) -> Ints:
     def steps(start: int, end: int) -> Ints:
         return _motions(targets, cell, slice(start, end)).steps
 
-    return np.cumsum(np.concatenate(in_chunks(steps, chunk_borders(len(targets)))))
+    counts = np.concatenate(in_chunks(steps, chunk_borders(len(targets))))
+    return np.cumsum(counts, out=counts)
 
 
 def sample_lines(targets: Targets, cell: Cell, start: int, end: int) -> Line:
