@@ -1,7 +1,7 @@
 """KRL in: reads the subset that is written, in the order in which the controller would execute it."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -278,16 +278,17 @@ class _Reader:
             self._issue("krl-malformed", int(line), text, int(file))
 
     def _executed(self, runs: list["_Block"]) -> "_Executed":
-        """Return the statements of runs; those of one run are views of what was scanned."""
+        """Return the statements of runs; rows that stand together in a file are views of what was scanned."""
         runs = [run for run in runs if run.end > run.start] or [_Block(0, 0, 0)]
         others = [
             tuple(np.searchsorted(self.others[run.file], (run.start, run.end)).tolist()) for run in runs
         ]
 
-        def joined(column: str, rows: Iterable[tuple[int, int]]) -> NDArray[Any]:
+        def joined(column: str, rows: Sequence[tuple[int, int]]) -> NDArray[Any]:
+            files = [run.file for run in runs]
             parts = [
-                getattr(self.scanned[run.file], column)[first:behind]
-                for run, (first, behind) in zip(runs, rows, strict=True)
+                getattr(self.scanned[file], column)[first:behind]
+                for file, first, behind in _merged(files, rows)
             ]
             return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -330,7 +331,7 @@ class _Reader:
         else:  # a motion, whose text is asked for where it cannot be read
             start, end = self._lines(file)[scanned.line[row] - 1 : scanned.line[row] + 1]
         text = self.texts[self.names[file]][start:end].decode("ascii", "replace")
-        return _COMMENT.sub(r"\1", text.strip()).strip()
+        return (_COMMENT.sub(r"\1", text) if ";" in text else text).strip()
 
     def _lines(self, file: int) -> Ints:
         """Return where each line of a file begins, and the end; found once it is asked for."""
@@ -430,6 +431,17 @@ class _Reader:
             close = w.BLOCKS[begin]
             if first.count(begin) != first.count(close):
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
+
+
+def _merged(files: Sequence[int], rows: Sequence[tuple[int, int]]) -> list[tuple[int, int, int]]:
+    """Return (file, first, behind) of rows of files, as few as can be."""
+    merged: list[tuple[int, int, int]] = []
+    for file, (first, behind) in zip(files, rows, strict=True):
+        if merged and merged[-1][0] == file and merged[-1][2] == first:
+            merged[-1] = file, merged[-1][1], behind
+        else:
+            merged.append((file, first, behind))
+    return merged
 
 
 def _is_motion(kind: NDArray[np.int8]) -> Bools:
