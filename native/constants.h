@@ -554,6 +554,7 @@ typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 3
 typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
 typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+VIEW(StateView, State);
 
 typedef struct {
     int64_t rows;
@@ -576,6 +577,7 @@ typedef char Counts_mute_stands_at_48[offsetof(Counts, mute) == 48 ? 1 : -1];
 typedef char Counts_rows_wanted_stands_at_56[offsetof(Counts, rows_wanted) == 56 ? 1 : -1];
 typedef char Counts_events_wanted_stands_at_64[offsetof(Counts, events_wanted) == 64 ? 1 : -1];
 typedef char Counts_has_its_size[sizeof(Counts) == 72 ? 1 : -1];
+VIEW(CountsView, Counts);
 
 typedef struct {
     int64_t row;
@@ -592,6 +594,7 @@ typedef char Event_a_stands_at_16[offsetof(Event, a) == 16 ? 1 : -1];
 typedef char Event_b_stands_at_24[offsetof(Event, b) == 24 ? 1 : -1];
 typedef char Event_dwell_stands_at_32[offsetof(Event, dwell) == 32 ? 1 : -1];
 typedef char Event_has_its_size[sizeof(Event) == 40 ? 1 : -1];
+VIEW(EventView, Event);
 
 typedef struct {
     int32_t number;
@@ -606,6 +609,56 @@ typedef char Found_a_stands_at_8[offsetof(Found, a) == 8 ? 1 : -1];
 typedef char Found_b_stands_at_16[offsetof(Found, b) == 16 ? 1 : -1];
 typedef char Found_c_stands_at_24[offsetof(Found, c) == 24 ? 1 : -1];
 typedef char Found_has_its_size[sizeof(Found) == 32 ? 1 : -1];
+VIEW(FoundView, Found);
+
+typedef struct {
+    Bytes text;
+    Bytes letter;
+    Floats value;
+    Ints32 line;
+    Floats extra;
+    Ints message_span;
+    int64_t first_line;
+    int64_t words;
+    int64_t marks;
+    int64_t messages;
+    int64_t most_decimals;
+} Scan;
+
+typedef struct {
+    Floats position_mm;
+    Bools rapid;
+    Floats feed_mm_s;
+    Floats spindle_rad_s;
+    Ints32 tool;
+    Bools exact_stop;
+    Floats tolerance_mm;
+    Floats dwell_s;
+    Ints32 source_line;
+    Ints32 arc;
+    Bools machine;
+    Bools known;
+    Floats length_offset_mm;
+    Ints32 length_offset_tool;
+} Rows;
+
+typedef struct {
+    StateView state;
+    CountsView counts;
+    Rows rows;
+    EventView events;
+    FoundView found;
+    Floats offsets_mm;
+    Bools offset_known;
+    Floats tool_length_mm;
+    Ints32 group_of_g;
+    Ints32 doubt_of_g;
+    Ints32 doubt_of_group;
+    Ints32 doubt_of_letter;
+    double chord_tolerance_mm;
+    int64_t block_delete;
+    int64_t lengths_from_table;
+} Machine;
 
 typedef struct {
     double bottom_mm;

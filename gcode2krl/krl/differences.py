@@ -11,17 +11,14 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import (
-    BOOLS,
     FLOATS,
     INT,
     INTS,
-    INTS32,
-    OUT_FLOATS,
     OUT_INTS,
     StructOf,
     core_function,
 )
-from gcode2krl.compiled.inputs import contiguous, distinct
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.composition import turn_bits
 from gcode2krl.krl.read import KrlProgram
@@ -53,22 +50,6 @@ _CHECKS = (
     ("verify-status", "S or T differs from the predicted branch"),
 )
 """Code and sentence of each check."""
-
-_MOTIONS = {"ptp": BOOLS, "speed_mm_s": FLOATS, "cdis_mm": FLOATS, "wait_s": FLOATS}
-READ = StructOf(pose=FLOATS, **_MOTIONS)
-WANTED = StructOf(position_mm=FLOATS, rotation=FLOATS, home=BOOLS, tool=INTS32, **_MOTIONS)
-NOTED = StructOf(
-    largest=OUT_FLOATS,
-    taken=OUT_INTS,
-    row=OUT_INTS,
-    size=OUT_FLOATS,
-    worst_count=OUT_INTS,
-    worst=OUT_INTS,
-    worst_size=OUT_FLOATS,
-    worst_key=OUT_FLOATS,
-)
-_rotation_runs = core_function("krl_rotation_runs", READ, WANTED, INT, INT, OUT_INTS, returns=INT)
-_compare = core_function("krl_compare", READ, WANTED, INT, INT, INTS, FLOATS, NOTED)
 
 
 @dataclass(frozen=True)
@@ -144,18 +125,26 @@ class _Noted(NamedTuple):
         return _Rows(self.worst[taken], self.worst_size[taken])
 
 
+READ, WANTED = StructOf.record(_Read), StructOf.record(_Wanted)
+NOTED = StructOf.record(_Noted, written=_Noted._fields)
+_rotation_runs = core_function("krl_rotation_runs", READ, WANTED, INT, INT, OUT_INTS, returns=INT)
+_compare = core_function("krl_compare", READ, WANTED, INT, INT, INTS, FLOATS, NOTED)
+
+
 def differences_of(
     program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int
 ) -> Differences:
     """Compare the first ``count`` motions of a program as read with their targets."""
     read = _Read(*(np.ascontiguousarray(getattr(program, name)) for name in _Read._fields))
     wanted = _Wanted(*(np.ascontiguousarray(getattr(targets, name)) for name in _Wanted._fields))
+    of_read, of_wanted = READ(**read._asdict()), WANTED(**wanted._asdict())
 
     def compared(start: int, end: int) -> _Noted:
         noted = _Noted.nothing()
         begins = np.empty(end - start, dtype=np.int64)
-        begins = begins[: _rotation_runs(read, wanted, start, end, begins)]
-        _compare(read, wanted, start, end, begins, contiguous(_angles_deg(read, wanted, begins, cell)), noted)
+        begins = begins[: _rotation_runs(of_read, of_wanted, start, end, begins)]
+        angle_deg = _angles_deg(read, wanted, begins, cell)
+        _compare(of_read, of_wanted, start, end, begins, angle_deg, noted)
         return noted
 
     parts = in_chunks(compared, chunk_borders(count)) if count else []

@@ -4,15 +4,6 @@
 #include "core.h"
 
 /* The text, the columns of its words, and how many there are; as in gcode2krl/gcode/words.py. */
-typedef struct {
-    Bytes text, letter;
-    Floats value;
-    Ints32 line;
-    Floats extra; /* what was found at the first marks */
-    Ints message_span;
-    int64_t first_line, words, marks, messages, most_decimals;
-} Scan;
-
 /* Kinds of an item that makes no word: a comment; a line or program number. Other kinds are letters. */
 enum { NOTHING = -1, LINE_NUMBER = 0 };
 /* Instead of a lost letter: the one of the word before in the line has lost its value. */
