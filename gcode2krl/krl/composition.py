@@ -101,7 +101,6 @@ class _Composer:
         self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
         self.source = st.ascii_text(_file_name(targets.source), 40)
         self.position, self.abc_deg = written_poses(targets, cell)
-        self.speed_m_s = targets.speed_mm_s / MM_PER_M
         self.state = np.array(_NOTHING_IN_FORCE)
         self.events: dict[int, list[tuple[float, str]]] = {}
         for event in targets.events:
@@ -125,14 +124,14 @@ class _Composer:
         most = self.cell.program.max_lines
         count = len(self.targets)
         if count <= most and self.layout.split == "defs":
-            return self._assemble([self._head([]), *self._motions(0, count, self.state), self._foot()], [])
+            return self._assemble([self._head([]), *self._motions(0, count, self.state)[0], self._foot()], [])
         chunks = self._chunks(most)
         texts = iter(in_threads(self._part, [(start, end) for start, end, whole in chunks if whole]))
         body: list[bytes] = []
         subprograms: list[_Part] = []
         for start, end, whole in chunks:
             if not whole:
-                body += self._motions(start, end, self.state)
+                body += self._motions(start, end, self.state)[0]
                 continue
             name = part_name(self.name, len(subprograms) + 1)
             body.append(_text(f"{name}( )"))
@@ -142,9 +141,12 @@ class _Composer:
 
     def _part(self, rows: tuple[int, int]) -> tuple[list[bytes], bool, bool]:
         """Return the motions of a part, which states its speed and CDIS, and what they need of it."""
-        pieces = self._motions(*rows, np.array(_NOTHING_IN_FORCE))
-        has_message, has_pilot = (any(word in piece for piece in pieces) for word in (_MESSAGE, _PILOT_CALL))
-        return pieces, has_message, has_pilot
+        pieces, has_message = self._motions(*rows, np.array(_NOTHING_IN_FORCE))
+        return pieces, has_message, self._calls_pilot(pieces)
+
+    def _calls_pilot(self, pieces: list[bytes]) -> bool:
+        has_subprogram = self.pilot is not None and bool(self.pilot.subprogram)
+        return has_subprogram and any(_PILOT_CALL in piece for piece in pieces)
 
     def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
         """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program.
@@ -172,32 +174,34 @@ class _Composer:
             start = end
         return chunks
 
-    def _motions(self, start: int, end: int, state: Floats) -> list[bytes]:
-        """Return the pieces of text of rows start..end, with their waits and events; ``state`` is updated."""
+    def _motions(self, start: int, end: int, state: Floats) -> tuple[list[bytes], bool]:
+        """Return the pieces of text of rows start..end, with their waits and events, and whether these have a
+        message; ``state`` is updated."""
         ptp, wait = self.targets.ptp, self.targets.wait_s
         special = np.zeros(end - start, dtype=bool)
         special |= ptp[start:end] | (wait[start:end] > 0)
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         special[[row - start for row in rows if start <= row < end]] = True
         pieces: list[bytes] = []
-        at = start
+        at, has_message = start, False
         for row in [*(np.flatnonzero(special) + start), end]:
             stop = min(row + 1, end) if row < end and not ptp[row] else row
             if stop > at:
                 pieces += self._lines(at, stop, state)
             if row < end:
                 pieces.append(self._around(row))
+                has_message |= _MESSAGE in pieces[-1]
                 at = row + 1
             else:
                 at = end
-        return pieces
+        return pieces, has_message
 
     def _lines(self, start: int, end: int, state: Floats) -> list[bytes]:
         rows = slice(start, end)
         return motion_lines(
             self.position[rows],
             self.abc_deg[rows],
-            self.speed_m_s[rows],
+            self.targets.speed_mm_s[rows] / MM_PER_M,
             self.targets.cdis_mm[rows],
             self.targets.source_line[rows],
             state,
