@@ -18,8 +18,15 @@ def locked(array: Array) -> Array:
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the different values (k,) of a column (n,), in order; quick where all are the same."""
-    return values[:1] if len(values) and (values == values[0]).all() else np.unique(values)
+    """Return the different values (k,) of a column (n,), in order; quick where all are the same.
+
+    Numbers without NaN. Unlike numpy's it does not load `numpy.ma`, which takes longer than most columns.
+    """
+    if not len(values) or (values == values[0]).all():
+        return values[:1]
+    ordered = np.sort(values)
+    result: NDArray[Any] = ordered[np.append(True, ordered[1:] != ordered[:-1])]
+    return result
 
 
 def contiguous(values: ArrayLike) -> Floats:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
@@ -309,10 +310,10 @@ class _Reader:
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
         found: set[str] = set()
-        for file in np.unique(file_of).tolist():
+        for file in distinct(file_of).tolist():
             data = np.frombuffer(self.texts[self.names[file]], dtype=np.uint8)
             own = place[file_of == file]
-            for size in np.unique(own[:, 1]).tolist():
+            for size in distinct(own[:, 1]).tolist():
                 first = own[own[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
                 found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
