@@ -1,14 +1,13 @@
 """KRL in: reads the subset that is written, in the order in which the controller would execute it."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
@@ -16,6 +15,7 @@ from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
+from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
@@ -149,54 +149,15 @@ def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
     return _Reader({name: texts[name] for name in sources}, main).read()
 
 
-class _Block(NamedTuple):
-    file: int
-    start: int
-    end: int
-
-
-class _Executed(NamedTuple):
-    """The statements (k) of runs, one behind the other; the numbers of motions and of the others apart."""
-
-    files: Ints32
-    """(r,) file of each run."""
-    starts: Ints
-    """(r,) its first statement in that file."""
-    begins: Ints
-    """(r + 1,) its first statement here, and how many there are."""
-    kind: NDArray[np.int8]
-    blend: NDArray[np.int8]
-    line: Ints32
-    others: Ints
-    """(k - m,) statements that are no motion."""
-    pose: Floats
-    """(m, 8)"""
-    value: Floats
-    """(k - m, 8)"""
-
-    def places(self, rows: Ints) -> tuple[Ints32, Ints]:
-        """Return the file of each of the statements (s,), and its number there."""
-        run = np.searchsorted(self.begins, rows, side="right") - 1
-        return self.files[run], self.starts[run] + rows - self.begins[run]
-
-    def motions_before(self, rows: Ints) -> Ints:
-        """Return how many motions there are before each of the statements (s,)."""
-        return rows - np.searchsorted(self.others, rows)
-
-    def file_of_motions(self) -> Ints32:
-        """Return the file (m,) of each motion."""
-        return np.repeat(self.files, np.diff(self.motions_before(self.begins)))
-
-
 class _Reader:
     def __init__(self, texts: Mapping[str, bytes], main: str) -> None:
         self.texts, self.main = texts, main
         self.names = tuple(texts)
         self.scanned = [sc.scan_krl(text) for text in texts.values()]
-        self.others = [np.flatnonzero(~_is_motion(scanned.kind)) for scanned in self.scanned]
+        self.others = [np.flatnonzero(~is_motion(scanned.kind)) for scanned in self.scanned]
         self.line_starts: dict[int, Ints] = {}
         self.issues: list[Issue] = []
-        self.blocks: dict[tuple[int, str], _Block] = {}
+        self.blocks: dict[tuple[int, str], Block] = {}
         self.executed: set[tuple[int, str]] = set()
         self.declarations: list[Statement] = []
         self.def_lines: dict[str, int] = {}
@@ -209,7 +170,7 @@ class _Reader:
         if not self.blocks:
             raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
         main = next(iter(self.blocks))
-        executed = self._executed(list(self._execute(main, 0)))
+        executed = executed_in(list(self._execute(main, 0)), self.scanned, self.others)
         kind, others, value = executed.kind, executed.others, executed.value
         other_kind = kind[others]
         self._malformed(executed)
@@ -246,7 +207,7 @@ class _Reader:
             texts=self.texts,
         )
 
-    def _statements(self, executed: "_Executed") -> tuple[Statement, ...]:
+    def _statements(self, executed: Executed) -> tuple[Statement, ...]:
         """Return what is neither motion nor setting nor a trigger that is understood."""
         kind = executed.kind[executed.others]
         rows = executed.others[(kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC)]
@@ -257,7 +218,7 @@ class _Reader:
             for motion, place, number in zip(motions, places, line, strict=True)
         )
 
-    def _triggers(self, executed: "_Executed") -> ReadTriggers:
+    def _triggers(self, executed: Executed) -> ReadTriggers:
         own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
         rows, values = executed.others[own], executed.value[own]
         file_of = executed.places(rows)[0]
@@ -272,40 +233,11 @@ class _Reader:
             file_of=file_of,
         )
 
-    def _malformed(self, executed: "_Executed") -> None:
+    def _malformed(self, executed: Executed) -> None:
         rows = np.flatnonzero(executed.blend == w.MALFORMED)[:MOST_PLACES]
         for line, file, row in zip(executed.line[rows], *executed.places(rows), strict=True):
             text = f"cannot read {self._statement(int(file), int(row))!r}"
             self._issue("krl-malformed", int(line), text, int(file))
-
-    def _executed(self, runs: list["_Block"]) -> "_Executed":
-        """Return the statements of runs; rows that stand together in a file are views of what was scanned."""
-        runs = [run for run in runs if run.end > run.start] or [_Block(0, 0, 0)]
-        others = [
-            tuple(np.searchsorted(self.others[run.file], (run.start, run.end)).tolist()) for run in runs
-        ]
-
-        def joined(column: str, rows: Sequence[tuple[int, int]]) -> NDArray[Any]:
-            files = [run.file for run in runs]
-            parts = [
-                getattr(self.scanned[file], column)[first:behind]
-                for file, first, behind in _merged(files, rows)
-            ]
-            return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-        statements = [(run.start, run.end) for run in runs]
-        kind, blend, line = (joined(column, statements) for column in ("kind", "blend", "line"))
-        motions = [
-            (start - first, end - behind)
-            for (start, end), (first, behind) in zip(statements, others, strict=True)
-        ]
-        pose, value = joined("pose", motions), joined("value", others)
-        files = np.array([run.file for run in runs], dtype=np.int32)
-        starts = np.array([run.start for run in runs])
-        begins = np.cumsum([0, *(run.end - run.start for run in runs)])
-        return _Executed(
-            files, starts, begins, kind, blend, line, np.flatnonzero(~_is_motion(kind)), pose, value
-        )
 
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
@@ -319,7 +251,7 @@ class _Reader:
                 found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
         return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
 
-    def _texts_of(self, block: "_Block") -> tuple[str, ...]:
+    def _texts_of(self, block: Block) -> tuple[str, ...]:
         rows = range(block.start, block.end)
         return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
@@ -365,11 +297,11 @@ class _Reader:
                     continue
                 if (file, name) in self.blocks:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
-                self.blocks.setdefault((file, name), _Block(file, start, int(row)))
+                self.blocks.setdefault((file, name), Block(file, start, int(row)))
                 name = ""
         if name:
             self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
-            self.blocks.setdefault((file, name), _Block(file, start, len(scanned.kind)))
+            self.blocks.setdefault((file, name), Block(file, start, len(scanned.kind)))
 
     def _called(self, file: int, name: str) -> tuple[int, str] | None:
         """Return the subprogram that a file means by a name: its own, else the one a file is named after."""
@@ -379,7 +311,7 @@ class _Reader:
         others = (k for k, other in enumerate(self.names) if Path(other).stem.upper() == name)
         return next(((k, name) for k in others if (k, name) in self.blocks), None)
 
-    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[_Block]:
+    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[Block]:
         """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
         self.executed.add(block)
         file, start, end = self.blocks[block]
@@ -395,16 +327,16 @@ class _Reader:
                     self._issue(
                         "krl-structure", int(scanned.line[row]), f"{text[:40]!r} behind statements", file
                     )
-                yield _Block(file, at, int(row))
+                yield Block(file, at, int(row))
                 at = int(row) + 1
             elif call and (called := self._called(file, call.group(1))):
-                yield _Block(file, at, int(row))
+                yield Block(file, at, int(row))
                 at = int(row) + 1
                 if depth > 20:
                     self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
                     return
                 yield from self._execute(called, depth + 1)
-        yield _Block(file, at, end)
+        yield Block(file, at, end)
 
     def _last_declaration(self, file: int, start: int, end: int) -> int:
         """Return the last row of the run of declarations with which a block begins."""
@@ -432,22 +364,6 @@ class _Reader:
             close = w.BLOCKS[begin]
             if first.count(begin) != first.count(close):
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
-
-
-def _merged(files: Sequence[int], rows: Sequence[tuple[int, int]]) -> list[tuple[int, int, int]]:
-    """Return (file, first, behind) of rows of files, as few as can be."""
-    merged: list[tuple[int, int, int]] = []
-    for file, (first, behind) in zip(files, rows, strict=True):
-        if merged and merged[-1][0] == file and merged[-1][2] == first:
-            merged[-1] = file, merged[-1][1], behind
-        else:
-            merged.append((file, first, behind))
-    return merged
-
-
-def _is_motion(kind: NDArray[np.int8]) -> Bools:
-    result: Bools = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | (kind == w.KIND_PTP_AXES)
-    return result
 
 
 def _dwells(motions_before: Ints, seconds: Floats, count: int) -> Floats:
