@@ -93,6 +93,7 @@ def prepare(place: Path) -> Try:
 
 def _scanned(rng: np.random.Generator, text: bytes) -> None:
     """Scan a text as a whole, in short chunks, and some of its lines alone."""
+    from gcode2krl import krl_words
     from gcode2krl.krl.scan import scan_krl
 
     whole = scan_krl(text)
@@ -100,17 +101,22 @@ def _scanned(rng: np.random.Generator, text: bytes) -> None:
         assert np.array_equal(one, other, equal_nan=np.ndim(other) == 2), "chunks differ"
     lines = text.split(b"\n")
     assert (np.diff(whole.line) > 0).all(), "lines out of order"
+    motions = (krl_words.KIND_LIN, krl_words.KIND_PTP, krl_words.KIND_PTP_AXES)
+    is_motion = np.isin(whole.kind, motions)
+    place = np.where(is_motion, np.cumsum(is_motion), np.cumsum(~is_motion)) - 1
     for row in rng.permutation(len(whole.line))[:20]:
-        first, last = whole.span[row]
-        statement = text[first:last]
-        assert statement == lines[whole.line[row] - 1].strip(b" \t").rstrip(b" \t\r"), "another line"
+        statement, k = lines[whole.line[row] - 1].strip(b" \t").rstrip(b" \t\r"), place[row]
         alone = scan_krl(statement)
+        assert (alone.kind[0], alone.blend[0]) == (whole.kind[row], whole.blend[row]), "another statement"
+        if is_motion[row]:
+            assert np.array_equal(alone.pose[0], whole.pose[k], equal_nan=True), "other components"
+            continue
+        first, last = whole.span[k]
+        assert statement == text[first:last], "another line"
         value = alone.value[0].copy()
-        if alone.kind[0] == whole.kind[row] and np.isfinite(value[6]) and statement[:1] in b"Tt":
+        if np.isfinite(value[6]) and statement[:1] in b"Tt":
             value[6] += first  # the place of the name in the whole text
-        assert alone.kind[0] == whole.kind[row], "another kind"
-        assert alone.blend[0] == whole.blend[row], "another blending"
-        assert np.array_equal(value, whole.value[row], equal_nan=True), "other numbers"
+        assert np.array_equal(value, whole.value[k], equal_nan=True), "other numbers"
 
 
 def damaged(rng: np.random.Generator, good: bytes) -> tuple[str, bytes]:

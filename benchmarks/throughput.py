@@ -91,7 +91,9 @@ def run(command: Sequence[str], folder: Path) -> Run:
     """Run a process to its end, with its wall time and its own peak memory."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         start = time.perf_counter()
-        process = subprocess.Popen(command, cwd=folder, stdout=out, stderr=err, stdin=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            command, cwd=folder, env=environment(folder), stdout=out, stderr=err, stdin=subprocess.DEVNULL
+        )
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
@@ -100,6 +102,14 @@ def run(command: Sequence[str], folder: Path) -> Run:
         said = err.read().decode("utf-8", "replace").strip().splitlines()
         problem = f"exit code {process.returncode}: {said[-1] if said else ''}" if process.returncode else ""
         return Run(seconds, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem)
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """Return the environment of a process: Python keeps its bytecode, as it does unless it is told not to."""
+    named = dict(os.environ)
+    if named.pop("PYTHONDONTWRITEBYTECODE", ""):
+        named["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
+    return named
 
 
 @dataclass

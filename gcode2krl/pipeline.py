@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
@@ -319,8 +320,9 @@ def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
         return robot.ptp_joints(targets, cell)
     _, rows, q_rad, status, turn = known
     count = len(targets)
-    nothing = np.full((count, 6), np.nan)
-    q, bits = nothing.copy(), np.zeros((2, count), dtype=np.int32)
+    nothing = np.broadcast_to(np.nan, (count, 6))
+    q, bits = np.empty((count, 6)), np.zeros((2, count), dtype=np.int32)
+    in_chunks(lambda start, end: q[start:end].fill(np.nan), chunk_borders(count))
     q[rows], bits[:, rows] = q_rad, (status, turn)
     return Joints(
         q_rad=q,

@@ -428,6 +428,29 @@
 #define PILOT_GATE_UNPROVEN 8
 #define PILOT_GATE_STANDS 9
 
+/* gcode2krl.krl.differences */
+#define DIFF_MOST_PLACES 1000
+#define DIFF_DEG_PER_RAD 57.29577951308232
+#define DIFF_RAD_PER_DEG 0.017453292519943295
+#define DIFF_S_PER_MIN 60.0
+#define DIFF_POSITION_LIMIT_MM 0.002
+#define DIFF_ROTATION_LIMIT_DEG 0.001
+#define DIFF_SPEED_LIMIT_MM_S 0.0016666666666666668
+#define DIFF_JOINT_LIMIT_DEG 0.001
+#define DIFF_CDIS_LIMIT_MM 0.0006
+#define DIFF_WAIT_LIMIT_S 0.0006
+#define DIFF_REMEDY "translate again"
+#define DIFF_OTHER_KIND 0
+#define DIFF_POSITION 1
+#define DIFF_NO_POSITION 2
+#define DIFF_ROTATION 3
+#define DIFF_NO_ROTATION 4
+#define DIFF_SPEED 5
+#define DIFF_NO_SPEED 6
+#define DIFF_CDIS 7
+#define DIFF_WAIT 8
+#define DIFF_OTHER_BRANCH 9
+
 typedef struct {
     double x;
     double y;
@@ -531,6 +554,7 @@ typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 3
 typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
 typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+VIEW(StateView, State);
 
 typedef struct {
     int64_t rows;
@@ -553,6 +577,7 @@ typedef char Counts_mute_stands_at_48[offsetof(Counts, mute) == 48 ? 1 : -1];
 typedef char Counts_rows_wanted_stands_at_56[offsetof(Counts, rows_wanted) == 56 ? 1 : -1];
 typedef char Counts_events_wanted_stands_at_64[offsetof(Counts, events_wanted) == 64 ? 1 : -1];
 typedef char Counts_has_its_size[sizeof(Counts) == 72 ? 1 : -1];
+VIEW(CountsView, Counts);
 
 typedef struct {
     int64_t row;
@@ -569,6 +594,7 @@ typedef char Event_a_stands_at_16[offsetof(Event, a) == 16 ? 1 : -1];
 typedef char Event_b_stands_at_24[offsetof(Event, b) == 24 ? 1 : -1];
 typedef char Event_dwell_stands_at_32[offsetof(Event, dwell) == 32 ? 1 : -1];
 typedef char Event_has_its_size[sizeof(Event) == 40 ? 1 : -1];
+VIEW(EventView, Event);
 
 typedef struct {
     int32_t number;
@@ -583,6 +609,56 @@ typedef char Found_a_stands_at_8[offsetof(Found, a) == 8 ? 1 : -1];
 typedef char Found_b_stands_at_16[offsetof(Found, b) == 16 ? 1 : -1];
 typedef char Found_c_stands_at_24[offsetof(Found, c) == 24 ? 1 : -1];
 typedef char Found_has_its_size[sizeof(Found) == 32 ? 1 : -1];
+VIEW(FoundView, Found);
+
+typedef struct {
+    Bytes text;
+    Bytes letter;
+    Floats value;
+    Ints32 line;
+    Floats extra;
+    Ints message_span;
+    int64_t first_line;
+    int64_t words;
+    int64_t marks;
+    int64_t messages;
+    int64_t most_decimals;
+} Scan;
+
+typedef struct {
+    Floats position_mm;
+    Bools rapid;
+    Floats feed_mm_s;
+    Floats spindle_rad_s;
+    Ints32 tool;
+    Bools exact_stop;
+    Floats tolerance_mm;
+    Floats dwell_s;
+    Ints32 source_line;
+    Ints32 arc;
+    Bools machine;
+    Bools known;
+    Floats length_offset_mm;
+    Ints32 length_offset_tool;
+} Rows;
+
+typedef struct {
+    StateView state;
+    CountsView counts;
+    Rows rows;
+    EventView events;
+    FoundView found;
+    Floats offsets_mm;
+    Bools offset_known;
+    Floats tool_length_mm;
+    Ints32 group_of_g;
+    Ints32 doubt_of_g;
+    Ints32 doubt_of_group;
+    Ints32 doubt_of_letter;
+    double chord_tolerance_mm;
+    int64_t block_delete;
+    int64_t lengths_from_table;
+} Machine;
 
 typedef struct {
     double bottom_mm;
@@ -654,5 +730,35 @@ typedef struct {
     Floats overlap_mm;
     Bools is_read;
 } Result;
+
+typedef struct {
+    Floats pose;
+    Bools ptp;
+    Floats speed_mm_s;
+    Floats cdis_mm;
+    Floats wait_s;
+} ReadMotions;
+
+typedef struct {
+    Floats position_mm;
+    Floats rotation;
+    Bools home;
+    Ints32 tool;
+    Bools ptp;
+    Floats speed_mm_s;
+    Floats cdis_mm;
+    Floats wait_s;
+} Wanted;
+
+typedef struct {
+    Floats largest;
+    Ints taken;
+    Ints row;
+    Floats size;
+    Ints worst_count;
+    Ints worst;
+    Floats worst_size;
+    Floats worst_key;
+} Noted;
 
 #endif

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,7 @@ MODULES = {
     "LIMITS": "gcode2krl.online.limits",
     "BLENDING": "gcode2krl.online.blending",
     "PILOT": "gcode2krl.online.pilot_gate",
+    "DIFF": "gcode2krl.krl.differences",
 }
 """Prefix -> module whose numbers and words the core uses."""
 RECORDS = {
@@ -47,6 +49,9 @@ RECORDS = {
 }
 """Name of the struct -> module and numpy record."""
 ARGUMENTS = {
+    "Scan": ("gcode2krl.gcode.words", "SCAN"),
+    "Rows": ("gcode2krl.gcode.columns", "ROWS"),
+    "Machine": ("gcode2krl.gcode.machine", "MACHINE"),
     "Shape": ("gcode2krl.cutting.cutter", "SHAPE"),
     "Grid": ("gcode2krl.cutting.sweep", "GRID"),
     "Path": ("gcode2krl.cutting.sweep", "PATH"),
@@ -54,6 +59,9 @@ ARGUMENTS = {
     "Cutters": ("gcode2krl.cutting.edge", "CUTTERS"),
     "Work": ("gcode2krl.cutting.edge", "WORK"),
     "Result": ("gcode2krl.cutting.reading", "RESULT"),
+    "ReadMotions": ("gcode2krl.krl.differences", "READ"),
+    "Wanted": ("gcode2krl.krl.differences", "WANTED"),
+    "Noted": ("gcode2krl.krl.differences", "NOTED"),
 }
 """Name of the struct -> module and `StructOf`."""
 _VIEWS = {
@@ -82,10 +90,10 @@ def header() -> str:
     ]
     for prefix, name in MODULES.items():
         lines += [*_constants(prefix, import_module(name)), ""]
-    for name, (module, record) in RECORDS.items():
-        lines += [*_struct(name, getattr(import_module(module), record)), ""]
-    for name, (module, argument) in ARGUMENTS.items():
-        lines += [*_argument(name, getattr(import_module(module), argument)), ""]
+    for name, place in RECORDS.items():
+        lines += [*_struct(name, _at(place)), f"VIEW({name}View, {name});", ""]
+    for name, place in ARGUMENTS.items():
+        lines += [*_argument(name, _at(place)), ""]
     return "\n".join([*lines, "#endif", ""])
 
 
@@ -126,11 +134,25 @@ def _struct(name: str, record: np.dtype) -> Iterator[str]:
 def _argument(name: str, argument: core.StructOf) -> Iterator[str]:
     yield "typedef struct {"
     for field, kind in argument.fields.items():
-        if isinstance(kind, core.ArrayOf):
-            yield f"    {_VIEWS[kind.dtype.str[1:]]} {field};"
-        else:
-            yield f"    {'double' if kind is core.FLOAT else 'int64_t'} {field};"
+        yield f"    {_field_type(kind)} {field};"
     yield f"}} {name};"
+
+
+def _field_type(kind: object) -> str:
+    """Return the C type of a field: a number, a view of numbers or of a numpy record, or another struct."""
+    if isinstance(kind, core.StructOf):
+        return next(name for name, place in ARGUMENTS.items() if _at(place) is kind)
+    if isinstance(kind, core.ArrayOf) and kind.dtype.fields:
+        return next(f"{name}View" for name, place in RECORDS.items() if _at(place) == kind.dtype)
+    if isinstance(kind, core.ArrayOf):
+        return _VIEWS[kind.dtype.str[1:]]
+    return "double" if kind is core.FLOAT else "int64_t"
+
+
+def _at(place: tuple[str, str]) -> Any:
+    """Return what a module calls by a name."""
+    module, name = place
+    return getattr(import_module(module), name)
 
 
 if __name__ == "__main__":

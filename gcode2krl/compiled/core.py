@@ -6,21 +6,22 @@ once, beside the Python that calls it::
     _lines = core_function("krl_lines", FLOATS, OUT_BYTES, INT, returns=INT)
 
 An array goes in as a view: its address, its rows and the numbers in a row. It has to be contiguous and of the
-declared type; one that is written to has to be writeable. What many functions take together is a named tuple
-of arrays and numbers, in C a struct of the same fields (`StructOf`). A call releases the interpreter's lock.
+declared type; one that is written to has to be writeable. What many functions take together is a record of
+arrays and numbers, in C a struct of the same fields (`StructOf`). A call releases the interpreter's lock.
 """
 
 import ctypes
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, get_type_hints
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from gcode2krl import arrays
 from gcode2krl.errors import InstallationError, Issue
 
 _SUFFIX: Final = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -72,28 +73,8 @@ OUT_FLOATS, OUT_INTS, OUT_INTS32, OUT_BYTES, OUT_BOOLS, OUT_FLOATS32 = (
 )
 
 
-class StructOf:
-    """An argument that is a record with fields of these types; C gets a pointer to a struct of the same.
-
-    ``native/constants.py`` writes the struct into ``constants.h``.
-    """
-
-    def __init__(self, **fields: Any) -> None:
-        """Take the type of each field: an array, INT or FLOAT."""
-        self.fields = fields
-        kinds = [(name, View if isinstance(kind, ArrayOf) else kind) for name, kind in fields.items()]
-        self.struct = type("Struct", (ctypes.Structure,), {"_fields_": kinds})
-
-    def from_param(self, record: Any) -> Any:
-        """Return a pointer to the struct; it holds no array of the record, which has to outlive the call."""
-        values = [(kind, getattr(record, name)) for name, kind in self.fields.items()]
-        return ctypes.byref(
-            self.struct(*(kind.from_param(it) if isinstance(kind, ArrayOf) else it for kind, it in values))
-        )
-
-
 class Struct(ctypes.Structure):
-    """A struct of views and numbers; assigned by name, its arrays are checked and kept alive."""
+    """What C sees of a record: views and numbers. Assigned by name, its arrays are checked and kept alive."""
 
     declared: ClassVar[dict[str, Any]] = {}
 
@@ -109,13 +90,53 @@ class Struct(ctypes.Structure):
         super().__setattr__(name, kind.from_param(value) if isinstance(kind, ArrayOf) else value)
 
 
-def core_struct(name: str, **fields: Any) -> type[Struct]:
-    """Return a struct of the core, declared by the types of its fields; it is passed by `pointer_to`."""
-    parts = [(field, View if isinstance(kind, ArrayOf) else kind) for field, kind in fields.items()]
-    return type(name, (Struct,), {"_fields_": parts, "declared": fields})
+class StructOf:
+    """An argument that is a record with fields of these types; C gets a pointer to a struct of the same.
+
+    A call makes the struct, which is passed as it is, field after field changed between calls; instead of it
+    any object with these attributes may be passed. ``native/constants.py`` writes the struct into
+    ``constants.h``.
+    """
+
+    def __init__(self, **fields: Any) -> None:
+        """Take the type of each field: an array, INT, FLOAT or another struct."""
+        self.fields = fields
+        parts = [(name, _in_struct(kind)) for name, kind in fields.items()]
+        self.struct = type("Struct", (Struct,), {"_fields_": parts, "declared": fields})
+
+    @classmethod
+    def record(cls, record: type, written: Iterable[str] = ()) -> "StructOf":
+        """Return the struct of a named tuple, from the types of its fields; ``written`` are written to."""
+        kinds = {name: _KINDS[kind] for name, kind in get_type_hints(record).items()}
+        changed = {name: ArrayOf(kinds[name].dtype, written=True) for name in written}
+        return cls(**kinds | changed)
+
+    def __call__(self, **values: Any) -> Struct:
+        """Return the struct with the values of some fields; the others are 0."""
+        made: Struct = self.struct(**values)
+        return made
+
+    def from_param(self, record: Any) -> Any:
+        """Return a pointer to the struct, or to one of a record's fields, which has to outlive the call."""
+        is_struct = isinstance(record, self.struct)
+        return ctypes.byref(record if is_struct else self(**{n: getattr(record, n) for n in self.fields}))
 
 
-pointer_to = ctypes.POINTER
+def _in_struct(kind: Any) -> Any:
+    """Return the type of a field for ctypes."""
+    return View if isinstance(kind, ArrayOf) else kind.struct if isinstance(kind, StructOf) else kind
+
+
+_KINDS: Final[dict[Any, Any]] = {
+    arrays.Floats: FLOATS,
+    arrays.Ints: INTS,
+    arrays.Ints32: INTS32,
+    arrays.Bools: BOOLS,
+    NDArray[np.float32]: FLOATS32,
+    float: FLOAT,
+    int: INT,
+}
+"""Type of a field of a record: what C gets."""
 
 
 def core_function(name: str, *arguments: Any, returns: Any = None) -> Callable[..., Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Tool
-from gcode2krl.compiled.core import FLOAT, StructOf
+from gcode2krl.compiled.core import StructOf
 from gcode2krl.units import RAD_PER_DEG
 
 DRILL_POINT_DEG = 118.0
@@ -53,7 +53,7 @@ class Shape:
         return self.arc_radius_mm + straight * _cot(self.kappa_rad)
 
 
-SHAPE = StructOf(bottom_mm=FLOAT, corner_mm=FLOAT, kappa_rad=FLOAT, side_mm=FLOAT, flute_mm=FLOAT)
+SHAPE = StructOf.record(Shape)
 """A `Shape` as the compiled core takes it."""
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.compiled.core import FLOATS, INTS, OUT_FLOATS, StructOf
+from gcode2krl.compiled.core import StructOf
 
 BAND_COLUMNS = 7
 _MOST_BINS = 1024
@@ -50,13 +50,5 @@ def new_work() -> Work:
     return Work(*(np.zeros((rows, _MOST_BINS)) for rows in (8, 2, 5, 2)))
 
 
-CUTTERS = StructOf(
-    bands=FLOATS,
-    used=INTS,
-    wall_bins=INTS,
-    ring_bins=INTS,
-    teeth=FLOATS,
-    lag_mm=FLOATS,
-    above=FLOATS,
-)
-WORK = StructOf(turn=OUT_FLOATS, heading=OUT_FLOATS, rows=OUT_FLOATS, reach=OUT_FLOATS)
+CUTTERS = StructOf.record(Cutters)
+WORK = StructOf.record(Work, written=Work._fields)

@@ -43,7 +43,7 @@ class Result(NamedTuple):
     """(n,) False where a row lies between those of the samples read before and after it."""
 
 
-RESULT = StructOf(**dict.fromkeys(Result._fields, OUT_FLOATS) | {"is_read": OUT_BOOLS})
+RESULT = StructOf.record(Result, written=Result._fields)
 
 mark_nodes = core_function("cutting_mark_nodes", SAMPLES, BOOLS, FLOATS, OUT_BOOLS)
 """Mark the samples (n,) at which the engagement is read in any case.

@@ -7,14 +7,6 @@ from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.compiled.core import (
-    BOOLS,
-    FLOAT,
-    FLOATS,
-    INT,
-    INTS,
-    INTS32,
-    OUT_FLOATS32,
-    OUT_INTS32,
     StructOf,
 )
 
@@ -82,33 +74,6 @@ class Samples(NamedTuple):
     """(n,) True where the engagement is read in any case."""
 
 
-GRID = StructOf(
-    height=OUT_FLOATS32,
-    wall=OUT_INTS32,
-    bound=OUT_FLOATS32,
-    visits=OUT_INTS32,
-    x_mm=FLOAT,
-    y_mm=FLOAT,
-    dx_mm=FLOAT,
-    dy_mm=FLOAT,
-    row=INT,
-    column=INT,
-    bottom_mm=FLOAT,
-)
-PATH = StructOf(
-    position_mm=FLOATS,
-    way_mm=FLOATS,
-    tool=INTS32,
-    rapid=BOOLS,
-    first=BOOLS,
-    outlines=FLOATS,
-)
-SAMPLES = StructOf(
-    position_mm=FLOATS,
-    direction=FLOATS,
-    way_mm=FLOATS,
-    f_z_mm=FLOATS,
-    tool=INTS32,
-    point=INTS,
-    node=BOOLS,
-)
+GRID = StructOf.record(Grid, written=("height", "wall", "bound", "visits"))
+PATH = StructOf.record(Path)
+SAMPLES = StructOf.record(Samples)

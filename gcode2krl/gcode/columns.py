@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.compiled.core import OUT_BOOLS, OUT_FLOATS, OUT_INTS32, core_struct
+from gcode2krl.compiled.core import OUT_BOOLS, OUT_FLOATS, OUT_INTS32, Struct, StructOf
 
 _COLUMNS = {
     "position_mm": OUT_FLOATS,
@@ -34,7 +34,7 @@ _START = {
     "length_offset_tool": -1,
 }
 """What is not 0 in the row of the start point, from which nothing has moved."""
-Rows = core_struct("Rows", **_COLUMNS)
+ROWS = StructOf(**_COLUMNS)
 
 
 class Columns:
@@ -61,9 +61,9 @@ class Columns:
             larger[:used] = old[:used]
             self._arrays[name] = larger
 
-    def views(self) -> Any:
+    def views(self) -> Struct:
         """Return what the core writes to, until more room is made."""
-        return Rows(**self._arrays)
+        return ROWS(**self._arrays)
 
     def finished(self, count: int) -> dict[str, NDArray[Any]]:
         """Return the first ``count`` rows of the columns by their names in the Toolpath."""

@@ -11,19 +11,17 @@ from gcode2krl.compiled.core import (
     INT,
     INTS32,
     ArrayOf,
+    StructOf,
     core_function,
-    core_struct,
-    pointer_to,
 )
-from gcode2krl.gcode.columns import Rows
+from gcode2krl.gcode.columns import ROWS
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.state import STATE
 
-Machine = core_struct(
-    "Machine",
+MACHINE = StructOf(
     state=ArrayOf(STATE, written=True),
     counts=ArrayOf(COUNTS, written=True),
-    rows=Rows,
+    rows=ROWS,
     events=ArrayOf(EVENT, written=True),
     found=ArrayOf(FOUND, written=True),
     offsets_mm=FLOATS,
@@ -37,9 +35,9 @@ Machine = core_struct(
     block_delete=INT,
     lengths_from_table=INT,
 )
-"""What the interpreter goes on with from block to block; as ``native/gcode/block.h`` has it."""
+"""What the interpreter goes on with from block to block."""
 
-run = core_function("gcode_run", pointer_to(Machine), BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)
+run = core_function("gcode_run", MACHINE, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)
 """Execute the blocks of words (letter, value, extra, line) from a word on; return the word at which to go on.
 
 It stops early where the next block wants more room: ``rows_wanted`` and ``events_wanted`` say how much.

@@ -272,7 +272,7 @@ class _Interpreter:
         self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
-        self.machine = machine.Machine(
+        self.machine: Any = machine.MACHINE(
             state=self.state,
             counts=self.counts,
             rows=self.columns.views(),

@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_INCH
@@ -96,7 +95,7 @@ def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") ->
 
     A comment without a tool number counts where the program has one tool.
     """
-    used = {int(number) or (cell.mounted_tool or 0) for number in np.unique(toolpath.tool[1:])}
+    used = {int(number) or (cell.mounted_tool or 0) for number in distinct(toolpath.tool[1:])}
     used -= {0} if len(used) > 1 else set()
     only = next(iter(used)) if len(used) == 1 else 0
     told: set[int] = set()

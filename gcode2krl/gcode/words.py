@@ -7,7 +7,7 @@ value cannot be read). A line has at most one ``!`` of its characters; the words
 that later mistakes in the line are found too.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,13 @@ from gcode2krl.compiled.core import (
     OUT_FLOATS,
     OUT_INTS,
     OUT_INTS32,
+    StructOf,
     core_function,
-    core_struct,
-    pointer_to,
 )
 
 _MOST_EXTRAS = 1024
 """Marks of a piece that keep what was found: only the first findings are ever shown."""
-_Scan = core_struct(
-    "Scan",
+SCAN = StructOf(
     text=BYTES,
     letter=OUT_BYTES,
     value=OUT_FLOATS,
@@ -41,7 +39,7 @@ _Scan = core_struct(
     messages=INT,
     most_decimals=INT,
 )
-_fill = core_function("gcode_scan", pointer_to(_Scan))
+_fill = core_function("gcode_scan", SCAN)
 
 
 class Words(NamedTuple):
@@ -73,7 +71,7 @@ class Scanner:
         if len(self._letter) < 2 * len(text):  # a byte makes at most two words
             self._reserve(2 * len(text))
         span = np.empty((text.count(b"("), 2), dtype=np.int64)
-        done = _Scan(
+        done: Any = SCAN(
             text=np.frombuffer(text, np.uint8),
             letter=self._letter,
             value=self._value,

@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
+from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
@@ -36,6 +39,20 @@ DECL FRAME GK_DIFF"""
 _T_GRID_RAD = 1e-4 / DEG_PER_RAD
 _LOOK_BACK = 0.2
 """Share of a subprogram within which a standstill is preferred as its end."""
+
+
+_NOTHING_IN_FORCE = (-1.0, -1.0, 0.0)
+"""The state of `motion_lines` at the beginning of a program or a part."""
+_MESSAGE, _PILOT_CALL = b"GK_MSG", f" {w.PILOT_SUBPROGRAM}(".encode("ascii")
+
+
+class _Part(NamedTuple):
+    """A subprogram: its name, its motions in pieces of text, and what these need declared or beside them."""
+
+    name: str
+    motions: list[bytes]
+    has_message: bool
+    has_pilot: bool
 
 
 @dataclass(frozen=True)
@@ -84,8 +101,7 @@ class _Composer:
         self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
         self.source = st.ascii_text(_file_name(targets.source), 40)
         self.position, self.abc_deg = written_poses(targets, cell)
-        self.speed_m_s = targets.speed_mm_s / MM_PER_M
-        self.state = np.array([-1.0, -1.0, 0.0])
+        self.state = np.array(_NOTHING_IN_FORCE)
         self.events: dict[int, list[tuple[float, str]]] = {}
         for event in targets.events:
             text = st.event_statements(event, cell)
@@ -107,21 +123,30 @@ class _Composer:
         """Compose the main program and its subprograms."""
         most = self.cell.program.max_lines
         count = len(self.targets)
-        body: list[bytes] = []
-        subprograms: list[tuple[str, bytes]] = []
         if count <= most and self.layout.split == "defs":
-            body.append(self._motions(0, count))
-        else:
-            for start, end, whole in self._chunks(most):
-                if not whole:
-                    body.append(self._motions(start, end))
-                    continue
-                part = part_name(self.name, len(subprograms) + 1)
-                body.append(_text(f"{part}( )"))
-                self.state[:] = -1.0, -1.0, 0.0  # each part states its speed and CDIS
-                subprograms.append((part, self._motions(start, end)))
-                self.state[:] = -1.0, -1.0, 0.0
+            return self._assemble([self._head([]), *self._motions(0, count, self.state)[0], self._foot()], [])
+        chunks = self._chunks(most)
+        texts = iter(in_threads(self._part, [(start, end) for start, end, whole in chunks if whole]))
+        body: list[bytes] = []
+        subprograms: list[_Part] = []
+        for start, end, whole in chunks:
+            if not whole:
+                body += self._motions(start, end, self.state)[0]
+                continue
+            name = part_name(self.name, len(subprograms) + 1)
+            body.append(_text(f"{name}( )"))
+            subprograms.append(_Part(name, *next(texts)))
+            self.state[:] = _NOTHING_IN_FORCE
         return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
+
+    def _part(self, rows: tuple[int, int]) -> tuple[list[bytes], bool, bool]:
+        """Return the motions of a part, which states its speed and CDIS, and what they need of it."""
+        pieces, has_message = self._motions(*rows, np.array(_NOTHING_IN_FORCE))
+        return pieces, has_message, self._calls_pilot(pieces)
+
+    def _calls_pilot(self, pieces: list[bytes]) -> bool:
+        has_subprogram = self.pilot is not None and bool(self.pilot.subprogram)
+        return has_subprogram and any(_PILOT_CALL in piece for piece in pieces)
 
     def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
         """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program.
@@ -149,35 +174,37 @@ class _Composer:
             start = end
         return chunks
 
-    def _motions(self, start: int, end: int) -> bytes:
-        """Motions of rows start..end with their waits and events."""
+    def _motions(self, start: int, end: int, state: Floats) -> tuple[list[bytes], bool]:
+        """Return the pieces of text of rows start..end, with their waits and events, and whether these have a
+        message; ``state`` is updated."""
         ptp, wait = self.targets.ptp, self.targets.wait_s
         special = np.zeros(end - start, dtype=bool)
         special |= ptp[start:end] | (wait[start:end] > 0)
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         special[[row - start for row in rows if start <= row < end]] = True
         pieces: list[bytes] = []
-        at = start
+        at, has_message = start, False
         for row in [*(np.flatnonzero(special) + start), end]:
             stop = min(row + 1, end) if row < end and not ptp[row] else row
             if stop > at:
-                pieces.append(self._lines(at, stop))
+                pieces += self._lines(at, stop, state)
             if row < end:
                 pieces.append(self._around(row))
+                has_message |= _MESSAGE in pieces[-1]
                 at = row + 1
             else:
                 at = end
-        return b"".join(pieces)
+        return pieces, has_message
 
-    def _lines(self, start: int, end: int) -> bytes:
+    def _lines(self, start: int, end: int, state: Floats) -> list[bytes]:
         rows = slice(start, end)
         return motion_lines(
             self.position[rows],
             self.abc_deg[rows],
-            self.speed_m_s[rows],
+            self.targets.speed_mm_s[rows] / MM_PER_M,
             self.targets.cdis_mm[rows],
             self.targets.source_line[rows],
-            self.state,
+            state,
             self.cell.program.comment_every,
             self._triggers_before(start, end),
         )
@@ -234,12 +261,12 @@ class _Composer:
         turn = turn_bits(self.joints.q_rad[row])
         return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
-    def _head(self, subprograms: list[tuple[str, bytes]]) -> bytes:
-        tools = sorted({int(number) for number in np.unique(self.targets.tool)})
+    def _head(self, subprograms: list[_Part]) -> bytes:
+        tools = [int(number) for number in distinct(self.targets.tool)]
         checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
         declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
-            declarations += [f"{w.EXT} {name}( )" for name, _ in subprograms]
+            declarations += [f"{w.EXT} {part.name}( )" for part in subprograms]
         declarations.append(DECLARATIONS)
         if checks:
             declarations.append(FRAME_DECLARATIONS)
@@ -273,16 +300,15 @@ class _Composer:
     def _foot(self) -> bytes:
         return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)
 
-    def _assemble(self, main: list[bytes], subprograms: list[tuple[str, bytes]]) -> dict[str, bytes]:
+    def _assemble(self, main: list[bytes], subprograms: list[_Part]) -> dict[str, bytes]:
         parts: dict[str, bytes] = {}
-        needs = f" {w.PILOT_SUBPROGRAM}(".encode("ascii")
         called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
-        for name, motions in subprograms:
-            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if b"GK_MSG" in motions else ""
-            text = [_text(f"{w.DEF} {name}( )\n{needed}"), motions, _text(w.END)]
+        for name, motions, has_message, has_pilot in subprograms:
+            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if has_message else ""
+            text = [_text(f"{w.DEF} {name}( )\n{needed}"), *motions, _text(w.END)]
             if self.layout.split == "files":
                 head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
-                own = called if needs in motions else []  # a local subprogram is known in its file only
+                own = called if has_pilot else []  # a local subprogram is known in its file only
                 parts[f"{name}{w.SOURCE_SUFFIX}"] = b"".join([head, *text, *own])
             else:
                 main += [NEWLINE, *text]
@@ -305,15 +331,18 @@ def turn_bits(q_rad: Floats) -> int:
 
 def written_poses(targets: Targets, cell: Cell) -> tuple[Floats, Floats]:
     """Return positions (p, 3) in mm and A, B, C (p, 3) in degrees in the controller's tool axes."""
-    rotation = targets.rotation
     abc_deg = np.empty((len(targets), 3))
-    for number in np.unique(targets.tool):
-        rows = targets.tool == number if (targets.tool != number).any() else slice(None)
-        turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
-        chosen = rotation[rows]
-        first, run = fr.equal_runs(chosen)
-        turned = fr.rotation_from_quaternion(chosen[first]) @ turn
-        abc_deg[rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
+
+    def part(start: int, end: int) -> None:
+        tool, rotation = targets.tool[start:end], targets.rotation[start:end]
+        for number in distinct(tool):
+            rows = slice(None) if tool[0] == number and (tool == number).all() else tool == number
+            turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3].T
+            first, run = fr.equal_runs(rotation[rows])
+            turned = fr.rotation_from_quaternion(rotation[rows][first]) @ turn
+            abc_deg[start:end][rows] = (fr.abc_from_rotation(turned) * DEG_PER_RAD)[run]
+
+    in_chunks(part, chunk_borders(len(targets)))
     return targets.position_mm, abc_deg
 
 

@@ -7,9 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl import frames as fr
-from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.core import (
+    FLOATS,
+    INT,
+    INTS,
+    OUT_INTS,
+    StructOf,
+    core_function,
+)
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.composition import turn_bits
 from gcode2krl.krl.read import KrlProgram
@@ -25,6 +34,9 @@ CDIS_LIMIT_MM = 0.0006
 WAIT_LIMIT_S = 0.0006
 REMEDY = "translate again"
 _MOST_WORST = 10
+OTHER_KIND, POSITION, NO_POSITION, ROTATION, NO_ROTATION = range(5)
+SPEED, NO_SPEED, CDIS, WAIT, OTHER_BRANCH = range(5, 10)
+"""What is checked of a motion; a row of `_CHECKS` each."""
 _CHECKS = (
     ("verify-motion", "PTP and LIN exchanged"),
     ("verify-position", "{:.4f} mm off"),
@@ -37,7 +49,7 @@ _CHECKS = (
     ("verify-wait", "dwell {:.3f} s off"),
     ("verify-status", "S or T differs from the predicted branch"),
 )
-"""Code and sentence of each check of a motion, in the order of `_Compared.wrong`."""
+"""Code and sentence of each check."""
 
 
 @dataclass(frozen=True)
@@ -58,26 +70,88 @@ class _Rows(NamedTuple):
     value: Floats
 
 
-class _Compared(NamedTuple):
-    """What is kept of a chunk."""
+class _Read(NamedTuple):
+    """The columns of the motions that were read."""
 
-    largest: tuple[float, float, float]
-    worst: _Rows
-    wrong: tuple[_Rows, ...]
+    pose: Floats
+    ptp: Bools
+    speed_mm_s: Floats
+    cdis_mm: Floats
+    wait_s: Floats
+
+
+class _Wanted(NamedTuple):
+    """The columns of their targets."""
+
+    position_mm: Floats
+    rotation: Floats
+    home: Bools
+    tool: Ints32
+    ptp: Bools
+    speed_mm_s: Floats
+    cdis_mm: Floats
+    wait_s: Floats
+
+
+class _Noted(NamedTuple):
+    """What is kept of a chunk: the largest differences, motions that are furthest off, and wrong ones."""
+
+    largest: Floats
+    """(3,)"""
+    taken: Ints
+    """(checks,) places that are taken in `row` and `size`."""
+    row: Ints
+    """(checks, places)"""
+    size: Floats
+    worst_count: Ints
+    worst: Ints
+    worst_size: Floats
+    worst_key: Floats
+
+    @classmethod
+    def nothing(cls) -> "_Noted":
+        places, checks = (len(_CHECKS), MOST_PLACES), len(_CHECKS)
+        counts = np.zeros(checks, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        rows = np.empty(places, dtype=np.int64), np.empty(_MOST_WORST, dtype=np.int64)
+        sizes = np.empty(_MOST_WORST), np.empty(_MOST_WORST)
+        return cls(np.zeros(3), counts[0], rows[0], np.empty(places), counts[1], rows[1], *sizes)
+
+    def wrong(self, check: int) -> _Rows:
+        taken = slice(0, int(self.taken[check]))
+        return _Rows(self.row[check, taken], self.size[check, taken])
+
+    def furthest(self) -> _Rows:
+        taken = slice(0, int(self.worst_count[0]))
+        return _Rows(self.worst[taken], self.worst_size[taken])
+
+
+READ, WANTED = StructOf.record(_Read), StructOf.record(_Wanted)
+NOTED = StructOf.record(_Noted, written=_Noted._fields)
+_rotation_runs = core_function("krl_rotation_runs", READ, WANTED, INT, INT, OUT_INTS, returns=INT)
+_compare = core_function("krl_compare", READ, WANTED, INT, INT, INTS, FLOATS, NOTED)
 
 
 def differences_of(
     program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, count: int
 ) -> Differences:
     """Compare the first ``count`` motions of a program as read with their targets."""
+    read = _Read(*(np.ascontiguousarray(getattr(program, name)) for name in _Read._fields))
+    wanted = _Wanted(*(np.ascontiguousarray(getattr(targets, name)) for name in _Wanted._fields))
+    of_read, of_wanted = READ(**read._asdict()), WANTED(**wanted._asdict())
 
-    def compared(start: int, end: int) -> _Compared:
-        return _compared(program, targets, joints, cell, slice(start, end))
+    def compared(start: int, end: int) -> _Noted:
+        noted = _Noted.nothing()
+        begins = np.empty(end - start, dtype=np.int64)
+        begins = begins[: _rotation_runs(of_read, of_wanted, start, end, begins)]
+        angle_deg = _angles_deg(read, wanted, begins, cell)
+        _compare(of_read, of_wanted, start, end, begins, angle_deg, noted)
+        return noted
 
-    parts = in_chunks(compared, chunk_borders(count))
+    parts = in_chunks(compared, chunk_borders(count)) if count else []
     position, rotation, speed = np.array([part.largest for part in parts]).reshape(-1, 3).max(0, initial=0.0)
-    wrong = [_joined([part.wrong[check] for part in parts]) for check in range(len(_CHECKS))]
-    worst = _furthest(_joined([part.worst for part in parts]))
+    wrong = [_joined([part.wrong(check) for part in parts]) for check in range(len(_CHECKS))]
+    wrong[OTHER_BRANCH] = _other_branches(program, targets, joints, count)
+    worst = _furthest(_joined([part.furthest() for part in parts]))
     return Differences(
         largest=(float(position), float(rotation), float(speed)),
         worst=tuple(zip(worst.row.tolist(), worst.value.tolist(), strict=True)),
@@ -85,61 +159,28 @@ def differences_of(
     )
 
 
-def _compared(program: KrlProgram, targets: Targets, joints: Joints, cell: Cell, rows: slice) -> _Compared:
-    home, ptp = targets.home[rows], targets.ptp[rows]
-    deviation = np.linalg.norm(program.position_mm[rows] - targets.position_mm[rows], axis=1)
-    rotation = _rotation_deg(program, targets, cell, rows)
-    deviation[home], rotation[home] = 0.0, 0.0
-    speed = np.where(ptp, 0.0, np.abs(program.speed_mm_s[rows] - targets.speed_mm_s[rows]))
-    cdis = np.abs(program.cdis_mm[rows] - targets.cdis_mm[rows])
-    wait = np.abs(program.wait_s[rows] - targets.wait_s[rows])
-    other_kind = program.ptp[rows] != ptp
-    other_branch = np.zeros(len(ptp), dtype=np.bool_)
-    for row in np.flatnonzero(ptp & ~home):
-        at = rows.start + row
-        branch = joints.status[at], turn_bits(joints.q_rad[at])
-        other_branch[row] = (program.status_turn[at] != branch).any()
-    none = np.zeros(len(ptp))
-    wrong = (
-        (other_kind, none),
-        (deviation > POSITION_LIMIT_MM, deviation),
-        (np.isnan(deviation), none),
-        (rotation > ROTATION_LIMIT_DEG, rotation),
-        (np.isnan(rotation), none),
-        (speed > SPEED_LIMIT_MM_S, speed),
-        (np.isnan(speed) & ~other_kind, none),
-        (~(cdis <= CDIS_LIMIT_MM), cdis),
-        (~(wait <= WAIT_LIMIT_S), wait),
-        (other_branch, none),
-    )
-    return _Compared(
-        (float(deviation.max()), float(rotation.max()), float(speed.max())),
-        _furthest(_Rows(np.arange(rows.start, rows.stop), deviation)),
-        tuple(_first(mask, values, rows.start) for mask, values in wrong),
-    )
-
-
-def _rotation_deg(program: KrlProgram, targets: Targets, cell: Cell, rows: slice) -> Floats:
-    """Return the angles between read and intended rotations in deg; NaN where A, B or C is missing.
-
-    Equal rotations in a row are compared once.
-    """
-    tool, abc_deg = targets.tool[rows], program.abc_deg[rows]
-    first, run = fr.equal_runs(np.column_stack([abc_deg, targets.rotation[rows], tool]))
-    own, angle = rows.start + first, np.zeros(len(first))
-    for number in np.unique(targets.tool[own]):
-        runs = np.flatnonzero(targets.tool[own] == number)
+def _angles_deg(read: _Read, wanted: _Wanted, rows: Ints, cell: Cell) -> Floats:
+    """Return the angles (r,) in deg between read and intended rotations; NaN where A, B or C is missing."""
+    abc_deg, angle_deg = read.pose[rows, 3:6], np.empty(len(rows))
+    for number in distinct(wanted.tool[rows]):
+        own = np.flatnonzero(wanted.tool[rows] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
-        read = fr.rotation_from_abc(np.nan_to_num(program.abc_deg[own[runs]]) * RAD_PER_DEG) @ turn
-        angle[runs] = fr.angle_between(fr.quaternion_from_rotation(read), targets.rotation[own[runs]])
-    angle[np.isnan(program.abc_deg[own]).any(axis=1)] = np.nan
-    result: Floats = angle[run] * DEG_PER_RAD
-    return result
+        found = fr.rotation_from_abc(np.nan_to_num(abc_deg[own]) * RAD_PER_DEG) @ turn
+        angle = fr.angle_between(fr.quaternion_from_rotation(found), wanted.rotation[rows[own]])
+        angle_deg[own] = angle * DEG_PER_RAD
+    angle_deg[np.isnan(abc_deg).any(axis=1)] = np.nan
+    return angle_deg
 
 
-def _first(mask: Bools, values: Floats, start: int) -> _Rows:
-    rows = np.flatnonzero(mask)[:MOST_PLACES]
-    return _Rows(start + rows, values[rows])
+def _other_branches(program: KrlProgram, targets: Targets, joints: Joints, count: int) -> _Rows:
+    """Return the first PTP motions whose S or T is another one than that of the joints."""
+    rows = np.flatnonzero(targets.ptp[:count] & ~targets.home[:count])
+    other = [
+        row
+        for row in rows.tolist()
+        if (program.status_turn[row] != (joints.status[row], turn_bits(joints.q_rad[row]))).any()
+    ]
+    return _Rows(np.array(other[:MOST_PLACES], dtype=np.int64), np.zeros(len(other[:MOST_PLACES])))
 
 
 def _furthest(found: _Rows) -> _Rows:

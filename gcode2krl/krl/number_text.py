@@ -4,6 +4,7 @@ Values are first rounded to 1e-9 and then, as integers, to their decimals (half 
 floating-point formatting is involved.
 """
 
+import threading
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +27,7 @@ from gcode2krl.compiled.core import (
 
 BYTES_PER_TARGET = 240
 NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
+_OF_THREAD = threading.local()
 
 _fixed = core_function("krl_fixed", OUT_BYTES, FLOAT, INT, returns=INT)
 _in_decimals = core_function("krl_in_decimals", FLOATS, INT, OUT_INTS)
@@ -45,8 +47,8 @@ def motion_lines(
     state: Floats,
     comment_every: int,
     before: tuple[NDArray[np.uint8], Ints] = NOTHING_BEFORE,
-) -> bytes:
-    """Return the KRL text (CRLF) of a run of LIN motions; chunks of it are written at once.
+) -> list[bytes]:
+    """Return the KRL text (CRLF) of a run of LIN motions in pieces of whole lines, made at once.
 
     Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
     only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
@@ -67,7 +69,7 @@ def motion_lines(
     def write(start: int, end: int) -> bytes:
         part = slice(start, end)
         own = text[begins[start] : begins[end]] if len(text) else text
-        buffer = np.empty(BYTES_PER_TARGET * (end - start) + len(own), dtype=np.uint8)
+        buffer = _room(BYTES_PER_TARGET * (end - start) + len(own))
         size = _lines(
             position[part],
             abc[part],
@@ -82,7 +84,15 @@ def motion_lines(
         )
         return buffer[:size].tobytes()
 
-    return b"".join(in_chunks(write, borders))
+    return in_chunks(write, borders)
+
+
+def _room(size: int) -> NDArray[np.uint8]:
+    """Return the thread's own room for a text of so many bytes."""
+    if len(getattr(_OF_THREAD, "room", ())) < size:
+        _OF_THREAD.room = np.empty(size, dtype=np.uint8)
+    room: NDArray[np.uint8] = _OF_THREAD.room
+    return room
 
 
 def _state_behind(

@@ -3,17 +3,19 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
-from gcode2krl.units import MM_PER_M
+from gcode2krl.krl.columns import motion_columns
+from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
@@ -57,14 +59,12 @@ class KrlProgram:
     """A KRL program as executed: a row per motion, and the statements in between."""
 
     name: str
-    position_mm: Floats
-    """(p, 3), NaN where a component is missing."""
-    abc_deg: Floats
-    """(p, 3)"""
-    status_turn: Floats
-    """(p, 2) S and T, NaN where absent."""
-    q_deg: Floats
-    """(p, 6) joint targets, NaN on Cartesian motions."""
+    pose: Floats
+    """(p, 8) X, Y, Z in mm, A, B, C in degrees, S and T, NaN where absent and in motions to joint targets."""
+    joint_rows: Ints
+    """(j,) motions to joint targets."""
+    joint_deg: Floats
+    """(j, 6) A1 to A6 of these motions, NaN where absent."""
     ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
@@ -84,6 +84,28 @@ class KrlProgram:
     def_line: int = 0
     """Line of the main DEF."""
     texts: Mapping[str, bytes] = field(default_factory=dict)
+
+    @property
+    def position_mm(self) -> Floats:
+        """The positions (p, 3)."""
+        return self.pose[:, 0:3]
+
+    @property
+    def abc_deg(self) -> Floats:
+        """The angles A, B, C (p, 3)."""
+        return self.pose[:, 3:6]
+
+    @property
+    def status_turn(self) -> Floats:
+        """S and T (p, 2)."""
+        return self.pose[:, 6:8]
+
+    @cached_property
+    def q_deg(self) -> Floats:
+        """The joint targets (p, 6), NaN in Cartesian motions."""
+        q_deg = np.full((len(self.ptp), 6), np.nan)
+        q_deg[self.joint_rows] = self.joint_deg
+        return q_deg
 
 
 def read_krl(path: str | Path) -> KrlProgram:
@@ -127,19 +149,15 @@ def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
     return _Reader({name: texts[name] for name in sources}, main).read()
 
 
-class _Block(NamedTuple):
-    file: int
-    start: int
-    end: int
-
-
 class _Reader:
     def __init__(self, texts: Mapping[str, bytes], main: str) -> None:
         self.texts, self.main = texts, main
         self.names = tuple(texts)
         self.scanned = [sc.scan_krl(text) for text in texts.values()]
+        self.others = [np.flatnonzero(~is_motion(scanned.kind)) for scanned in self.scanned]
+        self.line_starts: dict[int, Ints] = {}
         self.issues: list[Issue] = []
-        self.blocks: dict[tuple[int, str], _Block] = {}
+        self.blocks: dict[tuple[int, str], Block] = {}
         self.executed: set[tuple[int, str]] = set()
         self.declarations: list[Statement] = []
         self.def_lines: dict[str, int] = {}
@@ -152,61 +170,31 @@ class _Reader:
         if not self.blocks:
             raise input_error("no-def", "no DEF … END in the file", "is this a KRL source?", source=self.main)
         main = next(iter(self.blocks))
-        runs = list(self._execute(main, 0))
-        if not runs:
-            runs = [_Block(0, 0, 0)]
-        kind = np.concatenate([self.scanned[f].kind[a:b] for f, a, b in runs])
-        line = np.concatenate([self.scanned[f].line[a:b] for f, a, b in runs])
-        value = np.concatenate([self.scanned[f].value[a:b] for f, a, b in runs])
-        blend = np.concatenate([self.scanned[f].blend[a:b] for f, a, b in runs])
-        file_of = np.repeat(np.array([f for f, _, _ in runs], dtype=np.int32), [b - a for _, a, b in runs])
-        where = np.concatenate([np.arange(a, b) for _, a, b in runs])
-        axes = kind == w.KIND_PTP_AXES
-        motion = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | axes
-        for row in np.flatnonzero(blend == w.MALFORMED)[:MOST_PLACES]:
-            self._issue(
-                "krl-malformed",
-                int(line[row]),
-                f"cannot read {self._statement(int(file_of[row]), int(where[row]))!r}",
-                int(file_of[row]),
-            )
-        before = np.cumsum(motion)
-        statements = tuple(
-            Statement(
-                int(before[row]),
-                self._statement(int(file_of[row]), int(where[row])),
-                self.names[file_of[row]],
-                int(line[row]),
-            )
-            for row in np.flatnonzero((kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC))
-        )
-        rows = np.flatnonzero(motion)
-        speed = _in_force(np.flatnonzero(kind == w.KIND_VEL_CP), value[:, 0], rows) * MM_PER_M
-        cdis = _in_force(np.flatnonzero(kind == w.KIND_APO_CDIS), value[:, 0], rows)
-        cdis[blend[rows] != 1] = 0.0
-        ptp = kind[rows] != w.KIND_LIN
-        speed[ptp] = np.nan
-        joint_rows = np.flatnonzero(axes[rows])
-        pose = value.take(rows, axis=0)
-        q_deg = np.full((len(rows), 6), np.nan)
-        q_deg[joint_rows] = pose[joint_rows, :6]
+        executed = executed_in(list(self._execute(main, 0)), self.scanned, self.others)
+        kind, others, value = executed.kind, executed.others, executed.value
+        other_kind = kind[others]
+        self._malformed(executed)
+        first_number = np.ascontiguousarray(value[:, 0])
+        ptp, speed, cdis, line = motion_columns(kind, executed.blend, executed.line, first_number)
+        dwells = np.flatnonzero((other_kind == w.KIND_WAIT_SEC) & (executed.blend[others] == 1))
+        joint_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_PTP_AXES))
+        pose, joint_deg = executed.pose, executed.pose[joint_rows, :6]
         pose[joint_rows] = np.nan
         guard = w.NO_GUARD.encode("ascii") not in b"".join(text[:6000] for text in self.texts.values())
         return KrlProgram(
             name=main[1],
-            position_mm=pose[:, 0:3],
-            abc_deg=pose[:, 3:6],
-            status_turn=pose[:, 6:8],
-            q_deg=q_deg,
+            pose=pose,
+            joint_rows=joint_rows,
+            joint_deg=joint_deg,
             ptp=ptp,
             speed_mm_s=speed,
             cdis_mm=cdis,
-            wait_s=_dwells((kind == w.KIND_WAIT_SEC) & (blend == 1), value[:, 0], before, len(rows)),
-            line=line[rows],
+            wait_s=_dwells(others[dwells] - dwells, first_number[dwells], len(ptp)),
+            line=line,
             file=self.names,
-            file_of=file_of[rows],
-            statements=statements,
-            triggers=self._triggers(kind, value, blend, before, line, file_of),
+            file_of=executed.file_of_motions(),
+            statements=self._statements(executed),
+            triggers=self._triggers(executed),
             uncalled={
                 f"{self.names[key[0]]}/{key[1]}": self._texts_of(block)
                 for key, block in self.blocks.items()
@@ -219,48 +207,72 @@ class _Reader:
             texts=self.texts,
         )
 
-    def _triggers(
-        self,
-        kind: NDArray[np.int8],
-        value: Floats,
-        blend: NDArray[np.int8],
-        before: Ints,
-        line: Ints32,
-        file_of: Ints32,
-    ) -> ReadTriggers:
-        rows = np.flatnonzero(kind == w.KIND_TRIGGER)
-        values = value[rows]
+    def _statements(self, executed: Executed) -> tuple[Statement, ...]:
+        """Return what is neither motion nor setting nor a trigger that is understood."""
+        kind = executed.kind[executed.others]
+        rows = executed.others[(kind == w.KIND_OTHER) | (kind == w.KIND_WAIT_SEC)]
+        motions, line = executed.motions_before(rows).tolist(), executed.line[rows].tolist()
+        places = zip(*(column.tolist() for column in executed.places(rows)), strict=True)
+        return tuple(
+            Statement(motion, self._statement(*place), self.names[place[0]], number)
+            for motion, place, number in zip(motions, places, line, strict=True)
+        )
+
+    def _triggers(self, executed: Executed) -> ReadTriggers:
+        own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
+        rows, values = executed.others[own], executed.value[own]
+        file_of = executed.places(rows)[0]
         return ReadTriggers(
-            motion=before[rows].astype(np.int64),
+            motion=rows - own,
             distance=values[:, w.TRIGGER_DISTANCE],
             delay_ms=values[:, w.TRIGGER_DELAY],
             written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
-            calls=blend[rows] == w.CALLS,
-            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of[rows]),
-            line=line[rows],
-            file_of=file_of[rows],
+            calls=executed.blend[rows] == w.CALLS,
+            names=self._names_written(values[:, w.TRIGGER_NAME :].astype(np.int64), file_of),
+            line=executed.line[rows],
+            file_of=file_of,
         )
+
+    def _malformed(self, executed: Executed) -> None:
+        rows = np.flatnonzero(executed.blend == w.MALFORMED)[:MOST_PLACES]
+        for line, file, row in zip(executed.line[rows], *executed.places(rows), strict=True):
+            text = f"cannot read {self._statement(int(file), int(row))!r}"
+            self._issue("krl-malformed", int(line), text, int(file))
 
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
         found: set[str] = set()
-        for file in np.unique(file_of).tolist():
+        for file in distinct(file_of).tolist():
             data = np.frombuffer(self.texts[self.names[file]], dtype=np.uint8)
             own = place[file_of == file]
-            for size in np.unique(own[:, 1]).tolist():
+            for size in distinct(own[:, 1]).tolist():
                 first = own[own[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
                 found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
         return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
 
-    def _texts_of(self, block: "_Block") -> tuple[str, ...]:
+    def _texts_of(self, block: Block) -> tuple[str, ...]:
         rows = range(block.start, block.end)
         return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
     def _statement(self, file: int, row: int) -> str:
-        a, b = self.scanned[file].span[row]
-        text = self.texts[self.names[file]][a:b].decode("ascii", "replace")
-        return _COMMENT.sub(r"\1", text).strip()
+        """Return the text of a statement, without its comment."""
+        scanned, others = self.scanned[file], self.others[file]
+        k = int(np.searchsorted(others, row))
+        if k < len(others) and others[k] == row:
+            start, end = scanned.span[k]
+        else:  # a motion, whose text is asked for where it cannot be read
+            start, end = self._lines(file)[scanned.line[row] - 1 : scanned.line[row] + 1]
+        text = self.texts[self.names[file]][start:end].decode("ascii", "replace")
+        return (_COMMENT.sub(r"\1", text) if ";" in text else text).strip()
+
+    def _lines(self, file: int) -> Ints:
+        """Return where each line of a file begins, and the end; found once it is asked for."""
+        if file not in self.line_starts:
+            text = self.texts[self.names[file]]
+            newline = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n"))
+            self.line_starts[file] = np.concatenate([[0], newline + 1, [len(text)]])
+        return self.line_starts[file]
 
     def _issue(self, code: str, line: int, message: str, file: int = 0, remedy: str = "") -> None:
         name = self.names[file]
@@ -285,11 +297,11 @@ class _Reader:
                     continue
                 if (file, name) in self.blocks:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
-                self.blocks.setdefault((file, name), _Block(file, start, int(row)))
+                self.blocks.setdefault((file, name), Block(file, start, int(row)))
                 name = ""
         if name:
             self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
-            self.blocks.setdefault((file, name), _Block(file, start, len(scanned.kind)))
+            self.blocks.setdefault((file, name), Block(file, start, len(scanned.kind)))
 
     def _called(self, file: int, name: str) -> tuple[int, str] | None:
         """Return the subprogram that a file means by a name: its own, else the one a file is named after."""
@@ -299,7 +311,7 @@ class _Reader:
         others = (k for k, other in enumerate(self.names) if Path(other).stem.upper() == name)
         return next(((k, name) for k in others if (k, name) in self.blocks), None)
 
-    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[_Block]:
+    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[Block]:
         """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
         self.executed.add(block)
         file, start, end = self.blocks[block]
@@ -315,16 +327,16 @@ class _Reader:
                     self._issue(
                         "krl-structure", int(scanned.line[row]), f"{text[:40]!r} behind statements", file
                     )
-                yield _Block(file, at, int(row))
+                yield Block(file, at, int(row))
                 at = int(row) + 1
             elif call and (called := self._called(file, call.group(1))):
-                yield _Block(file, at, int(row))
+                yield Block(file, at, int(row))
                 at = int(row) + 1
                 if depth > 20:
                     self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
                     return
                 yield from self._execute(called, depth + 1)
-        yield _Block(file, at, end)
+        yield Block(file, at, end)
 
     def _last_declaration(self, file: int, start: int, end: int) -> int:
         """Return the last row of the run of declarations with which a block begins."""
@@ -354,16 +366,9 @@ class _Reader:
                 self._issue("krl-structure", 0, f"{begin} and {close} do not match", file)
 
 
-def _in_force(settings: Ints, values: Floats, rows: Ints) -> Floats:
-    """Return what is in force at rising rows: the value of the last setting before, NaN before the first."""
-    valid = settings[~np.isnan(values[settings])]
-    borders = [0, *np.searchsorted(rows, valid), len(rows)]
-    return np.repeat(np.concatenate([[np.nan], values[valid]]), np.diff(borders))
-
-
-def _dwells(marked: Bools, seconds: Floats, motions_before: Ints, count: int) -> Floats:
-    """Return the dwell (p,) behind each motion: the waits that are marked as such."""
+def _dwells(motions_before: Ints, seconds: Floats, count: int) -> Floats:
+    """Return the dwell (p,) behind each motion, from marked waits and the motions before each."""
     dwell = np.zeros(count)
-    rows = np.flatnonzero(marked & (motions_before > 0))
-    np.add.at(dwell, motions_before[rows] - 1, np.nan_to_num(seconds[rows]))
+    behind_motions = motions_before > 0
+    np.add.at(dwell, motions_before[behind_motions] - 1, np.nan_to_num(seconds[behind_motions]))
     return dwell

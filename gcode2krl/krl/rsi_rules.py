@@ -68,7 +68,8 @@ def _place_issues(
 ) -> Iterator[Issue]:
     """On and off, the robot stands on the clearance plane; every LIN lies between, and no PTP."""
     ptp = program.ptp
-    joints = np.isfinite(program.q_deg[:, 0])
+    joints = np.zeros(len(ptp), dtype=np.bool_)
+    joints[program.joint_rows[np.isfinite(program.joint_deg[:, 0])]] = True
     for statement in (create, on, off):
         row = statement.motion - 1
         stands = row >= 0 and not joints[row] and program.cdis_mm[row] == 0.0

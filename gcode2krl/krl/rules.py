@@ -67,14 +67,15 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
 def _motion_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
     """Yield targets that lack a component, then speeds that are missing or too high."""
     fastest_m_s = cell.controller.vel_cp_m_s
+    by_joints = program.joint_rows[~np.isnan(program.joint_deg).any(axis=1)]
 
     def wrong(start: int, end: int) -> tuple[Ints, Ints]:
         rows = slice(start, end)
-        ptp, no_angle = program.ptp[rows], np.isnan(program.q_deg[rows])
-        cartesian = no_angle.all(axis=1)
-        incomplete = cartesian & _lacks(program.position_mm[rows], program.abc_deg[rows])
-        incomplete |= ~cartesian & no_angle.any(axis=1)
-        incomplete |= cartesian & ptp & _lacks(program.status_turn[rows])
+        ptp = program.ptp[rows]
+        incomplete = _lacks(program.position_mm[rows], program.abc_deg[rows])
+        incomplete |= ptp & _lacks(program.status_turn[rows])
+        first, behind = np.searchsorted(by_joints, (start, end))
+        incomplete[by_joints[first:behind] - start] = False
         speed_m_s = program.speed_mm_s[rows] / MM_PER_M
         allowed = (speed_m_s > 0) & (speed_m_s <= fastest_m_s * (1 + 1e-6))
         return start + np.flatnonzero(incomplete), start + np.flatnonzero(~ptp & ~allowed)

@@ -21,22 +21,24 @@ _count = core_function("krl_count", BYTES, INT, INT, OUT_INTS)
 _scan = core_function(
     "krl_scan",
     *(BYTES, INT, INT, INT),
-    *(OUT_BYTES, OUT_INTS32, OUT_INTS, OUT_FLOATS, OUT_BYTES, OUT_INTS),
+    *(OUT_BYTES, OUT_BYTES, OUT_INTS32, OUT_FLOATS, OUT_INTS, OUT_FLOATS, OUT_INTS),
 )
 
 
 class Scanned(NamedTuple):
-    """A row per statement."""
+    """A row per statement (k); motions (m of them) and all others have their numbers apart, in this order."""
 
     kind: NDArray[np.int8]
-    line: Ints32
-    span: Ints
-    """(k, 2) first and last byte of the statement."""
-    value: Floats
-    """(k, 8) components X, Y, Z, A, B, C, S, T, or A1 to A6, NaN where absent; a lone number stands in
-    column 0. The columns of a trigger are named in `krl_words`; any other trigger is `KIND_OTHER`."""
     blend: NDArray[np.int8]
     """(k,) 1 for ``C_DIS`` and for a wait marked ``; dwell``, else 0, -1 where the line is malformed."""
+    line: Ints32
+    pose: Floats
+    """(m, 8) components X, Y, Z, A, B, C, S, T of a motion, or A1 to A6, NaN where absent."""
+    span: Ints
+    """(k - m, 2) first and last byte of a statement that is no motion."""
+    value: Floats
+    """(k - m, 8) its numbers; a lone one stands in column 0. The columns of a trigger are named in
+    `krl_words`; any other trigger is `KIND_OTHER`."""
     too_long: int
     """First line that is too long, 0 = none."""
     not_ascii: int
@@ -50,26 +52,33 @@ def scan_krl(text: bytes, chunk_bytes: int = CHUNK_BYTES) -> Scanned:
     data, borders = np.frombuffer(text, dtype=np.uint8), _borders(text, chunk_bytes)
 
     def counted(start: int, end: int) -> Ints:
-        lines_statements = np.empty(2, dtype=np.int64)
-        _count(data, start, end, lines_statements)
-        return lines_statements
+        lines_statements_motions = np.empty(3, dtype=np.int64)
+        _count(data, start, end, lines_statements_motions)
+        return lines_statements_motions
 
-    before = list(accumulate(in_chunks(counted, borders), initial=np.zeros(2, dtype=np.int64)))
-    begins = {start: (int(lines), int(rows)) for start, (lines, rows) in zip(borders, before, strict=True)}
-    count = int(before[-1][1])
+    before = list(accumulate(in_chunks(counted, borders), initial=np.zeros(3, dtype=np.int64)))
+    begins = dict(zip(borders, (counts.tolist() for counts in before), strict=True))
+    _, count, motions = begins[borders[-1]]
     kind, blend = np.empty(count, dtype=np.int8), np.empty(count, dtype=np.int8)
-    line, span = np.empty(count, dtype=np.int32), np.empty((count, 2), dtype=np.int64)
-    value = np.empty((count, w.STATEMENT_COLUMNS))
+    line, pose = np.empty(count, dtype=np.int32), np.empty((motions, w.STATEMENT_COLUMNS))
+    span = np.empty((count - motions, 2), dtype=np.int64)
+    value = np.empty((count - motions, w.STATEMENT_COLUMNS))
     kinds, blends = kind.view(np.uint8), blend.view(np.uint8)
 
     def scanned(start: int, end: int) -> Ints:
-        lines, first = begins[start]
-        rows, found = slice(first, begins[end][1]), np.zeros(3, dtype=np.int64)
-        _scan(data, start, end, lines, kinds[rows], line[rows], span[rows], value[rows], blends[rows], found)
+        (lines, first, motion), (_, behind, last_motion) = begins[start], begins[end]
+        rows, own, others = (
+            slice(first, behind),
+            slice(motion, last_motion),
+            slice(first - motion, behind - last_motion),
+        )
+        found = np.zeros(3, dtype=np.int64)
+        columns = kinds[rows], blends[rows], line[rows], pose[own], span[others], value[others]
+        _scan(data, start, end, lines, *columns, found)
         return found
 
     too_long, not_ascii, folds = np.transpose(in_chunks(scanned, borders)).tolist()
-    return Scanned(kind, line, span, value, blend, _first(too_long), _first(not_ascii), sum(folds))
+    return Scanned(kind, blend, line, pose, span, value, _first(too_long), _first(not_ascii), sum(folds))
 
 
 def _borders(text: bytes, chunk_bytes: int) -> list[int]:

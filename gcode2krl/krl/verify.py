@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gcode2krl import krl_words as w
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.krl.announce import pilot_forces
@@ -214,7 +215,7 @@ def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: i
     """Return where HOME is another, axis by axis."""
     issues = []
     for row in np.flatnonzero(targets.home[:count] & program.ptp[:count]):
-        found, wanted = program.q_deg[row], joints.q_rad[row] * DEG_PER_RAD
+        found, wanted = _joints_at(program, int(row)), joints.q_rad[row] * DEG_PER_RAD
         wrong = np.flatnonzero(~(np.abs(found - wanted) <= JOINT_LIMIT_DEG))
         if not len(wrong):
             continue
@@ -229,6 +230,14 @@ def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: i
         text = in_file(program, program.file[program.file_of[row]]) + text
         issues.append(Issue("error", "verify-position", int(program.line[row]), text, REMEDY))
     return issues
+
+
+def _joints_at(program: KrlProgram, row: int) -> Floats:
+    """Return the joint target (6,) in degrees of a motion, NaN where it has none."""
+    at = int(np.searchsorted(program.joint_rows, row))
+    has = at < len(program.joint_rows) and program.joint_rows[at] == row
+    joints: Floats = program.joint_deg[at] if has else np.full(6, np.nan)
+    return joints
 
 
 def _start_issues(program: KrlProgram, targets: Targets) -> list[Issue]:
@@ -285,8 +294,9 @@ def _first_difference(program: KrlProgram, targets: Targets) -> tuple[int, int]:
     """Return the row and the .src line at which the motions begin to differ."""
     count = min(len(program.ptp), len(targets))
     off = np.linalg.norm(program.position_mm[:count] - targets.position_mm[:count], axis=1)
-    joints = ~np.isnan(program.q_deg[:count]).any(axis=1)
-    other = np.where(targets.home[:count], ~joints, ~(off <= POSITION_LIMIT_MM))
+    joints = np.zeros(len(program.ptp), dtype=np.bool_)
+    joints[program.joint_rows] = ~np.isnan(program.joint_deg).any(axis=1)
+    other = np.where(targets.home[:count], ~joints[:count], ~(off <= POSITION_LIMIT_MM))
     row = int(np.argmax(other)) if other.any() else count
     line = program.line[min(row, len(program.line) - 1)] if len(program.line) else 0
     return row, int(line)

@@ -7,7 +7,7 @@ import numpy as np
 from gcode2krl.arrays import Bools
 from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
-from gcode2krl.program.needs import doubtful_issues, lacks_geometry, missing_issues
+from gcode2krl.program.needs import doubtful_issues, lacks_geometry, missing_issues, used_tools
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
@@ -40,6 +40,8 @@ def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
 
 def _stretches(wrong: Bools) -> list[int]:
     """Return the first row of each run of wrong rows."""
+    if not wrong.any():
+        return []
     starts = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
     return [int(row) for row in starts[:MOST_PLACES]]
 
@@ -219,8 +221,9 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             "give [clearance] z_mm in the cell",
         )
         return
-    highest = toolpath.position_mm[feed, 2].max(initial=clearance)
-    for row in _stretches(feed & (toolpath.position_mm[:, 2] > clearance)):
+    above = feed & (toolpath.position_mm[:, 2] > clearance)
+    highest = toolpath.position_mm[above, 2].max(initial=clearance)
+    for row in _stretches(above):
         yield Issue(
             "error",
             "above-clearance",
@@ -231,9 +234,8 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    moves = toolpath.is_position() & ~toolpath.machine
-    for number in np.unique(toolpath.tool[moves]).tolist():
-        row = int(np.flatnonzero(moves & (toolpath.tool == number))[0])
+    for number in used_tools(toolpath):
+        row = int(np.argmax(toolpath.is_position() & ~toolpath.machine & (toolpath.tool == number)))
         line = int(toolpath.source_line[row])
         for event in toolpath.events:
             if event.kind == "tool" and event.values["tool"] == number:

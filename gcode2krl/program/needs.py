@@ -1,14 +1,15 @@
 """Keys that a program needs and its cell does not state, and doubtful values that it states."""
 
 from collections.abc import Iterator
-
-import numpy as np
+from weakref import WeakKeyDictionary
 
 from gcode2krl.cell import Cell, plain_view, ranges
 from gcode2krl.cell.sections import missing_key
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Event, Toolpath
 
+_USED: WeakKeyDictionary[Toolpath, list[int]] = WeakKeyDictionary()
 _LEAST_WAIT_S = 0.5
 """Assumed: motor spindles start and stop in 1 to 15 s, the smallest in half a second."""
 _LEAST_HELIX_DEG = 5.0
@@ -28,7 +29,7 @@ def missing_issues(toolpath: Toolpath, cell: Cell) -> list[Issue]:
 
 def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield warnings on stated values: beyond their usual range, or left at a default that matters."""
-    used = set(_used_tools(toolpath))
+    used = set(used_tools(toolpath))
     yield from ranges.range_issues(cell, used)
     yield from _doubtful_cutters(used, cell)
     yield from _short_waits(toolpath, cell)
@@ -86,9 +87,9 @@ def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
         yield "frames.base", "where $BASE stands is not known"
     if cell.home.q_deg is None:
         yield "home.q_deg", "where the program starts and ends is not known"
-    used = [number for number in _used_tools(toolpath) if number in cell.tool]
+    used = [number for number in used_tools(toolpath) if number in cell.tool]
     if not cell.tool:
-        numbers = [number for number in _used_tools(toolpath) if number > 0]
+        numbers = [number for number in used_tools(toolpath) if number > 0]
         yield f"tool.{numbers[0] if numbers else 1}", "the cell has no tool"
     for number in used or sorted(cell.tool)[:1]:
         for key in cell.missing_of_tool(number):
@@ -97,7 +98,7 @@ def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
 
 def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
     """Yield (key, reason) of the other keys that the text of the program needs."""
-    tools = [cell.tool[number] for number in _used_tools(toolpath) if number in cell.tool]
+    tools = [cell.tool[number] for number in used_tools(toolpath) if number in cell.tool]
     if cell.load.mass_kg is None and any(tool.tool_data is None for tool in tools):
         yield "load.mass_kg", "$LOAD is written with $TOOL"
     if any(event.kind == "spindle" for event in toolpath.events) and cell.spindle.max_rpm is None:
@@ -138,6 +139,9 @@ def _template_of(event: Event) -> str:
     return "tool_change" if event.kind == "tool" else f"m_code.M{event.values['m']}"
 
 
-def _used_tools(toolpath: Toolpath) -> list[int]:
-    moves = toolpath.is_position() & ~toolpath.machine
-    return [int(number) for number in np.unique(toolpath.tool[moves])]
+def used_tools(toolpath: Toolpath) -> list[int]:
+    """Return the numbers of the tools that move to a programmed position, in order; found once."""
+    if toolpath not in _USED:
+        moves = toolpath.is_position() & ~toolpath.machine
+        _USED[toolpath] = distinct(toolpath.tool[moves]).tolist()
+    return _USED[toolpath]

@@ -7,6 +7,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Targets
 
@@ -52,7 +53,7 @@ def lowest_points(targets: Targets, cell: Cell) -> Floats:
     lowest = np.array(targets.position_mm[:, 2])
     if leaning.max(initial=0.0) < 1e-9:
         return lowest
-    for number in np.unique(targets.tool).tolist():
+    for number in distinct(targets.tool).tolist():
         with_tool = targets.tool == number
         points = [
             upright[with_tool] * height - leaning[with_tool] * radius - corner

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
+from gcode2krl.compiled.threads import in_threads
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
@@ -201,19 +202,19 @@ class _Plan:
     def targets(self, spin_of: SpinOf, tolerance_mm: float | None) -> Targets:
         """Assemble the table from what was planned."""
         toolpath, columns = self.toolpath, self.columns
-        position, move = np.concatenate(columns.position), np.concatenate(columns.move)
+        position, move = _joined(columns.position), np.concatenate(columns.move)
         kind, tool = np.concatenate(columns.kind), np.concatenate(columns.tool)
         axis = self._axes()
         stand, keep = _StandingAt(move), _distinct(position, axis, kind, tool)
         if not keep.all():
             position, move, kind, tool = position[keep], move[keep], kind[keep], tool[keep]
             axis = _rows(axis, keep)
-        kept_index = np.cumsum(keep) - 1
+        kept = _Kept(keep)
         rotation = self._rotations(position, axis, tool, kind, spin_of)
         wait = np.zeros(len(position))
-        events = self._place_events(stand, kept_index)
+        events = self._place_events(stand, kept)
         for row in np.flatnonzero(toolpath.dwell_s > 0).tolist():
-            for target, dwell_s in self._dwells(row, stand, kept_index):
+            for target, dwell_s in self._dwells(row, stand, kept):
                 wait[target] += dwell_s
         programmed = self._programmed_columns(move, kind, tolerance_mm)
         exact = self._exact_stops(programmed, move, kind, tool, wait, events)
@@ -280,21 +281,29 @@ class _Plan:
         axis = _rows(axis, planned)
         spin = spin_of(position[planned], axis, tool[planned])
         rotation = np.empty((len(position), 4))
-        rotation[planned] = tool_rotation(axis, spin)
+        turned = tool_rotation(axis, spin)
+        if isinstance(planned, slice):
+
+            def part(start: int, end: int) -> None:
+                rotation[planned][start:end] = turned[start:end]
+
+            in_chunks(part, chunk_borders(len(turned)))
+        else:
+            rotation[planned] = turned
         for row in np.flatnonzero(kind == _HOME):
             position[row], rotation[row] = self.home_pose(int(tool[row]))
         return rotation
 
-    def _place_events(self, stand: "_StandingAt", kept_index: Ints) -> tuple[Event, ...]:
+    def _place_events(self, stand: "_StandingAt", kept: "_Kept") -> tuple[Event, ...]:
         placed: list[Event] = []
         earliest, switched = 0, 0
         for index, event in enumerate(self.toolpath.events):
             if index in self.tool_events:
-                target = int(kept_index[self.tool_events[index]])
+                target = kept.at(self.tool_events[index])
             elif event.values.get("implied"):  # above the work, not while the mill is in the material
-                target = int(kept_index[self._next_tool_change(index)])
+                target = kept.at(self._next_tool_change(index))
             else:
-                target = int(kept_index[stand.at(event.row)])
+                target = kept.at(stand.at(event.row))
             implied = event.values.get("implied")  # may move before M30 and messages only
             row = max(switched if implied else earliest, target)
             earliest = max(earliest, row)
@@ -313,12 +322,12 @@ class _Plan:
         earlier = [k for k in self._changes_at(row) if k <= index]
         return float(self.toolpath.events[earlier[-1]].values.get("dwell_s", 0.0)) if earlier else 0.0
 
-    def _dwells(self, row: int, stand: "_StandingAt", kept_index: Ints) -> list[tuple[int, float]]:
+    def _dwells(self, row: int, stand: "_StandingAt", kept: "_Kept") -> list[tuple[int, float]]:
         """Return (target, seconds) of the dwell at a row: before and after tool changes there."""
-        marks = [(int(kept_index[stand.at(row)]), 0.0)]
+        marks = [(kept.at(stand.at(row)), 0.0)]
         for index in self._changes_at(row):
             before_s = float(self.toolpath.events[index].values.get("dwell_s", 0.0))
-            marks.append((int(kept_index[self.tool_events[index]]), before_s))
+            marks.append((kept.at(self.tool_events[index]), before_s))
         ends = [*(start_s for _, start_s in marks[1:]), float(self.toolpath.dwell_s[row])]
         return [(target, end_s - start_s) for (target, start_s), end_s in zip(marks, ends, strict=True)]
 
@@ -391,12 +400,40 @@ class _StandingAt:
     """Finds the planned motion at whose end the tool is after a row of the Toolpath."""
 
     def __init__(self, move: Ints32) -> None:
-        self.moved = np.flatnonzero(move >= 0)
-        self.rows = move[self.moved]
+        self.move, self.latest = move, np.maximum.accumulate(move)
 
     def at(self, row: int) -> int:
-        index = int(np.searchsorted(self.rows, row, side="right")) - 1
-        return int(self.moved[index]) if index >= 0 else 0
+        index = int(np.searchsorted(self.latest, row, side="right")) - 1
+        while index > 0 and self.move[index] < 0:  # added, the tool has left that place
+            index -= 1
+        return max(index, 0)
+
+
+class _Kept:
+    """Finds the target of a planned motion, where some are left out: its own, or the one before."""
+
+    def __init__(self, keep: Bools) -> None:
+        self.left_out = np.flatnonzero(~keep)
+
+    def at(self, index: int) -> int:
+        return index - int(np.searchsorted(self.left_out, index, side="right"))
+
+
+def _joined(parts: list[Floats]) -> Floats:
+    """Return parts (n, 3) one behind the other, copied by all cores at once."""
+    begins = list(itertools.accumulate((len(part) for part in parts), initial=0))
+    result = np.empty((begins[-1], 3))
+    pieces = [
+        (begin + first, part[first : first + ROWS])
+        for begin, part in zip(begins, parts, strict=False)
+        for first in range(0, len(part), ROWS)
+    ]
+
+    def copy(piece: tuple[int, Floats]) -> None:
+        result[piece[0] : piece[0] + len(piece[1])] = piece[1]
+
+    in_threads(copy, pieces)
+    return result
 
 
 def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints32) -> Bools:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.robot.inverse_kinematics import one_branch
 from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.poses import flange_frames
@@ -71,7 +72,7 @@ def same_branch(path: Path, q_rad: Floats, cell: Cell) -> Floats:
 def thinned(starts: Ints, count: int) -> Ints:
     """Return the samples of the trial: some 2000, with the first of each chain and the last of all."""
     evenly = np.arange(0, count, max(1, count // _TRIAL_SAMPLES))
-    return np.unique(np.concatenate([evenly, starts, np.arange(count)[-1:]]))
+    return distinct(np.concatenate([evenly, starts, np.arange(count)[-1:]]))
 
 
 def best_branch(path: Path, samples: Ints, cell: Cell) -> Branch:

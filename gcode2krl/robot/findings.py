@@ -42,16 +42,16 @@ _PTP_TOLERANCE_MM = 0.01
 
 
 def joint_findings(
-    targets: Targets, q: Floats, wrong: Bits, samples: Ints, branch: Branch, cell: Cell
+    targets: Targets, q: Floats, wrong: Bits, counts: Ints, branch: Branch, cell: Cell
 ) -> tuple[Issue, ...]:
     """Return the findings along the path, by line.
 
     ``q`` (p, 6) are the joints at the targets, ``wrong`` (p,) the bits of `what_is_wrong` on the way there,
-    found in ``samples`` (p,) samples each.
+    ``counts`` (p,) the samples up to and with each.
     """
     findings = [*_cell_findings(cell)]
     if wrong.any():
-        line, joints, bits = _sampled(targets, q, _spans(wrong, samples), branch, cell)
+        line, joints, bits = _sampled(targets, q, _spans(wrong, np.diff(counts, prepend=0)), branch, cell)
         findings += _reach_findings(line, bits, targets)
         findings += _limit_findings(line, joints, bits, targets, cell)
         findings += _speed_findings(line, joints, bits, targets, cell)

@@ -13,6 +13,7 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
@@ -41,7 +42,7 @@ def target_angles(targets: Targets, cell: Cell) -> tuple[Floats, tuple[Issue, ..
     counts = count_samples(targets, cell)
     branch = _branch_of(targets, counts, cell)
     q, wrong = _along_lines(targets, counts, branch, cell)
-    return q, joint_findings(targets, q, wrong, np.diff(counts, prepend=0), branch, cell)
+    return q, joint_findings(targets, q, wrong, counts, branch, cell)
 
 
 def joints_at(q_rad: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:
@@ -143,11 +144,10 @@ def _path(line: Line) -> Path:
 
 def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> tuple[Floats, Bits]:
     """Return the joints (p, 6) at the targets, and the bits of `what_is_wrong` up to each (p,)."""
-    q = np.full((len(targets), 6), np.nan)
-    wrong = np.zeros(len(targets), dtype=np.uint16)
+    q, wrong = np.empty((len(targets), 6)), np.empty(len(targets), dtype=np.uint16)
 
     def solve(start: int, end: int, before: Floats | None) -> Floats:
-        wrong[start:end] = 0
+        q[start:end], wrong[start:end] = np.nan, 0
         line, shared = _with_row_before(targets, counts, start, end, cell)
         guess = branch.guess(int(counts[start]) - 1) if before is None else before
         found = branch.joints(_path(line), cell, guess)
@@ -202,7 +202,7 @@ def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool 
         rows = slice(start, end)
         margin[rows] = limit_margin(q[rows], cell)
         status[rows], turn[rows] = status_turn(q[rows], geometry, _ANGLE_GRID_RAD)
-        for number in np.unique(tool[rows]) if conditioning else ():
+        for number in distinct(tool[rows]) if conditioning else ():
             with_tool = start + np.flatnonzero(tool[rows] == number)
             tip = cell.tool_matrix(int(number))[:3, 3]
             sigma[with_tool] = smallest_singular_value(q[with_tool], geometry, tip)

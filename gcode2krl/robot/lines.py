@@ -10,6 +10,7 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import Rows, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.tables import Targets
 from gcode2krl.units import RAD_PER_DEG
 
@@ -82,7 +83,8 @@ def count_samples(targets: Targets, cell: Cell) -> Ints:
     def steps(start: int, end: int) -> Ints:
         return _motions(targets, cell, slice(start, end)).steps
 
-    return np.cumsum(np.concatenate(in_chunks(steps, chunk_borders(len(targets)))))
+    counts = np.concatenate(in_chunks(steps, chunk_borders(len(targets))))
+    return np.cumsum(counts, out=counts)
 
 
 def sample_lines(targets: Targets, cell: Cell, start: int, end: int) -> Line:
@@ -103,7 +105,8 @@ def sample_lines(targets: Targets, cell: Cell, start: int, end: int) -> Line:
 def samples_at(targets: Targets, cell: Cell, counts: Ints, samples: Ints) -> Line:
     """Return the line thinned to some of its samples (t,); ``counts`` as from `count_samples`."""
     target = np.searchsorted(counts, samples, side="right")
-    rows, which = np.unique(target, return_inverse=True)
+    rows = distinct(target)
+    which = np.searchsorted(rows, target)
     motions = _motions(targets, cell, rows)
     part = (samples - (counts[target] - motions.steps[which]) + 1) / motions.steps[which]
     return _line(targets, motions, rows, target, which, part)

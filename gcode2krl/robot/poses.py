@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.robot.inverse_kinematics import all_branches
 from gcode2krl.robot.kinematics import flange_pose
 from gcode2krl.robot.velocity_kinematics import jacobian as tip_jacobian
@@ -54,7 +55,7 @@ def flange_frames(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cel
         return position_mm @ base[:3, :3].T + lever, turned @ tool_inverse[:3, :3]
     flange_position = np.empty((len(position_mm), 3))
     flange_rotation = np.empty((len(position_mm), 3, 3))
-    for number in np.unique(tool):
+    for number in distinct(tool):
         rows = slice(None) if (tool == number).all() else tool == number
         tool_inverse = fr.invert(cell.tool_matrix(int(number)))
         tip_rotation = turned if constant else turned[rows]

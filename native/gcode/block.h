@@ -6,40 +6,6 @@
 #include "constants.h"
 #include "core.h"
 
-VIEW(States, State);
-VIEW(Counted, Counts);
-VIEW(Events, Event);
-VIEW(Findings, Found);
-
-/* The columns of the Toolpath, with room for more rows than are counted; as in gcode2krl/gcode/columns.py. */
-typedef struct {
-    Floats position_mm;
-    Bools rapid;
-    Floats feed_mm_s, spindle_rad_s;
-    Ints32 tool;
-    Bools exact_stop;
-    Floats tolerance_mm, dwell_s;
-    Ints32 source_line, arc;
-    Bools machine, known;
-    Floats length_offset_mm;
-    Ints32 length_offset_tool;
-} Rows;
-
-/* As in gcode2krl/gcode/machine.py. */
-typedef struct {
-    States state;
-    Counted counts;
-    Rows rows;
-    Events events;
-    Findings found;
-    Floats offsets_mm;
-    Bools offset_known;
-    Floats tool_length_mm; /* by tool number, NaN = not declared */
-    Ints32 group_of_g, doubt_of_g, doubt_of_group, doubt_of_letter;
-    double chord_tolerance_mm;
-    int64_t block_delete, lengths_from_table;
-} Machine;
-
 /* The columns of the words, as in gcode2krl/gcode/words.py. */
 typedef struct {
     Bytes letter;

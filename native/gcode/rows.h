@@ -34,6 +34,12 @@ static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool r
     CELL(rows->known, row, 2) = s->known_z != 0;
 }
 
+static inline void stand_at(State *s, const double position_mm[3]) {
+    s->x = position_mm[0];
+    s->y = position_mm[1];
+    s->z = position_mm[2];
+}
+
 /* Where the work offset in force has its zero. */
 static inline const double *work_offset_mm(const Block *block) {
     return &CELL(block->machine->offsets_mm, block->state->work_offset, 0);

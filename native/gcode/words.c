@@ -1,17 +1,7 @@
 /* Bytes to words: the scanner of G-code text. What goes where in its columns says gcode2krl/gcode/words.py. */
 
-#include "constants.h"
-#include "core.h"
-
-/* The text, the columns of its words, and how many there are; as in gcode2krl/gcode/words.py. */
-typedef struct {
-    Bytes text, letter;
-    Floats value;
-    Ints32 line;
-    Floats extra; /* what was found at the first marks */
-    Ints message_span;
-    int64_t first_line, words, marks, messages, most_decimals;
-} Scan;
+#include "gcode/expressions.h"
+#include "gcode/numbers.h"
 
 /* Kinds of an item that makes no word: a comment; a line or program number. Other kinds are letters. */
 enum { NOTHING = -1, LINE_NUMBER = 0 };
@@ -27,29 +17,6 @@ typedef struct {
     int64_t end;
 } Item;
 
-enum { MOST_DIGITS = 15, MOST_DECIMALS = 18 };
-static const double TEN_TO[MOST_DECIMALS + 1] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
-                                                 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
-
-/* A number: `plain` is a whole one without a minus sign. */
-typedef struct {
-    int finding;
-    double value;
-    int64_t digits, decimals;
-    bool plain;
-    int64_t end;
-} Number;
-
-/* --- characters ----------------------------------------------------------------------------------------- */
-
-static inline bool is_space(uint8_t c) { return c == CH_SPACE || c == CH_TAB; }
-static inline bool is_blank(uint8_t c) { return is_space(c) || c == CH_RETURN; }
-static inline bool is_digit(uint8_t c) { return (uint8_t)(c - CH_DIGIT_0) <= CH_DIGIT_9 - CH_DIGIT_0; }
-static inline bool is_sign(uint8_t c) { return c == CH_MINUS || c == CH_PLUS; }
-static inline bool is_letter(uint8_t c) {
-    return (uint8_t)((c | CH_CASE_BIT) - CH_SMALL_A) <= CH_SMALL_Z - CH_SMALL_A;
-}
-
 /* Return the code point of the UTF-8 character at i, the byte itself where it is none. */
 static int character(Bytes text, int64_t i) {
     const int first = AT(text, i);
@@ -63,69 +30,6 @@ static int character(Bytes text, int64_t i) {
         code = code << 6 | (AT(text, k) & 0x3F);
     }
     return code;
-}
-
-static int64_t line_end(Bytes text, int64_t i) {
-    while (i < text.rows && AT(text, i) != CH_NEWLINE)
-        i++;
-    return i;
-}
-
-/* --- expressions, which are not read but passed over whole ------------------------------------------------ */
-
-/* Tell whether a function with its argument stands at i, as in XABS[#1]. */
-static bool is_function(Bytes text, int64_t i) {
-    const int64_t start = i;
-    while (i < text.rows && is_letter(AT(text, i)))
-        i++;
-    return i > start + 1 && i < text.rows && AT(text, i) == CH_BRACKET_OPEN;
-}
-
-/* Return the place behind the bracket expression that opens at i. */
-static int64_t after_bracket(Bytes text, int64_t i, int64_t end) {
-    int64_t depth = 0;
-    for (; i < end; i++) {
-        depth += AT(text, i) == CH_BRACKET_OPEN;
-        if (AT(text, i) == CH_BRACKET_CLOSE && --depth == 0)
-            return i + 1;
-    }
-    return end;
-}
-
-/* Tell whether [, or the /[ of ATAN, stands at i. */
-static bool opens_bracket(Bytes text, int64_t i, int64_t end) {
-    if (AT(text, i) == CH_SLASH && i + 1 < end)
-        return AT(text, i + 1) == CH_BRACKET_OPEN;
-    return AT(text, i) == CH_BRACKET_OPEN;
-}
-
-static bool precedes_value(uint8_t c) { return is_blank(c) || is_sign(c) || c == CH_HASH; }
-
-/* Return the place behind a number, parameter, function or bracket expression that begins at i. */
-static int64_t after_value(Bytes text, int64_t i, int64_t end) {
-    while (i < end && precedes_value(AT(text, i)))
-        i++;
-    if (i < end && AT(text, i) == CH_LESS) { /* <name> */
-        while (i < end && AT(text, i) != CH_GREATER)
-            i++;
-        return least(i + 1, end);
-    }
-    while (i < end && is_letter(AT(text, i))) /* a function: its name, its argument */
-        i++;
-    while (i < end && (AT(text, i) == CH_POINT || is_digit(AT(text, i))))
-        i++;
-    while (i < end && opens_bracket(text, i, end))
-        i = after_bracket(text, i + (AT(text, i) == CH_SLASH), end);
-    return i;
-}
-
-/* Return the place behind "#1 = value" or a lone parameter. */
-static int64_t after_assignment(Bytes text, int64_t i) {
-    const int64_t end = line_end(text, i);
-    i = after_value(text, i, end);
-    while (i < end && is_blank(AT(text, i)))
-        i++;
-    return i < end && AT(text, i) == CH_EQUALS ? after_value(text, i + 1, end) : i;
 }
 
 /* --- comments ------------------------------------------------------------------------------------------- */
@@ -150,91 +54,6 @@ static Item comment(Bytes text, int64_t i) {
     if (nested || depth > 0)
         return (Item){V_MARK, nested ? F_COMMENT_NESTED : F_COMMENT_OPEN, CH_PAREN_OPEN, 0, end};
     return (Item){is_message(text, i + 1, end - 1) ? CH_PAREN_OPEN : NOTHING, F_OK, 0.0, 0, end};
-}
-
-/* --- numbers -------------------------------------------------------------------------------------------- */
-
-/* Read the number from i on, whatever it looks like. Blanks inside it mean nothing; digits beyond what a float
-   holds are dropped behind the point. */
-static Number any_number(Bytes text, int64_t i) {
-    Number read = {F_OK, 0.0, 0, 0, false, i};
-    int64_t mantissa = 0, significant = 0;
-    bool negative = false, point = false, started = false;
-    for (; i < text.rows; i++) {
-        const uint8_t c = AT(text, i);
-        if (is_digit(c)) {
-            started = true;
-            read.digits++;
-            significant += significant > 0 || c != CH_DIGIT_0;
-            if (significant <= MOST_DIGITS) {
-                mantissa = mantissa * 10 + (c - CH_DIGIT_0);
-                read.decimals += point;
-            } else if (!point) {
-                read.finding = F_NUMBER_TOO_LONG;
-            }
-        } else if (c == CH_POINT && !point) {
-            point = started = true;
-        } else if (is_sign(c) && !started) {
-            started = true;
-            negative = c == CH_MINUS;
-        } else if (!is_space(c)) {
-            break;
-        }
-    }
-    read.decimals = least(read.decimals, MOST_DECIMALS);
-    read.value = (negative ? -(double)mantissa : (double)mantissa) / TEN_TO[read.decimals];
-    read.plain = !point && !negative;
-    read.end = i;
-    return read;
-}
-
-/* Add the digits from i on to a mantissa; return the place behind. */
-static inline int64_t add_digits(Bytes text, int64_t i, int64_t *mantissa) {
-    for (; i < text.rows && is_digit(AT(text, i)); i++)
-        *mantissa = (int64_t)((uint64_t)*mantissa * 10 + (AT(text, i) - CH_DIGIT_0));
-    return i;
-}
-
-/* Read the number from i on: at once what most look like, a sign, digits, a point, digits. */
-static inline Number number(Bytes text, int64_t i) {
-    const int64_t start = i;
-    int64_t mantissa = 0, decimals = 0;
-    const bool negative = i < text.rows && AT(text, i) == CH_MINUS;
-    const int64_t first_digit = i += negative;
-    i = add_digits(text, i, &mantissa);
-    int64_t digits = i - first_digit;
-    const bool point = i < text.rows && AT(text, i) == CH_POINT;
-    if (point) {
-        const int64_t behind = i + 1;
-        i = add_digits(text, behind, &mantissa);
-        decimals = i - behind;
-        digits += decimals;
-    }
-    while (i < text.rows && is_space(AT(text, i)))
-        i++;
-    const bool goes_on = i < text.rows && (is_digit(AT(text, i)) || AT(text, i) == CH_POINT);
-    if (digits == 0 || digits > MOST_DIGITS || goes_on)
-        return any_number(text, start);
-    const double value = (negative ? -(double)mantissa : (double)mantissa) / TEN_TO[decimals];
-    return (Number){F_OK, value, digits, decimals, !point && !negative, i};
-}
-
-/* Tell whether N is followed by digits, or digits.digits: what LinuxCNC reads as a line number. */
-static bool is_line_number(Bytes text, int64_t i, int64_t end) {
-    int64_t before = 0, behind = 0;
-    bool point = false;
-    for (; i < end; i++) {
-        const uint8_t c = AT(text, i);
-        if (is_sign(c))
-            return false;
-        if (c == CH_POINT) {
-            point = true;
-        } else if (!is_blank(c)) {
-            before += !point;
-            behind += point;
-        }
-    }
-    return before > 0 && (behind > 0 || !point);
 }
 
 /* --- items ---------------------------------------------------------------------------------------------- */

@@ -27,7 +27,7 @@ def damaged(program, seed):
     """The program with wrong and missing numbers at random places."""
     random = np.random.default_rng(seed)
     changed = {}
-    for name in ("position_mm", "abc_deg", "speed_mm_s", "cdis_mm", "wait_s"):
+    for name in ("pose", "speed_mm_s", "cdis_mm", "wait_s"):
         values = np.array(getattr(program, name))
         rows = random.integers(0, len(values), 200)
         values[rows] += random.choice([1e-4, 1e-3, 1.0, np.nan], size=(200, *values.shape[1:]))
@@ -51,10 +51,10 @@ def test_the_chunks_do_not_matter(case, seed, rows, monkeypatch):
 
 def test_what_is_furthest_off_and_how_far(case):
     program, targets, joints, cell = case
-    position = np.array(program.position_mm)
+    pose = np.array(program.pose)
     lin = np.flatnonzero(~targets.ptp)[[3, 40, 500]]
-    position[lin, 1] += [0.5, 2.0, 1.0]
-    found = differences_of(replace(program, position_mm=position), targets, joints, cell, len(targets))
+    pose[lin, 1] += [0.5, 2.0, 1.0]
+    found = differences_of(replace(program, pose=pose), targets, joints, cell, len(targets))
     assert [row for row, _ in found.worst[:3]] == [lin[1], lin[2], lin[0]]
     assert [off for _, off in found.worst[:3]] == pytest.approx([2.0, 1.0, 0.5], abs=1e-3)
     assert found.largest[0] == found.worst[0][1]
@@ -64,10 +64,10 @@ def test_what_is_furthest_off_and_how_far(case):
 
 def test_a_missing_number_comes_first_and_has_no_size(case):
     program, targets, joints, cell = case
-    position = np.array(program.position_mm)
+    pose = np.array(program.pose)
     row = np.flatnonzero(~targets.ptp)[100]
-    position[row, 0] = np.nan
-    found = differences_of(replace(program, position_mm=position), targets, joints, cell, len(targets))
+    pose[row, 0] = np.nan
+    found = differences_of(replace(program, pose=pose), targets, joints, cell, len(targets))
     assert found.worst[0][0] == row
     assert np.isnan(found.largest[0])
     assert [issue.message.partition(" (")[0] for issue in found.issues] == ["X, Y or Z is missing"]

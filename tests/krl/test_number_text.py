@@ -31,7 +31,7 @@ def written(run):
     """The text, and the state behind it."""
     *columns, state, every, before = run
     state = state.copy()
-    return number_text.motion_lines(*columns, state, every, before), state.tolist()
+    return b"".join(number_text.motion_lines(*columns, state, every, before)), state.tolist()
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 50])
@@ -59,5 +59,5 @@ def test_no_motion_is_no_text():
     *columns, state, every, _ = random_run(2)
     nothing = [column[:0] for column in columns]
     before = state.copy()
-    assert number_text.motion_lines(*nothing, state, every) == b""
+    assert b"".join(number_text.motion_lines(*nothing, state, every)) == b""
     assert state.tolist() == before.tolist()

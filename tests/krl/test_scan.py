@@ -13,7 +13,7 @@ def one(text):
     """Return kind, blending and numbers of the only statement of a text."""
     scanned = scan_krl(text)
     assert len(scanned.kind) == 1
-    return int(scanned.kind[0]), int(scanned.blend[0]), scanned.value[0]
+    return int(scanned.kind[0]), int(scanned.blend[0]), np.concatenate([scanned.pose, scanned.value])[0]
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,8 @@ def test_lines_without_a_statement_are_counted_and_left_out():
     scanned = scan_krl(text)
     assert scanned.line.tolist() == [5, 7, 8]
     assert scanned.open_folds == 1
-    assert [text[a:b] for a, b in scanned.span.tolist()] == [b"LIN {X 1}", b"HALT", b"END"]
+    assert scanned.pose[:, 0].tolist() == [1]
+    assert [text[a:b] for a, b in scanned.span.tolist()] == [b"HALT", b"END"]
 
 
 def test_the_first_line_too_long_and_the_first_that_is_not_ascii():
@@ -125,4 +126,4 @@ def test_chunks_change_nothing(chunk_bytes, end):
 def test_a_text_without_a_line():
     scanned = scan_krl(b"")
     assert len(scanned.kind) == 0
-    assert scanned[5:] == (0, 0, 0)
+    assert scanned[6:] == (0, 0, 0)

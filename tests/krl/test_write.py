@@ -495,7 +495,7 @@ poses = st.lists(st.lists(nanos, min_size=6, max_size=6), min_size=1, max_size=5
 @given(poses, st.integers(1, 2 * 10**9), st.sampled_from([0.0, 0.05]))
 def test_motion_lines_use_the_same_rule(rows, speed, cdis):
     values = np.array(rows) / 1e9
-    text = motion_lines(
+    pieces = motion_lines(
         values[:, :3],
         values[:, 3:],
         np.full(len(rows), speed / 1e9),
@@ -503,7 +503,8 @@ def test_motion_lines_use_the_same_rule(rows, speed, cdis):
         np.zeros(len(rows), dtype=np.int32),
         np.array([-1.0, -1.0, 0.0]),
         0,
-    ).decode("ascii")
+    )
+    text = b"".join(pieces).decode("ascii")
     expected = [f"$VEL.CP={rounded(speed, 7)}", *(["$APO.CDIS=0.050"] if cdis else [])]
     for row in rows:
         parts = zip("XYZABC", row, (3, 3, 3, 4, 4, 4), strict=True)

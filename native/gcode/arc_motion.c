@@ -1,0 +1,211 @@
+/* G2 and G3: the centre from R or from I, J, K, and the chords that replace the arc. */
+
+#include "gcode/arc_motion.h"
+
+#include "gcode/feed.h"
+#include "gcode/reporting.h"
+#include "gcode/rows.h"
+#include "gcode/settings.h"
+
+enum { MOST_MISFITS = 10 };        /* arcs whose lines are kept */
+enum { MOST_TURNS = 1000 };
+
+/* --- the centre ---------------------------------------------------------------------------------------- */
+
+Arc arc_of(const Block *b) {
+    const State *s = b->state;
+    const double here_mm[3] = {s->x, s->y, s->z};
+    Arc arc = {.first = s->plane == V_PLANE_XY ? 0 : s->plane == V_PLANE_ZX ? 2 : 1};
+    arc.second = (arc.first + 1) % 3;
+    arc.third = (arc.first + 2) % 3;
+    target(b, arc.to_mm);
+    arc.from = (Point){here_mm[arc.first], here_mm[arc.second]};
+    arc.to = (Point){arc.to_mm[arc.first], arc.to_mm[arc.second]};
+    arc.from_w = here_mm[arc.third];
+    arc.to_w = arc.to_mm[arc.third];
+    arc.rests_on = S_DOUBT_X << arc.first | S_DOUBT_X << arc.second | S_DOUBT_UNIT | S_DOUBT_PLANE |
+                   S_DOUBT_DISTANCE | S_DOUBT_CENTRE;
+    return arc;
+}
+
+/* Tell whether the centre word along the arc's axis is 0 or missing; report it where it is not. */
+static bool axis_word_is_harmless(Block *b, const Arc *arc) {
+    const int index = V_WORD_I + arc->third, letter = CH_LETTER_I + arc->third;
+    if (!b->has[index])
+        return true;
+    if (b->word[index] != 0.0) {
+        const Says says = {.a = letter, .b = b->word[index], .c = b->state->plane};
+        report_unless(b, S_DOUBT_PLANE, F_ARC_WRONG_OFFSET, says);
+        return false;
+    }
+    if (!b->counts->mute)
+        note(b, S_NOTE_CENTRE, letter);
+    return true;
+}
+
+/* Find the centre of an arc with R; return false where there is none. */
+static bool centre_by_radius(Block *b, Arc *arc) {
+    const State *s = b->state;
+    if (b->has[V_WORD_I + arc->first] || b->has[V_WORD_I + arc->second]) {
+        report(b, F_ARC_BOTH_FORMATS, (Says){0});
+        return false;
+    }
+    const double radius_mm = b->word[V_WORD_R] * s->unit_mm;
+    const bool ccw = s->motion == V_MOTION_ARC_CCW;
+    const int finding = centre_from_radius(arc->from, arc->to, radius_mm, ccw, &arc->centre);
+    if (finding != F_OK)
+        report_unless(b, arc->rests_on, finding,
+                      (Says){.a = fabs(radius_mm), .b = distance(arc->to, arc->from)});
+    return finding == F_OK;
+}
+
+/* Find the centre of an arc with I, J, K; return false where there is none. */
+static bool centre_by_words(Block *b, Arc *arc) {
+    const State *s = b->state;
+    const bool has_u = b->has[V_WORD_I + arc->first], has_v = b->has[V_WORD_I + arc->second];
+    if (!has_u && !has_v) {
+        report(b, F_ARC_NO_CENTRE, (Says){.a = s->motion * V_TENFOLD, .b = s->motion_line});
+        return false;
+    }
+    if (s->arc_absolute && !(has_u && has_v)) {
+        report_unless(b, S_DOUBT_CENTRE, F_ARC_NEEDS_OFFSETS, (Says){0});
+        return false;
+    }
+    const double u = has_u ? b->word[V_WORD_I + arc->first] * s->unit_mm : 0.0;
+    const double v = has_v ? b->word[V_WORD_I + arc->second] * s->unit_mm : 0.0;
+    const double *base_mm = work_offset_mm(b);
+    arc->centre.u = u + (s->arc_absolute ? base_mm[arc->first] : arc->from.u);
+    arc->centre.v = v + (s->arc_absolute ? base_mm[arc->second] : arc->from.v);
+    return true;
+}
+
+/* --- what does not fit --------------------------------------------------------------------------------- */
+
+/* Return the centre as the other of G90.1 and G91.1 would have it. */
+static Point other_centre(const Block *b, const Arc *arc) {
+    const double *base_mm = work_offset_mm(b);
+    const Point base = {base_mm[arc->first], base_mm[arc->second]};
+    const Point centre = arc->centre, from = arc->from;
+    if (b->state->arc_absolute)
+        return (Point){centre.u + (from.u - base.u), centre.v + (from.v - base.v)};
+    return (Point){centre.u + (base.u - from.u), centre.v + (base.v - from.v)};
+}
+
+/* An arc from a position that was never programmed cannot fit: the cause is the first such move. */
+static void report_unknown_start(Block *b) {
+    State *s = b->state;
+    if (s->unknown_reported)
+        b->counts->consequences++;
+    else
+        report_at(b, (int32_t)least(b->line, s->unknown_feed_line), F_UNKNOWN_START,
+                  (Says){.a = s->absolute ? 0 : s->distance_line});
+    s->unknown_reported = 1;
+}
+
+static void report_misfit(Block *b, const Arc *arc) {
+    State *s = b->state;
+    if (b->counts->mute)
+        return;
+    const Point other = other_centre(b, arc);
+    s->misfits++;
+    s->misfits_other_centre +=
+        radii_fit(distance(arc->from, other), distance(arc->to, other), s->unit_mm) != MISFIT;
+    if (s->misfits > MOST_MISFITS)
+        return;
+    const int centre = s->arc_absolute ? V_G90_1 : V_G91_1;
+    report(b, F_ARC_RADIUS_MISMATCH,
+           (Says){arc->from_radius_mm, arc->to_radius_mm, s->unit_mm == 1.0 ? centre : -centre});
+}
+
+static void misfit(Block *b, const Arc *arc) {
+    const State *s = b->state;
+    const int8_t known[3] = {s->known_x, s->known_y, s->known_z};
+    if (!(known[arc->first] && known[arc->second]))
+        report_unknown_start(b);
+    else if (!rests_on_doubt(b, arc->rests_on))
+        report_misfit(b, arc);
+}
+
+/* Count an arc that is read as a spiral; the worst is kept. */
+static void note_spiral(Block *b, const Arc *arc) {
+    State *s = b->state;
+    s->spirals++;
+    if (s->spirals > 1 &&
+        !(fabs(arc->from_radius_mm - arc->to_radius_mm) > fabs(s->spiral_start - s->spiral_end)))
+        return;
+    s->spiral_line = b->line;
+    s->spiral_start = arc->from_radius_mm;
+    s->spiral_end = arc->to_radius_mm;
+    s->spiral_unit_mm = s->unit_mm;
+}
+
+/* --- the chords ---------------------------------------------------------------------------------------- */
+
+/* Write the rows of an arc; the last ends exactly where the block says. */
+static void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
+    State *s = b->state;
+    double at_mm[3];
+    for (int64_t k = 1; k <= chords; k++) {
+        const double part = (double)k / (double)chords;
+        const double r = arc->from_radius_mm + (arc->to_radius_mm - arc->from_radius_mm) * part;
+        at_mm[arc->first] = arc->centre.u + r * cos(angle + sweep * part);
+        at_mm[arc->second] = arc->centre.v + r * sin(angle + sweep * part);
+        at_mm[arc->third] = arc->from_w + (arc->to_w - arc->from_w) * part;
+        stand_at(s, k == chords ? arc->to_mm : at_mm);
+        emit(b->machine, b->line, mm_s, false, false, s->arcs);
+    }
+    s->arcs++;
+}
+
+/* Write an arc whose radii fit; return false, with nothing written, where there is no room for its rows. */
+static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
+    const Machine *machine = b->machine;
+    double angle, mm_s = 0.0;
+    const bool ccw = b->state->motion == V_MOTION_ARC_CCW;
+    const double sweep = sweep_angle(arc->from, arc->to, arc->centre, ccw, turns, &angle);
+    const double radius_mm = greater(arc->from_radius_mm, arc->to_radius_mm);
+    const int64_t count = chord_count(radius_mm, sweep, machine->chord_tolerance_mm);
+    if (count > MOST_CHORDS) {
+        report_unless(b, arc->rests_on, F_ARC_TOO_LONG, (Says){.a = radius_mm});
+        return true;
+    }
+    if (b->counts->rows + count > machine->rows.feed_mm_s.rows) {
+        b->counts->rows_wanted = b->counts->rows + count;
+        return false;
+    }
+    const double along_mm = 0.5 * (arc->from_radius_mm + arc->to_radius_mm) * sweep;
+    const int finding = feed_speed(b, hypot(along_mm, arc->to_w - arc->from_w), &mm_s);
+    if (finding != F_OK) {
+        report_speed(b, finding);
+        return true;
+    }
+    if (fit != FITS)
+        note_spiral(b, arc);
+    learn(b);
+    emit_chords(b, arc, angle, sweep, count, mm_s);
+    return true;
+}
+
+/* Carry out G2 or G3; return false where there is no room for its rows. */
+bool arc_move(Block *b, Arc *arc) {
+    if (!axis_word_is_harmless(b, arc))
+        return true;
+    if (!(b->has[V_WORD_R] ? centre_by_radius(b, arc) : centre_by_words(b, arc)))
+        return true;
+    const int32_t turns = b->has[V_WORD_P] ? whole(b->word[V_WORD_P]) : 1;
+    if (turns < 1 || turns > MOST_TURNS) {
+        report(b, F_ARC_TURNS, (Says){.a = b->word[V_WORD_P]});
+        return true;
+    }
+    arc->from_radius_mm = distance(arc->from, arc->centre);
+    arc->to_radius_mm = distance(arc->to, arc->centre);
+    if (lesser(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM) {
+        report_unless(b, arc->rests_on, F_ARC_ZERO_RADIUS, (Says){0});
+        return true;
+    }
+    const Fit fit = radii_fit(arc->from_radius_mm, arc->to_radius_mm, b->state->unit_mm);
+    if (fit != MISFIT)
+        return chords(b, arc, turns, fit);
+    misfit(b, arc);
+    return true;
+}

@@ -1,0 +1,82 @@
+/* A LIN or PTP by its components. */
+
+#ifndef KRL_MOTION_H
+#define KRL_MOTION_H
+
+#include "krl/statement.h"
+
+enum { NO_COMPONENT = -1 };
+enum { COLUMN_X = 0, COLUMN_A = 3, COLUMN_S = 6, COLUMN_T = 7 };
+/* Components A1 to A6 have the bits from here on, the others those of their columns. */
+enum { AXIS_BITS = W_STATEMENT_COLUMNS, CARTESIAN = (1 << W_STATEMENT_COLUMNS) - 1 };
+
+/* Read the name of a component; return the place behind it. */
+static inline Place component(Place at, Place end, int *bit) {
+    const uint8_t letter = capital(HERE(at, end));
+    at++;
+    if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
+        *bit = COLUMN_X + letter - CH_LETTER_X;
+    else if (letter == CH_LETTER_A && at < end && is_axis(HERE(at, end))) {
+        *bit = AXIS_BITS + HERE(at, end) - CH_DIGIT_1;
+        at++;
+    } else if (letter >= CH_LETTER_A && letter <= CH_LETTER_C)
+        *bit = COLUMN_A + letter - CH_LETTER_A;
+    else if (letter == CH_LETTER_S)
+        *bit = COLUMN_S;
+    else
+        *bit = letter == CH_LETTER_T ? COLUMN_T : NO_COMPONENT;
+    return at;
+}
+
+/* Read `{X 1.0,Y 2.0,…}`, the components found as bits; return the place behind the brace, else NULL. */
+static inline Place components(Place at, Place end, double *value, int *found) {
+    *found = 0;
+    if (!is(at, end, CH_BRACE_OPEN))
+        return NULL;
+    for (;;) {
+        int bit;
+        double read;
+        at = blank(at + 1, end);
+        if (at >= end)
+            return NULL;
+        at = component(at, end, &bit);
+        if (bit == NO_COMPONENT || at >= end || !is_blank(HERE(at, end)))
+            return NULL;
+        at = number(blank(at, end), end, &read);
+        if (at == NULL || *found & (1 << bit))
+            return NULL;
+        *found |= 1 << bit;
+        SLOT(value, bit >= AXIS_BITS ? bit - AXIS_BITS : bit) = read;
+        at = blank(at, end);
+        if (is(at, end, CH_BRACE_CLOSE))
+            return at + 1;
+        if (!is(at, end, CH_COMMA))
+            return NULL;
+    }
+}
+
+/* Tell whether a statement is a motion, whether or not it can be read. */
+static inline bool is_motion(Place begin, Place end) {
+    return STANDS(begin, end, W_LIN) || STANDS(begin, end, W_PTP);
+}
+
+/* Read a motion into value. */
+static inline Statement motion(Place begin, Place end, double *value) {
+    Statement read = {STANDS(begin, end, W_LIN) ? W_KIND_LIN : W_KIND_PTP, W_MALFORMED};
+    int found;
+    Place at = components(blank(begin + sizeof(W_LIN) - 1, end), end, value, &found);
+    const bool axes = found > CARTESIAN, linear = read.kind == W_KIND_LIN;
+    if (axes && !linear)
+        read.kind = W_KIND_PTP_AXES;
+    if (at == NULL || (axes && (linear || found & CARTESIAN)))
+        return read;
+    at = blank(at, end);
+    const bool blends = STANDS(at, end, W_C_DIS);
+    if (blends)
+        at = blank(at + sizeof(W_C_DIS) - 1, end);
+    if (ends_here(at, end))
+        read.blend = blends;
+    return read;
+}
+
+#endif
