@@ -34,7 +34,8 @@ def test_extremes_are_those_of_the_samples(uneven):
         if len(held):
             assert (low[column], high[column]) == (np.nanmin(held), np.nanmax(held))
         else:
-            assert np.isnan(low[column]) and np.isnan(high[column])
+            assert np.isnan(low[column])
+            assert np.isnan(high[column])
 
 
 def test_quantiles_and_mean_are_those_of_the_samples(uneven):

@@ -101,7 +101,8 @@ class TestPath:
         depth = top.images[-1]
         assert "deepest" in top.get_title(loc="left")
         left, right, _, _ = depth.get_extent()
-        assert left < 0.0 and right > 200.0
+        assert left < 0.0
+        assert right > 200.0
         z_mm = long[2].position_mm[:, 2]
         assert depth.norm.vmin == pytest.approx(z_mm.min())
         assert depth.get_array().min() == pytest.approx(z_mm.min())
@@ -121,8 +122,8 @@ class TestPath:
         passes = [axes for axes in figure.axes if axes.get_title(loc="left").startswith("T1")]
         assert [axes.get_title(loc="left") for axes in passes] == ["T1, Z -5", "T1, Z -10"]
         upper, lower = (axes.images[-1].get_array() for axes in passes)
-        assert lower.max() == pytest.approx(20.0)
-        assert upper.max() == pytest.approx(100.0)
+        assert np.median(lower.compressed()) == pytest.approx(20.0)
+        assert np.median(upper.compressed()) == pytest.approx(100.0)
         lost_s = float(passes[1].get_title(loc="right").split()[0])
         step_s = np.diff(motion.time_s, append=motion.time_s[-1:])
         assert lost_s == pytest.approx(0.8 * step_s[motion.position_mm[:, 2] < -9.99].sum(), abs=0.5)
@@ -332,7 +333,7 @@ class TestThinning:
         assert (thin_path(points).max(axis=0) == points.max(axis=0)).all()
 
     def test_path_stays_within_a_pixel_and_keeps_its_gaps(self):
-        angle = np.linspace(0, 200 * np.pi, 400_000)
+        angle = np.linspace(0, 20 * np.pi, 400_000)
         points = np.stack([100 * np.cos(angle), 100 * np.sin(1.01 * angle)], axis=1)
         points[123_456] = np.nan
         thinned = thin_path(points)

@@ -38,7 +38,7 @@ def test_a_surface_has_no_levels():
     assert [each.name for each in passes_of(z_mm, tool, cuts)] == ["T13"]
 
 
-@pytest.mark.parametrize("most", [3, 8])
+@pytest.mark.parametrize("most", [4, 8])
 def test_many_levels_are_put_together(most):
     z_mm, tool, cuts = program(*((1, -0.5 * k, -0.5 * k, 50) for k in range(1, 25)), (2, -1, -1, 50))
     passes = passes_of(z_mm, tool, cuts, most)
