@@ -14,6 +14,7 @@ from gcode2krl.report.maps import (
     draw_passes,
     height_in,
     hide_each_other,
+    near,
     passes_height_in,
     side_columns,
     side_title,
@@ -47,9 +48,10 @@ def coloured_path_figure(
     shading = Shading(values, cuts, Normalize(0.0, top_value or 1.0), "viridis")
     passes = passes_of(position[:, 2], motion.tool, cuts)
     several = hide_each_other(position, passes)
-    side, stretch = side_columns(position)
+    shown = position[near(position, cuts)]
+    side, stretch = side_columns(shown)
     with look():
-        heights = [height_in(position, _WIDTH_IN, _LOWEST_IN, _HIGHEST_IN), 1.8]
+        heights = [height_in(shown, _WIDTH_IN, _LOWEST_IN, _HIGHEST_IN), 1.8]
         heights += [passes_height_in(position, passes)] if several else []
         figure = Figure(figsize=(11.0, sum(heights) + 1.2), layout="constrained")
         grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)

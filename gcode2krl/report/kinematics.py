@@ -45,7 +45,7 @@ def kinematics_figure(toolpath: Toolpath, motion: Motion) -> Figure:
         clock.columns.is_hatch(values, span.height)
         for (_, _, values, _), span in zip(quantities, spans, strict=True)
     )
-    crowded = bool(np.any(motion.corner & ~told_in_time(clock, motion.corner)))
+    crowded = bool(np.any(motion.corner & ~told_in_time(clock, motion)))
     heights = [1.0, 1.0, 1.0, *([0.16] if crowded else []), *([0.9] if long else [])]
     with look():
         figure = Figure(figsize=(11.0, 10.0 if long else 7.5), layout="constrained")
@@ -57,7 +57,7 @@ def kinematics_figure(toolpath: Toolpath, motion: Motion) -> Figure:
             panel(axes, clock, values, unit, BLUE, "commanded", keep)
             axes.set_ylabel(f"{name} ({unit})")
             axes.grid(axis="y", color=PALE, lw=0.4)
-        mark_corners(panels[:3], clock, motion.corner)
+        mark_corners(panels[:3], clock, motion)
         if crowded:
             corner_share(panels[3], clock, motion.corner)
         for axes in panels[:-1]:

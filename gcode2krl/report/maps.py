@@ -20,8 +20,10 @@ STRETCHES = (1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 500, 1000)
 _ACROSS = 2000
 """Pixels across a large map: more than the page has, so that nothing is dropped."""
 _ACROSS_SMALL = 700
-_FILLED = 0.6
+_FILLED = 1.0
 """Share of the pixels that lines are thickened to, at most."""
+_AROUND = 0.25
+"""Pale moves are drawn up to this share of the coloured path's extent around it."""
 _HIDES = 0.05
 """Share of pixels that several passes cover from which on they are drawn beside each other."""
 _BESIDE = 4
@@ -56,6 +58,17 @@ def side_columns(points_mm: Floats) -> tuple[list[int], int]:
     return [side, 2], stretch if span[2] > 0.0 else 1
 
 
+def near(position_mm: Floats, coloured: Bools) -> Bools:
+    """Return (m,) the samples that a picture shows: those with a colour, and the others not far from them."""
+    if not coloured.any():
+        return np.ones(len(position_mm), dtype=np.bool_)
+    low, high = position_mm[coloured].min(axis=0), position_mm[coloured].max(axis=0)
+    room = max(_AROUND * float((high - low).max()), 1.0)
+    x, y, z = ((position_mm >= low - room) & (position_mm <= high + room)).T
+    shown: Bools = x & y & z
+    return shown
+
+
 def side_title(stretch: int) -> str:
     """Return the title of the side view."""
     return "From the side" + (f", Z drawn {stretch} times larger" if stretch > 1 else "")
@@ -64,10 +77,15 @@ def side_title(stretch: int) -> str:
 def draw_map(
     axes: Axes, position_mm: Floats, columns: list[int], shading: Shading, stretch: float
 ) -> AxesImage:
-    """Draw the path in a plane: pale where it has no colour, else the worst in each pixel."""
+    """Draw the path in a plane: pale where it has no colour, else the worst in each pixel.
+
+    Moves far from those with a colour, as to a tool changer, are not drawn.
+    """
     points = position_mm[:, columns]
-    canvas = Canvas.around(points, _ACROSS, stretch)
-    air = worst_per_pixel(canvas, points, np.ones(len(points)), _with_neighbours(~shading.coloured))
+    shown = near(position_mm, shading.coloured)
+    canvas = Canvas.around(points[shown], _ACROSS, stretch)
+    drawn_pale = _with_neighbours(~shading.coloured) & shown
+    air = worst_per_pixel(canvas, points, np.ones(len(points)), drawn_pale)
     _show(axes, thicken(air, 1), canvas, cmap=ListedColormap([PALE]))
     image = shading.image(canvas, points, shading.coloured)
     drawn = _show(axes, image, canvas, cmap=shading.colours, norm=shading.norm)

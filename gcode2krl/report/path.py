@@ -30,6 +30,7 @@ from gcode2krl.report.maps import (
     draw_map,
     draw_passes,
     height_in,
+    near,
     passes_height_in,
     side_columns,
     side_title,
@@ -89,7 +90,7 @@ def _of_lines(scene: _Scene) -> Figure:
     motion, corner = scene.motion, scene.corner
     programmed = _programmed_mm(scene.targets, motion)
     across_mm = float(np.ptp(motion.position_mm, axis=0).max())
-    told = corners_apart(motion.path_mm, motion.corner, _TOLD * across_mm)
+    told = corners_apart(motion.path_mm, motion.corner, motion.move, _TOLD * across_mm)
     side, stretch = side_columns(np.concatenate([programmed, motion.position_mm]))
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.75, 1.0), height_ratios=(2.2, 1.0))
@@ -114,10 +115,14 @@ def _of_lines(scene: _Scene) -> Figure:
 def _of_maps(scene: _Scene) -> Figure:
     """Draw the path coloured by depth, and its passes coloured by speed."""
     motion, corner, position = scene.motion, scene.corner, scene.motion.position_mm
-    side, stretch = side_columns(position)
     feed = ~scene.rapid
+    side, stretch = side_columns(position[near(position, feed)])
     passes = passes_of(position[:, 2], motion.tool, feed)
-    heights = (height_in(position, 6.0, 2.8, 6.0), 1.6, passes_height_in(position, passes))
+    heights = (
+        height_in(position[near(position, feed)], 6.0, 2.8, 6.0),
+        1.6,
+        passes_height_in(position, passes),
+    )
     figure = Figure(figsize=(11.0, sum(heights) + 1.6), layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.75, 1.0), height_ratios=heights)
     z_mm = position[:, 2]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import read_gcode, set_targets
+from gcode2krl.report.corner_marks import corners_apart
 from gcode2krl.report.drawing import MOST_POINTS, intervals, line_ticks, thin, thin_path
 from gcode2krl.report.figures import save_figures
 from gcode2krl.report.joints import joints_figure
@@ -139,6 +140,13 @@ class TestPath:
         marks = [line for line in figure.axes[0].lines if "told apart" in line.get_label()]
         assert len(marks) == 1
         assert np.allclose(marks[0].get_xdata(), 300.0, atol=0.3), "only the corner far from the circle"
+
+    def test_an_arc_of_blended_chords_is_not_one_corner(self):
+        corner = np.zeros(100, dtype=bool)
+        corner[[10, 11, *range(40, 60)]] = True
+        move = np.repeat(np.arange(20, dtype=np.int32), 5)
+        shown = corners_apart(np.arange(100.0), corner, move, 5.0)
+        assert np.flatnonzero(shown).tolist() == [10, 11]
 
     @pytest.mark.parametrize("rows", [1, 2])
     def test_tiny(self, rows):

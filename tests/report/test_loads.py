@@ -128,6 +128,18 @@ def test_an_outlier_does_not_darken_the_path(circles):
     assert any("1: 100 at line 12" in words for words in texts(figure))
 
 
+def test_a_move_to_the_tool_changer_does_not_shrink_the_part(circles):
+    toolpath, motion, _ = circles
+    position = motion.position_mm.copy()
+    position[-5:] = [5000.0, 0.0, 800.0]
+    values = np.ones(len(motion))
+    values[-5:] = 0.0
+    far = type(motion)(**{**vars(motion), "position_mm": position})
+    figure = coloured_path_figure(toolpath, far, values, "force (N)", "Force")
+    left, right, _, _ = figure.axes[0].images[-1].get_extent()
+    assert (left, right) == pytest.approx((30.0, 70.0), abs=1.0)
+
+
 def test_all_in_air_is_pale():
     motion = motion_of(targets_of(DOG_LEG))
     draw(coloured_path_figure(toolpath_of(DOG_LEG), motion, np.zeros(len(motion)), "force (N)", "Force"))
