@@ -3,6 +3,7 @@
     python examples/make_examples.py                          the four example files, always the same bytes
     python examples/make_examples.py --out DIR                the same, elsewhere
     python examples/make_examples.py --raster-lines 1000000   one raster of about so many lines instead
+    python examples/make_examples.py --pocket                 an adaptive pocket of 15,000 lines instead
 
 Positions are those of the tool tip in $BASE, in mm, feeds in mm/min; tool numbers are the default cell's.
 """
@@ -13,6 +14,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from make_pocket import long_pocket
 from make_raster import long_raster, raster_finish
 
 # --- what the LinuxCNC-style programs share ----------------------------------------------------
@@ -288,10 +290,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Write the example G-code programs.")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder, made if missing")
     parser.add_argument("--raster-lines", type=int, metavar="N", help="write only raster_N.nc, about N lines")
+    parser.add_argument("--pocket", action="store_true", help="write only adaptive_pocket.nc, 15,000 lines")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     if options.raster_lines is not None:
         write(options.out / f"raster_{options.raster_lines}.nc", long_raster(options.raster_lines))
+        return
+    if options.pocket:
+        write(options.out / "adaptive_pocket.nc", long_pocket())
         return
     for name, lines in EXAMPLES.items():
         write(options.out / name, lines())

@@ -199,7 +199,10 @@ def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> 
 
 def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Path]:
     """Draw path, speed and joints; returns the files."""
-    from gcode2krl.report import figures as fig
+    from gcode2krl.report.figures import save_figures
+    from gcode2krl.report.joints import joints_figure
+    from gcode2krl.report.kinematics import kinematics_figure
+    from gcode2krl.report.path import path_figure
 
     motion, joints, robot = prediction.motion, prediction.joints, prediction.cell.robot
     if motion is None or joints is None:
@@ -207,12 +210,12 @@ def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Pa
     limits = np.array(robot.limits.q_deg) if robot.limits.q_deg is not None else None
     speeds = np.array(robot.speeds.qd_deg_s) if robot.speeds.qd_deg_s is not None else None
     drawn = {
-        "path": fig.path_figure(prediction.toolpath, prediction.targets, motion),
-        "kinematics": fig.kinematics_figure(prediction.toolpath, motion),
-        "joints": fig.joints_figure(motion, joints, limits, speeds),
+        "path": path_figure(prediction.toolpath, prediction.targets, motion),
+        "kinematics": kinematics_figure(prediction.toolpath, motion),
+        "joints": joints_figure(motion, joints, limits, speeds, prediction.toolpath),
         **_load_figures(prediction),
     }
-    return fig.save_figures(drawn, folder, inputs)
+    return save_figures(drawn, folder, inputs)
 
 
 def _folder(part: str, output: str | None) -> Path:
@@ -228,7 +231,9 @@ def _folder(part: str, output: str | None) -> Path:
 
 def _load_figures(prediction: "Prediction") -> "dict[str, Figure]":
     """Return the figures of forces and deflection, where they are known."""
-    from gcode2krl.report import load_figures as fig
+    from gcode2krl.report.coloured_path import coloured_path_figure
+    from gcode2krl.report.deflections import deflection_figure, share_figure
+    from gcode2krl.report.forces import force_figure
 
     toolpath, motion, forces = prediction.toolpath, prediction.motion, prediction.forces
     deflection, joints = prediction.deflection, prediction.joints
@@ -236,8 +241,10 @@ def _load_figures(prediction: "Prediction") -> "dict[str, Figure]":
         return {}
     size_N = np.linalg.norm(forces.force_base_N, axis=1)
     drawn = {
-        "force": fig.force_figure(toolpath, motion, forces),
-        "force_path": fig.coloured_path_figure(motion, size_N, "force (N)", "Cutting force on the path"),
+        "force": force_figure(toolpath, motion, forces),
+        "force_path": coloured_path_figure(
+            toolpath, motion, size_N, "force (N)", "Cutting force on the path"
+        ),
     }
     if deflection is None or joints is None:
         return drawn
@@ -245,11 +252,11 @@ def _load_figures(prediction: "Prediction") -> "dict[str, Figure]":
     names, share_mm = _shares(prediction)
     return {
         **drawn,
-        "deflection": fig.deflection_figure(toolpath, motion, deflection),
-        "deflection_path": fig.coloured_path_figure(
-            motion, bent_mm, "deflection (mm)", "Deflection on the path"
+        "deflection": deflection_figure(toolpath, motion, deflection),
+        "deflection_path": coloured_path_figure(
+            toolpath, motion, bent_mm, "deflection (mm)", "Deflection on the path"
         ),
-        "deflection_joints": fig.share_figure(toolpath, motion, names, share_mm),
+        "deflection_joints": share_figure(toolpath, motion, names, share_mm),
     }
 
 

@@ -5,122 +5,31 @@ import sys
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from gcode2krl import read_gcode, set_targets
-from gcode2krl.report.drawing import MOST_POINTS, intervals, line_ticks, smooth, thin, thin_path, worst_corner
-from gcode2krl.report.figures import joints_figure, kinematics_figure, path_figure, save_figures
-from gcode2krl.tables import Joints, Motion, Targets, Toolpath
+from gcode2krl.report.corner_marks import corners_apart
+from gcode2krl.report.drawing import MOST_POINTS, intervals, line_ticks, thin, thin_path
+from gcode2krl.report.figures import save_figures
+from gcode2krl.report.joints import joints_figure
+from gcode2krl.report.kinematics import kinematics_figure
+from gcode2krl.report.path import path_figure, speed_share
+from gcode2krl.report.worst_corner import smooth, worst_corner
+from gcode2krl.tables import Joints, Motion
 from tests.conftest import ROOT
-
-LIMITS_DEG = np.array([[-147, 147], [-140, -5], [-112, 153], [-350, 350], [-122.5, 122.5], [-350, 350.0]])
-SPEEDS_DEG_S = np.array([84, 85, 83, 115, 110, 184.0])
-DOG_LEG = np.array([[0, 0, 5], [0, 0, 0], [100, 0, 0], [100, 60, 0], [100, 60, 30.0]])
-
-
-def toolpath_of(points, feed=50.0):
-    rows = len(points)
-    return Toolpath(
-        position_mm=points,
-        axis=np.tile([0.0, 0.0, 1.0], (rows, 1)),
-        rapid=np.arange(rows) == rows - 1,
-        feed_mm_s=np.where(np.arange(rows) == rows - 1, np.inf, feed),
-        spindle_rad_s=np.zeros(rows),
-        tool=np.ones(rows),
-        exact_stop=np.zeros(rows),
-        tolerance_mm=np.full(rows, np.nan),
-        dwell_s=np.zeros(rows),
-        source_line=10 + np.arange(rows),
-        arc=np.full(rows, -1),
-        machine=np.zeros(rows),
-        known=np.ones((rows, 3)),
-        length_offset_mm=np.full(rows, np.nan),
-        length_offset_tool=np.full(rows, -1),
-        source="dir/part.nc",
-    )
-
-
-def targets_of(points, cdis=10.0):
-    """HOME, the points, HOME."""
-    points = np.vstack([[500, 0, 500], points, [500, 0, 500]])
-    rows = len(points)
-    added = np.isin(np.arange(rows), [0, rows - 1])
-    return Targets(
-        position_mm=points,
-        rotation=np.tile([0.0, 0.0, 0.0, 1.0], (rows, 1)),
-        ptp=added | (np.arange(rows) == 1),
-        home=added,
-        speed_mm_s=np.where(added, np.nan, 50.0),
-        cdis_mm=np.where(added, 0.0, cdis),
-        wait_s=np.zeros(rows),
-        move=np.where(added, -1, np.arange(rows) - 1),
-        source_line=np.where(added, 0, 9 + np.arange(rows)),
-        tool=np.ones(rows),
-    )
-
-
-def motion_of(targets, speed=50.0, dt=0.012):
-    """A fake: the blended path of the programmed targets at constant speed, corners as parabolas."""
-    rows = np.flatnonzero(targets.move >= 0)
-    corners, pieces = targets.position_mm[rows], []
-    for at in range(1, len(rows)):
-        start, end = corners[at - 1], corners[at]
-        half = np.linalg.norm(end - start) / 2
-        if half == 0:
-            continue
-        along = (end - start) / (2 * half)
-        reach = [0.0, 0.0]
-        for side, row in enumerate((at - 1, at)):
-            if 0 < row < len(rows) - 1:
-                other = np.linalg.norm(corners[row + 1 if side else row - 1] - corners[row]) / 2
-                reach[side] = min(targets.cdis_mm[rows[row]], half, other)
-        pieces.append(
-            (start + along * reach[0], end - along * reach[1], end, reach[1], targets.move[rows[at]])
-        )
-    position, move, corner = [corners[:1]], [[pieces[0][4]]], [[False]]
-    for number, (start, end, vertex, reach, row) in enumerate(pieces):
-        count = max(int(np.linalg.norm(end - start) / (speed * dt)), 1)
-        s = np.linspace(0, 1, count + 1)[1:, None]
-        position.append(start + s * (end - start))
-        move.append([row] * count)
-        corner.append([False] * count)
-        if reach > 0 and number + 1 < len(pieces):
-            count = int(2 * reach / (speed * dt))
-            s = (np.arange(count)[:, None] + 0.5) / max(count, 1)
-            after = pieces[number + 1][0]
-            position.append((1 - s) ** 2 * end + 2 * s * (1 - s) * vertex + s**2 * after)
-            move.append(np.where(s[:, 0] < 0.5, row, pieces[number + 1][4]))
-            corner.append([True] * count)
-    return motion_from(np.vstack(position), np.concatenate(move), np.concatenate(corner), speed, dt)
-
-
-def motion_from(position, move, corner, speed=50.0, dt=0.012):
-    rows = len(position)
-    length = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    return Motion(
-        time_s=np.arange(rows) * dt,
-        position_mm=position,
-        rotation=np.tile([0.0, 0.0, 0.0, 1.0], (rows, 1)),
-        speed_mm_s=np.full(rows, speed),
-        acceleration_mm_s2=np.where(corner, 200.0, 0.0),
-        jerk_mm_s3=np.zeros(rows),
-        path_mm=np.append(0.0, np.cumsum(length)),
-        move=move,
-        corner=corner,
-        tool=np.ones(rows),
-    )
-
-
-def joints_of(motion, scale=1.0):
-    wave = np.sin(motion.time_s[:, None] + np.arange(6))
-    return Joints(
-        q_rad=np.radians(np.array([0, -90, 90, 0, 45, 0]) + 20 * scale * wave),
-        qd_rad_s=np.radians(20 * scale * np.cos(motion.time_s[:, None] + np.arange(6))),
-        limit_margin_rad=np.radians(40 + 10 * wave[:, 0]),
-        sigma_min=0.2 + 0.05 * wave[:, 1],
-        status=np.zeros(len(motion)),
-        turn=np.zeros(len(motion)),
-    )
+from tests.report.scenes import (
+    DOG_LEG,
+    LIMITS_DEG,
+    SPEEDS_DEG_S,
+    draw,
+    joints_of,
+    labels,
+    longest_line,
+    motion_from,
+    motion_of,
+    targets_of,
+    texts,
+    toolpath_of,
+)
 
 
 @pytest.fixture(scope="module")
@@ -149,19 +58,6 @@ def long():
     speed[123_457] = 777.0
     motion = Motion(**{**vars(motion), "speed_mm_s": speed})
     return toolpath_of(points), targets_of(points), motion
-
-
-def longest_line(figure):
-    return max(len(line.get_xdata()) for axes in figure.axes for line in axes.lines)
-
-
-def texts(figure):
-    return [text.get_text() for axes in figure.axes for text in (*axes.texts, axes.title, axes._right_title)]
-
-
-def draw(figure):
-    assert isinstance(figure, Figure)
-    figure.draw_without_rendering()
 
 
 class TestPath:
@@ -199,13 +95,58 @@ class TestPath:
         programmed = figure.axes[0].lines[0]
         assert np.nanmax(programmed.get_xdata()) == 100.0
 
-    def test_long(self, long):
+    def test_long_is_coloured_by_depth_with_nothing_lost(self, long):
         figure = path_figure(*long)
         draw(figure)
-        assert longest_line(figure) <= MOST_POINTS
-        path = figure.axes[0].lines[1]
-        assert np.nanmin(path.get_xdata()) == 0.0
-        assert np.nanmax(path.get_xdata()) == 200.0
+        top, side = figure.axes[:2]
+        depth = top.images[-1]
+        assert "deepest" in top.get_title(loc="left")
+        left, right, _, _ = depth.get_extent()
+        assert left < 0.0
+        assert right > 200.0
+        z_mm = long[2].position_mm[:, 2]
+        assert depth.norm.vmin == pytest.approx(z_mm.min())
+        assert depth.get_array().min() == pytest.approx(z_mm.min())
+        assert side.get_ylabel() == "Z (mm)"
+
+    def test_many_moves_show_speed_pass_by_pass(self):
+        levels = [[x, y, z] for z in (-5.0, -10.0) for y in range(30) for x in (0, 40)[:: 1 - 2 * (y % 2)]]
+        points = np.repeat(np.array(levels, dtype=float), 40, axis=0)
+        points[:, 0] += np.tile(np.linspace(0, 1, 40), len(levels))
+        targets = targets_of(points, cdis=0.0)
+        motion = motion_of(targets)
+        slow = np.where(motion.position_mm[:, 2] < -9.0, 10.0, 50.0)
+        motion = Motion(**{**vars(motion), "speed_mm_s": slow})
+        toolpath = toolpath_of(points)
+        figure = path_figure(toolpath, targets, motion)
+        draw(figure)
+        passes = [axes for axes in figure.axes if axes.get_title(loc="left").startswith("T1")]
+        assert [axes.get_title(loc="left") for axes in passes] == ["T1, Z -5", "T1, Z -10"]
+        upper, lower = (axes.images[-1].get_array() for axes in passes)
+        assert np.median(lower.compressed()) == pytest.approx(20.0)
+        assert np.median(upper.compressed()) == pytest.approx(100.0)
+        lost_s = float(passes[1].get_title(loc="right").split()[0])
+        step_s = np.diff(motion.time_s, append=motion.time_s[-1:])
+        assert lost_s == pytest.approx(0.8 * step_s[motion.position_mm[:, 2] < -9.99].sum(), abs=0.5)
+        assert speed_share(toolpath, motion).min() == pytest.approx(20.0)
+
+    def test_corners_too_close_to_tell_apart_are_not_marked(self):
+        circle = np.linspace(0, 2 * np.pi, 200)
+        points = np.stack([20 * np.cos(circle), 20 * np.sin(circle), 0 * circle], axis=1)
+        points = np.vstack([points, [[300, 0, 0], [300, 100, 0]]])
+        targets = targets_of(points, cdis=0.2)
+        figure = path_figure(toolpath_of(points), targets, motion_of(targets, speed=5.0))
+        draw(figure)
+        marks = [line for line in figure.axes[0].lines if "told apart" in line.get_label()]
+        assert len(marks) == 1
+        assert np.allclose(marks[0].get_xdata(), 300.0, atol=0.3), "only the corner far from the circle"
+
+    def test_an_arc_of_blended_chords_is_not_one_corner(self):
+        corner = np.zeros(100, dtype=bool)
+        corner[[10, 11, *range(40, 60)]] = True
+        move = np.repeat(np.arange(20, dtype=np.int32), 5)
+        shown = corners_apart(np.arange(100.0), corner, move, 5.0)
+        assert np.flatnonzero(shown).tolist() == [10, 11]
 
     @pytest.mark.parametrize("rows", [1, 2])
     def test_tiny(self, rows):
@@ -269,15 +210,56 @@ class TestKinematics:
         assert upper.get_xlabel().startswith("G-code line")
         assert [line.get_label() for line in speed.lines] == ["programmed feed", "commanded"]
         assert all(axes.collections for axes in figure.axes)  # the shaded corners
+        assert "approximated corner" in labels(figure)
         assert np.isnan(speed.lines[0].get_ydata()[-1])  # no feed on a rapid
+
+    def test_long_names_the_outlier_that_is_beyond_the_frame(self, long):
+        toolpath, _, motion = long
+        speed = motion.speed_mm_s.copy()
+        speed[123_457] = 7770.0
+        figure = kinematics_figure(toolpath, Motion(**{**vars(motion), "speed_mm_s": speed}))
+        draw(figure)
+        assert longest_line(figure) <= MOST_POINTS
+        panel = figure.axes[0]
+        assert panel.get_ylim()[1] < 100.0, "the peak does not flatten the rest"
+        words = "largest 7,770 mm/s at 1481.48 s, line 11"
+        (note,) = [text for text in panel.texts if text.get_text() == words]
+        assert note.xy == (motion.time_s[123_457], 1.0)
+        assert "1 of 750,000 samples beyond the frame" in texts(figure)
+        (arrows,) = [line for line in panel.lines if line.get_label() == "beyond the frame"]
+        assert arrows.get_xdata().tolist() == [motion.time_s[123_457]]
 
     def test_long_keeps_the_peak(self, long):
         toolpath, _, motion = long
-        figure = kinematics_figure(toolpath, motion)
+        speed = motion.speed_mm_s.copy()
+        speed[123_457] = 177.0
+        figure = kinematics_figure(toolpath, Motion(**{**vars(motion), "speed_mm_s": speed}))
+        assert (
+            max(line.get_ydata().max() for line in figure.axes[0].lines if line.get_label() == "commanded")
+            == 177
+        )
+        assert "largest 177 mm/s at 1481.48 s, line 11" in texts(figure)
+
+    def test_what_would_be_a_hatch_is_a_band_that_reaches_every_extreme(self, long):
+        toolpath, _, motion = long
+        rng = np.random.default_rng(3)
+        acceleration = rng.uniform(0.0, 100.0, len(motion))
+        acceleration[400_000] = 140.0
+        figure = kinematics_figure(toolpath, Motion(**{**vars(motion), "acceleration_mm_s2": acceleration}))
         draw(figure)
-        assert longest_line(figure) <= MOST_POINTS
-        assert figure.axes[0].lines[1].get_ydata().max() == 777.0
-        assert "largest 777 mm/s at 1481.48 s, line 11" in texts(figure)
+        panel = figure.axes[1]
+        (band,) = [each for each in panel.collections if each.get_label() == "commanded, lowest to highest"]
+        assert band.get_paths()[0].vertices[:, 1].max() == 140.0
+        assert not [line for line in panel.lines if line.get_label() == "commanded"]
+        assert any("largest 140 mm/s²\nat 4800.00 s, line 12" in words for words in texts(figure)), "enlarged"
+
+    def test_corners_that_cannot_be_told_apart_are_a_share_of_the_time(self, long):
+        toolpath, _, motion = long
+        figure = kinematics_figure(toolpath, motion)
+        share = next(axes for axes in figure.axes if axes.get_ylabel().startswith("In corners"))
+        height = share.collections[0].get_paths()[0].vertices[:, 1]
+        assert np.median(height[height > 0]) == pytest.approx(30.0, abs=2.0)
+        assert "approximated corner" not in labels(figure)
 
     def test_what_is_not_finite_is_a_gap(self, dog_leg):
         toolpath, _, motion = dog_leg
@@ -356,9 +338,17 @@ class TestThinning:
 
     def test_path_keeps_its_bounds(self):
         points = np.random.default_rng(2).normal(size=(50_000, 2))
+        assert (thin_path(points).max(axis=0) == points.max(axis=0)).all()
+
+    def test_path_stays_within_a_pixel_and_keeps_its_gaps(self):
+        angle = np.linspace(0, 20 * np.pi, 400_000)
+        points = np.stack([100 * np.cos(angle), 100 * np.sin(1.01 * angle)], axis=1)
+        points[123_456] = np.nan
         thinned = thin_path(points)
-        assert len(thinned) <= MOST_POINTS
-        assert (thinned.max(axis=0) == points.max(axis=0)).all()
+        assert len(thinned) < 0.9 * len(points)
+        assert np.isnan(thinned[:, 0]).sum() == 1
+        step = np.linalg.norm(np.diff(thinned, axis=0), axis=1)
+        assert np.nanmax(step) < 2 * 200 / 3000 + np.nanmax(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
     def test_intervals_join_only_when_many(self):
         time = np.arange(10_000.0)

@@ -1,0 +1,216 @@
+"""The commanded path as a matplotlib figure, after figure 4 of Bigliardi et al. 2022."""
+
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MaxNLocator
+
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.report.corner_marks import corners_apart
+from gcode2krl.report.corner_view import draw_corner
+from gcode2krl.report.drawing import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    look,
+    need_samples,
+    thin_path,
+    title,
+)
+from gcode2krl.report.maps import (
+    Shading,
+    draw_map,
+    draw_passes,
+    height_in,
+    near,
+    passes_height_in,
+    side_columns,
+    side_title,
+)
+from gcode2krl.report.passes import Pass, passes_of
+from gcode2krl.report.worst_corner import Corner, worst_corner
+from gcode2krl.tables import Motion, Targets, Toolpath
+
+_MANY_MOVES = 2000
+"""Moves above which the path is coloured by depth instead of drawn over the programmed lines."""
+_MUCH_INK = 60.0
+"""So many times across the picture, and the path is drawn as if it had many moves."""
+_TOLD = 1.0 / 150.0
+"""Share of the picture that two corners must be apart to be marked."""
+
+
+class _Scene(NamedTuple):
+    """What both pictures draw."""
+
+    toolpath: Toolpath
+    targets: Targets
+    motion: Motion
+    rapid: Bools
+    """(m,)"""
+    corner: Corner | None
+
+
+def path_figure(toolpath: Toolpath, targets: Targets, motion: Motion) -> Figure:
+    """Draw the commanded path from above, from the side, and its worst corner.
+
+    The side view is XZ or YZ, whichever is larger, with Z stretched by a whole number where the part is
+    flat. The zoom shows, in the plane of the corner, where the path misses a programmed vertex most, with
+    the G-code line that ends there and the distance; without an approximated corner it is left out.
+
+    A path of many moves is coloured by depth, the deepest on top, and drawn once more pass by pass with its
+    speed as a share of the programmed feed, the slowest on top.
+
+    Raises
+    ------
+    ValueError
+        Where the motion has no sample.
+    """
+    need_samples(motion)
+    rapid = ~np.isfinite(toolpath.feed_mm_s[np.clip(motion.move, 0, len(toolpath) - 1)])
+    scene = _Scene(toolpath, targets, motion, rapid, worst_corner(targets, motion))
+    across_mm = max(float(np.ptp(motion.position_mm, axis=0).max()), 1e-9)
+    ink = float(motion.path_mm[-1] - motion.path_mm[0]) / across_mm
+    many = len(np.unique(motion.move)) > _MANY_MOVES or ink > _MUCH_INK
+    with look():
+        figure = _of_maps(scene) if many and not rapid.all() else _of_lines(scene)
+        figure.suptitle(title("Commanded path", toolpath))
+    return figure
+
+
+def _of_lines(scene: _Scene) -> Figure:
+    """Draw the path over the programmed lines."""
+    motion, corner = scene.motion, scene.corner
+    programmed = _programmed_mm(scene.targets, motion)
+    across_mm = float(np.ptp(motion.position_mm, axis=0).max())
+    told = corners_apart(motion.path_mm, motion.corner, motion.move, _TOLD * across_mm)
+    side, stretch = side_columns(np.concatenate([programmed, motion.position_mm]))
+    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.75, 1.0), height_ratios=(2.2, 1.0))
+    views = _views(figure, grid, side, stretch, corner)
+    for axes, columns in views:
+        _draw_path(axes, programmed[:, columns], motion.position_mm[:, columns], scene.rapid, told)
+        axes.set_xlabel(f"{'XYZ'[columns[0]]} (mm)")
+        axes.set_ylabel(f"{'XYZ'[columns[1]]} (mm)")
+    views[0][0].set_title("From above", loc="left")
+    handles, labels = views[0][0].get_legend_handles_labels()
+    if corner:
+        _mark_corner(views, scene.targets, corner)
+        draw_corner(figure.add_subplot(grid[0, 1]), corner, scene.targets, motion)
+        room = figure.add_subplot(grid[1, 1])
+        room.set_axis_off()
+        room.legend(handles, labels, loc="upper left", borderaxespad=0.0)
+    else:
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def _of_maps(scene: _Scene) -> Figure:
+    """Draw the path coloured by depth, and its passes coloured by speed."""
+    motion, corner, position = scene.motion, scene.corner, scene.motion.position_mm
+    feed = ~scene.rapid
+    side, stretch = side_columns(position[near(position, feed)])
+    passes = passes_of(position[:, 2], motion.tool, feed)
+    heights = (
+        height_in(position[near(position, feed)], 6.0, 2.8, 6.0),
+        1.6,
+        passes_height_in(position, passes),
+    )
+    figure = Figure(figsize=(11.0, sum(heights) + 1.6), layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.75, 1.0), height_ratios=heights)
+    z_mm = position[:, 2]
+    depth = Shading(z_mm, feed, Normalize(z_mm[feed].min(), z_mm[feed].max()), "viridis", -1.0)
+    views = _views(figure, grid, side, stretch, corner)
+    for axes, columns in views:
+        coloured = draw_map(axes, position, columns, depth, stretch if 2 in columns else 1.0)
+        _mark_ends(axes, position[:, columns])
+    views[0][0].set_title("From above, the deepest feed moves on top, rapids pale", loc="left")
+    figure.colorbar(coloured, ax=[axes for axes, _ in views], label="Z of feed moves (mm)", aspect=40)
+    if corner:
+        _mark_corner(views, scene.targets, corner)
+        draw_corner(figure.add_subplot(grid[0, 1]), corner, scene.targets, motion)
+        room = figure.add_subplot(grid[1, 1])
+        room.set_axis_off()
+        room.legend(*views[0][0].get_legend_handles_labels(), loc="upper left", borderaxespad=0.0)
+    _draw_speeds(figure, grid, scene, passes)
+    return figure
+
+
+def _draw_speeds(figure: Figure, grid: GridSpec, scene: _Scene, passes: list[Pass]) -> None:
+    """Draw each pass coloured by its speed, with the time that it loses against the programmed feed."""
+    share = speed_share(scene.toolpath, scene.motion)
+    step_s = np.diff(scene.motion.time_s, append=scene.motion.time_s[-1:])
+    lost_s = (1.0 - share / 100.0) * step_s
+    words = [f"{lost_s[each.rows].sum():.1f} of {step_s[each.rows].sum():.1f} s lost" for each in passes]
+    speed = Shading(share, ~scene.rapid, Normalize(0.0, 100.0), "viridis_r", -1.0)
+    panels = draw_passes(figure, grid[2, :], scene.motion.position_mm, passes, speed, words)
+    label = "Speed (% of the\nprogrammed feed)"
+    figure.colorbar(panels[0].images[0], ax=panels, label=label, aspect=15)
+
+
+def speed_share(toolpath: Toolpath, motion: Motion) -> Floats:
+    """Return (m,) the speed in percent of the programmed feed, at most 100; 100 where there is none."""
+    feed_mm_s = toolpath.feed_mm_s[np.clip(motion.move, 0, len(toolpath) - 1)]
+    known = np.isfinite(feed_mm_s) & (feed_mm_s > 0.0)
+    share = np.divide(motion.speed_mm_s, feed_mm_s, where=known, out=np.ones(len(motion)))
+    shares: Floats = np.minimum(share, 1.0) * 100.0
+    return shares
+
+
+def _views(
+    figure: Figure, grid: GridSpec, side: list[int], stretch: int, corner: Corner | None
+) -> list[tuple[Axes, list[int]]]:
+    """Return the axes from above and from the side, with the columns of the position that they show."""
+    top = figure.add_subplot(grid[0, 0] if corner else grid[0, :])
+    below = figure.add_subplot(grid[1, 0] if corner else grid[1, :])
+    top.set_aspect("equal", adjustable="datalim")
+    below.set_aspect(stretch, adjustable="datalim")
+    below.set_title(side_title(stretch), loc="left")
+    below.margins(y=0.15)
+    below.yaxis.set_major_locator(MaxNLocator(5))
+    return [(top, [0, 1]), (below, side)]
+
+
+def _mark_corner(views: list[tuple[Axes, list[int]]], targets: Targets, corner: Corner) -> None:
+    at = targets.position_mm[corner.target]
+    for axes, columns in views:
+        axes.plot(*at[columns], "o", ms=13, mfc="none", mec=VERMILION, mew=1.2, zorder=6)
+
+
+def _mark_ends(axes: Axes, path: Floats) -> None:
+    axes.plot(*path[0], "^", color=GREEN, mec=BLACK, mew=0.7, ms=8, zorder=5, label="start")
+    axes.plot(*path[-1], "s", color=VERMILION, mec=BLACK, mew=0.7, ms=7, zorder=5, label="end")
+
+
+def _programmed_mm(targets: Targets, motion: Motion) -> Floats:
+    """Return (k, 3) the programmed vertices that the motion covers, with a NaN row where lines end."""
+    planned = targets.move >= max(int(motion.move.min()), 0)
+    points = targets.position_mm[planned]
+    row = np.flatnonzero(planned)
+    jump = (np.diff(row, prepend=row[:1]) > 1) | (targets.ptp | targets.home)[planned]
+    jump[:1] = False
+    return np.insert(points, np.flatnonzero(jump), np.nan, axis=0)
+
+
+def _draw_path(axes: Axes, programmed: Floats, path: Floats, rapid: Bools, told: Bools) -> None:
+    """Draw one plane view: programmed lines, path, corner samples, start and end."""
+    axes.plot(*thin_path(programmed).T, color=GREY, lw=0.7, zorder=2, label="programmed lines")
+    into_rapid = rapid & np.append(rapid[1:], True)  # the sample on the border belongs to both
+    for mask, colour, label in (
+        (~rapid, BLUE, "commanded path, feed"),
+        (rapid, SKY, "commanded path, rapid"),
+    ):
+        if mask.any():
+            shown = np.where((mask | (into_rapid != rapid))[:, None], path, np.nan)
+            axes.plot(*thin_path(shown).T, color=colour, lw=1.2, zorder=3, label=label)
+    if told.any():
+        label = "samples in corners that can be told apart"
+        axes.plot(*path[told].T, ".", color=ORANGE, ms=2.5, zorder=4, label=label)
+    _mark_ends(axes, path)
