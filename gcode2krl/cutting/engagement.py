@@ -21,8 +21,8 @@ from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path, Samples
 from gcode2krl.tables import chord_directions
 
 NODES_PER_DIAMETER = 20.0
-_BALL_STRETCH = 10.0 / 3.0
-"""How much farther apart the nodes of a ball lie: its force has no jumps, and does not hang on the lag."""
+_BALL_STRETCH = 5.0
+"""How much farther apart the nodes of a ball lie: its force hardly depends on how far the field lags."""
 _SETTLED_PER_DIAMETER = 0.1
 _LONGEST_OF_LAG = 0.5
 """Longest sweep, as a share of the distance by which the field lags: longer ones would lag farther."""

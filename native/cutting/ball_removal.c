@@ -13,6 +13,7 @@ side by side, rows or columns, each from its own first cell. */
    vector of the sweep, all along (p) and across (q) the lines. */
 typedef struct {
     float dp, dq, ep, eq, start_p, start_q;
+    float per_dp, per_ep;     /* reciprocals */
     int64_t shift_p, shift_q; /* from the cell at the start to the grid */
     int64_t cells, lines;     /* of the grid */
     int64_t step_p, step_q;   /* from cell to cell in memory */
@@ -43,8 +44,8 @@ static Lines lines_across(const Grid *grid, const Sweep *sweep) {
     const float x = place_in(sweep->ax, grid->x_mm, grid->dx_mm, grid->column, &column);
     const float y = place_in(sweep->ay, grid->y_mm, grid->dy_mm, grid->row, &row);
     if (fabs(sweep->ex) >= fabs(sweep->ey))
-        return (Lines){dx, dy, ex, ey, x, y, column, row, columns, rows, 1, grid->height.columns};
-    return (Lines){dy, dx, ey, ex, y, x, row, column, rows, columns, grid->height.columns, 1};
+        return (Lines){dx, dy, ex, ey, x, y, 1.0f / dx, 1.0f / ex, column, row, columns, rows, 1, grid->height.columns};
+    return (Lines){dy, dx, ey, ex, y, x, 1.0f / dy, 1.0f / ey, row, column, rows, columns, grid->height.columns, 1};
 }
 
 static Band32 band_of(const Sweep *sweep) {
@@ -60,7 +61,7 @@ static inline void cross(const Lines *lines, const Band32 *band, float q, float 
                          float *leaves) {
     const float low = band->from * (band->from < 0.0f ? most_w : least_w);
     const float high = band->to + band->ahead * (band->ahead < 0.0f ? least_w : most_w);
-    const float a = (low - q * lines->eq) / lines->ep, b = (high - q * lines->eq) / lines->ep;
+    const float a = (low - q * lines->eq) * lines->per_ep, b = (high - q * lines->eq) * lines->per_ep;
     *enters = min32(a, b);
     *leaves = max32(a, b);
 }
@@ -78,8 +79,8 @@ static void find_cells(const Lines *lines, const Band32 *band, int64_t line, Blo
         const float nearest = beside_a * beside_b < 0.0f ? 0.0f : min32(fabsf(beside_a), fabsf(beside_b));
         cross(lines, band, q, root32(square - farthest * farthest), root32(square - nearest * nearest), &enters,
               &leaves);
-        const int32_t first = (int32_t)ceilf(enters / lines->dp + lines->start_p - ROOM_CELLS);
-        const int32_t last = (int32_t)floorf(leaves / lines->dp + lines->start_p + ROOM_CELLS);
+        const int32_t first = (int32_t)ceilf(enters * lines->per_dp + lines->start_p - ROOM_CELLS);
+        const int32_t last = (int32_t)floorf(leaves * lines->per_dp + lines->start_p + ROOM_CELLS);
         block->q[lane] = q;
         block->first[lane] = first > low ? first : low;
         block->after[lane] = nearest > band->radius ? block->first[lane] : last < high ? last + 1 : high;

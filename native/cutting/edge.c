@@ -72,8 +72,7 @@ static void read_ring(const Strip *strip, const Sample *sample, double r, Bins b
                        .north = &CELL(strip->work->heading, 1, 0),
                        .tops = tops,
                        .above = above};
-    if (read_cells(strip->grid, sample, &ring))
-        correct_at_walls(strip->grid, strip->path, sample, &ring);
+    read_cells(strip->grid, strip->path, sample, &ring);
     take_off_recent(sample, &ring);
 }
 

@@ -19,7 +19,7 @@ typedef struct {
 } Tolerance;
 
 /* A ball's arcs are known to a bin of each of its rings, but its force has no jumps. */
-static const Tolerance ON_BALL = {0.2, 0.05, 0.15}, ON_OTHER = {0.05, 0.05, 0.05};
+static const Tolerance ON_BALL = {0.3, 0.05, 0.15}, ON_OTHER = {0.05, 0.05, 0.05};
 
 enum { LOADS = sizeof(Load) / sizeof(double) };
 

@@ -52,8 +52,7 @@ static bool to_depths(const Ring *rim, double foot) {
 
 /* Read the material's top along the rim. */
 static void read_tops(const Strip *strip, const Sample *sample, const Ring *rim) {
-    if (read_cells(strip->grid, sample, rim))
-        correct_at_walls(strip->grid, strip->path, sample, rim);
+    read_cells(strip->grid, strip->path, sample, rim);
     take_off_recent(sample, rim);
 }
 

@@ -101,16 +101,27 @@ static void stand_above_cutter(const Outline32 *outline, const Chunk *chunk, flo
     }
 }
 
-bool read_cells(const Grid *grid, const Sample *sample, const Ring *ring) {
+/* Replace the top of a cell with a wall, and what is above the ring, by that of the point's side. */
+static void correct_at_wall(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring, int64_t j) {
+    const double x = sample->x + ring->r * (double)ring->east[j], y = sample->y + ring->r * (double)ring->north[j];
+    const Cell cell = cell_at(grid, x, y);
+    if (!is_inside(grid, cell) || CELL(grid->wall, cell.row, cell.column) < 0)
+        return;
+    const double top = beside_wall(grid, path, CELL(grid->wall, cell.row, cell.column), cell, x, y);
+    ring->tops[j] = (float)(top - sample->z);
+    ring->above[j] = ring->tops[j] - (float)ring->height;
+}
+
+void read_cells(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring) {
     const Ground ground = ground_at(grid, sample);
     const Outline32 outline = in_single(sample->outline);
     const Floats32 heights = grid->height;
     const Ints32 walls = grid->wall;
     const double z = sample->z;
     Chunk chunk;
-    int32_t no_wall = -1;
     for (int64_t first = ring->first; first < ring->after; first += CHUNK) {
         float *tops = ring->tops + first;
+        int32_t no_wall = -1;
         list_cells(&ground, ring, first, &chunk);
         for (int32_t j = 0; j < CHUNK; j++) {
             const int64_t at = ground.at + chunk.at[j];
@@ -119,21 +130,10 @@ bool read_cells(const Grid *grid, const Sample *sample, const Ring *ring) {
         }
         if (ring->above != ring->tops)
             stand_above_cutter(&outline, &chunk, (float)ring->height, tops, ring->above + first);
-    }
-    return no_wall >= 0;
-}
-
-void correct_at_walls(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring) {
-    for (int64_t j = ring->first; j < ring->after; j++) {
-        const double x = sample->x + ring->r * (double)ring->east[j], y = sample->y + ring->r * (double)ring->north[j];
-        const Cell cell = cell_at(grid, x, y);
-        if (!is_inside(grid, cell))
-            continue;
-        const int64_t sweep = CELL(grid->wall, cell.row, cell.column);
-        if (sweep >= 0) {
-            ring->tops[j] = (float)(beside_wall(grid, path, sweep, cell, x, y) - sample->z);
-            ring->above[j] = ring->tops[j] - (float)ring->height;
-        }
+        if (no_wall >= 0)
+            for (int64_t j = first; j < least(first + CHUNK, ring->after); j++)
+                if (AT(walls, ground.at + chunk.at[j - first]) >= 0)
+                    correct_at_wall(grid, path, sample, ring, j);
     }
 }
 
