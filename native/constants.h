@@ -359,6 +359,10 @@
 #define SW_BALL 1
 #define SW_OTHER 2
 
+/* gcode2krl.cutting.edge */
+#define ED_BAND_COLUMNS 7
+#define ED_CHUNK 32
+
 /* gcode2krl.cutting.reading */
 #define RD_ARCS 3
 
@@ -712,10 +716,10 @@ typedef struct {
 } Cutters;
 
 typedef struct {
-    Floats turn;
-    Floats heading;
-    Floats rows;
-    Floats reach;
+    Floats32 turn;
+    Floats32 heading;
+    Floats32 rows;
+    Floats32 reach;
 } Work;
 
 typedef struct {

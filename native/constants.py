@@ -30,6 +30,7 @@ MODULES = {
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",
+    "ED": "gcode2krl.cutting.edge",
     "RD": "gcode2krl.cutting.reading",
     "LAW": "gcode2krl.cutting.law",
     "STANDING": "gcode2krl.robot.standing",

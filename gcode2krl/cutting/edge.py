@@ -3,12 +3,15 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.compiled.core import StructOf
 
 BAND_COLUMNS = 7
 _MOST_BINS = 1024
+CHUNK = 32
+"""Bins that a compiled loop takes at once; rows have as many to spare."""
 
 
 class Cutters(NamedTuple):
@@ -33,21 +36,21 @@ class Cutters(NamedTuple):
 class Work(NamedTuple):
     """Scratch memory of one thread."""
 
-    turn: Floats
-    """(8, bins) sin and cos of the wall's and the ring's bins; over the ring's bins the integrals of sin,
-    cos, sin², sin·cos."""
-    heading: Floats
+    turn: NDArray[np.float32]
+    """(9, bins) sin and cos of the wall's and the ring's bins; over the ring's bins the integrals of 1,
+    sin, cos, sin², sin·cos."""
+    heading: NDArray[np.float32]
     """(2, bins) x and y of the directions of the bins."""
-    rows: Floats
+    rows: NDArray[np.float32]
     """(5, bins) thickness above a band's lower and upper ring, each with the material's top; engaged
-    fraction."""
-    reach: Floats
+    fraction, of a rim the depth."""
+    reach: NDArray[np.float32]
     """(2, bins) largest radius of the edge that is engaged, 0 = none; largest height of material there."""
 
 
 def new_work() -> Work:
     """Return scratch memory for one thread."""
-    return Work(*(np.zeros((rows, _MOST_BINS)) for rows in (8, 2, 5, 2)))
+    return Work(*(np.zeros((rows, _MOST_BINS + CHUNK), np.float32) for rows in (9, 2, 5, 2)))
 
 
 CUTTERS = StructOf.record(Cutters)

@@ -21,6 +21,9 @@ from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path, Samples
 from gcode2krl.tables import chord_directions
 
 NODES_PER_DIAMETER = 20.0
+_BALL_STRETCH = 5.0
+"""How much farther apart the nodes of a ball lie: its force hardly depends on how far the field lags."""
+_SETTLED_PER_DIAMETER = 0.1
 _LONGEST_OF_LAG = 0.5
 """Longest sweep, as a share of the distance by which the field lags: longer ones would lag farther."""
 _BINS = 16
@@ -65,7 +68,8 @@ def engage(
     threads : how many; default: all cores.
     direction : (k, 3) unit tangents; by default those of the chords.
     wanted : (k,) True at the n samples; False at points that only shape the path. Default: all are samples.
-    nodes_per_diameter : the least number of readings while the tool goes its diameter; inf: every sample.
+    nodes_per_diameter : how many nodes there are at least while the tool goes its diameter, of a ball a part
+        of that; between two of them only what is not smooth is read. inf: every sample is read.
 
     Notes
     -----
@@ -90,7 +94,8 @@ def engage(
     columns = (position, way_mm, first, rapid, tool)
     mark_corners(*columns, _LONGEST_OF_LAG * cutters.lag_mm, is_short, corner)
     path = Path(position[corner], way_mm[corner], tool[corner], rapid[corner], first[corner], outlines)
-    apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter
+    stretch = np.where(outlines[:, -1] == BALL, _BALL_STRETCH, 1.0)
+    apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter * stretch
     samples = Samples(
         position[rows],
         np.ascontiguousarray(tangents[rows], dtype=np.float64),
@@ -100,11 +105,9 @@ def engage(
         np.cumsum(corner)[rows] - 1,
         np.empty(len(rows), dtype=np.bool_),
     )
-    mark_nodes(
-        samples, rapid[rows], apart_mm if np.isfinite(nodes_per_diameter) else apart_mm - 1.0, samples.node
-    )
+    mark_nodes(samples, rapid[rows], apart_mm, _SETTLED_PER_DIAMETER * 2.0 * outlines[:, 0], samples.node)
     widest_mm = float(max(outlines[:, 0].max(), cutters.above[:, ::2].max()))
-    farthest_mm = float(apart_mm.max())
+    farthest_mm = 2.0 * float(apart_mm.max())  # nodes are the samples that are nearest to the places meant
     # how far around itself a strip reads: around a sample, and around the nodes beside it
     halo_mm = widest_mm + farthest_mm + _MARGIN_CELLS * cell_mm
     axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))

@@ -237,7 +237,7 @@ def _peaks(
 ) -> Floats:
     """Return the largest force of a revolution (m,), at least the mean; zero in air.
 
-    Between two samples that were read its ratio to the mean lies between theirs.
+    Between two samples that were read it lies between theirs.
     """
     peak = np.zeros(len(mean_N))
     cuts = np.isfinite(engaged.phi_rad[:, 0]) & (mean_N > 0.0)
@@ -248,6 +248,7 @@ def _peaks(
             peak[rows] = peak_force(one, law, arcs, depth, f_z_mm[rows], ramp)
     read, between = np.flatnonzero(cuts & engaged.is_read), np.flatnonzero(cuts & ~engaged.is_read)
     if len(between):
-        ratio = np.interp(between, read, peak[read] / mean_N[read])
-        peak[between] = ratio * mean_N[between]
+        # a sample's feed raises its peak as it does its mean
+        peak_N, usual_N = (np.interp(between, read, column[read]) for column in (peak, mean_N))
+        peak[between] = peak_N * mean_N[between] / usual_N
     return np.maximum(peak, mean_N)

@@ -45,12 +45,12 @@ class Result(NamedTuple):
 
 RESULT = StructOf.record(Result, written=Result._fields)
 
-mark_nodes = core_function("cutting_mark_nodes", SAMPLES, BOOLS, FLOATS, OUT_BOOLS)
+mark_nodes = core_function("cutting_mark_nodes", SAMPLES, BOOLS, FLOATS, FLOATS, OUT_BOOLS)
 """Mark the samples (n,) at which the engagement is read in any case.
 
-Takes samples, whether each is rapid, the largest distance (t,) in mm between two nodes of a tool, and the
-marks. A node stands where the tool has gone so far, where its way turns by 10° and wherever tool or kind of
-move changes; behind such a place every sample is one for a while.
+Takes samples, whether each is rapid, the largest distance (t,) in mm between two nodes of a tool, that (t,)
+for which every sample behind a change is one, and the marks. A node stands where the tool has gone so far,
+where its way turns by 10° and wherever tool or kind of move changes.
 """
 
 mark_corners = core_function(

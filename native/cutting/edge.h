@@ -18,11 +18,11 @@ typedef struct {
 } Band;
 
 /* Rows of Work.turn: sine and cosine in the middle of the bins of the rim and of a ring; integrals over a
-   ring's bins of sin, cos, sin², sin·cos. */
-enum { RIM_SIN, RIM_COS, RING_SIN, RING_COS, BIN_SIN, BIN_COS, BIN_SIN_SIN, BIN_SIN_COS };
+   ring's bins of 1, sin, cos, sin², sin·cos. */
+enum { RIM_SIN, RIM_COS, RING_SIN, RING_COS, BIN_ONE, BIN_SIN, BIN_COS, BIN_SIN_SIN, BIN_SIN_COS };
 
 /* Rows of Work.rows: thickness above a band's lower and upper ring, each with the material's top; engaged
-   fraction. */
+   fraction, of a rim the depth. */
 enum { LOWER, LOWER_TOP, UPPER, UPPER_TOP, SHARE };
 
 /* What does not change along a strip. */

@@ -36,27 +36,40 @@ static bool has_turned(const Samples *samples, int64_t node, int64_t i) {
     return dot(row_of(samples->direction, i), row_of(samples->direction, node)) < TURN_COSINE;
 }
 
-/* Mark the nodes of a motion: apart_mm (a row a tool) of way apart at most, if samples are that dense.
+/* Return which of two samples is the nearer to the multiple of a distance that the way passes between them, -1 if it
+   passes none. */
+static int64_t at_multiple(const Samples *samples, int64_t i, double apart_mm) {
+    const double before_mm = AT(samples->way_mm, i - 1), here_mm = AT(samples->way_mm, i);
+    const double multiple = floor(here_mm / apart_mm);
+    if (multiple == floor(before_mm / apart_mm))
+        return -1;
+    return multiple * apart_mm - before_mm < here_mm - multiple * apart_mm ? i - 1 : i;
+}
 
-   Behind a turn or a change the engagement is a new one, and every sample is a node for twice as far. */
-EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Bools node) {
+/* Mark the nodes of a motion: where the way passes multiples of apart_mm (a row a tool; 0 = every sample), so that the
+   same ones are read however densely samples lie.
+
+   Behind a turn or a change the engagement is a new one, and every sample is a node for settled_mm (a row a tool). */
+EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Floats settled_mm, Bools node) {
     int64_t last = 0;
-    double settled_mm = -INFINITY;
-    AT(node, 0) = 1;
+    double settled_at_mm = -INFINITY;
+    for (int64_t i = 0; i < node.rows; i++)
+        AT(node, i) = i == 0 || i == node.rows - 1;
     for (int64_t i = 1; i < node.rows; i++) {
-        const double way_mm = AT(samples->way_mm, i), apart = AT(apart_mm, AT(samples->tool, i));
+        const int64_t tool = AT(samples->tool, i);
+        const double way_mm = AT(samples->way_mm, i), apart = AT(apart_mm, tool);
         const bool is_new = changes(samples, rapid, i) || has_turned(samples, last, i);
-        if (is_new)
-            settled_mm = way_mm + 2.0 * apart;
-        AT(node, i) = is_new || way_mm < settled_mm || i == node.rows - 1;
-        if (last < i - 1 && (is_new || way_mm - AT(samples->way_mm, last) > apart)) {
+        if (is_new) {
+            settled_at_mm = way_mm + AT(settled_mm, tool);
             AT(node, i - 1) = 1;
-            last = i - 1;
         }
-        if (AT(node, i) || way_mm - AT(samples->way_mm, last) > apart) {
+        const int64_t near = apart > 0.0 ? at_multiple(samples, i, apart) : i;
+        if (near >= 0)
+            AT(node, near) = 1;
+        if (is_new || way_mm < settled_at_mm)
             AT(node, i) = 1;
-            last = i;
-        }
+        if (AT(node, i) || near >= 0)
+            last = AT(node, i) ? i : i - 1;
     }
 }
 

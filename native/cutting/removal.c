@@ -2,283 +2,39 @@
 
 #include "cutting/removal.h"
 
-/* Room for rounding in a bound of the height below a sweep: ten times that of coordinates of a metre. */
-#define ROUNDING_MM 1e-3f
+#include "cutting/swept.h"
 
 #define NO_LENGTH_MM 1e-9
 #define LEAST_ONWARD 2.0 /* how far a sweep goes on for what it goes aside, if it follows the one before */
+#define JOINT_MM 1e-4    /* room for rounding at the joint of two sweeps */
 
 enum { REFRESH = 48 }; /* visits after which the bound of a block is computed again */
 
-/* A sweep from (ax, ay, az): its direction and length in plan, its slope in plan and along the path. */
-typedef struct {
-    const Outline *outline;
-    double ax, ay, az, ex, ey, length, slope, sink;
-    double behind; /* cells farther back along it were cut when the cutter was at the start */
-    double ahead;  /* cells farther along it are cut by the next sweep */
-    bool hollow;   /* the whole disc at the start was cut */
-} Sweep;
+/* Note whether the next sweep goes on from a ball's sweep at nearly the same heading.
 
-/* Where a row enters and leaves something, in mm from the start of the sweep; nothing if left > right. */
-typedef struct {
-    double left, right;
-} Chord;
-
-/* Cells of a row: along and beside the sweep at the cell `begin`, which may lie outside the grid, and their
-   steps from cell to cell. */
-typedef struct {
-    int64_t i, begin;
-    Cells cells;
-    double along, beside, along_step, beside_step;
-} Row;
-
-/* A sweep and its cutter in single precision: 1 µm at the size of a cutter. */
-typedef struct {
-    float z, slope, sink, length, square, towards;
-    float bottom, corner, arc_radius, arc_top, steep;
-    float lowest; /* no point of the cutter gets below it */
-} Sweep32;
-
-typedef float Below(const Sweep32 *sweep, float along, float beside);
-
-static inline float clamp32(float x, float low, float high) {
-    x = x > low ? x : low;
-    return x < high ? x : high;
-}
-
-static inline float root32(float x) { return sqrtf(x > 0.0f ? x : 0.0f); }
-
-/* Below a ball the lowest point over a cell belongs to the nearest point of its path; z is its centre's. */
-static inline float below_ball(const Sweep32 *sweep, float along, float beside) {
-    const float rest = sweep->square - beside * beside;
-    const float t = clamp32(along - sweep->sink * root32(rest), 0.0f, sweep->length);
-    return sweep->z + sweep->slope * t - root32(rest - (along - t) * (along - t));
-}
-
-/* Below a flat cutter that rises or sinks: its height where it reaches or leaves a cell. */
-static inline float below_ramp(const Sweep32 *sweep, float along, float beside) {
-    const float reach = root32(sweep->square - beside * beside);
-    return sweep->z + sweep->slope * clamp32(along + sweep->towards * reach, 0.0f, sweep->length);
-}
-
-/* `outline_height` of a squared radius, in single precision and without branches. */
-static inline float height32(const Sweep32 *sweep, float square) {
-    const float r = sqrtf(square);
-    const float x = clamp32(r - sweep->bottom, 0.0f, sweep->corner);
-    const float arc = sweep->corner - root32(sweep->corner * sweep->corner - x * x);
-    const float side = sweep->arc_top + (r - sweep->arc_radius) * sweep->steep;
-    return r < sweep->arc_radius ? arc : side;
-}
-
-static inline float height_at_way(const Sweep32 *sweep, float along, float beside_square, float t) {
-    return sweep->slope * t + height32(sweep, beside_square + (along - t) * (along - t));
-}
-
-static inline float min32(float a, float b) { return a < b ? a : b; }
-
-/* Below any cutter. Along the sweep the height over a cell is convex: the lowest of both ends of the contact,
-   the nearest point in plan, and the lowest point of a parabola. */
-static inline float below_other(const Sweep32 *sweep, float along, float beside) {
-    const float square = beside * beside, reach = root32(sweep->square - square);
-    float a = along - reach, b = along + reach;
-    a = a > 0.0f ? a : 0.0f;
-    b = b < sweep->length ? b : sweep->length;
-    b = b > a ? b : a;
-    const float middle = 0.5f * (a + b);
-    const float at_a = height_at_way(sweep, along, square, a), at_b = height_at_way(sweep, along, square, b);
-    const float at_middle = height_at_way(sweep, along, square, middle);
-    const float bend = at_a - at_middle + at_b - at_middle;
-    const float t = middle - 0.25f * (b - a) * (at_b - at_a) / (bend > 1e-9f ? bend : 1e-9f);
-    const float at_lowest = height_at_way(sweep, along, square, clamp32(t, a, b));
-    const float near = height_at_way(sweep, along, square, clamp32(along, a, b));
-    return sweep->z + min32(min32(min32(min32(at_lowest, near), at_a), at_b), at_middle);
-}
-
-/* The same where all heights along the way are alike: on the level, as larger radii are not lower,
-   or upright. */
-static inline float below_level(const Sweep32 *sweep, float along, float beside) {
-    const float square = beside * beside, reach = root32(sweep->square - square);
-    float a = along - reach, b = along + reach;
-    a = a > 0.0f ? a : 0.0f;
-    b = b < sweep->length ? b : sweep->length;
-    b = b > a ? b : a;
-    return sweep->z + height_at_way(sweep, along, square, clamp32(along, a, b));
-}
-
-/* Not above `below_other`: the nearest point of the way, as if it were at the lower end of the slope. */
-static inline float bound_other(const Sweep32 *sweep, float along, float beside) {
-    const float off = along - clamp32(along, 0.0f, sweep->length);
-    return sweep->lowest + height32(sweep, beside * beside + off * off);
-}
-
-/* Not above any: what no point of the cutter gets below. */
-static inline float bound_any(const Sweep32 *sweep, float along, float beside) {
-    (void)along;
-    (void)beside;
-    return sweep->lowest;
-}
-
-/* Write the height below a sweep over SW_LANES cells, the first `from` cells after the row's begin. */
-static inline void heights_below(const Row *row, const Sweep32 *sweep, Below *below, int32_t from,
-                                 float *lows) {
-    const float along = (float)row->along, along_step = (float)row->along_step;
-    const float beside = (float)row->beside, beside_step = (float)row->beside_step;
-    for (int32_t lane = 0; lane < SW_LANES; lane++) {
-        const float at = (float)(from + lane);
-        lows[lane] = below(sweep, along + at * along_step, beside + at * beside_step);
-    }
-}
-
-static inline bool any_above(const float *heights, const float *lows) {
-    int32_t is_above = 0;
-    for (int32_t lane = 0; lane < SW_LANES; lane++)
-        is_above |= heights[lane] > lows[lane];
-    return is_above;
-}
-
-/* Lower the cells of a row, SW_LANES at once: without branches and with as many spare cells behind a row, so
-   that the compiler takes eight together. Where a cell is lowered, older walls end. Cells that are all below
-   a bound of the sweep are left out; most were cut by the sweep before. */
-static inline void lower_row(const Grid *grid, const Row *row, const Sweep32 *sweep, Below *below,
-                             Below *bound) {
-    float lows[SW_LANES];
-    for (int64_t j = row->cells.first; j < row->cells.after; j += SW_LANES) {
-        float *height = &CELL(grid->height, row->i, j);
-        int32_t *wall = &CELL(grid->wall, row->i, j);
-        (void)INSIDE(j + SW_LANES - 1, grid->height.columns);
-        const int32_t from = (int32_t)(j - row->begin), left = (int32_t)least(row->cells.after - j, SW_LANES);
-        if (bound) {
-            heights_below(row, sweep, bound_any, from, lows);
-            if (!any_above(height, lows))
-                continue;
-        }
-        if (bound && bound != bound_any) {
-            heights_below(row, sweep, bound, from, lows);
-            if (!any_above(height, lows))
-                continue;
-        }
-        heights_below(row, sweep, below, from, lows);
-        for (int32_t lane = 0; lane < SW_LANES; lane++) {
-            const float low = lane < left ? lows[lane] : INFINITY;
-            wall[lane] = low < height[lane] ? -1 : wall[lane];
-            height[lane] = low < height[lane] ? low : height[lane];
-        }
-    }
-}
-
-/* Lower the cells of a row to a level. */
-static void lower_level(const Grid *grid, int64_t i, int64_t first, int64_t after, float z) {
-    if (first >= after)
-        return;
-    float *restrict height = &CELL(grid->height, i, first);
-    int32_t *restrict wall = &CELL(grid->wall, i, first);
-    (void)INSIDE(after - 1, grid->height.columns);
-    for (int64_t j = 0; j < after - first; j++) {
-        wall[j] = z < height[j] ? -1 : wall[j];
-        height[j] = z < height[j] ? z : height[j];
-    }
-}
-
-/* Lower a row below a level sweep of a flat cutter, without what the disc at its start has cut. */
-static void lower_flat(const Grid *grid, const Row *row, const Sweep *sweep, double y) {
-    const double radius = sweep->outline->radius;
-    const int64_t first = row->cells.first, after = row->cells.after;
-    Cells gap = {after, after};
-    if (sweep->hollow && fabs(y) < radius) {
-        const double half = sqrt(radius * radius - y * y);
-        gap = columns_between(grid, sweep->ax - half, sweep->ax + half, grid->height.columns - SW_LANES);
-    }
-    lower_level(grid, row->i, first, least(gap.first, after), (float)sweep->az);
-    lower_level(grid, row->i, most(gap.after, first), after, (float)sweep->az);
-}
-
-static Sweep32 in_single(const Sweep *sweep) {
-    const Outline *outline = sweep->outline;
-    const double z = outline->kind == SW_BALL ? sweep->az + outline->radius : sweep->az;
-    return (Sweep32){
-        .z = (float)z,
-        .slope = (float)sweep->slope,
-        .sink = (float)sweep->sink,
-        .length = (float)sweep->length,
-        .square = (float)(outline->radius * outline->radius),
-        .towards = sweep->slope > 0.0 ? -1.0f : 1.0f,
-        .bottom = (float)outline->bottom,
-        .corner = (float)outline->corner,
-        .arc_radius = outline->steep > 0.0 ? (float)outline->arc_radius : INFINITY,
-        .arc_top = (float)outline->arc_top,
-        .steep = (float)outline->steep,
-        .lowest = (float)(sweep->az + lesser(sweep->slope * sweep->length, 0.0)) - ROUNDING_MM,
-    };
-}
-
-/* Return the largest height that a sweep cuts off in a row of cells. */
-static double measure(const Grid *grid, const Row *row, const Sweep *sweep) {
-    double worst = 0.0;
-    for (int64_t j = row->cells.first; j < row->cells.after; j++) {
-        const double at = (double)(j - row->begin);
-        const double along = row->along + at * row->along_step, beside = row->beside + at * row->beside_step;
-        const double t = lesser(greater(along, 0.0), sweep->length);
-        const double r = sqrt(squared(along - t) + beside * beside);
-        const double low = sweep->az + sweep->slope * t + outline_height(r, sweep->outline);
-        worst = greater(worst, CELL(grid->height, row->i, j) - low);
-    }
-    return worst;
-}
-
-/* Return where a row enters and leaves the plan of a sweep. */
-static Chord chord(double y, const Sweep *sweep) {
-    const double ex = sweep->ex, ey = sweep->ey, radius = sweep->outline->radius;
-    double low = 0.0, high = sweep->length, left = 0.0, right = sweep->length;
-    if (ey != 0.0) {
-        const double a = (y - radius) / ey, b = (y + radius) / ey;
-        low = greater(low, lesser(a, b));
-        high = lesser(high, greater(a, b));
-        const double tangent = ey > 0.0 ? radius * ex : -radius * ex;
-        left = (y - tangent) / ey;
-        right = (y + tangent) / ey;
-    } else if (ex < 0.0) {
-        left = sweep->length;
-        right = 0.0;
-    }
-    if (low > high || (ey == 0.0 && fabs(y) > radius))
-        return (Chord){1.0, 0.0};
-    left = lesser(greater(left, low), high);
-    right = lesser(greater(right, low), high);
-    const double reach_left = sqrt(greater(radius * radius - squared(y - ey * left), 0.0));
-    const double reach_right = sqrt(greater(radius * radius - squared(y - ey * right), 0.0));
-    return (Chord){ex * left - reach_left, ex * right + reach_right};
-}
-
-/* Leave out what the sweeps before and after cut: behind <= along <= ahead. */
-static Chord in_slab(Chord row, double y, const Sweep *sweep) {
-    const double from = sweep->behind - y * sweep->ey, to = sweep->ahead - y * sweep->ey;
-    if (fabs(sweep->ex) > 1e-9) {
-        const double near = from / sweep->ex, far = to / sweep->ex;
-        return sweep->ex > 0.0 ? (Chord){greater(row.left, near), lesser(row.right, far)}
-                               : (Chord){greater(row.left, far), lesser(row.right, near)};
-    }
-    return from > 0.0 || to < 0.0 ? (Chord){INFINITY, -INFINITY} : row;
-}
-
-/* Return how far along a ball's sweep cells are not cut by the next one, which goes on at nearly the same heading. */
-static double ahead_of(const Path *path, int64_t k, const Sweep *sweep) {
+   It cuts all cells that are lowest below its own way. Those below the joint that lie behind the plane across its
+   beginning, s·w ahead of the joint on a slope of sine s at a half-width w of the ball, are the first one's: the
+   wedge is what turns by an angle of tangent t may move that border by, t·R in plan and, as w is steep at the rim,
+   s·R·(sqrt(2t + t²) + t²). */
+static void join(const Path *path, int64_t k, Sweep *sweep) {
     const int64_t next = k + 1;
-    if (sweep->outline->kind != SW_BALL || next >= path->position_mm.rows || AT(path->first, next) ||
-        AT(path->rapid, k) || AT(path->rapid, next))
-        return INFINITY;
-    const double *b = &CELL(path->position_mm, k, 0), *c = &CELL(path->position_mm, next, 0);
-    const double x = c[0] - b[0], y = c[1] - b[1];
+    if (next >= path->position_mm.rows || AT(path->first, next) || AT(path->rapid, k) || AT(path->rapid, next))
+        return;
+    const double *b = place_of(path, k), *c = place_of(path, next);
+    const double x = c[0] - b[0], y = c[1] - b[1], z = c[2] - b[2];
     const double onward = x * sweep->ex + y * sweep->ey, aside = fabs(y * sweep->ex - x * sweep->ey);
     if (!(onward > LEAST_ONWARD * aside) || !(onward > NO_LENGTH_MM))
-        return INFINITY;
-    /* between the planes across both sweeps at their joint lies a wedge, which the first one cuts */
-    return sweep->length + sweep->outline->radius * (greater(sweep->sink, 0.0) + aside / onward);
+        return;
+    const double turn = aside / onward, radius = sweep->outline->radius;
+    sweep->goes_on = true;
+    sweep->next_sink = z / sqrt(x * x + y * y + z * z);
+    sweep->wedge = JOINT_MM + radius * (turn + fabs(sweep->next_sink) * (sqrt(2.0 * turn + turn * turn) + turn * turn));
 }
 
 static Sweep sweep_to(const Path *path, int64_t k) {
-    const double *a = &CELL(path->position_mm, k - 1, 0), *b = &CELL(path->position_mm, k, 0);
+    const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const Outline *outline = outline_of(path, AT(path->tool, k));
-    Sweep sweep = {outline, a[0], a[1], a[2], 1.0, 0.0, 0.0, 0.0, 0.0, -INFINITY, INFINITY, false};
+    Sweep sweep = {.outline = outline, .ax = a[0], .ay = a[1], .az = a[2], .ex = 1.0};
     const double length = sqrt(squared(b[0] - a[0]) + squared(b[1] - a[1])), rise = b[2] - a[2];
     if (!(length > NO_LENGTH_MM)) {
         sweep.az = lesser(a[2], b[2]);
@@ -289,12 +45,9 @@ static Sweep sweep_to(const Path *path, int64_t k) {
     sweep.ey = (b[1] - a[1]) / length;
     sweep.slope = rise / length;
     sweep.sink = rise / sqrt(length * length + rise * rise);
-    if (k > 1 && !AT(path->first, k - 1)) {
-        const double of_shape = outline->kind == SW_BALL ? sweep.sink * outline->radius : -outline->radius;
-        sweep.behind = sweep.slope >= 0.0 ? 0.0 : of_shape;
-        sweep.hollow = outline->kind == SW_FLAT && sweep.slope >= 0.0;
-    }
-    sweep.ahead = ahead_of(path, k, &sweep);
+    sweep.follows = k > 1 && !AT(path->first, k - 1);
+    if (outline->kind == SW_BALL)
+        join(path, k, &sweep);
     return sweep;
 }
 
@@ -308,56 +61,23 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
             }
 }
 
-static void lower(const Grid *grid, const Row *row, const Sweep *sweep, const Sweep32 *single, double y) {
-    const double kind = sweep->outline->kind;
-    if (kind == SW_BALL)
-        lower_row(grid, row, single, below_ball, NULL); /* hardly a cell is below its tip */
-    else if (kind == SW_FLAT && sweep->slope == 0.0)
-        lower_flat(grid, row, sweep, y);
-    else if (kind == SW_FLAT)
-        lower_row(grid, row, single, below_ramp, bound_any);
-    else if (sweep->slope == 0.0 && (sweep->outline->steep == 0.0 || sweep->length == 0.0))
-        lower_row(grid, row, single, below_level, bound_any);
-    else
-        lower_row(grid, row, single, below_other, bound_other);
-}
-
 double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
-    const double *a = &CELL(path->position_mm, k - 1, 0), *b = &CELL(path->position_mm, k, 0);
+    const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const double radius = outline_of(path, AT(path->tool, k))->radius;
     const double x_low = lesser(a[0], b[0]) - radius, x_high = greater(a[0], b[0]) + radius;
     const double y_low = lesser(a[1], b[1]) - radius, y_high = greater(a[1], b[1]) + radius;
     if (highest(grid, x_low, x_high, y_low, y_high) <= lesser(a[2], b[2]))
         return 0.0;
-    const Sweep sweep = sweep_to(path, k);
-    const Sweep32 single = in_single(&sweep);
-    const double dx = grid->dx_mm, dy = grid->dy_mm;
-    const int64_t columns = grid->height.columns - SW_LANES;
     const Cells rows = rows_between(grid, y_low, y_high, grid->height.rows);
-    double worst = 0.0;
-    for (int64_t i = rows.first; i < rows.after; i++) {
-        const double y = grid->y_mm + ((double)(i + grid->row) + 0.5) * dy - sweep.ay;
-        const Chord cut = in_slab(chord(y, &sweep), y, &sweep);
-        if (cut.left > cut.right)
-            continue;
-        const Cells cells = columns_between(grid, cut.left + sweep.ax, cut.right + sweep.ax, columns);
-        if (cells.first >= cells.after)
-            continue;
-        const int64_t begin = (int64_t)ceil((cut.left + sweep.ax - grid->x_mm) / dx - 0.5) - grid->column;
-        const double x = grid->x_mm + ((double)(begin + grid->column) + 0.5) * dx - sweep.ax;
-        const Row row = {.i = i,
-                         .begin = begin,
-                         .cells = cells,
-                         .along = x * sweep.ex + y * sweep.ey,
-                         .beside = y * sweep.ex - x * sweep.ey,
-                         .along_step = dx * sweep.ex,
-                         .beside_step = -dx * sweep.ey};
-        if (AT(path->rapid, k))
-            worst = greater(worst, measure(grid, &row, &sweep));
-        lower(grid, &row, &sweep, &single, y);
-    }
-    const Cells touched = columns_between(grid, x_low, x_high, columns);
-    if (rows.first < rows.after && touched.first < touched.after)
-        visit(grid, rows, touched);
+    const Cells columns = columns_between(grid, x_low, x_high, grid->height.columns - SW_LANES);
+    if (rows.first >= rows.after || columns.first >= columns.after)
+        return 0.0;
+    const Sweep sweep = sweep_to(path, k);
+    const double worst = AT(path->rapid, k) ? cut_off_by(grid, &sweep, rows) : 0.0;
+    if (sweep.outline->kind == SW_BALL)
+        lower_below_ball(grid, &sweep);
+    else
+        lower_below_other(grid, &sweep, rows);
+    visit(grid, rows, columns);
     return worst;
 }

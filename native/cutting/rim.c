@@ -12,6 +12,8 @@ static bool jumps(double a, double b) {
     return fabs(a - b) > JUMP * greater(a, b) || (a == 0.0) != (b == 0.0);
 }
 
+static double between(float a, float b, double share) { return (double)a + share * ((double)b - (double)a); }
+
 static double depth_above(double height, double foot) {
     return height - foot > FEEL_MM ? height - foot : 0.0;
 }
@@ -19,17 +21,16 @@ static double depth_above(double height, double foot) {
 /* Return the angle between bins j - 1 and j at which the depth above a foot jumps. */
 static double edge_between(const Strip *strip, const Sample *sample, const Ring *rim, int64_t j, int64_t bins,
                            double foot) {
-    const double before = rim->tops[j - 1], behind = rim->tops[j];
+    const double before = (double)rim->tops[j - 1], behind = (double)rim->tops[j];
     double low = 0.0, high = 1.0;
     for (int halving = 0; halving < HALVINGS; halving++) {
         const double middle = 0.5 * (low + high);
-        const double x = sample->x + rim->r * (rim->east[j - 1] + middle * (rim->east[j] - rim->east[j - 1]));
-        const double y =
-            sample->y + rim->r * (rim->north[j - 1] + middle * (rim->north[j] - rim->north[j - 1]));
+        const double x = sample->x + rim->r * between(rim->east[j - 1], rim->east[j], middle);
+        const double y = sample->y + rim->r * between(rim->north[j - 1], rim->north[j], middle);
         double height = height_at(strip->grid, strip->path, x, y);
         for (int past = 0; past < sample->recent_count; past++)
             height = lesser(height, sweep_height(&sample->recent[past], sample->outline, x, y, 0.0));
-        const double depth = depth_above(height, foot);
+        const double depth = depth_above(height - sample->z, foot);
         if (fabs(depth - before) < fabs(depth - behind))
             low = middle;
         else
@@ -42,17 +43,16 @@ static double edge_between(const Strip *strip, const Sample *sample, const Ring 
 static bool to_depths(const Ring *rim, double foot) {
     bool is_engaged = false;
     for (int64_t j = rim->first; j < rim->after; j++) {
-        const double depth = depth_above(rim->tops[j], foot);
+        const double depth = depth_above((double)rim->tops[j], foot);
         is_engaged |= depth > 0.0;
-        rim->tops[j] = depth;
+        rim->tops[j] = (float)depth;
     }
     return is_engaged;
 }
 
 /* Read the material's top along the rim. */
 static void read_tops(const Strip *strip, const Sample *sample, const Ring *rim) {
-    if (tops_on_ring(strip->grid, sample, rim))
-        correct_at_walls(strip->grid, strip->path, sample, rim);
+    read_cells(strip->grid, strip->path, sample, rim);
     take_off_recent(sample, rim);
 }
 
@@ -72,9 +72,9 @@ static void add_arc(const Strip *strip, const Sample *sample, const Band *band, 
 
 void add_rim(const Strip *strip, const Sample *sample, const Band *band, Reading *reading) {
     const int64_t bins = AT(strip->cutters->wall_bins, sample->tool);
-    double *depths = &CELL(strip->work->rows, SHARE, 0);
+    float *depths = &CELL(strip->work->rows, SHARE, 0);
     const Ring rim = {.r = band->r_high,
-                      .level = 0.0,
+                      .height = 0.0,
                       .first = bins / 4,
                       .after = bins - bins / 4,
                       .east = &CELL(strip->work->heading, 0, 0),
@@ -83,7 +83,7 @@ void add_rim(const Strip *strip, const Sample *sample, const Band *band, Reading
                       .above = depths};
     const double foot = greater(band->low, greater(sample->bottom, 0.0));
     read_tops(strip, sample, &rim);
-    if (!to_depths(&rim, sample->z + foot))
+    if (!to_depths(&rim, foot))
         return;
     double a = 0.0;
     for (int64_t at = rim.first, end; at < rim.after; at = end) {
@@ -91,8 +91,8 @@ void add_rim(const Strip *strip, const Sample *sample, const Band *band, Reading
         for (end = at; end < rim.after && !jumps(depths[at], depths[end]); end++)
             added += depths[end];
         const double b =
-            end < rim.after ? edge_between(strip, sample, &rim, end, bins, sample->z + foot) : 0.5 * TURN;
-        if (depths[at] > 0.0 && b > a)
+            end < rim.after ? edge_between(strip, sample, &rim, end, bins, foot) : 0.5 * TURN;
+        if (depths[at] > 0.0f && b > a)
             add_arc(strip, sample, band, a, b, added / (double)(end - at), foot, reading);
         a = b;
     }

@@ -5,16 +5,11 @@
 
 #include "cutting/sample.h"
 
-/* Write the height of the cells on a ring; return whether a wall runs through one of them. */
-bool tops_on_ring(const Grid *grid, const Sample *sample, const Ring *ring);
+/* Write the height of the cells on a ring, and how far they stand above the cutter; where a wall runs through a cell,
+   those of the point's side. */
+void read_cells(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring);
 
-/* Write how far the tops stand above the cutter's surface. */
-void stand_above_cutter(const Grid *grid, const Sample *sample, const Ring *ring);
-
-/* Replace the tops of cells with a wall, and what is above the level, by those of the point's side. */
-void correct_at_walls(const Grid *grid, const Path *path, const Sample *sample, const Ring *ring);
-
-/* Lower tops, and what is above the level, by the sweeps that the field does not show yet. */
+/* Lower tops, and what is above the ring, by the sweeps that the field does not show yet. */
 void take_off_recent(const Sample *sample, const Ring *ring);
 
 #endif

@@ -21,14 +21,18 @@ typedef struct {
     int recent_count;
 } Sample;
 
-/* A ring of the cutter: the circle on which a point of the edge turns, read in bins from `first` on. For each
-   bin its direction in plan, the top of the material, and how far it stands above a level or the cutter.
-   `tops` and `above` may be the same. */
+/* A range of bins. */
 typedef struct {
-    double r, level;
     int64_t first, after;
-    const double *east, *north;
-    double *tops, *above;
+} Bins;
+
+/* A ring of the cutter: the circle on which a point of the edge turns, read in bins from `first` on. For each bin its direction in plan, the top of the material above the tip, and how far it
+   stands above the ring or the cutter's surface; `tops` and `above` may be the same. */
+typedef struct {
+    double r, height; /* of the ring, above the tip */
+    int64_t first, after;
+    const float *east, *north;
+    float *tops, *above;
 } Ring;
 
 #endif

@@ -61,7 +61,8 @@ def nodes_of(position, direction, apart_mm, rapid=None, tool=None):
     node = np.empty(count, bool)
     samples = Samples(position, direction, way, np.zeros(count), tool, np.zeros(count, np.int64), node)
     rapid = np.zeros(count, bool) if rapid is None else rapid
-    mark_nodes(samples, rapid, np.full(tool.max() + 1, apart_mm), node)
+    apart = np.full(tool.max() + 1, apart_mm)
+    mark_nodes(samples, rapid, apart, 2.0 * apart, node)
     return node, way
 
 
