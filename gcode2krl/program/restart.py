@@ -1,0 +1,236 @@
+"""A Toolpath that begins at a later G-code line: which row that is, and what is in force there.
+
+Nothing here asks the material; `gcode2krl.restart` does, and says where the way down may begin.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.tables import Event, Restart, Toolpath
+from gcode2krl.units import S_PER_MIN
+
+ENTRY_MM_S = 1000.0 / S_PER_MIN
+"""Fastest way down into a cut: assumed, slow enough to be stopped by hand."""
+_M0, _M1, _OUTPUTS = 0, 1, {62: "digital", 63: "digital", 64: "digital", 65: "digital", 67: "analog"}
+_ANALOG_NOW = 68
+_WORD = re.compile(r"([0-9]{1,9})(?::([0-9]{1,9}))?")
+
+
+def parse_line(word: str) -> tuple[int, int | None]:
+    """Return line and run of ``4812`` or ``4812:3``; raises `NotUnderstoodError` where it is neither."""
+    found = _WORD.fullmatch(word)
+    if not found or int(found[1]) == 0 or (found[2] is not None and int(found[2]) == 0):
+        sentence = f"--from-line {word}: not a line of the G-code"
+        raise input_error("restart-line", sentence, "--from-line 4812, or 4812:3 for its third run")
+    return int(found[1]), None if found[2] is None else int(found[2])
+
+
+def begun_row(toolpath: Toolpath, line: int, run: int | None = None) -> int:
+    """Return the row (of the Toolpath) that is the first of a G-code line.
+
+    ``run`` counts from 1 the runs of a line that a loop or a subprogram repeats. Raises `NotUnderstoodError`
+    where the line moves nothing, stands behind the last that does, runs more than once and no run is named,
+    or stands within a tool change.
+    """
+    rows = _moving(toolpath)
+    own = rows[toolpath.source_line[rows] == line]
+    if not len(own):
+        raise _without_motion(toolpath, rows, line)
+    starts = own[np.flatnonzero(np.diff(own, prepend=-2) > 1)]
+    if run is None and len(starts) > 1:
+        sentence = f"line {line} runs {len(starts)} times, in a loop or a subprogram"
+        raise _refused(toolpath, line, sentence, f"--from-line {line}:1 to {line}:{len(starts)} name one run")
+    if run is not None and run > len(starts):
+        sentence = f"line {line} runs {len(starts)} times, not {run}"
+        raise _refused(toolpath, line, sentence, f"--from-line {line}:{len(starts)} is the last run")
+    row = int(starts[(run or 1) - 1])
+    if not _is_ready(toolpath, row):
+        raise _refused(toolpath, line, _why_not(toolpath, row), _next_ready(toolpath, rows, row))
+    return row
+
+
+def _is_ready(toolpath: Toolpath, row: int) -> bool:
+    """Tell whether a program can begin at a row: it leads to a position, and no tool change is pending."""
+    return bool(toolpath.is_position()[row]) and pending_change(toolpath, row) is None
+
+
+def _why_not(toolpath: Toolpath, row: int) -> str:
+    line, change = int(toolpath.source_line[row]), pending_change(toolpath, row)
+    if change is None:
+        return f"line {line} leads to no position: not all of X, Y and Z are programmed there"
+    of_change = f"the change to T{change.values['tool']} of line {change.values['line']}"
+    return f"line {line} stands within {of_change}: its length or its position is not programmed yet"
+
+
+def _next_ready(toolpath: Toolpath, rows: Ints, row: int) -> str:
+    """Return the remedy that names the next line behind a row at which a program can begin."""
+    lines = toolpath.source_line
+    behind = (r for r in rows[rows > row].tolist() if lines[r] != lines[row] and _is_ready(toolpath, r))
+    found = next(behind, None)
+    if found is None:
+        return "no line behind it can be one"
+    return f"--from-line {int(lines[found])} is the next that has a motion of its own"
+
+
+def pending_change(toolpath: Toolpath, row: int) -> Event | None:
+    """Return the tool change that is not over at a row: tool in, but no position or not its length yet."""
+    changes = [event for event in toolpath.events if event.kind == "tool" and event.row < row]
+    if not changes:
+        return None
+    last = changes[-1]
+    between = slice(last.row + 1, row + 1)
+    if not toolpath.is_position()[between].any():
+        return last
+    tool = int(last.values["tool"])
+    later = toolpath.tool[row:] == tool
+    takes = toolpath.length_offset_tool[row:] == tool
+    is_own = bool((toolpath.length_offset_tool[between] == tool).any())
+    return (
+        last if not is_own and bool(toolpath.rapid[between].all()) and bool((later & takes).any()) else None
+    )
+
+
+def row_before(toolpath: Toolpath, row: int) -> int | None:
+    """Return the first row of the G-code line whose move leads to a row, None where a tool was changed."""
+    if not starts_at_known(toolpath, row):
+        return None
+    before = row - 1
+    while before > 1 and toolpath.source_line[before - 1] == toolpath.source_line[row - 1]:
+        before -= 1
+    return before
+
+
+def starts_at_known(toolpath: Toolpath, row: int) -> bool:
+    """Tell whether the tool of a row stands, in front of it, at a position that a robot may be sent to."""
+    changed = any(event.kind == "tool" and event.row == row - 1 for event in toolpath.events)  # another tip
+    known = toolpath.is_position()[row - 1] and not toolpath.machine[row - 1]
+    return row > 1 and bool(known) and not changed
+
+
+def approached_row(toolpath: Toolpath, row: int) -> int:
+    """Return the row whose end is the first position in the work: of a feed move its start, else its end."""
+    return row - 1 if not toolpath.rapid[row] and starts_at_known(toolpath, row) else row
+
+
+def begun_at(toolpath: Toolpath, row: int, restart: Restart, way_mm: Floats) -> Toolpath:
+    """Return a Toolpath that goes on from a row, with what is in force there.
+
+    Parameters
+    ----------
+    way_mm : (k, 3) the way to the first position, from above: rapids, but where it ends at the start of a
+        feed move the last piece at that move's feed, `ENTRY_MM_S` at most.
+    """
+    count, is_start = len(way_mm), approached_row(toolpath, row) != row
+    columns: dict[str, NDArray[Any]] = {}
+    for spec in fields(toolpath):
+        if "tail" in spec.metadata:
+            values = getattr(toolpath, spec.name)
+            columns[spec.name] = _begun(values, row, count)
+    way = slice(1, count + 1)
+    columns["position_mm"][way] = way_mm
+    columns["rapid"][way], columns["feed_mm_s"][way] = True, np.inf
+    if is_start:
+        columns["rapid"][count], columns["feed_mm_s"][count] = False, min(toolpath.feed_mm_s[row], ENTRY_MM_S)
+    columns["known"][0], columns["known"][way] = False, True
+    columns["exact_stop"][way], columns["tolerance_mm"][way] = True, np.nan
+    columns["dwell_s"][: count + 1], columns["arc"][way], columns["machine"][way] = 0.0, -1, False
+    in_force, left_out = _in_force(toolpath, row, 1 if count else 0)
+    rest = (e._replace(row=e.row - row + count + 1) for e in toolpath.events if e.row >= row)
+    return Toolpath(
+        **columns,
+        events=(*in_force, *rest),
+        issues=(*toolpath.issues, *left_out),
+        source=toolpath.source,
+        restart=replace(restart, way_rows=count),
+    )
+
+
+def _begun(values: NDArray[Any], row: int, count: int) -> NDArray[Any]:
+    """Return a column from a row on, behind row 0 and ``count`` copies of the row; a constant stays one."""
+    if values.strides[0] == 0:
+        return np.broadcast_to(values[0], (1 + count + len(values) - row, *values.shape[1:]))
+    return np.concatenate([values[:1], np.repeat(values[row : row + 1], count, axis=0), values[row:]])
+
+
+def state_words(toolpath: Toolpath) -> str:
+    """Return what is in force where a Toolpath begins: ``T3, M3 S8000, M8``."""
+    words = []
+    for event in toolpath.events:
+        if event.row > 1:
+            break
+        code = event.values.get("m", -1)
+        if event.kind == "tool":
+            words.append(f"T{event.values['tool']}")
+        elif code >= 0:
+            words.append(f"M{code}" + (f" S{abs(event.values['rpm']):g}" if event.kind == "spindle" else ""))
+    return ", ".join(words)
+
+
+def _in_force(toolpath: Toolpath, row: int, above: int) -> tuple[list[Event], list[Issue]]:
+    """Return the events that make what is in force before a row, and what is not repeated.
+
+    The tool is changed at HOME, as at any start; the rest is switched at the row ``above``, over the work.
+    """
+    before = [event for event in toolpath.events if event.row < row]
+    tools = [event for event in before if event.kind == "tool"]
+    spindle = [event for event in before if event.kind == "spindle"][-1:]
+    coolant = [event for event in before if event.kind == "coolant"]
+    found = [event._replace(row=0) for event in tools[-1:]]
+    found += [_at(event, above) for event in spindle if event.values["rpm"] != 0.0]
+    if coolant:
+        on = {"mist": 7, "flood": 8}
+        for key, code in on.items():
+            last = [event for event in coolant if event.values["m"] == code][-1:]
+            found += [_at(event, above) for event in last if coolant[-1].values[key]]
+    outputs: dict[tuple[str, float], Event] = {}
+    others: dict[int, int] = {}
+    for event in before:
+        code = event.values.get("m", -1)
+        if event.kind != "message" or code < 0 or code in (_M0, _M1):
+            continue
+        if code in _OUTPUTS or code == _ANALOG_NOW:
+            outputs[_OUTPUTS.get(code, "analog"), event.values.get("p", -1.0)] = event
+        else:
+            others[code] = event.values["line"]
+    found += [_at(event, above) for event in outputs.values()]
+    return found, list(_not_repeated(others))
+
+
+def _at(event: Event, row: int) -> Event:
+    return Event(row, event.kind, {key: v for key, v in event.values.items() if key != "dwell_s"})
+
+
+def _not_repeated(codes: dict[int, int]) -> Iterator[Issue]:
+    for code, line in codes.items():
+        sentence = f"M{code} of line {line}, before the restart, is not repeated"
+        yield Issue("warning", "restart-not-repeated", line, sentence, "do by hand what the rest needs of it")
+
+
+def _moving(toolpath: Toolpath) -> Ints:
+    """Return the rows that move the tool in the work: not row 0, no machine moves."""
+    moves = ~toolpath.machine
+    moves[:1] = False
+    return np.flatnonzero(moves)
+
+
+def _without_motion(toolpath: Toolpath, rows: Ints, line: int) -> NotUnderstoodError:
+    lines = toolpath.source_line[rows]
+    if not len(rows) or line > int(lines.max()):
+        last = int(lines.max(initial=0))
+        sentence = f"line {line} stands behind the last line that moves the tool, {last}"
+        return _refused(toolpath, line, sentence, f"--from-line {last} at most")
+    own = toolpath.source_line == line
+    what = "is a machine move (G28, G30, G53)" if toolpath.machine[own].any() else "moves nothing"
+    first = int(np.flatnonzero(toolpath.source_line[1:] > line)[0])  # the row before the next line's
+    return _refused(toolpath, line, f"line {line} {what}", _next_ready(toolpath, rows, first))
+
+
+def _refused(toolpath: Toolpath, line: int, sentence: str, remedy: str) -> NotUnderstoodError:
+    return input_error("restart-line", sentence, remedy, line=line, source=toolpath.source)
