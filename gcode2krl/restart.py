@@ -26,6 +26,8 @@ _LEAST_UPRIGHT = 0.5
 _CONTACT_MM = 0.02
 _MOST_OF_CORNER_MM = 0.3
 """A rounded corner never excuses a thicker layer, as in `cutting.findings`."""
+_UNTRUE = "rapid-in-stock"
+"""A finding about the lines before that makes the material they have left doubtful."""
 _MISSING = frozenset({"tool-unknown", "tool-missing"})
 
 
@@ -41,12 +43,12 @@ class _Before:
     """(3, 3) from ``$BASE`` to the frame of the field."""
 
 
-def restarted(toolpath: Toolpath, word: str, cell: Cell, tolerance_mm: float | None = None) -> Toolpath:
+def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | None = None) -> Toolpath:
     """Return the Toolpath that begins at a G-code line, see the module's head.
 
     Parameters
     ----------
-    word : ``4812``, or ``4812:3`` for the third run of a line that a loop or a subprogram repeats.
+    line : G-code line whose move is to be the first.
     tolerance_mm : blend tolerance that the program is made with.
 
     Raises
@@ -56,14 +58,13 @@ def restarted(toolpath: Toolpath, word: str, cell: Cell, tolerance_mm: float | N
     RefusedError
         Where a tool used before is missing, or the start of the line lies in material.
     """
-    line, run = program.parse_line(word)
-    row = program.begun_row(toolpath, line, run)
+    row = program.begun_row(toolpath, line)
     before, issues = _before(toolpath, row, cell, tolerance_mm)
     first = _first_row(before, row, cell)
     if first != row:
         issues.append(_one_before(toolpath, row, first))
     begins = int(toolpath.source_line[first])
-    restart = Restart(line=line, begins_line=begins, run=run or 1, left=before.left)
+    restart = Restart(line=line, begins_line=begins, left=before.left)
     begun = program.begun_at(toolpath, first, restart, _way(before, first, cell))
     issues += _other_arm(before, begun, cell, tolerance_mm)
     return replace(begun, issues=(*begun.issues, *issues))
@@ -75,7 +76,7 @@ def restarted(toolpath: Toolpath, word: str, cell: Cell, tolerance_mm: float | N
 def _before(
     toolpath: Toolpath, row: int, cell: Cell, tolerance_mm: float | None
 ) -> tuple[_Before, list[Issue]]:
-    """Return the program up to a row, and what keeps its material from being known."""
+    """Return the program up to a row, and what makes its material doubtful or keeps it from being known."""
     _refuse_missing_tools(toolpath, row, cell)
     targets, joints = targets_and_joints(toolpath, cell, tolerance_mm)
     try:
@@ -83,14 +84,16 @@ def _before(
         field, to_field = cutting.raw_field(toolpath, motion, cell)
         known = Restart(line=0, begins_line=0, left=field)
         done = _until(motion, krc4.build_chain(targets, cell), row)
-        part = cutting.remove(replace(toolpath, restart=known), done, cell, is_checked=False).part
+        removal = cutting.remove(replace(toolpath, restart=known), done, cell)
     except Gcode2KrlError as error:
         sentence = f"the material that the lines before have left is not known: {error.issues[0].message}"
         issue = Issue(
             "error", "restart-stock-unknown", 0, sentence, error.issues[0].advice() or "state [stock]"
         )
         return _Before(toolpath, targets, joints, None, np.eye(3)), [issue]
-    return _Before(toolpath, targets, joints, part, to_field), []
+    # a rapid has removed what it met, so what is below it would count as cut
+    collisions = [issue for issue in removal.forces.issues if issue.code == _UNTRUE]
+    return _Before(toolpath, targets, joints, removal.part, to_field), collisions
 
 
 def _until(motion: Motion, chain: krc4.Chain, row: int) -> Motion:

@@ -78,17 +78,10 @@ class Restart:
     """G-code line that was asked for."""
     begins_line: int
     """G-code line whose move is the first; the one before ``line`` where ``line`` begins in material."""
-    run: int = 1
-    """Which run of that line, where a loop or a subprogram repeats it."""
     way_rows: int = 0
     """Rows of the Toolpath, from row 1 on, that lead to the first position."""
-    left: object = None
+    left: object = field(default=None, repr=False)
     """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
-
-    @property
-    def word(self) -> str:
-        """``4812``, or ``4812:3`` for the third run of a line, as ``--from-line`` takes it."""
-        return f"{self.line}" if self.run == 1 else f"{self.line}:{self.run}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 from_line_option = click.option(
     "--from-line",
-    metavar="LINE[:RUN]",
-    help="Begin at this G-code line, as after a broken cutter; RUN counts the runs of a line in a loop.",
+    type=click.IntRange(1, 10**9),
+    metavar="LINE",
+    help="Begin at this G-code line, as after a broken cutter.",
 )
 
 
-def refuse_without_forces(from_line: str | None, no_forces: bool) -> None:
+def refuse_without_forces(from_line: int | None, no_forces: bool) -> None:
     """Raise where a restart is wanted without the material removal that judges it."""
     if from_line is not None and no_forces:
         sentence = "--from-line needs the material as cut so far, which --no-forces leaves out"
@@ -29,7 +30,7 @@ def refuse_without_forces(from_line: str | None, no_forces: bool) -> None:
 
 
 def restart_name(
-    part: str, name: str | None, output: str | None, from_line: str | None, cell: "Cell"
+    part: str, name: str | None, output: str | None, from_line: int | None, cell: "Cell"
 ) -> str | None:
     """Return the name of the program: ``part_from4812`` for a restart, where nothing names it."""
     into_folder = output is None or (output not in ("", STANDARD) and Path(output).is_dir())
@@ -38,7 +39,7 @@ def restart_name(
     from gcode2krl.krl.names import name_problem, suggested_name
     from gcode2krl.krl_words import LONGEST_NAME
 
-    externals, suffix = cell.program.externals, f"_from{from_line.replace(':', '_')}"
+    externals, suffix = cell.program.externals, f"_from{from_line}"
     whole = f"{Path(part).stem}{suffix}"
     if not name_problem(whole, externals):
         return whole
@@ -53,7 +54,7 @@ def read_restarted(
     chord_tolerance_mm: float,
     block_delete: bool,
     tolerance_mm: float | None,
-    from_line: str | None,
+    from_line: int | None,
 ) -> "Toolpath":
     """Read the G-code of a command, from a line on where one is named."""
     toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
@@ -75,7 +76,6 @@ def restart_record(toolpath: "Toolpath") -> dict[str, Any]:
     way_mm = toolpath.position_mm[1 : restart.way_rows + 1]
     record = {
         "line": restart.line,
-        "run": restart.run,
         "begins_line": restart.begins_line,
         "in_force": state_words(toolpath),
         "way_mm": [[round(float(value), 3) for value in point] for point in way_mm],
@@ -88,7 +88,7 @@ def restart_words(toolpath: "Toolpath") -> list[str]:
     if toolpath.restart is None:
         return []
     record = restart_record(toolpath)["restart"]
-    line = f"from line {toolpath.restart.word}, begins with the move of line {record['begins_line']}"
+    line = f"from line {toolpath.restart.line}, begins with the move of line {record['begins_line']}"
     way = record["way_mm"]
     x, y, z = way[0]
     down = (

@@ -113,7 +113,7 @@ def command(
     online: str | None,
     both: bool,
     comment_every: int | None,
-    from_line: str | None,
+    from_line: int | None,
 ) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 

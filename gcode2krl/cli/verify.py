@@ -31,7 +31,7 @@ def command(
     chord_tolerance: float,
     block_delete: bool,
     compensate: Literal["offline"] | None,
-    from_line: str | None,
+    from_line: int | None,
 ) -> int:
     """Read a KRL program back and compare it with its G-code.
 

@@ -296,7 +296,7 @@ def _issue_record(issue: Issue) -> dict[str, Any]:
 
 
 def _restart_record(restart: Restart) -> dict[str, Any]:
-    return {name: getattr(restart, name) for name in ("line", "begins_line", "run", "way_rows")}
+    return {name: getattr(restart, name) for name in ("line", "begins_line", "way_rows")}
 
 
 def _event_record(event: Event) -> dict[str, Any]:

@@ -82,7 +82,6 @@ class _RestartRecord(_Part):
 
     line: Annotated[int, Field(strict=True, ge=1, le=_LARGEST_LINE)]
     begins_line: Annotated[int, Field(strict=True, ge=1, le=_LARGEST_LINE)]
-    run: Annotated[int, Field(strict=True, ge=1, le=_LARGEST_LINE)]
     way_rows: Annotated[int, Field(strict=True, ge=0, le=3)]
 
 

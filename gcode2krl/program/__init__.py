@@ -7,7 +7,6 @@ from gcode2krl.program.restart import (
     approached_row,
     begun_at,
     begun_row,
-    parse_line,
     row_before,
     state_words,
 )
@@ -23,7 +22,6 @@ __all__ = [
     "check_toolpath",
     "doubtful",
     "feeds_per_tooth",
-    "parse_line",
     "plan_targets",
     "require_geometry",
     "row_before",

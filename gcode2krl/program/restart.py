@@ -3,7 +3,6 @@
 Nothing here asks the material; `gcode2krl.restart` does, and says where the way down may begin.
 """
 
-import re
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from typing import Any
@@ -18,39 +17,25 @@ from gcode2krl.units import S_PER_MIN
 
 ENTRY_MM_S = 1000.0 / S_PER_MIN
 """Fastest way down into a cut: assumed, slow enough to be stopped by hand."""
-_M0, _M1, _OUTPUTS = 0, 1, {62: "digital", 63: "digital", 64: "digital", 65: "digital", 67: "analog"}
-_ANALOG_NOW = 68
-_WORD = re.compile(r"([0-9]{1,9})(?::([0-9]{1,9}))?")
+_STOPS = (0, 1)
+"""M0 and M1 wait for a person: a restart waits anyway."""
 
 
-def parse_line(word: str) -> tuple[int, int | None]:
-    """Return line and run of ``4812`` or ``4812:3``; raises `NotUnderstoodError` where it is neither."""
-    found = _WORD.fullmatch(word)
-    if not found or int(found[1]) == 0 or (found[2] is not None and int(found[2]) == 0):
-        sentence = f"--from-line {word}: not a line of the G-code"
-        raise input_error("restart-line", sentence, "--from-line 4812, or 4812:3 for its third run")
-    return int(found[1]), None if found[2] is None else int(found[2])
-
-
-def begun_row(toolpath: Toolpath, line: int, run: int | None = None) -> int:
+def begun_row(toolpath: Toolpath, line: int) -> int:
     """Return the row (of the Toolpath) that is the first of a G-code line.
 
-    ``run`` counts from 1 the runs of a line that a loop or a subprogram repeats. Raises `NotUnderstoodError`
-    where the line moves nothing, stands behind the last that does, runs more than once and no run is named,
-    or stands within a tool change.
+    Raises `NotUnderstoodError` where the line moves nothing, stands behind the last that does, within a tool
+    change, or runs more than once.
     """
     rows = _moving(toolpath)
     own = rows[toolpath.source_line[rows] == line]
     if not len(own):
         raise _without_motion(toolpath, rows, line)
-    starts = own[np.flatnonzero(np.diff(own, prepend=-2) > 1)]
-    if run is None and len(starts) > 1:
-        sentence = f"line {line} runs {len(starts)} times, in a loop or a subprogram"
-        raise _refused(toolpath, line, sentence, f"--from-line {line}:1 to {line}:{len(starts)} name one run")
-    if run is not None and run > len(starts):
-        sentence = f"line {line} runs {len(starts)} times, not {run}"
-        raise _refused(toolpath, line, sentence, f"--from-line {line}:{len(starts)} is the last run")
-    row = int(starts[(run or 1) - 1])
+    runs = 1 + np.count_nonzero(np.diff(own) > 1)
+    if runs > 1:
+        sentence = f"line {line} runs {runs} times: which run is meant is not known"
+        raise _refused(toolpath, line, sentence, "begin at a line that runs once")
+    row = int(own[0])
     if not _is_ready(toolpath, row):
         raise _refused(toolpath, line, _why_not(toolpath, row), _next_ready(toolpath, rows, row))
     return row
@@ -89,12 +74,10 @@ def pending_change(toolpath: Toolpath, row: int) -> Event | None:
     if not toolpath.is_position()[between].any():
         return last
     tool = int(last.values["tool"])
-    later = toolpath.tool[row:] == tool
-    takes = toolpath.length_offset_tool[row:] == tool
-    is_own = bool((toolpath.length_offset_tool[between] == tool).any())
-    return (
-        last if not is_own and bool(toolpath.rapid[between].all()) and bool((later & takes).any()) else None
-    )
+    offset = toolpath.length_offset_tool
+    takes_later = bool(((toolpath.tool[row:] == tool) & (offset[row:] == tool)).any())
+    takes = bool((offset[between] == tool).any()) or not toolpath.rapid[between].all()
+    return last if takes_later and not takes else None
 
 
 def row_before(toolpath: Toolpath, row: int) -> int | None:
@@ -131,8 +114,7 @@ def begun_at(toolpath: Toolpath, row: int, restart: Restart, way_mm: Floats) -> 
     columns: dict[str, NDArray[Any]] = {}
     for spec in fields(toolpath):
         if "tail" in spec.metadata:
-            values = getattr(toolpath, spec.name)
-            columns[spec.name] = _begun(values, row, count)
+            columns[spec.name] = _begun(getattr(toolpath, spec.name), row, count)
     way = slice(1, count + 1)
     columns["position_mm"][way] = way_mm
     columns["rapid"][way], columns["feed_mm_s"][way] = True, np.inf
@@ -189,17 +171,8 @@ def _in_force(toolpath: Toolpath, row: int, above: int) -> tuple[list[Event], li
         for key, code in on.items():
             last = [event for event in coolant if event.values["m"] == code][-1:]
             found += [_at(event, above) for event in last if coolant[-1].values[key]]
-    outputs: dict[tuple[str, float], Event] = {}
-    others: dict[int, int] = {}
-    for event in before:
-        code = event.values.get("m", -1)
-        if event.kind != "message" or code < 0 or code in (_M0, _M1):
-            continue
-        if code in _OUTPUTS or code == _ANALOG_NOW:
-            outputs[_OUTPUTS.get(code, "analog"), event.values.get("p", -1.0)] = event
-        else:
-            others[code] = event.values["line"]
-    found += [_at(event, above) for event in outputs.values()]
+    codes = {e.values["m"]: e.values["line"] for e in before if e.kind == "message"}
+    others = {code: line for code, line in codes.items() if code >= 0 and code not in _STOPS}
     return found, list(_not_repeated(others))
 
 
