@@ -150,7 +150,7 @@ def drawn(parts: list[Path], count: int, seed: int, cell_file: Path) -> list[Tri
     """Return trials at ``count`` random lines of all programs; one that cannot be written is left out."""
     chance, trials = random.Random(seed), list[Trial]()
     chance.shuffle(parts)
-    share = max(1, -(-count // max(1, len(parts))))
+    share = max(1, -(-2 * count // max(1, len(parts))))  # of some nothing can be asked
     for part in parts:
         if len(trials) >= count:
             break

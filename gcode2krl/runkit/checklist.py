@@ -1,0 +1,91 @@
+"""The check list: one printed page with what a person compares at the cell before the program runs."""
+
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from gcode2krl.cell import Cell
+from gcode2krl.krl import statements as st
+from gcode2krl.prediction import Prediction
+from gcode2krl.runkit.accepted import Accepted, Switch, position_text
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_MIN
+from gcode2krl.version import __version__
+
+_MOST_SWITCHES, _MOST_TOOLS = 8, 4
+
+
+def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, lift_mm: float) -> str:
+    """Return the page as one HTML file without network; ``prediction`` is that of the program itself."""
+    targets, motion, joints = accepted.targets, prediction.motion, prediction.joints
+    if motion is None or joints is None:
+        raise ValueError("the program has no motion")
+    away, lin = ~targets.home, ~targets.ptp
+    first = int(np.flatnonzero(away)[0])
+    rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M
+    feed = targets.speed_mm_s[lin & (targets.speed_mm_s < rapid_mm_s)]
+    tools = list(dict.fromkeys(targets.tool[away].tolist()))
+    low, high = targets.position_mm[away].min(axis=0), targets.position_mm[away].max(axis=0)
+    return (
+        _environment()
+        .get_template("checklist.html.j2")
+        .render(
+            accepted=accepted,
+            cell=cell,
+            version=__version__,
+            air_name=air_name,
+            lift_mm=lift_mm,
+            first_mm=position_text(targets.position_mm[first]),
+            first_deg=_angles(joints.q_rad[0] * DEG_PER_RAD),
+            home_deg=_angles(np.array(cell.home.q_deg)),
+            base=st.base_statement(cell),
+            tools=[(number, st.tool_statements(cell, number).split("\n")) for number in tools[:_MOST_TOOLS]],
+            more_tools=max(len(tools) - _MOST_TOOLS, 0),
+            switches=[_words(switch) for switch in accepted.switches[:_MOST_SWITCHES]],
+            more_switches=max(len(accepted.switches) - _MOST_SWITCHES, 0),
+            inputs=cell.guard_inputs,
+            minutes=f"{motion.time_s[-1] / S_PER_MIN:.1f}",
+            seconds=f"{motion.time_s[-1]:.1f}",
+            motions=len(targets),
+            feed=f"{feed.max() * S_PER_MIN:.0f}" if len(feed) else "none",
+            rapid=f"{rapid_mm_s * S_PER_MIN:.0f}",
+            joint_speeds=_joint_speeds(joints.qd_rad_s, cell),
+            limit_deg=f"{np.nanmin(joints.limit_margin_rad) * DEG_PER_RAD:.1f}",
+            low=position_text(low),
+            high=position_text(high),
+            lowest=f"{low[2]:.2f}",
+        )
+    )
+
+
+def _angles(q_deg: "np.ndarray[Any, np.dtype[np.float64]]") -> str:
+    return "  ".join(f"A{k} {angle:.1f}°" for k, angle in enumerate(q_deg, start=1))
+
+
+def _joint_speeds(qd_rad_s: "np.ndarray[Any, np.dtype[np.float64]]", cell: Cell) -> str:
+    """Return the largest speed of each joint in degrees per second, as a share of its limit where known."""
+    largest = np.nanmax(np.abs(qd_rad_s), axis=0) * DEG_PER_RAD
+    limits = cell.robot.speeds.qd_deg_s
+    if limits is None:
+        return "  ".join(f"A{k} {speed:.1f}°/s" for k, speed in enumerate(largest, start=1))
+    shares = largest / np.array(limits)
+    return "  ".join(
+        f"A{k} {s:.1f}°/s ({share:.0%})"
+        for k, (s, share) in enumerate(zip(largest, shares, strict=True), start=1)
+    )
+
+
+def _words(switch: Switch) -> dict[str, Any]:
+    where = f"line {switch.first_line}" if switch.first_line else "at the end"
+    times = "" if switch.count == 1 else f", {switch.count} times"
+    return {"code": switch.code, "does": "; ".join(switch.statements), "where": f"{where}{times}"}
+
+
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("gcode2krl.runkit", "."),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
