@@ -8,14 +8,12 @@ from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell
 from gcode2krl.errors import Gcode2KrlError, input_error
 
-LIFT_MM = 100.0
-
 
 @click.command("runkit")
 @click.argument("program", metavar="PART.src")
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the kit; default: part_runkit beside it.")
 @click.option(
-    "--lift", type=float, metavar="MM", default=LIFT_MM, show_default=True, help="Height of the run in air."
+    "--lift", type=float, metavar="MM", default=100.0, show_default=True, help="Height of the run in air."
 )
 @common_options
 def command(
@@ -52,10 +50,10 @@ def command(
         files = [str(file) for file in kit.files]
         console.json({"files": files, "time_s": kit.time_s, "issues": issue_dicts(kit.issues)})
         return 0
-    console.findings(kit.issues, path.name)
+    console.findings(kit.issues, kit.source, notes=False)
     console.say(f"{path} -> {folder}: {kit.time_s:.1f} s of motion at 100 %")
     console.say(f"  {kit.air_name}.src   the same path {lift:g} mm higher, spindle and outputs left out")
     console.say("  checklist.html  print it: what to compare at the cell, and the steps")
-    console.say("  trace.txt       set-up of the controller's recorder; the recording belongs into run-100/")
-    console.say("  prediction/     of the run in air: gcode2krl diagnose prediction/ run-100/")
+    console.say("  trace.txt       set-up of the controller's recorder; the recording belongs into run_air/")
+    console.say("  prediction/     of the run in air: gcode2krl diagnose prediction/ run_air/")
     return 0

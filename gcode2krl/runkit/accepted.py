@@ -167,7 +167,7 @@ def _tools(program: KrlProgram, path: Path, cell: Cell) -> tuple[tuple[Event, ..
         if event.values["tool"] not in cell.tool:
             raise _other_cell(path, f"T{event.values['tool']}")
         tool[event.row + 1 :] = event.values["tool"]
-    _refuse_other_tools(program, set(tool.tolist()), path, cell)
+    _refuse_other_tools(program, tool, changes, path, cell)
     return tuple(changes), tool
 
 
@@ -182,12 +182,17 @@ def _first_tool(program: KrlProgram, changes: list[Event], path: Path, cell: Cel
     return int(best)
 
 
-def _refuse_other_tools(program: KrlProgram, used: set[int], path: Path, cell: Cell) -> None:
-    """Raise where the program sets a tool frame that is none of its tools'."""
-    own = set().union(*(_tool_texts(cell, number) for number in used))
+def _refuse_other_tools(
+    program: KrlProgram, tool: Ints32, changes: list[Event], path: Path, cell: Cell
+) -> None:
+    """Raise where the program sets a tool frame that is not that of its tool."""
+    last = changes[-1].values["tool"] if changes else int(tool[-1])
     for statement in program.statements:
         text = _normal(statement.text)
-        if text.startswith(("$TOOL=", "$LOAD=", "BAS(#TOOL,")) and text not in own:
+        if not text.startswith(("$TOOL=", "$LOAD=", "BAS(#TOOL,")):
+            continue
+        number = int(tool[statement.motion]) if statement.motion < len(tool) else last
+        if text not in _tool_texts(cell, number):
             raise _other_cell(path, "$TOOL or $LOAD")
 
 
@@ -266,5 +271,5 @@ def _refused(path: Path, sentence: str, remedy: str) -> RefusedError:
 
 
 def position_text(position_mm: Floats) -> str:
-    """Return a position as ``X 1.0 Y 2.0 Z 3.0``."""
-    return " ".join(f"{axis} {value:.1f}" for axis, value in zip("XYZ", position_mm, strict=True))
+    """Return a position as ``X 1.00 Y 2.00 Z 3.00``."""
+    return " ".join(f"{axis} {value:.2f}" for axis, value in zip("XYZ", position_mm, strict=True))

@@ -12,7 +12,8 @@ from gcode2krl.runkit.accepted import Accepted, Switch, position_text
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_MIN
 from gcode2krl.version import __version__
 
-_MOST_SWITCHES, _MOST_TOOLS = 8, 4
+_MOST_SWITCHES, _MOST_TOOLS = 12, 4
+"""What fits on one page."""
 
 
 def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, lift_mm: float) -> str:
@@ -53,13 +54,12 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
             limit_deg=f"{np.nanmin(joints.limit_margin_rad) * DEG_PER_RAD:.1f}",
             low=position_text(low),
             high=position_text(high),
-            lowest=f"{low[2]:.2f}",
         )
     )
 
 
 def _angles(q_deg: "np.ndarray[Any, np.dtype[np.float64]]") -> str:
-    return "  ".join(f"A{k} {angle:.1f}°" for k, angle in enumerate(q_deg, start=1))
+    return "  ".join(f"A{k} {round(float(angle), 1) + 0.0:.1f}°" for k, angle in enumerate(q_deg, start=1))
 
 
 def _joint_speeds(qd_rad_s: "np.ndarray[Any, np.dtype[np.float64]]", cell: Cell) -> str:

@@ -11,6 +11,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files import make_folder, refuse_inputs, write_together
 from gcode2krl.krl import output_files, write_krl
+from gcode2krl.krl.release import released
 from gcode2krl.pipeline import checked, predict_toolpath
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit.accepted import Accepted, read_program, toolpath_of
@@ -20,7 +21,7 @@ from gcode2krl.tables import Targets
 
 LIFT_MM = 100.0
 """Height above the program at which it is run in air (acceptance, step 5)."""
-CHECKLIST, SET_UP, PREDICTION, RUN = "checklist.html", "trace.txt", "prediction", "run-100"
+CHECKLIST, SET_UP, PREDICTION, RUN = "checklist.html", "trace.txt", "prediction", "run_air"
 _SUFFIX = "_AIR"
 
 
@@ -30,6 +31,8 @@ class RunKit:
 
     files: tuple[Path, ...]
     air_name: str
+    source: str
+    """Name of the G-code, whose lines the findings name."""
     time_s: float
     """Predicted motion at 100 % override."""
     issues: tuple[Issue, ...]
@@ -63,6 +66,7 @@ def make_kit(
     air_name = accepted.name[: w.LONGEST_NAME - len(_SUFFIX)] + _SUFFIX
     itself = _predicted(checked(accepted.targets, cell)[0], cell)
     air = _predicted(checked(lifted(accepted.targets, lift_mm), cell)[0], cell)
+    released(air.issues, ())
     make_folder(place)
     texts = {
         place / CHECKLIST: page(accepted, itself, cell, air_name, lift_mm),
@@ -80,7 +84,7 @@ def make_kit(
     write_together({file: text.encode("utf-8") for file, text in texts.items()}, inputs)
     motion = itself.motion
     time_s = float(motion.time_s[-1]) if motion is not None else 0.0
-    return RunKit((*written.files, *texts, *tables), air_name, time_s, written.issues)
+    return RunKit((*written.files, *texts, *tables), air_name, accepted.source, time_s, written.issues)
 
 
 def lifted(targets: Targets, lift_mm: float) -> Targets:

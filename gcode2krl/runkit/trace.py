@@ -40,7 +40,7 @@ def set_up_text(name: str, air: Prediction) -> str:
     motion_s = float(air.motion.time_s[-1]) if air.motion is not None else 0.0
     seconds = int(motion_s + _MARGIN_S) + 1
     return _TEXT.format(
-        name=name, cycle=_CYCLE_MS, seconds=seconds, motion=motion_s, run="run-100/", prediction="prediction/"
+        name=name, cycle=_CYCLE_MS, seconds=seconds, motion=motion_s, run="run_air/", prediction="prediction/"
     )
 
 
