@@ -17,6 +17,7 @@ from gcode2krl.units import S_PER_MIN
 
 ENTRY_MM_S = 1000.0 / S_PER_MIN
 """Fastest way down into a cut: assumed, slow enough to be stopped by hand."""
+_M7, _M8 = 7, 8
 _STOPS = (0, 1)
 """M0 and M1 wait for a person: a restart waits anyway."""
 
@@ -161,29 +162,37 @@ def _in_force(toolpath: Toolpath, row: int, above: int) -> tuple[list[Event], li
     The tool is changed at HOME, as at any start; the rest is switched at the row ``above``, over the work.
     """
     before = [event for event in toolpath.events if event.row < row]
-    tools = [event for event in before if event.kind == "tool"]
-    spindle = [event for event in before if event.kind == "spindle"][-1:]
+    tool = [event._replace(row=0) for event in before if event.kind == "tool"][-1:]
+    on = [*_spindle_on(before), *_coolant_on(before)]
+    return [*tool, *(_at(event, above) for event in on)], list(_not_repeated(before))
+
+
+def _spindle_on(before: list[Event]) -> list[Event]:
+    last = [event for event in before if event.kind == "spindle"][-1:]
+    return [event for event in last if event.values["rpm"] != 0.0]
+
+
+def _coolant_on(before: list[Event]) -> list[Event]:
+    """Return the last M7 and the last M8, each where it is still on."""
     coolant = [event for event in before if event.kind == "coolant"]
-    found = [event._replace(row=0) for event in tools[-1:]]
-    found += [_at(event, above) for event in spindle if event.values["rpm"] != 0.0]
-    if coolant:
-        on = {"mist": 7, "flood": 8}
-        for key, code in on.items():
-            last = [event for event in coolant if event.values["m"] == code][-1:]
-            found += [_at(event, above) for event in last if coolant[-1].values[key]]
-    codes = {e.values["m"]: e.values["line"] for e in before if e.kind == "message"}
-    others = {code: line for code, line in codes.items() if code >= 0 and code not in _STOPS}
-    return found, list(_not_repeated(others))
+    on: list[Event] = []
+    for key, code in (("mist", _M7), ("flood", _M8)):
+        if coolant and coolant[-1].values[key]:
+            on += [event for event in coolant if event.values["m"] == code][-1:]
+    return on
 
 
 def _at(event: Event, row: int) -> Event:
     return Event(row, event.kind, {key: v for key, v in event.values.items() if key != "dwell_s"})
 
 
-def _not_repeated(codes: dict[int, int]) -> Iterator[Issue]:
-    for code, line in codes.items():
-        sentence = f"M{code} of line {line}, before the restart, is not repeated"
-        yield Issue("warning", "restart-not-repeated", line, sentence, "do by hand what the rest needs of it")
+def _not_repeated(before: list[Event]) -> Iterator[Issue]:
+    lines = {event.values["m"]: event.values["line"] for event in before if event.kind == "message"}
+    for code, line in lines.items():
+        if code >= 0 and code not in _STOPS:
+            sentence = f"M{code} of line {line}, before the restart, is not repeated"
+            remedy = "do by hand what the rest needs of it"
+            yield Issue("warning", "restart-not-repeated", line, sentence, remedy)
 
 
 def _moving(toolpath: Toolpath) -> Ints:
