@@ -178,9 +178,10 @@ def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
 
 
 def _tool(before: _Before, row: int) -> int:
-    """Return the number of the tool whose frame moves in a row."""
-    own = np.flatnonzero(before.targets.move == row)
-    return int(before.targets.tool[own[-1]]) if len(own) else int(before.toolpath.tool[row])
+    """Return the number of the tool whose frame moves in a row; a row that leads nowhere has no target."""
+    move = before.targets.move
+    so_far = np.flatnonzero((move >= 0) & (move <= row))
+    return int(before.targets.tool[so_far[-1] if len(so_far) else 0])
 
 
 def _one_before(toolpath: Toolpath, row: int, first: int) -> Issue:

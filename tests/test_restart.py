@@ -122,6 +122,13 @@ def test_without_material_the_start_cannot_be_judged():
     assert issue.severity == "error"
 
 
+def test_a_line_that_leads_nowhere_and_names_no_tool_may_be_the_start():
+    cell = stated(mounted_tool=1)
+    twice = SLOT.replace("T1 M6\n", "").replace("G43 H1 ", "").replace("G1 X180", "G1 X100\nG1 X180")
+    rest = restarted(read(twice, cell), 8, cell)
+    assert rest.position_mm[rest.restart.way_rows].tolist() == [100.0, 0.0, -5.0]
+
+
 def test_a_missing_tool_before_the_line_is_refused():
     cell = stated()
     two = HEAD.replace("T1 M6", "T77 M6").replace("H1", "H77") + "G1 Z-5 F600\nG0 Z50\n"
