@@ -1,6 +1,7 @@
 """``--from-line``: what the commands share for a program that begins at a later G-code line."""
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from gcode2krl.cell import Cell
     from gcode2krl.tables import Toolpath
 
+_RESTART = re.compile(rb"^; \*\* RESTART AT G-CODE LINE (\d+)", re.MULTILINE)
+_HEAD_BYTES = 10_000
 from_line_option = click.option(
     "--from-line",
     type=click.IntRange(1, 10**9),
@@ -64,6 +67,22 @@ def read_restarted(
 
     with console.progress("cutting the lines before", None):
         return restarted(toolpath, from_line, cell, tolerance_mm)
+
+
+def refuse_other_start(program: str, from_line: int | None) -> None:
+    """Raise where a program says that it is a restart, and ``--from-line`` does not name its line.
+
+    A file that cannot be read is left to whoever reads it.
+    """
+    try:
+        with Path(program).open("rb") as file:
+            found = _RESTART.search(file.read(_HEAD_BYTES))
+    except OSError:
+        return
+    if found and int(found[1]) != from_line:
+        line = int(found[1])
+        sentence = f"the program is a restart: it begins at G-code line {line}"
+        raise input_error("option-value", sentence, f"--from-line {line}", source=program)
 
 
 def restart_record(toolpath: "Toolpath") -> dict[str, Any]:

@@ -7,7 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell
-from gcode2krl.cli.restart import from_line_option, read_restarted, restart_record
+from gcode2krl.cli.restart import from_line_option, read_restarted, refuse_other_start, restart_record
 from gcode2krl.errors import Gcode2KrlError
 
 
@@ -41,6 +41,7 @@ def command(
     try:
         from gcode2krl.krl import verify_krl
 
+        refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         prediction = None

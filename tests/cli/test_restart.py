@@ -36,11 +36,34 @@ def test_json_has_the_restart(run, part):
     assert result["time_s"] < 20
 
 
-def test_it_verifies_with_its_line_and_with_no_other(run, part):
+def test_it_verifies_with_its_line(run, part):
     assert run(part, "--from-line", 9).code == 0
     assert run("verify", "slot_from9.src", part, "--from-line", 9).code == 0
-    assert run("verify", "slot_from9.src", part, "--from-line", 8).code == 1
-    assert run("verify", "slot_from9.src", part).code == 1
+
+
+@pytest.mark.parametrize("options", [(), ("--from-line", 8)])
+def test_verify_names_the_line_that_it_needs(run, part, options):
+    assert run(part, "--from-line", 9).code == 0
+    done = run("verify", "slot_from9.src", part, *options)
+    assert done.code == 2
+    assert "it begins at G-code line 9" in done.err
+    assert "-> --from-line 9" in done.err
+
+
+def test_verify_sees_another_path_behind_the_start(run, part, tmp_path):
+    assert run(part, "--from-line", 9).code == 0
+    program = tmp_path / "slot_from9.src"
+    text = program.read_bytes().decode("ascii")
+    assert "LIN {X 180.000" in text
+    program.write_bytes(text.replace("LIN {X 180.000", "LIN {X 181.000").encode("ascii"))
+    done = run("verify", "slot_from9.src", part, "--from-line", 9)
+    assert done.code == 1
+    assert "[verify-position]" in done.err
+
+
+def test_a_whole_program_is_no_restart(run, part):
+    assert run(part, "-o", "SLOT.src").code == 0
+    assert run("verify", "SLOT.src", part, "--from-line", 9).code == 1
 
 
 def test_a_long_name_keeps_the_line(run, tmp_path):
