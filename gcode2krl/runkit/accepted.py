@@ -27,7 +27,7 @@ _RESTART = re.compile(r"^; \*\* RESTART AT G-CODE LINE (\d+)", re.MULTILINE)
 _LINE = re.compile(r"^; line (\d+)")
 _CODE = re.compile(r"^; (?:line (\d+)|end of the program): (M\d+)(?: (S[\d.]+|T\d+))?$")
 _NO_SWITCH = re.compile(
-    r"(?:PTP|LIN|TRIGGER|END|\$VEL|\$APO|\$TOOL|\$LOAD|GK_)\b|\$(?:VEL|APO|TOOL|LOAD)", re.IGNORECASE
+    r"(?:PTP|LIN|TRIGGER|END|BAS|\$VEL|\$APO|\$TOOL|\$LOAD|GK_)\b|\$(?:VEL|APO|TOOL|LOAD)", re.IGNORECASE
 )
 _REMEDY = "name the cell that it was made with: --cell cell.toml; or translate again"
 

@@ -1,10 +1,12 @@
 """The check list: one printed page with what a person compares at the cell before the program runs."""
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import jinja2
 import numpy as np
 
+from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.krl import statements as st
 from gcode2krl.prediction import Prediction
@@ -12,8 +14,9 @@ from gcode2krl.runkit.accepted import Accepted, Switch, position_text
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_MIN
 from gcode2krl.version import __version__
 
-_MOST_SWITCHES, _MOST_TOOLS = 12, 4
+_MOST_SWITCH_LINES, _MOST_TOOLS, _MOST_INPUTS = 10, 4, 3
 """What fits on one page."""
+_LINE_CHARACTERS = 80
 
 
 def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, lift_mm: float) -> str:
@@ -26,6 +29,7 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
     rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M
     feed = targets.speed_mm_s[lin & (targets.speed_mm_s < rapid_mm_s)]
     tools = list(dict.fromkeys(targets.tool[away].tolist()))
+    switches = list(_fitting(accepted.switches))
     low, high = targets.position_mm[away].min(axis=0), targets.position_mm[away].max(axis=0)
     return (
         _environment()
@@ -39,12 +43,13 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
             first_mm=position_text(targets.position_mm[first]),
             first_deg=_angles(joints.q_rad[0] * DEG_PER_RAD),
             home_deg=_angles(np.array(cell.home.q_deg)),
-            base=st.base_statement(cell),
-            tools=[(number, st.tool_statements(cell, number).split("\n")) for number in tools[:_MOST_TOOLS]],
+            base=_base_lines(cell),
+            tools=[(number, _tool_lines(cell, number)) for number in tools[:_MOST_TOOLS]],
             more_tools=max(len(tools) - _MOST_TOOLS, 0),
-            switches=[_words(switch) for switch in accepted.switches[:_MOST_SWITCHES]],
-            more_switches=max(len(accepted.switches) - _MOST_SWITCHES, 0),
-            inputs=cell.guard_inputs,
+            switches=switches,
+            more_switches=len(accepted.switches) - len(switches),
+            inputs=cell.guard_inputs[:_MOST_INPUTS],
+            more_inputs=max(len(cell.guard_inputs) - _MOST_INPUTS, 0),
             minutes=f"{motion.time_s[-1] / S_PER_MIN:.1f}",
             seconds=f"{motion.time_s[-1]:.1f}",
             motions=len(targets),
@@ -56,6 +61,27 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
             high=position_text(high),
         )
     )
+
+
+def _base_lines(cell: Cell) -> list[str]:
+    """Return the statement that sets ``$BASE``, with what stands in the controller's table under a number."""
+    number = cell.frames.base_data
+    if number is None:
+        return [st.base_statement(cell)]
+    return [f"{st.base_statement(cell)}: {w.BASE_DATA}[{number}]={st.frame_text(cell.base_matrix())}"]
+
+
+def _tool_lines(cell: Cell, number: int) -> list[str]:
+    """Return the same for ``$TOOL`` and ``$LOAD``."""
+    text = st.tool_statements(cell, number)
+    data, load = cell.tool[number].tool_data, cell.load
+    if data is None:
+        return text.split("\n")
+    lines = [f"{text}: {w.TOOL_DATA}[{data}]={st.frame_text(st.written_tool(cell, number))}"]
+    if load.mass_kg is not None:
+        centre = f"X {load.x_mm:g}, Y {load.y_mm:g}, Z {load.z_mm:g} mm"
+        lines.append(f"LOAD_DATA[{data}]: {load.mass_kg:g} kg at {centre} (as the cell states it)")
+    return lines
 
 
 def _angles(q_deg: "np.ndarray[Any, np.dtype[np.float64]]") -> str:
@@ -75,7 +101,18 @@ def _joint_speeds(qd_rad_s: "np.ndarray[Any, np.dtype[np.float64]]", cell: Cell)
     )
 
 
-def _words(switch: Switch) -> dict[str, Any]:
+def _fitting(switches: Sequence[Switch]) -> Iterator[dict[str, str]]:
+    """Yield the words of the first switches, as many as fit on the page."""
+    lines = 0
+    for switch in switches:
+        words = _words(switch)
+        lines += -(-len(words["does"]) // _LINE_CHARACTERS)
+        if lines > _MOST_SWITCH_LINES:
+            return
+        yield words
+
+
+def _words(switch: Switch) -> dict[str, str]:
     where = f"line {switch.first_line}" if switch.first_line else "at the end"
     times = "" if switch.count == 1 else f", {switch.count} times"
     return {"code": switch.code, "does": "; ".join(switch.statements), "where": f"{where}{times}"}

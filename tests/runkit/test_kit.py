@@ -143,6 +143,20 @@ def test_a_program_of_another_cell_is_refused(program, tmp_path, other, what):
     assert not (tmp_path / "kit").exists()
 
 
+def test_frames_by_number_are_listed_with_what_must_stand_in_the_table(run, tmp_path):
+    frame = "x_mm = 1500.0, y_mm = 100.0, z_mm = 800.0, a_deg = 10.0, b_deg = 0.0, c_deg = 0.0"
+    (tmp_path / "cell.toml").write_text(
+        f'based_on = "demonstration"\n[frames]\nbase_data = 3\nbase = {{ {frame} }}\n', encoding="ascii"
+    )
+    (tmp_path / "part.nc").write_text(PART, encoding="ascii")
+    assert run("part.nc", "-o", "PART.src", "--cell", "cell.toml").code == 0
+    done = run("runkit", "PART.src", "--cell", "cell.toml")
+    assert done.code == 0, done.err
+    page = text_of(tmp_path / "PART_runkit" / "checklist.html")
+    assert "BAS (#BASE,3 )" in page
+    assert "BASE_DATA[3]={X 1500.000,Y 100.000,Z 800.000,A 10.0000,B 0.0000,C 0.0000}" in page
+
+
 def test_a_foreign_program_is_refused(tmp_path):
     foreign = tmp_path / "X.src"
     foreign.write_text("DEF X( )\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nEND\n", encoding="ascii")
