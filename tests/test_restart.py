@@ -138,6 +138,30 @@ def test_a_missing_tool_before_the_line_is_refused():
     assert {i.code for i in caught.value.issues} == {"tool-unknown"}
 
 
+def tilted(path, degrees):
+    """The same path with a tool that leans along y."""
+    axis = np.array([0.0, np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+    return replace(path, axis=np.broadcast_to(axis, (len(path), 3)))
+
+
+def test_an_inclined_tool_comes_down_along_its_axis():
+    cell = stated(stock={"box_mm": [[0.0, -40.0, -20.0], [200.0, 40.0, -4.0]]})
+    path = tilted(read(SLOT, cell), 30.0)
+    rest = restarted(path, SECOND_HALF, cell)
+    points = rest.position_mm[1 : rest.restart.way_rows + 1]
+    along = points[:-1] - points[-1]
+    assert np.allclose(np.cross(along, path.axis[0]), 0.0, atol=1e-9)
+    assert points[0, 2] == pytest.approx(100.0)
+    assert points[-1].tolist() == [100.0, 0.0, -5.0]
+
+
+def test_no_way_down_for_a_tool_that_lies():
+    cell = stated()
+    with pytest.raises(RefusedError) as caught:
+        restarted(tilted(read(SLOT, cell), 75.0), SECOND_HALF, cell)
+    assert [issue.code for issue in caught.value.issues] == ["restart-axis"]
+
+
 def test_a_saved_restart_stays_one(tmp_path):
     cell = stated()
     prediction = predict_toolpath(restarted(read(SLOT, cell), SECOND_HALF, cell), cell)
