@@ -25,6 +25,7 @@ def test_name_header_and_summary_say_that_it_is_a_restart(run, part, tmp_path):
     text = (tmp_path / "slot_from9.src").read_text("ascii")
     assert "RESTART AT G-CODE LINE 9. NOT FOR A RAW PART." in text
     assert "from_line=9" in text
+    assert text.count("; restart: from above down to the start of line 9\nPTP {X 100.000") == 1
     assert len({len(line) for line in text.splitlines() if line.startswith("; **")}) == 1  # a closed frame
 
 
