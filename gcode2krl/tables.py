@@ -70,6 +70,20 @@ class Table:
         return 0
 
 
+@dataclass(frozen=True)
+class Restart:
+    """Where a program begins that does not run from its start (`program.restart`)."""
+
+    line: int
+    """G-code line that was asked for."""
+    begins_line: int
+    """G-code line whose move is the first; the one before ``line`` where ``line`` begins in material."""
+    way_rows: int = 0
+    """Rows of the Toolpath, from row 1 on, that lead to the first position."""
+    left: object = field(default=None, repr=False)
+    """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Toolpath(Table):
     """What the G-code says: a row per straight move, row 0 the start point."""
@@ -105,6 +119,8 @@ class Toolpath(Table):
     """(n,) the tool whose length that is (H), -1 = none."""
     events: tuple[Event, ...] = ()
     source: str = ""
+    restart: Restart | None = None
+    """None: the program runs from its start."""
 
     def is_position(self) -> Bools:
         """Return (n,) True where X, Y and Z are all known: a point a robot may be sent to."""
@@ -138,6 +154,8 @@ class Targets(Table):
     """(p,) tool number whose frame moves."""
     events: tuple[Event, ...] = ()
     source: str = ""
+    restart: Restart | None = None
+    """That of the Toolpath."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

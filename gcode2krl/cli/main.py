@@ -23,6 +23,8 @@ _COMMANDS = {
     "online": "Compensate online: the twin, the RSI server, replay.",
     "stiffness-map": "Draw how far the robot bends under a load: over $BASE's plane, over the spin, "
     "and joint by joint.",
+    "runkit": "Write what a program is accepted with: a variant in air, its prediction, a trace set-up, "
+    "a check list.",
     "make-test": "Write a test program of air moves.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
     "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",

@@ -15,10 +15,17 @@ from gcode2krl.cli.inputs import (
     existing,
     gcode_options,
     read_cell,
-    read_part,
     require_figure,
     require_outputs,
     require_part,
+)
+from gcode2krl.cli.restart import (
+    from_line_option,
+    read_restarted,
+    refuse_without_forces,
+    restart_name,
+    restart_record,
+    restart_words,
 )
 from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
@@ -81,6 +88,7 @@ if TYPE_CHECKING:
 @click.option(
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
+@from_line_option
 # each branch is one of the options, in the order in which they are refused or done
 def command(
     part: str,
@@ -105,6 +113,7 @@ def command(
     online: str | None,
     both: bool,
     comment_every: int | None,
+    from_line: int | None,
 ) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 
@@ -117,11 +126,13 @@ def command(
         require_part(part)
         place = _place(part, output, name)
         _refuse_online(online, both, compensate, place)
+        refuse_without_forces(from_line, no_forces)
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
+        name = restart_name(part, name, output, from_line, cell)
         inputs = existing(part, *cell_files(cell_path))
         require_figure(compensate_plot)
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
-        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         from gcode2krl.cell.confirmation import future_confirmation
         from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.pipeline import corner_errors, predict_toolpath, solve_joints, targets_and_joints
@@ -134,6 +145,7 @@ def command(
             compensate=compensate,
             online=online,
             both=both,
+            from_line=from_line,
         )
         if place is None and name is None and part != STANDARD:
             name = suggested_name(Path(part).stem, cell.program.externals)
@@ -175,12 +187,15 @@ def command(
     if as_json:
         figures = _figures(prediction, corner_mm)
         pilot_figures = written.pilot.as_dict() if written.pilot is not None else None
-        console.json(_result(written.files, written.issues, figures, written.report.as_dict(), pilot_figures))
+        result = _result(written.files, written.issues, figures, written.report.as_dict(), pilot_figures)
+        console.json(result | restart_record(toolpath))
         return 0
     console.findings(written.issues, part)
     from gcode2krl.cli.summary import summary_lines
 
     for line in summary_lines(part, prediction, joints, corner_mm, written):
+        console.say(line)
+    for line in restart_words(toolpath):
         console.say(line)
     if online is not None:
         for line in _online_lines(written):

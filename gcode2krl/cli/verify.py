@@ -6,7 +6,8 @@ from typing import Literal
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part
+from gcode2krl.cli.inputs import common_options, gcode_options, read_cell
+from gcode2krl.cli.restart import from_line_option, read_restarted, refuse_other_start, restart_record
 from gcode2krl.errors import Gcode2KrlError
 
 
@@ -18,6 +19,7 @@ from gcode2krl.errors import Gcode2KrlError
 @click.option(
     "--compensate", type=click.Choice(["offline"]), help="The program was made with --compensate offline."
 )
+@from_line_option
 def command(
     program: str,
     part: str,
@@ -29,6 +31,7 @@ def command(
     chord_tolerance: float,
     block_delete: bool,
     compensate: Literal["offline"] | None,
+    from_line: int | None,
 ) -> int:
     """Read a KRL program back and compare it with its G-code.
 
@@ -38,8 +41,9 @@ def command(
     try:
         from gcode2krl.krl import verify_krl
 
+        refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
-        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         prediction = None
         if compensate == "offline":
             from gcode2krl.cli.compensation import compensated
@@ -53,7 +57,8 @@ def command(
         console.json({"verify": {"max_deviation_mm": None}, "issues": issue_dicts(error.issues)})
         return error.exit_code
     if as_json:
-        console.json({"verify": report.as_dict(), "issues": issue_dicts(report.issues)})
+        result = {"verify": report.as_dict(), "issues": issue_dicts(report.issues)}
+        console.json(result | restart_record(toolpath))
     else:
         console.findings(report.issues, program)
         state = "agrees with" if report.ok else "DIFFERS from"

@@ -1,16 +1,20 @@
 """Motion and stock to Forces: cutters, height field, engagement, force laws."""
 
+from gcode2krl.cutting.entry import depth_in_material, highest_below
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
-from gcode2krl.cutting.milling import Removal, cut, force_basis, mean_cut, no_forces, remove
+from gcode2krl.cutting.milling import Removal, cut, force_basis, mean_cut, no_forces, raw_field, remove
 
 __all__ = [
     "Load",
     "Removal",
     "cut",
     "cutting_load",
+    "depth_in_material",
     "force_basis",
+    "highest_below",
     "mean_cut",
     "mean_force",
     "no_forces",
+    "raw_field",
     "remove",
 ]

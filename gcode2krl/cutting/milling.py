@@ -159,11 +159,21 @@ def remove(
     )
     issues = (
         *findings_of(seen, forces, cell, field.guessed),
-        *stock_findings(work, cell.stock, before, seen.engaged & work.feed),
+        *stock_findings(work, cell.stock, before, seen.engaged & work.feed, is_raw=toolpath.restart is None),
         *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))
     return Removal(replace(forces, issues=ordered), field)
+
+
+def raw_field(toolpath: Toolpath, motion: Motion, cell: Cell) -> tuple[HeightField, Floats]:
+    """Return the material before the first cut, as fine as the tools of the motion need.
+
+    Second the rotation (3, 3) from ``$BASE`` to its frame. Raises what `cut` raises.
+    """
+    to_field = _set_up(motion)
+    tools = [cell.tool[int(number)] for number in np.unique(motion.tool)]
+    return height_field_of(toolpath, cell, to_field, tools), to_field
 
 
 def _way(position_mm: Floats, motion: Motion, to_field: Floats, tool: Ints32) -> Shaped:

@@ -31,7 +31,7 @@ _COARSEST_OF_DIAMETER = 20.0
 
 
 def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: list[Tool]) -> HeightField:
-    """Return the raw part before the first cut, in the frame of the field.
+    """Return the raw part before the first cut, in the frame of the field; of a restart what is left of it.
 
     Parameters
     ----------
@@ -44,6 +44,9 @@ def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: lis
     NotUnderstoodError
         Where a mesh cannot be read or the field would be too large.
     """
+    left = toolpath.restart.left if toolpath.restart is not None else None
+    if isinstance(left, HeightField):
+        return left.copy()
     stock = cell.stock
     own_mm = stock.resolution_mm if stock is not None else None
     if stock is not None and stock.mesh is not None:

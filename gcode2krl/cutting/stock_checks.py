@@ -37,13 +37,18 @@ class Work:
     """True on feed moves."""
 
 
-def stock_findings(work: Work, stock: Stock | None, before: HeightField, engaged: Bools) -> Iterator[Issue]:
-    """Yield the findings from the raw part ``before`` the first cut; ``engaged`` (m,) is True in material."""
+def stock_findings(
+    work: Work, stock: Stock | None, before: HeightField, engaged: Bools, is_raw: bool = True
+) -> Iterator[Issue]:
+    """Yield the findings from the material ``before`` the first cut; ``engaged`` (m,) is True in material.
+
+    Unless it ``is_raw``, a program may end without touching it.
+    """
     yield from _approach(work, before)
     yield from _above_edges(work, before)
     if before.guessed or stock is None:
         return
-    if not engaged.any() and work.feed.any():
+    if is_raw and not engaged.any() and work.feed.any():
         yield Issue(
             "error",
             "stock-untouched",

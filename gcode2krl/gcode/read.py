@@ -372,6 +372,7 @@ class _Interpreter:
             events=(*self._events(), *self._stopped_by_end()),
             issues=issues,
             source=self.name,
+            restart=None,
         )
 
     def _stopped_by_end(self) -> Iterator[Event]:

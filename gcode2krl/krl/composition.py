@@ -107,6 +107,7 @@ class _Composer:
             text = st.event_statements(event, cell)
             self.events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
         self.guarded_pose = False
+        self.on_the_way = False
         self.pilot = pilot
         self.checksum = 0
         if pilot is not None:
@@ -236,6 +237,9 @@ class _Composer:
         lines: list[str] = []
         targets = self.targets
         if targets.ptp[row]:
+            if targets.restart is not None and not targets.home[row] and not self.on_the_way:
+                lines.append(f"; restart: from above down to the start of line {targets.restart.begins_line}")
+                self.on_the_way = True
             lines.append(self._ptp(row))
             if not targets.home[row] and self.layout.guard and not self.guarded_pose:
                 self.guarded_pose = True
@@ -284,6 +288,7 @@ class _Composer:
             guard=self.layout.guard,
             forces=self.layout.forces,
             provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
+            restart=self.targets.restart,
             pilot=self.pilot,
             rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",

@@ -19,7 +19,7 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.files import Content, make_folder, refuse_inputs, write_together
 from gcode2krl.prediction.record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction.tables import PARQUET_TYPES, check_numbers, check_references, read_table
-from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Table, Targets, Toolpath
+from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Restart, Table, Targets, Toolpath
 
 RECORD = "prediction.toml"
 _UNFINISHED = f'schema = "{SCHEMA}"\nunfinished = true\n'.encode("ascii")
@@ -112,6 +112,8 @@ class Prediction:
             "targets_events": [_event_record(event) for event in self.targets.events],
             "cell": as_toml(self.cell),
         }
+        if self.toolpath.restart is not None:
+            record["restart"] = _restart_record(self.toolpath.restart)
         for name, table in (("forces", self.forces), ("deflection", self.deflection)):
             if table is not None:
                 record[f"{name}_relative_band"] = table.relative_band
@@ -148,12 +150,14 @@ def _cell_of(record: PredictionRecord, file: Path) -> Cell:
 def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict[str, Any]:
     """Return the tables of a prediction; raises `KeyError` or `ValueError` where they do not fit."""
     source, motion_frame = record.inputs.program, frames.get("motion")
+    restart = None if record.restart is None else Restart(**record.restart.model_dump())
     paths, poses = len(frames["toolpath"]), len(frames["targets"])
     toolpath = _table(
         Toolpath,
         frames["toolpath"],
         source=source,
         events=events_of(record.toolpath_events, paths, "toolpath"),
+        restart=restart,
     )
     targets = _table(
         Targets,
@@ -161,6 +165,7 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
         source=source,
         issues=record.findings(),
         events=events_of(record.targets_events, poses, "targets"),
+        restart=restart,
     )
     parts: dict[str, Any] = {"toolpath": toolpath, "targets": targets}
     if motion_frame is not None:
@@ -288,6 +293,10 @@ def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
 
 def _issue_record(issue: Issue) -> dict[str, Any]:
     return {name: getattr(issue, name) for name in ("severity", "code", "line", "message", "remedy")}
+
+
+def _restart_record(restart: Restart) -> dict[str, Any]:
+    return {name: getattr(restart, name) for name in ("line", "begins_line", "way_rows")}
 
 
 def _event_record(event: Event) -> dict[str, Any]:

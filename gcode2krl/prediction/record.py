@@ -77,6 +77,14 @@ class _EventRecord(_Part):
         return Event(self.row, self.kind, values)
 
 
+class _RestartRecord(_Part):
+    """`tables.Restart` without its material."""
+
+    line: Annotated[int, Field(strict=True, ge=1, le=_LARGEST_LINE)]
+    begins_line: Annotated[int, Field(strict=True, ge=1, le=_LARGEST_LINE)]
+    way_rows: Annotated[int, Field(strict=True, ge=0, le=3)]
+
+
 class _Inputs(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, _Plain | list[_Plain]]
@@ -95,6 +103,7 @@ class PredictionRecord(BaseModel):
     toolpath_events: tuple[_EventRecord, ...]
     targets_events: tuple[_EventRecord, ...]
     cell: dict[str, Any]
+    restart: _RestartRecord | None = None
     forces_relative_band: _Band = 0.0
     deflection_relative_band: _Band = 0.0
 

@@ -3,18 +3,30 @@
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
 from gcode2krl.program.orientation import tool_rotation
+from gcode2krl.program.restart import (
+    approached_row,
+    begun_at,
+    begun_row,
+    row_before,
+    state_words,
+)
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
 
 __all__ = [
+    "approached_row",
+    "begun_at",
+    "begun_row",
     "below_table",
     "check_toolpath",
     "doubtful",
     "feeds_per_tooth",
     "plan_targets",
     "require_geometry",
+    "row_before",
     "smooth_spin",
+    "state_words",
     "stiffest_spin",
     "tool_rotation",
 ]

@@ -232,6 +232,7 @@ class _Plan:
             events=events,
             issues=(*toolpath.issues, *check_toolpath(toolpath, self.cell), *self._notes()),
             source=toolpath.source,
+            restart=toolpath.restart,
         )
 
     def _source_lines(self, move: Ints32, kind: NDArray[np.int8]) -> Ints32:

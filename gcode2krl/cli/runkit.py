@@ -1,0 +1,59 @@
+"""``gcode2krl runkit part.src -o folder/``."""
+
+from pathlib import Path
+
+import click
+
+from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.inputs import cell_files, common_options, read_cell
+from gcode2krl.errors import Gcode2KrlError, input_error
+
+
+@click.command("runkit")
+@click.argument("program", metavar="PART.src")
+@click.option("-o", "--output", metavar="FOLDER", help="Folder of the kit; default: part_runkit beside it.")
+@click.option(
+    "--lift", type=float, metavar="MM", default=100.0, show_default=True, help="Height of the run in air."
+)
+@common_options
+def command(
+    program: str,
+    output: str | None,
+    lift: float,
+    cell_path: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Write what a program is accepted with: a variant in air, its prediction, a trace set-up, a check list.
+
+    Use the cell the program was made with. docs/acceptance.md says what to do with each file.
+    """
+    console = Console(quiet, as_json)
+    try:
+        path = Path(program)
+        if path.suffix.lower() != ".src":
+            sentence = f"{path.name!r} is no KRL program"
+            raise input_error("option-value", sentence, "name the .src that was written", source=path.name)
+        cell = read_cell(cell_path)
+        from gcode2krl.runkit import make_kit
+
+        folder = Path(output) if output is not None else path.with_name(f"{path.stem}_runkit")
+        with console.progress("planning, writing", None):
+            kit = make_kit(path, folder, cell, lift_mm=lift, inputs=cell_files(cell_path))
+    except Gcode2KrlError as error:
+        if not as_json:
+            raise
+        console.json({"files": [], "time_s": None, "issues": issue_dicts(error.issues)})
+        return error.exit_code
+    if as_json:
+        files = [str(file) for file in kit.files]
+        console.json({"files": files, "time_s": kit.time_s, "issues": issue_dicts(kit.issues)})
+        return 0
+    console.findings(kit.issues, kit.source, notes=False)
+    console.say(f"{path} -> {folder}: {kit.time_s:.1f} s of motion at 100 %")
+    console.say(f"  {kit.air_name}.src   the same path {lift:g} mm higher, spindle and outputs left out")
+    console.say("  checklist.html  print it: what to compare at the cell, and the steps")
+    console.say("  trace.txt       set-up of the controller's recorder; the recording belongs into run_air/")
+    console.say("  prediction/     of the run in air: gcode2krl diagnose prediction/ run_air/")
+    return 0
