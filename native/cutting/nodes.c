@@ -38,17 +38,20 @@ static bool has_turned(const Samples *samples, int64_t node, int64_t i) {
 
 /* Mark the nodes of a motion: apart_mm (a row a tool) of way apart at most, if samples are that dense.
 
-   Behind a turn or a change the engagement is a new one, and every sample is a node for twice as far. */
-EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Bools node) {
+   Behind a turn or a change the engagement is a new one, and every sample is a node for twice as far: up to
+   settled_mm, at a node at which the samples may be divided (NaN at others). The first sample is one, with its
+   settled_mm given; the last one is a node where the motion `ends`. */
+EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, int64_t ends, Bools node,
+                               Floats settled_mm) {
     int64_t last = 0;
-    double settled_mm = -INFINITY;
+    double settled = AT(settled_mm, 0);
     AT(node, 0) = 1;
     for (int64_t i = 1; i < node.rows; i++) {
         const double way_mm = AT(samples->way_mm, i), apart = AT(apart_mm, AT(samples->tool, i));
         const bool is_new = changes(samples, rapid, i) || has_turned(samples, last, i);
         if (is_new)
-            settled_mm = way_mm + 2.0 * apart;
-        AT(node, i) = is_new || way_mm < settled_mm || i == node.rows - 1;
+            settled = way_mm + 2.0 * apart;
+        AT(node, i) = is_new || way_mm < settled || (ends && i == node.rows - 1);
         if (last < i - 1 && (is_new || way_mm - AT(samples->way_mm, last) > apart)) {
             AT(node, i - 1) = 1;
             last = i - 1;
@@ -57,6 +60,7 @@ EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart
             AT(node, i) = 1;
             last = i;
         }
+        AT(settled_mm, i) = last == i ? settled : NAN;
     }
 }
 

@@ -61,7 +61,8 @@ def nodes_of(position, direction, apart_mm, rapid=None, tool=None):
     node = np.empty(count, bool)
     samples = Samples(position, direction, way, np.zeros(count), tool, np.zeros(count, np.int64), node)
     rapid = np.zeros(count, bool) if rapid is None else rapid
-    mark_nodes(samples, rapid, np.full(tool.max() + 1, apart_mm), node)
+    settled_mm = np.full(len(node), -np.inf)
+    mark_nodes(samples, rapid, np.full(tool.max() + 1, apart_mm), True, node, settled_mm)
     return node, way
 
 
