@@ -47,6 +47,8 @@ class Engaged(NamedTuple):
     """(r,) samples, counted from the first of the motion, on the way to which a rapid has cut material off."""
     rapid_mm: Floats
     """(r,) how deep."""
+    settled: int
+    """Nothing more will be said of rapids on the way to the samples before this one."""
 
 
 def engage(
@@ -144,16 +146,17 @@ class Engagement:
         count = len(samples.way_mm)
         result = air(count)
         if count == 0:
-            return Engaged(result, np.zeros(0, dtype=np.int64), np.zeros(0))
+            return Engaged(result, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
         path, shown = way.path(self._outlines), self._strips[0].shown
         noted = in_threads(
             lambda strip: self._cut(strip, path, samples, ends, result), self._strips, len(self._strips)
         )
         rapid_mm = np.maximum.reduce(noted)
         cut = np.flatnonzero(rapid_mm)
-        owner = way.owner(shown + 1 + cut)
-        way.forget(self._strips[0].shown)
-        return Engaged(Result(*(column[begins:] for column in result)), owner, rapid_mm[cut])
+        owner, shown = way.owner(shown + 1 + cut), self._strips[0].shown
+        settled = int(way.owner(np.array([shown]))[0])
+        way.forget(shown)
+        return Engaged(Result(*(column[begins:] for column in result)), owner, rapid_mm[cut], settled)
 
     def _cut(self, strip: "_Strip", path: Path, samples: Samples, ends: bool, result: Result) -> Floats:
         rapid_mm = np.zeros(len(path.way_mm) - 1 - strip.shown)
