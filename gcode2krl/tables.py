@@ -80,6 +80,12 @@ def rows_of(table: AnyTable, start: int, end: int) -> AnyTable:
     return replace(table, **columns)
 
 
+def rows_at(table: AnyTable, rows: NDArray[np.int64]) -> AnyTable:
+    """Return chosen rows of a table."""
+    columns = {spec.name: getattr(table, spec.name)[rows] for spec in fields(table) if "tail" in spec.metadata}
+    return replace(table, **columns)
+
+
 BLOCK_ROWS = 65_536
 """Rows of a table that go through the stages together: four chunks, some 30 MB in all stages."""
 
@@ -280,6 +286,22 @@ class Forces(Table):
     """(m,) tool number that cuts."""
     relative_band: float = 0.0
     """Half-width of the 90 % band of the forces, relative."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PilotForce(Table):
+    """What the pilot force of a program is made from: of a Motion and its forces a row per time sample."""
+
+    time_s: Floats = _column(np.float64)
+    path_mm: Floats = _column(np.float64)
+    speed_mm_s: Floats = _column(np.float64)
+    acceleration_mm_s2: Floats = _column(np.float64)
+    line: Ints32 = _column(np.int32)
+    """(m,) line of the G-code."""
+    force_N: Floats = _column(np.float64, 3)
+    """(m, 3) in the pilot frame."""
+    deflection_mm: Floats = _column(np.float64, 3)
+    """(m, 3) in the pilot frame; NaN where it is not predicted."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,7 +17,7 @@ from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, force_at, in_contact
 from gcode2krl.pilot.sidecar import NOT_YET
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion, PilotForce, Targets
 from gcode2krl.units import MS_PER_S
 
 _ROUNDING_S = 0.001
@@ -49,7 +49,7 @@ class PilotCase:
     """What the pilot force of a program is checked against."""
 
     text: PilotText
-    motion: Motion
+    motion: Motion | PilotForce
     force_N: Floats | None = None
     """(m, 3) predicted, in the pilot frame, where known."""
     windows: Windows | None = None
@@ -140,7 +140,7 @@ def _ends_early(program: KrlProgram, pilot: PilotText) -> bool:
 
 
 def _errors_of(
-    knots: Knots, motion: Motion, force_N: Floats | None, ends_early: bool
+    knots: Knots, motion: Motion | PilotForce, force_N: Floats | None, ends_early: bool
 ) -> tuple[float | None, float | None]:
     """Return the largest and the RMS distance of forces to the ramps that the online side makes of knots.
 

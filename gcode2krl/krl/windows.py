@@ -14,7 +14,7 @@ from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import halts_advance, read_order
 from gcode2krl.krl.statements import event_statements
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion, PilotForce, Targets
 from gcode2krl.units import MM_PER_M
 
 COUNTS_FROM_END_OF_ARC = True
@@ -52,7 +52,7 @@ class Windows:
         return np.asarray(self.section_s[np.maximum(section, 0)])
 
 
-def windows_of(targets: Targets, chain: Chain, motion: Motion, cell: Cell) -> Windows:
+def windows_of(targets: Targets, chain: Chain, motion: Motion | PilotForce, cell: Cell) -> Windows:
     """Return the windows of a program's LIN motions.
 
     ``chain`` is that of ``targets``. Path and time of the Motion are taken as they are, so a slower robot or
@@ -159,7 +159,7 @@ def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats)
 class _Clock:
     """Path to time of a Motion, with its standstills."""
 
-    def __init__(self, motion: Motion, cell: Cell) -> None:
+    def __init__(self, motion: Motion | PilotForce, cell: Cell) -> None:
         self.time_s, self.path_mm, self.speed = motion.time_s, motion.path_mm, motion.speed_mm_s
         self.acceleration = motion.acceleration_mm_s2
         k_s = cell.controller.k_s
