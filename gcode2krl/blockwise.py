@@ -9,8 +9,9 @@ import numpy as np
 from gcode2krl import compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.files.spool import Spool
+from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
 from gcode2krl.tables import Deflection, Forces, Motion, PilotForce, Targets, Toolpath, joined, rows_of
@@ -163,6 +164,8 @@ class Loads:
             return
         try:
             self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s)
+            let_go(toolpath)
+            give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
 
@@ -191,6 +194,7 @@ class Loads:
 
     def _judged(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, forces: Forces) -> Block:
         line = self._toolpath.source_line[np.clip(motion.move, 0, len(self._toolpath) - 1)]
+        let_go(self._toolpath)
         self._force_limits.take(forces, line)
         self._cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
         deflection = None

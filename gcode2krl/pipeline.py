@@ -16,6 +16,7 @@ from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
@@ -125,6 +126,7 @@ def forecast_toolpath(toolpath: Toolpath, cell: Cell, targets: Targets, *, force
     The samples pass by in blocks: memory does not grow by their tables.
     """
     planned = plan_course(targets, cell, cell.controller.cycle_s)
+    give_back()
     course, figures, samples = planned.course, LargestLoads(), PilotSamples(cell)
     outcome = Outcome(None, None, ())
     if forces:

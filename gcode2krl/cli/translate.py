@@ -123,6 +123,8 @@ def command(
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.cell.confirmation import future_confirmation
+        from gcode2krl.compiled.memory import give_back
+        from gcode2krl.files.spool import on_disk
         from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.pipeline import (
             corner_errors,
@@ -150,6 +152,8 @@ def command(
             dated = future_confirmation(cell)
             targets = replace(targets, issues=(*targets.issues, *corner_issues, *dated))
             _refuse_early(targets, cell, allow, online)
+            toolpath, joints = on_disk(toolpath), on_disk(joints)
+            give_back()
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
 

@@ -18,7 +18,7 @@ from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import ARCS, NODE_NUMBERS, PROGRESS, Result, cut_strip
+from gcode2krl.cutting.reading import ARCS, NODE_NUMBERS, PROGRESS, Result, cut_strip, mark_walls, number_walls
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Path, Samples
 from gcode2krl.cutting.way import Points, Way
 from gcode2krl.tables import chord_directions
@@ -34,6 +34,8 @@ _CELLS_PER_BAND = 4.0
 _FEWEST_BANDS, _MOST_BANDS = 6, 12
 _BOTTOM_BANDS = 4
 _MARGIN_CELLS = 4
+_BEFORE = 2
+"""Corners before the last sweep that was removed on which the next one depends."""
 _FEW_SAMPLES = 2000
 """Samples below which a second thread does not pay."""
 
@@ -155,7 +157,9 @@ class Engagement:
         cut = np.flatnonzero(rapid_mm)
         owner, shown = way.owner(shown + 1 + cut), self._strips[0].shown
         settled = int(way.owner(np.array([shown]))[0])
-        way.forget(shown)
+        way.forget()
+        if way.is_long:
+            self._drop_corners(len(path.way_mm), shown)
         return Engaged(Result(*(column[begins:] for column in result)), owner, rapid_mm[cut], settled)
 
     def _cut(self, strip: "_Strip", path: Path, samples: Samples, ends: bool, result: Result) -> Floats:
@@ -166,6 +170,17 @@ class Engagement:
             *(strip.progress, strip.node, rapid_mm, result),
         )
         return rapid_mm
+
+    def _drop_corners(self, count: int, shown: int) -> None:
+        """Drop the corners of sweeps that are removed and whose walls no strip shows."""
+        kept = np.zeros(count, dtype=np.bool_)
+        kept[max(shown - _BEFORE, 0) :] = True
+        for strip in self._strips:
+            mark_walls(strip.grid, kept)
+        number = self._way.renumber(kept)
+        for strip in self._strips:
+            number_walls(strip.grid, number)
+            strip.progress[:2] = number[strip.progress[:2]]
 
     def write_back(self, field: HeightField) -> None:
         """Write what is left into the field that was cut."""

@@ -85,3 +85,9 @@ strip's. Nodes up to ``apart_mm`` outside are read as well. The reading of a sam
 before it, not on how the field or the samples are divided. Of samples that go on behind others the first is the
 last of those, a node, which is not read again.
 """
+
+mark_walls = core_function("cutting_mark_walls", GRID, OUT_BOOLS)
+"""Mark the points (p,) at which the sweeps begin and end whose walls a grid shows."""
+
+number_walls = core_function("cutting_number_walls", GRID, INTS32)
+"""Give the sweeps whose walls a grid shows the new numbers (p,) of the points at which they end."""

@@ -13,6 +13,9 @@ from gcode2krl.cutting.reading import mark_corners, mark_nodes
 from gcode2krl.cutting.sweep import Path, Samples
 from gcode2krl.tables import lengths
 
+_FEW_CORNERS = 200_000
+"""Corners of a path, 46 bytes each, up to which all are kept."""
+
 
 class Points(NamedTuple):
     """The path of the tip (k), in the order of time: samples, and points that only shape it."""
@@ -141,19 +144,35 @@ class Way:
         """Return the samples, in the whole motion, to which the sweeps to corners lead."""
         return self._corners.owner(corner)
 
-    def forget(self, shown: int) -> None:
-        """Forget the points that are needed no more; the sweeps up to a corner are removed."""
+    def forget(self) -> None:
+        """Forget the points behind which corner and node are certain."""
         row = min(self._corner, self._node)
         wanted = self._waiting.points.wanted[:row]
         self._sample += int(np.count_nonzero(wanted))
         self._waiting = self._waiting.since(row)
         self._corner, self._node = self._corner - row, self._node - row
+        self._known -= row
+
+
+    @property
+    def is_long(self) -> bool:
+        """True where it is time to drop the corners that nothing refers to."""
+        return len(self._corners) > self._corners.limit
+
+    def renumber(self, kept: Bools) -> Ints32:
+        """Drop corners; return the new numbers (p,) of those that are kept, in which the last ones have to be."""
+        number = np.cumsum(kept, dtype=np.int32) - np.int32(1)
+        self._corners.keep(kept)
+        known = self._waiting.point[: self._known]
+        known[:] = number[known]
+        return number
 
 
 class _Corners:
     """The corners of a path, in arrays with room for more."""
 
     def __init__(self) -> None:
+        self.limit = _FEW_CORNERS
         self._count = 0
         self._columns = {
             "position_mm": np.empty((0, 3)),
@@ -186,6 +205,12 @@ class _Corners:
                 self._columns[name] = column = larger
             column[self._count : count] = new
         self._count = count
+
+    def keep(self, kept: Bools) -> None:
+        for name, column in self._columns.items():
+            self._columns[name] = column[: self._count][kept]
+        self._count = int(np.count_nonzero(kept))
+        self.limit = max(_FEW_CORNERS, 2 * self._count)
 
     def path(self, outlines: Floats) -> Path:
         rows = {name: column[: self._count] for name, column in self._columns.items()}

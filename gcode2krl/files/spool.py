@@ -1,12 +1,20 @@
 """A column that grows piece by piece and does not have to stay in memory: a temporary file, once it is long."""
 
+import mmap
 import tempfile
-from typing import IO, Any
+from dataclasses import fields, replace
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Record = TypeVar("Record", bound=DataclassInstance)
+
 _IN_MEMORY_BYTES = 1 << 20
+_ROWS = 65_536
 
 
 class Spool:
@@ -43,3 +51,29 @@ class Spool:
         self._spill()
         self._file.flush()
         return np.memmap(self._file, self._dtype, "r", shape=(self._rows, *self._tail))
+
+
+def on_disk(table: "Record") -> "Record":
+    """Return a table whose long columns lie in temporary files, and are read where they are looked at."""
+    columns = {}
+    for spec in fields(table):
+        values = getattr(table, spec.name)
+        if isinstance(values, np.ndarray) and values.nbytes > _IN_MEMORY_BYTES and values.strides[0]:
+            spool = Spool(values.dtype, *values.shape[1:])
+            for start in range(0, len(values), _ROWS):
+                spool.append(values[start : start + _ROWS])
+            columns[spec.name] = spool.column()
+    return replace(table, **columns)
+
+
+def let_go(*tables: "DataclassInstance | NDArray[Any]") -> None:
+    """Let go of what has been read of tables on disk; it is read again where it is looked at."""
+    if not hasattr(mmap, "MADV_DONTNEED"):
+        return  # there the system takes such pages where it needs memory
+    for table in tables:
+        columns = [table] if isinstance(table, np.ndarray) else [getattr(table, spec.name) for spec in fields(table)]
+        for column in columns:
+            while isinstance(column, np.ndarray):
+                column = column.base
+            if isinstance(column, mmap.mmap):
+                column.madvise(mmap.MADV_DONTNEED)

@@ -193,11 +193,12 @@ class _Composer:
         if pilot.stated is not None:
             return pilot.stated
         targets, home = self.targets, self.targets.home[:, None]
-        q_deg = self.joints.q_rad * DEG_PER_RAD
+        q_deg = np.full(self.joints.q_rad.shape, np.nan)
+        q_deg[targets.home] = self.joints.q_rad[targets.home] * DEG_PER_RAD
         return checksum(
             np.where(home, np.nan, self.position),
             np.where(home, np.nan, self.abc_deg),
-            np.where(home, q_deg, np.nan),
+            q_deg,
             targets.ptp,
             targets.speed_mm_s,
             targets.cdis_mm,
