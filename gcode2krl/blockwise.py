@@ -164,7 +164,6 @@ class Loads:
             return
         try:
             self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s)
-            let_go(toolpath)
             give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)

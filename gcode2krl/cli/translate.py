@@ -162,6 +162,7 @@ def command(
                 joints = solve_joints(forecast.targets, cell)
             else:
                 forecast = forecast_toolpath(toolpath, cell, targets, forces=not no_forces)
+            give_back()
             written = write_krl(
                 forecast,
                 place,

@@ -10,7 +10,9 @@ from gcode2krl import krc4
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import chunked
 from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.files.spool import let_go
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
 from gcode2krl.krl.pilot_text import NO_KNOT_YET, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
@@ -67,6 +69,7 @@ def check_pilot(
     pilot, knots = case.text, case.text.knots
     ends = _ends_early(program, pilot)
     error_N, rms_N = _errors_of(knots, case.motion, case.force_N, ends)
+    let_go(case.motion)
     issues = [*_checksum_issues(program, pilot), *_form_issues(program, pilot)]
     lead_s: float | None = None
     windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
@@ -149,12 +152,16 @@ def _errors_of(
     """
     if force_N is None:
         return _known(knots.max_error_N), _known(knots.rms_error_N)
-    off = force_N - force_at(knots, motion.time_s)
+    time_s = motion.time_s
     if ends_early:
-        said = motion.time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
-        off, force_N = off[said], force_N[said]
-    square = np.einsum("ij,ij->i", off, off)
-    acting = in_contact(force_N)
+        said = time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
+        time_s, force_N = time_s[said], force_N[said]
+
+    def squares(rows: slice) -> Floats:
+        off = force_N[rows] - force_at(knots, time_s[rows])
+        return np.asarray(np.einsum("ij,ij->i", off, off))
+
+    square, acting = chunked(squares, len(time_s)), in_contact(force_N)
     mean = float(np.mean(square[acting])) if acting.any() else 0.0
     figures = np.sqrt([float(square.max(initial=0.0)), mean])
     figures = np.fmax(figures, [knots.max_error_N, knots.rms_error_N])

@@ -10,6 +10,7 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
@@ -110,6 +111,7 @@ def write_krl(
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
     plan = _pilot_plan(source, pilot, joints, file is not None)
+    give_back()
     known = not isinstance(source, Targets) and source.has_forces
     layout = Layout(
         guard,
