@@ -215,6 +215,7 @@ class Loads:
         guessed = any(issue.code == "stock-guessed" for issue in found)
         feeds = program.feeds_per_tooth(self._toolpath, self._cell, self._cuts)
         force_issues = (*found, *limits.issues(guessed), *feeds)
+        let_go(self._toolpath)
         if self._missing is not None:
             return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
         if bent.absurd is not None:

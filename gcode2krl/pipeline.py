@@ -181,7 +181,9 @@ def forces_and_deflection(
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
     done = []
-    for (block, ends), (at, _) in zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ():
+    for (block, ends), (at, _) in (
+        zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ()
+    ):
         done.append(loads.take(block, at.q_rad, at.qd_rad_s, ends))
     outcome = loads.outcome()
     forces: Forces | None = None

@@ -76,13 +76,17 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 def rows_of(table: AnyTable, start: int, end: int) -> AnyTable:
     """Return rows of a table, which share its memory; findings and other fields stay."""
-    columns = {spec.name: getattr(table, spec.name)[start:end] for spec in fields(table) if "tail" in spec.metadata}
+    columns = {
+        spec.name: getattr(table, spec.name)[start:end] for spec in fields(table) if "tail" in spec.metadata
+    }
     return replace(table, **columns)
 
 
 def rows_at(table: AnyTable, rows: NDArray[np.int64]) -> AnyTable:
     """Return chosen rows of a table."""
-    columns = {spec.name: getattr(table, spec.name)[rows] for spec in fields(table) if "tail" in spec.metadata}
+    columns = {
+        spec.name: getattr(table, spec.name)[rows] for spec in fields(table) if "tail" in spec.metadata
+    }
     return replace(table, **columns)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.prediction.forecast import Forecast
@@ -13,9 +12,9 @@ from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
 def summary_lines(
-    part: str, forecast: Forecast, joints: Joints, corner_mm: Floats, written: WrittenProgram
+    part: str, forecast: Forecast, joints: Joints, corner_mm: float, written: WrittenProgram
 ) -> Iterator[str]:
-    """Yield the lines of the summary, from joints at the targets and corner errors of the moves."""
+    """Yield the lines of the summary, from joints at the targets and the largest corner error."""
     toolpath, targets, cell = forecast.toolpath, forecast.targets, forecast.cell
     size_mb = sum(len(text) for text in written.texts.values()) / BYTES_PER_MB
     report = written.report
@@ -43,7 +42,7 @@ def summary_lines(
     yield f"  extent     X {x}, Y {y}, Z {z} mm in $BASE"
     yield f"  tools      {', '.join(tools)}"
     yield f"  blending   {np.count_nonzero(blended)} corners, CDIS {_span(targets.cdis_mm[blended], 3)} mm"
-    yield f"  corners    off by at most {corner_mm.max(initial=0.0):.4f} mm"
+    yield f"  corners    off by at most {corner_mm:.4f} mm"
     yield f"  standstill {np.count_nonzero(lin & ~blended)} exact stops, {targets.wait_s.sum():.1f} s dwell"
     yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"

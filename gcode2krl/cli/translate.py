@@ -24,7 +24,6 @@ from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
-    from gcode2krl.arrays import Floats
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction.forecast import Forecast
@@ -148,7 +147,9 @@ def command(
             name = suggested_name(Path(part).stem, cell.program.externals)
         with console.progress("planning, writing, verifying", None):
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
-            corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
+            errors_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
+            corner_mm = float(errors_mm.max(initial=0.0))
+            del errors_mm
             dated = future_confirmation(cell)
             targets = replace(targets, issues=(*targets.issues, *corner_issues, *dated))
             _refuse_early(targets, cell, allow, online)
@@ -290,7 +291,7 @@ def _refuse_early(targets: "Targets", cell: "Cell", allow: tuple[str, ...], onli
         released(issues, matching(issues, allow))
 
 
-def _figures(forecast: "Forecast", corner_mm: "Floats") -> dict[str, Any]:
+def _figures(forecast: "Forecast", corner_mm: float) -> dict[str, Any]:
     """Return the figures of the JSON contract that the stages compute."""
     loads = forecast.loads
     return {
@@ -299,7 +300,7 @@ def _figures(forecast: "Forecast", corner_mm: "Floats") -> dict[str, Any]:
         "path_mm": forecast.path_mm,
         "max_force_N": loads.force_N if loads is not None else None,
         "max_deflection_mm": loads.deflection_mm if loads is not None else None,
-        "corner_error_mm": float(corner_mm.max(initial=0.0)),
+        "corner_error_mm": corner_mm,
     }
 
 

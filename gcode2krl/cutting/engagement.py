@@ -18,7 +18,15 @@ from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import ARCS, NODE_NUMBERS, PROGRESS, Result, cut_strip, mark_walls, number_walls
+from gcode2krl.cutting.reading import (
+    ARCS,
+    NODE_NUMBERS,
+    PROGRESS,
+    Result,
+    cut_strip,
+    mark_walls,
+    number_walls,
+)
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Path, Samples
 from gcode2krl.cutting.way import Points, Way
 from gcode2krl.tables import chord_directions

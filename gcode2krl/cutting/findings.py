@@ -56,7 +56,9 @@ class Cut:
 class Findings:
     """What is found on the samples of a motion, which are taken in order, some at a time."""
 
-    def __init__(self, cell: Cell, tools: Sequence[int], guessed: bool, blend_mm: float, cycle_s: float) -> None:
+    def __init__(
+        self, cell: Cell, tools: Sequence[int], guessed: bool, blend_mm: float, cycle_s: float
+    ) -> None:
         """Take the cell, the tools that move, whether the stock is guessed, and the time between samples.
 
         ``blend_mm`` is the largest CDIS: a rounded corner leaves material up to that thickness on the rim,
@@ -232,7 +234,9 @@ class Findings:
             teeth = self._cell.tool[number].teeth
             turns_hz = speed / RAD_PER_REV
             for mode in self._cell.compliance.modes_hz:
-                for order in sorted({*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}):
+                for order in sorted(
+                    {*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}
+                ):
                     if abs(order * turns_hz - mode) <= _NEAR_MODE * mode:
                         what = "the spindle" if order % teeth else "tooth passing"
                         yield Issue(

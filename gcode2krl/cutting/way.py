@@ -52,7 +52,9 @@ class _Waiting(NamedTuple):
         steps_mm = lengths(np.diff(position, axis=0, prepend=before))
         last_mm = self.way_mm[-1:] if len(old.tool) else np.zeros(1)
         tools = np.concatenate([old.tool[-1:] if len(old.tool) else [-1], points.tool])
-        joined = (np.concatenate(pair) for pair in zip(old, points._replace(position_mm=position), strict=True))
+        joined = (
+            np.concatenate(pair) for pair in zip(old, points._replace(position_mm=position), strict=True)
+        )
         return _Waiting(
             Points(*joined),
             np.concatenate([self.way_mm, np.cumsum(np.concatenate([last_mm, steps_mm]))[1:]]),
@@ -152,7 +154,6 @@ class Way:
         self._waiting = self._waiting.since(row)
         self._corner, self._node = self._corner - row, self._node - row
         self._known -= row
-
 
     @property
     def is_long(self) -> bool:

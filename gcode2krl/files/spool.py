@@ -71,7 +71,11 @@ def let_go(*tables: "DataclassInstance | NDArray[Any]") -> None:
     if not hasattr(mmap, "MADV_DONTNEED"):
         return  # there the system takes such pages where it needs memory
     for table in tables:
-        columns = [table] if isinstance(table, np.ndarray) else [getattr(table, spec.name) for spec in fields(table)]
+        columns = (
+            [table]
+            if isinstance(table, np.ndarray)
+            else [getattr(table, spec.name) for spec in fields(table)]
+        )
         for column in columns:
             while isinstance(column, np.ndarray):
                 column = column.base

@@ -88,9 +88,9 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         end_mm=end,
         from_rotation=from_rotation,
         to_rotation=to_rotation,
-        length_mm=length / scale,
-        speed_mm_s=speed / scale,
-        acceleration_mm_s2=acceleration / scale,
+        length_mm=_over(length, scale),
+        speed_mm_s=_over(speed, scale),
+        acceleration_mm_s2=_over(acceleration, scale),
         angle_rad=angle,
         blend_mm=d,
         stop=stop,
@@ -101,6 +101,11 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         cos_half=cos_half,
         scale=scale,
     )
+
+
+def _over(column: Floats, scale: Floats) -> Floats:
+    """Return a column in units of the scale, as it is where that is 1."""
+    return column if scale.strides[0] == 0 else column / scale
 
 
 def _owners(move: Ints32) -> Ints32:
@@ -210,9 +215,9 @@ def _with_orientation(
     reorientation on the spot gets the length that takes as much time.
     """
     controller = cell.controller
-    a_cp = np.full(len(length), controller.acc_cp_m_s2 * MM_PER_M)
+    a_cp = np.broadcast_to(controller.acc_cp_m_s2 * MM_PER_M, len(length))
     if one_orientation(from_rotation, to_rotation):
-        return length, speed, a_cp, np.zeros(len(length))
+        return length, speed, a_cp, np.broadcast_to(0.0, len(length))
     angle = fr.angle_between(from_rotation, to_rotation)
     turning = angle > 1e-12
     most_rad_s, most_rad_s2 = controller.vel_ori_deg_s * RAD_PER_DEG, controller.acc_ori_deg_s2 * RAD_PER_DEG
@@ -267,16 +272,18 @@ def _scales(
 ) -> Floats:
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
+    One number stands for all where it is 1.
+
     A corner makes a change of speed where |v2 - v1|/a + k <= T, its duration (our assumption, the paper does
     not say), and where the look-ahead lets the faster of the two be reached.
     """
-    scale = np.ones(len(length))
     rows = _wide_corners(length, speed, acceleration, blend, cdis, stop, cell)
     a, k = np.minimum(acceleration[rows], acceleration[rows + 1]), cell.controller.k_s
     fastest = np.maximum(speed[rows], speed[rows + 1])
     rows = rows[fastest * (fastest / a + k) / 2 <= _in_view(length, rows, cell)]
     if not len(rows):
-        return scale
+        return np.broadcast_to(1.0, len(length))
+    scale = np.ones(len(length))
     ratio = speed[rows + 1] / speed[rows]
     blend[rows] = _widest(length, ratio, cdis, rows)
     scale[rows + 1] = ratio

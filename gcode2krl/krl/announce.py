@@ -10,6 +10,7 @@ import numpy as np
 from gcode2krl import krc4
 from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files.spool import let_go
 from gcode2krl.krc4 import Chain
@@ -84,6 +85,7 @@ class Planner:
         self.chain = krc4.build_chain(self.targets, self.cell)
         self.windows = windows_of(self.targets, self.chain, self.motion, self.cell)
         let_go(self.motion)
+        give_back()
 
     def knots(self, tolerance_N: float | None) -> Knots:
         """Return the knots of a tolerance."""

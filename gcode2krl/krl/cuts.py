@@ -35,7 +35,12 @@ _cut = core_function(
 
 
 def cut_for(
-    triggers: Triggers, windows: Windows, chain: Chain, targets: Targets, motion: Motion | PilotForce, cell: Cell
+    triggers: Triggers,
+    windows: Windows,
+    chain: Chain,
+    targets: Targets,
+    motion: Motion | PilotForce,
+    cell: Cell,
 ) -> Pieces | None:
     """Return cuts that bring the number of waiting triggers towards ``[pilot] max_active``.
 

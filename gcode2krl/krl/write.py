@@ -161,6 +161,7 @@ def _composed(
     """Return the files of a program, and what reading them back finds."""
     targets, joints = content.targets, content.joints
     texts = compose(targets, joints, cell, name, layout, content.text)
+    give_back()
     return texts, compare(
         read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
     )

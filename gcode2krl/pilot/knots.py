@@ -102,10 +102,12 @@ def knots_of(
     error = np.zeros(len(time_s))
     _errors(time_s, path_mm, force, rows, knot_time, knot_path, knot_force, error)
     largest = float(error.max(initial=0.0))
-    touched = error[acting]
     issues: tuple[Issue, ...] = ()
     if largest > tolerance_N:
         issues = (_too_steep(largest, tolerance_N, cycle_s, int(lines[np.argmax(error)])),)
+    touched = error[acting]
+    del error
+    touched *= touched
     return Knots(
         line=lines[rows],
         path_mm=knot_path,
@@ -115,7 +117,7 @@ def knots_of(
         deflection_mm=_deflection_at(rows, deflection_mm),
         tolerance_N=tolerance_N,
         max_error_N=largest,
-        rms_error_N=float(np.sqrt(np.mean(touched**2))) if len(touched) else 0.0,
+        rms_error_N=float(np.sqrt(np.mean(touched))) if len(touched) else 0.0,
         issues=issues,
     )
 

@@ -44,7 +44,9 @@ class LargestLoads:
         if deflection is not None:
             bent, across = largest(deflection.deflection_base_mm), largest(deflection.correction_base_mm)
         most = [largest(forces.force_base_N)]
-        most += [float(column.max(initial=0.0)) for column in (forces.torque_Nmm, forces.a_p_mm, forces.a_e_mm)]
+        most += [
+            float(column.max(initial=0.0)) for column in (forces.torque_Nmm, forces.a_p_mm, forces.a_e_mm)
+        ]
         self._most = np.maximum(self._most, [*most, bent, across])
         self._samples += len(forces)
         self._cutting += int(np.count_nonzero(np.isfinite(forces.phi_rad[:, 0])))

@@ -76,7 +76,9 @@ class AccelerationLimit:
         tool, lines = np.concatenate([self._tool, motion.tool]), np.concatenate([self._line, line])
         if len(position) > 2 * n:
             self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])
-        self._position, self._tool, self._line = (column[-2 * n :].copy() for column in (position, tool, lines))
+        self._position, self._tool, self._line = (
+            column[-2 * n :].copy() for column in (position, tool, lines)
+        )
 
     def issues(self) -> Iterator[Issue]:
         """Yield a warning where no robot follows."""
@@ -86,7 +88,9 @@ class AccelerationLimit:
                 f"the tip is accelerated by {largest.value / MM_PER_M:.1f} m/s2 over one cycle, "
                 f"more than {self._most / MM_PER_M:g}: no robot follows that"
             )
-            remedy = "lower F or [controller] rapid_m_s, or raise CDIS there ([limits] acceleration_mm_s2 judges)"
+            remedy = (
+                "lower F or [controller] rapid_m_s, or raise CDIS there ([limits] acceleration_mm_s2 judges)"
+            )
             yield Issue("warning", "acceleration-high", largest.line, sentence, remedy)
 
 
@@ -224,9 +228,7 @@ def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None
     return Issue("error", "force-absurd", int(line[wrong]), sentence, remedy)
 
 
-def _absurd_deflection(
-    deflection: Deflection, size_mm: Floats, reached: Bools, line: Ints32
-) -> Issue | None:
+def _absurd_deflection(deflection: Deflection, size_mm: Floats, reached: Bools, line: Ints32) -> Issue | None:
     """Return the finding on an absurd deflection, None if there is none."""
     columns = (deflection.deflection_base_mm, deflection.correction_base_mm)
     if all(np.isfinite(column).all() for column in columns) and size_mm.max() <= ABSURD_DEFLECTION_MM:

@@ -109,7 +109,10 @@ class Follower:
 
         The last row waits for the one behind it, unless the Motion ``ends`` with it.
         """
-        known, tool = np.concatenate([self._q, self._angles(motion)]), np.concatenate([self._tool, motion.tool])
+        known, tool = (
+            np.concatenate([self._q, self._angles(motion)]),
+            np.concatenate([self._tool, motion.tool]),
+        )
         qd = self._speeds(known, tool)
         first, last = max(len(self._q) - 1, 0), len(known) - (not ends)
         self._q, self._tool = known[-2:].copy(), tool[-2:].copy()
