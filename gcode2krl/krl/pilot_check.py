@@ -157,11 +157,15 @@ def _errors_of(
         said = time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
         time_s, force_N = time_s[said], force_N[said]
 
+    acting = np.empty(len(time_s), dtype=np.bool_)
+
     def squares(rows: slice) -> Floats:
         off = force_N[rows] - force_at(knots, time_s[rows])
+        acting[rows] = in_contact(force_N[rows])
+        let_go(motion)
         return np.asarray(np.einsum("ij,ij->i", off, off))
 
-    square, acting = chunked(squares, len(time_s)), in_contact(force_N)
+    square = chunked(squares, len(time_s))
     mean = float(np.mean(square[acting])) if acting.any() else 0.0
     figures = np.sqrt([float(square.max(initial=0.0)), mean])
     figures = np.fmax(figures, [knots.max_error_N, knots.rms_error_N])
