@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -250,7 +250,7 @@ class PilotSamples:
 
     def force(self, with_deflection: bool) -> PilotForce:
         """Return all samples; a deflection that is not known is NaN."""
-        columns = {name: spool.column() for name, spool in self._columns.items()}
+        columns: dict[str, Any] = {name: spool.column() for name, spool in self._columns.items()}
         unknown = np.broadcast_to(np.nan, columns["force_N"].shape)
         return PilotForce(**columns, deflection_mm=self._bent.column() if with_deflection else unknown)
 

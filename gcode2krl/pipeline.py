@@ -17,7 +17,7 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.compiled.memory import give_back
-from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures

@@ -105,7 +105,7 @@ def joined(first: AnyTable, *others: AnyTable) -> AnyTable:
     tables = [table for table in (first, *others) if len(table)]
     if len(tables) < 2:
         return tables[0] if tables else first
-    columns = {}
+    columns: dict[str, Any] = {}
     for spec in fields(first):
         if "tail" in spec.metadata:
             columns[spec.name] = _concatenated([getattr(table, spec.name) for table in tables])

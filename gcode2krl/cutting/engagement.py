@@ -27,6 +27,7 @@ from gcode2krl.cutting.reading import (
     mark_walls,
     number_walls,
 )
+from gcode2krl.cutting.records import taken
 from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Path, Samples
 from gcode2krl.cutting.way import Points, Way
 from gcode2krl.tables import chord_directions
@@ -54,7 +55,7 @@ class Engaged(NamedTuple):
     result: Result
     """A row for each of the samples that follow those of the call before."""
     rapid_row: Ints
-    """(r,) samples, counted from the first of the motion, on the way to which a rapid has cut material off."""
+    """(r,) samples, counted from the first of the motion, before which a rapid has cut material off."""
     rapid_mm: Floats
     """(r,) how deep."""
     settled: int
@@ -168,7 +169,7 @@ class Engagement:
         way.forget()
         if way.is_long:
             self._drop_corners(len(path.way_mm), shown)
-        return Engaged(Result(*(column[begins:] for column in result)), owner, rapid_mm[cut], settled)
+        return Engaged(taken(result, slice(begins, None)), owner, rapid_mm[cut], settled)
 
     def _cut(self, strip: "_Strip", path: Path, samples: Samples, ends: bool, result: Result) -> Floats:
         rapid_mm = np.zeros(len(path.way_mm) - 1 - strip.shown)

@@ -229,7 +229,7 @@ class Findings:
             yield Issue("warning", "spindle-power", stretch.line, sentence, less)
 
     def _modes(self) -> Iterator[Issue]:
-        """A note where spindle or tooth passing meets a structural mode; stability itself is not predicted."""
+        """A note where spindle or tooth passing meets a structural mode; stability is not predicted."""
         for speed, number in sorted(self._speeds):
             teeth = self._cell.tool[number].teeth
             turns_hz = speed / RAD_PER_REV

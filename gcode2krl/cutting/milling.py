@@ -17,6 +17,7 @@ from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
 from gcode2krl.cutting.outlook import Outlook, outlook_of, turned
 from gcode2krl.cutting.raw_part import height_field_of
 from gcode2krl.cutting.reading import Result
+from gcode2krl.cutting.records import copied, followed, taken
 from gcode2krl.cutting.stock_checks import StockChecks, Work
 from gcode2krl.cutting.tool_use import Uses
 from gcode2krl.cutting.turns import shaped
@@ -172,12 +173,12 @@ class Milling:
         """
         rows = self._rows(motion)
         engaged = self._engagement.take(self._points(rows), ends)
-        self._last = _Rows(*(column[-1:].copy() for column in rows))
+        self._last = copied(rows, slice(-1, None))
         if self._waiting is not None:
-            rows = _Rows(*(np.concatenate(pair) for pair in zip(self._waiting, rows, strict=True)))
+            rows = followed(self._waiting, rows)
         count = len(engaged.result.a_p_mm)
-        self._waiting = _Rows(*(column[count:].copy() for column in rows))
-        return self._forces(_Rows(*(column[:count] for column in rows)), engaged)
+        self._waiting = copied(rows, slice(count, None))
+        return self._forces(taken(rows, slice(0, count)), engaged)
 
     def issues(self) -> tuple[Issue, ...]:
         """Return what was found, by line."""
@@ -217,15 +218,21 @@ class Milling:
         """Return the path of the tip, with the turns between samples."""
         last = self._last
         if last is not None:
-            rows = _Rows(*(np.concatenate(pair) for pair in zip(last, rows, strict=True)))
+            rows = followed(last, rows)
         is_joined = np.concatenate([[False], rows.tool[1:] == rows.tool[:-1]])
         way = shaped(rows.position_mm, rows.direction, rows.path_mm, is_joined)
         # the sweep to the first sample of a rapid move began on the feed move before it
         wholly_rapid = rows.rapid & np.concatenate([rows.rapid[:1], rows.rapid[:-1]])
         new = slice(0 if last is None else 1, None)
-        owner, position, wanted = way.sample[new], way.position_mm[new], way.read[new]
-        of_points = (column[owner] for column in (rows.direction, rows.tool, wholly_rapid, rows.f_z_mm))
-        return Points(position, *of_points, wanted)
+        owner = way.sample[new]
+        return Points(
+            position_mm=way.position_mm[new],
+            direction=rows.direction[owner],
+            tool=rows.tool[owner],
+            rapid=wholly_rapid[owner],
+            f_z_mm=rows.f_z_mm[owner],
+            wanted=way.read[new],
+        )
 
     def _forces(self, rows: _Rows, engaged: Engaged) -> Forces:
         found, checks = engaged.result, self._checks

@@ -23,8 +23,8 @@ ARCS = 3
 NODE_NUMBERS = 15 + 2 * ARCS
 """What the core keeps of the node that was read last."""
 PROGRESS = 4
-"""Numbers that say how far a strip has come; the first are those of the last point passed and of the last point
-whose sweep is removed."""
+"""Numbers that say how far a strip has come: first the last point that was passed, then the last one whose
+sweep is removed."""
 
 
 class Result(NamedTuple):
@@ -54,11 +54,11 @@ RESULT = StructOf(**dict.fromkeys(Result._fields, OUT_FLOATS) | {"is_read": OUT_
 mark_nodes = core_function("cutting_mark_nodes", SAMPLES, BOOLS, FLOATS, INT, OUT_BOOLS, OUT_FLOATS)
 """Mark the samples (n,) at which the engagement is read in any case.
 
-Takes samples, whether each is rapid, the largest distance (t,) in mm between two nodes of a tool, whether the
-motion ends with them, the marks, and ``settled_mm`` (n,), which has to begin with that of the first sample (-inf
-at the start of a motion). A node stands where the tool has gone so far, where its way turns by 10° and wherever
-tool or kind of move changes; behind such a place every sample is one for a while, up to ``settled_mm``. That is
-NaN at samples at which a motion cannot be divided in two.
+Takes samples, whether each is rapid, the largest distance (t,) in mm between two nodes of a tool, whether
+the motion ends with them, the marks, and ``settled_mm`` (n,), which has to begin with that of the first
+sample (-inf at the start of a motion). A node stands where the tool has gone so far, where its way turns by
+10° and wherever tool or kind of move changes; behind such a place every sample is one for a while, up to
+``settled_mm``. That is NaN at samples at which a motion cannot be divided in two.
 """
 
 mark_corners = core_function(
@@ -77,13 +77,13 @@ cut_strip = core_function(
 )
 """Cut all samples one after the other; write the rows of those whose coordinate ``axis`` lies in [low, high).
 
-Takes grid, path, samples, cutters, the law (8,), low, high, axis, ``reach_mm``, ``apart_mm``, whether the motion
-ends with these samples, an `edge.new_work`, how far the strip has come (`PROGRESS` and `NODE_NUMBERS`, zeros at
-the start), ``rapid_mm`` (p,), which gets the height that rapids cut off, a row a point whose sweep was not removed
-before, and a `Result`. Sweeps farther than ``reach_mm`` from the strip are left out: the field outside is another
-strip's. Nodes up to ``apart_mm`` outside are read as well. The reading of a sample depends only on the samples
-before it, not on how the field or the samples are divided. Of samples that go on behind others the first is the
-last of those, a node, which is not read again.
+Takes grid, path, samples, cutters, the law (8,), low, high, axis, ``reach_mm``, ``apart_mm``, whether the
+motion ends with these samples, an `edge.new_work`, how far the strip has come (`PROGRESS` and
+`NODE_NUMBERS`, zeros at the start), ``rapid_mm`` (p,), which gets the height that rapids cut off, a row a
+point whose sweep was not removed before, and a `Result`. Sweeps farther than ``reach_mm`` from the strip
+are left out: the field outside is another strip's. Nodes up to ``apart_mm`` outside are read as well. The
+reading of a sample depends only on the samples before it, not on how the field or the samples are divided.
+Of samples that go on behind others the first is the last of those, a node, which is not read again.
 """
 
 mark_walls = core_function("cutting_mark_walls", GRID, OUT_BOOLS)

@@ -122,8 +122,8 @@ class StockChecks:
                     "warning",
                     "holder-below-top",
                     depth.line,
-                    f"the {what} of T{number} goes {depth.worst_mm:.2f} mm below the top of the stock, and its "
-                    "width is not known",
+                    f"the {what} of T{number} goes {depth.worst_mm:.2f} mm below the top of the stock, and "
+                    "its width is not known",
                     f"give tool.{number}.stick_out_mm and holder_diameter_mm, or use a longer tool",
                 )
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.cutting.records import followed, taken
 from gcode2krl.errors import MOST_PLACES
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class RapidContacts:
         rows = np.flatnonzero(cut.rapid)
         columns = (cut.source_line[rows], tool[rows], cut.step_mm[rows], cut.descent_mm[rows])
         added = _Rows(self._count + rows, *columns, np.zeros(len(rows)))
-        self._rows = _Rows(*(np.concatenate(pair) for pair in zip(self._rows, added, strict=True)))
+        self._rows = followed(self._rows, added)
         self._count += len(tool)
 
     def met(self, row: Ints, depth_mm: Floats, settled: int) -> None:
@@ -91,12 +92,12 @@ class RapidContacts:
         known = self._rows
         np.maximum.at(known.depth_mm, np.searchsorted(known.row, row), depth_mm)
         kept = (known.row >= settled) | (known.depth_mm > CONTACT_MM)
-        self._rows = _Rows(*(column[kept] for column in known))
+        self._rows = taken(known, kept)
 
     def found(self) -> list[Stretch]:
         """Return the stretches in which a rapid meets more than the rest of a rounded corner."""
         met = self._rows.depth_mm > CONTACT_MM
-        rows = _Rows(*(column[met] for column in self._rows))
+        rows = taken(self._rows, met)
         if not len(rows.row):
             return []
         begins = np.flatnonzero(np.diff(rows.row, prepend=-2) > 1)

@@ -1,15 +1,17 @@
-"""The path of a motion as it grows: corners between which it is straight, nodes, and what is certain of them.
+"""The path of a motion as it grows: its corners and nodes, as far as they are certain.
 
-Whether a point is a corner, or a sample a node, depends on the points behind it. What is not certain yet waits
-for the next points, so that how many are given at a time changes nothing.
+Between two corners a path is straight. Whether a point is one, or a sample a node, depends on the points behind
+it. What is not certain yet waits for them, so that how many are given at a time changes nothing.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cutting.reading import mark_corners, mark_nodes
+from gcode2krl.cutting.records import copied, followed, taken
 from gcode2krl.cutting.sweep import Path, Samples
 from gcode2krl.tables import lengths
 
@@ -52,11 +54,8 @@ class _Waiting(NamedTuple):
         steps_mm = lengths(np.diff(position, axis=0, prepend=before))
         last_mm = self.way_mm[-1:] if len(old.tool) else np.zeros(1)
         tools = np.concatenate([old.tool[-1:] if len(old.tool) else [-1], points.tool])
-        joined = (
-            np.concatenate(pair) for pair in zip(old, points._replace(position_mm=position), strict=True)
-        )
         return _Waiting(
-            Points(*joined),
+            followed(old, points._replace(position_mm=position)),
             np.concatenate([self.way_mm, np.cumsum(np.concatenate([last_mm, steps_mm]))[1:]]),
             np.concatenate([self.first, tools[1:] != tools[:-1]]),
             np.concatenate([self.point, np.zeros(len(position), dtype=np.int64)]),
@@ -64,8 +63,8 @@ class _Waiting(NamedTuple):
 
     def since(self, row: int) -> "_Waiting":
         """Return those from a row on."""
-        kept = Points(*(column[row:].copy() for column in self.points))
-        return _Waiting(kept, self.way_mm[row:].copy(), self.first[row:].copy(), self.point[row:].copy())
+        points = copied(self.points, slice(row, None))
+        return _Waiting(points, self.way_mm[row:].copy(), self.first[row:].copy(), self.point[row:].copy())
 
 
 class Way:
@@ -104,7 +103,7 @@ class Way:
             return
         waiting.point[known] = len(self._corners) - 1 + np.cumsum(corner) - goes_on
         rows = known[corner][goes_on:]
-        samples_before = np.cumsum(waiting.points.wanted) - waiting.points.wanted
+        samples_before: Ints = np.cumsum(waiting.points.wanted) - waiting.points.wanted
         self._corners.extend(waiting, rows, self._sample + samples_before[rows])
         self._corner = int(known[corner][-1])
         self._known = int(known[-1]) + 1
@@ -134,9 +133,9 @@ class Way:
             able = np.flatnonzero(~np.isnan(settled_mm) & (samples.f_z_mm > 0.0) & ~points.rapid[rows])
             last = int(able[-1]) if len(able) else 0
         if last < begins:
-            return Samples(*(column[:0] for column in samples)), 0
+            return taken(samples, slice(0, 0)), 0
         self._settled_mm, self._node = float(settled_mm[last]), int(rows[last])
-        return Samples(*(column[: last + 1] for column in samples)), begins
+        return taken(samples, slice(0, last + 1)), begins
 
     def path(self, outlines: Floats) -> Path:
         """Return the corners that are certain."""
@@ -161,7 +160,7 @@ class Way:
         return len(self._corners) > self._corners.limit
 
     def renumber(self, kept: Bools) -> Ints32:
-        """Drop corners; return the new numbers (p,) of those that are kept, in which the last ones have to be."""
+        """Drop corners; return the new numbers (p,) of those that are kept: the last ones have to be."""
         number = np.cumsum(kept, dtype=np.int32) - np.int32(1)
         self._corners.keep(kept)
         known = self._waiting.point[: self._known]
@@ -175,7 +174,7 @@ class _Corners:
     def __init__(self) -> None:
         self.limit = _FEW_CORNERS
         self._count = 0
-        self._columns = {
+        self._columns: dict[str, NDArray[Any]] = {
             "position_mm": np.empty((0, 3)),
             "way_mm": np.empty(0),
             "tool": np.empty(0, dtype=np.int32),
@@ -190,7 +189,7 @@ class _Corners:
     def extend(self, waiting: _Waiting, rows: Ints, sample: Ints) -> None:
         """Add corners from rows of the points, which lead to samples of the motion."""
         points, count = waiting.points, self._count + len(rows)
-        added = {
+        added: dict[str, NDArray[Any]] = {
             "position_mm": points.position_mm[rows],
             "way_mm": waiting.way_mm[rows],
             "tool": points.tool[rows],
@@ -219,4 +218,4 @@ class _Corners:
         return Path(**rows, outlines=outlines)
 
     def owner(self, corner: Ints) -> Ints:
-        return self._columns["sample"][corner]
+        return np.asarray(self._columns["sample"][corner])

@@ -1,4 +1,4 @@
-"""A column that grows piece by piece and does not have to stay in memory: a temporary file, once it is long."""
+"""Columns that do not have to stay in memory: they lie in temporary files, and may grow piece by piece."""
 
 import mmap
 import tempfile

@@ -73,7 +73,8 @@ def write_krl(
 
     Parameters
     ----------
-    source : Targets from `set_targets`, a Prediction or a Forecast; errors among its ``issues`` refuse the program.
+    source : Targets from `set_targets`, a Prediction or a Forecast; errors among its ``issues`` refuse the
+        program.
     path : the ``.src``, or the folder that it is written into under a name that a controller takes; None
         composes and verifies without writing (everything in one ``.src`` text).
     cell : needed with Targets; the others have their own.

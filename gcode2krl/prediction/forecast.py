@@ -56,8 +56,17 @@ class LargestLoads:
         """Return the figures; a deflection that is not known is None."""
         force, torque, a_p, a_e, bent, across = self._most.tolist()
         share = self._cutting / max(self._samples, 1)
-        deflection = (bent, across) if with_deflection else (None, None)
-        return LoadFigures(force, torque, a_p, a_e, share, self._bands[0], *deflection, self._bands[1])
+        return LoadFigures(
+            force_N=force,
+            torque_Nmm=torque,
+            a_p_mm=a_p,
+            a_e_mm=a_e,
+            in_cut=share,
+            force_band=self._bands[0],
+            deflection_mm=bent if with_deflection else None,
+            across_mm=across if with_deflection else None,
+            deflection_band=self._bands[1],
+        )
 
 
 def load_figures(forces: Forces, deflection: Deflection | None) -> LoadFigures:

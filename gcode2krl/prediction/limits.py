@@ -154,8 +154,8 @@ class ForceLimits:
             f", with the {own_kg:g} kg on the flange {self._whole_N:.0f} N" if self._cut_N < rated_N else ""
         )
         sentence = (
-            f"T{load.tool} is loaded with {self._cut_N:.0f} N{with_own}; the {self._cell.robot.model} is rated "
-            f"for {rated_kg:g} kg ({rated_N:.0f} N)"
+            f"T{load.tool} is loaded with {self._cut_N:.0f} N{with_own}; the {self._cell.robot.model} is "
+            f"rated for {rated_kg:g} kg ({rated_N:.0f} N)"
         )
         remedy = "check S, F and the depth of cut, [stock], [material] and [load] mass_kg of the cell"
         sure = not is_guessed or load.value > GUESSED_FACTOR * rated_N

@@ -143,7 +143,7 @@ class Follower:
         return q[shared:]
 
     def _speeds(self, q: Floats, tool: Ints32) -> Floats:
-        """Return the central differences (m, 6), 0 in the first and the last row, and while the tool changes."""
+        """Return the central differences (m, 6), 0 in the first and last row and while the tool changes."""
         qd = np.zeros_like(q)
         if len(q) > 2:
 
