@@ -1,7 +1,7 @@
 """The path of a motion as it grows: its corners and nodes, as far as they are certain.
 
-Between two corners a path is straight. Whether a point is one, or a sample a node, depends on the points behind
-it. What is not certain yet waits for them, so that how many are given at a time changes nothing.
+Between two corners a path is straight. Whether a point is one, or a sample a node, depends on the points
+behind it. What is not certain yet waits for them, so that how many are given at a time changes nothing.
 """
 
 from typing import Any, NamedTuple
@@ -132,7 +132,7 @@ class Way:
             # where a tooth advances, so that peaks between two nodes need no third
             able = np.flatnonzero(~np.isnan(settled_mm) & (samples.f_z_mm > 0.0) & ~points.rapid[rows])
             last = int(able[-1]) if len(able) else 0
-        if last < begins:
+        if not len(rows) or last < begins:
             return taken(samples, slice(0, 0)), 0
         self._settled_mm, self._node = float(settled_mm[last]), int(rows[last])
         return taken(samples, slice(0, last + 1)), begins
