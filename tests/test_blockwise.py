@@ -110,7 +110,7 @@ def raster(folder, lines):
     ]
     body = [f"X{a:.3f} Y{b:.3f} Z{c:.3f}" for a, b, c in zip(x, y, z, strict=True)]
     file = folder / f"raster_{lines}.nc"
-    file.write_text("\n".join([*head, *body, "G0 Z20", "M5", "M30", ""]), encoding="ascii")
+    file.write_text("\n".join([*head, "F3000", *body, "G0 Z20", "M5", "M30", ""]), encoding="ascii")
     return file
 
 
