@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,20 +14,21 @@ from numpy.typing import NDArray
 
 from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
-from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
+from gcode2krl.compiled.memory import give_back
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
-from gcode2krl.prediction import limits as result_limits
-from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
+from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
+from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath, blocks_of, joined
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
 
 if TYPE_CHECKING:
     from gcode2krl.effects import Applied
 
-_SLOWING_ROUNDS = 3
 _ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
@@ -119,6 +121,57 @@ def predict_toolpath(
     return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
 
 
+def forecast_toolpath(toolpath: Toolpath, cell: Cell, targets: Targets, *, forces: bool = True) -> Forecast:
+    """Run the stages of `predict_toolpath` at the controller's cycle, and keep what a program needs.
+
+    The samples pass by in blocks: memory does not grow by their tables.
+    """
+    planned = plan_course(targets, cell, cell.controller.cycle_s)
+    give_back()
+    course, figures, samples = planned.course, LargestLoads(), PilotSamples(cell)
+    outcome = Outcome(None, None, ())
+    if forces:
+        loads = Loads(toolpath, cell, planned.outlook, course.dt_s)
+        for motion, q_rad, qd_rad_s, ends in blocks_with_joints(course, cell) if loads.possible else ():
+            block = loads.take(motion, q_rad, qd_rad_s, ends)
+            figures.take(block.forces, block.deflection)
+            samples.take(block.motion, block.line, block.forces, block.deflection)
+        outcome = loads.outcome()
+    known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
+    found = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
+    last = course.at(np.array([course.count - 1]))
+    return Forecast(
+        toolpath=toolpath,
+        targets=targets,
+        cell=cell,
+        issues=(*targets.issues, *planned.issues, *itertools.chain.from_iterable(found)),
+        time_s=float(last.time_s[0]),
+        path_mm=float(last.path_mm[0]),
+        loads=figures.figures(with_deflection=bends) if known else None,
+        pilot=samples.force(with_deflection=bends) if known else None,
+    )
+
+
+def forecast_of(prediction: Prediction) -> Forecast:
+    """Return what a program needs of a prediction that has a motion."""
+    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
+    samples, loads = PilotSamples(prediction.cell), None
+    if motion is not None and forces is not None:
+        line = prediction.toolpath.source_line[motion.move]
+        samples.take(motion, line, forces, deflection)
+        loads = load_figures(forces, deflection)
+    return Forecast(
+        toolpath=prediction.toolpath,
+        targets=prediction.targets,
+        cell=prediction.cell,
+        issues=prediction.issues,
+        time_s=float(motion.time_s[-1]) if motion is not None else np.nan,
+        path_mm=float(motion.path_mm[-1]) if motion is not None else np.nan,
+        loads=loads,
+        pilot=samples.force(with_deflection=deflection is not None) if loads is not None else None,
+    )
+
+
 def forces_and_deflection(
     toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell
 ) -> tuple[Forces | None, Deflection | None, tuple[Issue, ...]]:
@@ -126,35 +179,22 @@ def forces_and_deflection(
 
     Raises `NotUnderstoodError` where the stock that the cell names cannot be read.
     """
-    if cell.material is None:
-        remedy = "give [material] in the cell"
-        return None, None, (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
-    line = toolpath.source_line[np.clip(motion.move, 0, len(toolpath) - 1)]
-    try:
-        forces = cutting.cut(toolpath, motion, cell)
-    except RefusedError as error:
-        return None, None, tuple(replace(issue, severity="warning") for issue in error.issues)
-    absurd = result_limits.absurd_forces(forces, line)
-    if absurd is not None:
-        return None, None, (*forces.issues, absurd)
-    cuts = np.zeros(len(toolpath), dtype=np.bool_)
-    cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
-    issues = (
-        *result_limits.force_findings(forces, line, cell),
-        *program.feeds_per_tooth(toolpath, cell, cuts),
-    )
-    forces = replace(forces, issues=(*forces.issues, *issues))
-    missing = compliance.missing_stiffness(cell)
-    if missing is not None:
-        return forces, None, (replace(missing, severity="note"),)
-    with np.errstate(all="ignore"):  # an absurd result becomes a finding
-        deflection = compliance.deflect(joints, forces, cell)
-    reached = np.asarray(np.isfinite(joints.q_rad).all(axis=1))
-    absurd = result_limits.absurd_deflection(deflection, reached, line)
-    if absurd is not None:
-        return forces, None, (absurd,)
-    beyond = tuple(result_limits.deflection_findings(deflection, line, cell))
-    return forces, replace(deflection, issues=(*deflection.issues, *beyond)), ()
+    dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
+    loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
+    done = []
+    for (block, ends), (at, _) in (
+        zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ()
+    ):
+        done.append(loads.take(block, at.q_rad, at.qd_rad_s, ends))
+    outcome = loads.outcome()
+    forces: Forces | None = None
+    deflection: Deflection | None = None
+    if outcome.force_issues is not None:
+        forces = replace(joined(*(block.forces for block in done)), issues=outcome.force_issues)
+    if outcome.deflection_issues is not None:
+        bent = joined(*(block.deflection for block in done if block.deflection is not None))
+        deflection = replace(bent, issues=outcome.deflection_issues)
+    return forces, deflection, outcome.skipped
 
 
 def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:
@@ -221,38 +261,14 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
         Where the program has no motion, or ``dt_s`` is not positive.
     """
     targets = set_targets(source, cell) if isinstance(source, Toolpath) else source
-    chain = krc4.build_chain(targets, cell)
-    profile = krc4.plan(chain, cell)
-    motion = krc4.sample_motion(targets, chain, profile, cell, dt_s)
-    issues = list(krc4.motion_issues(chain, profile, cell))
-    slowed = chain.speed_mm_s
-    for _ in range(_SLOWING_ROUNDS):
-        share = _joint_speed_share(motion, chain, cell)
-        if share is None or share.max(initial=0.0) <= 1.0 + 1e-3:
-            break
-        slowed = slowed / np.maximum(share, 1.0)
-        slower = krc4.with_speed(chain, slowed)
-        new_profile = krc4.plan(slower, cell)
-        motion = krc4.sample_motion(targets, slower, new_profile, cell, dt_s)
-        lost_s = new_profile.total_s - profile.total_s
-        worst = int(np.argmin(slowed / chain.speed_mm_s))
-        issues = [issue for issue in issues if issue.code != "joint-speed"]
-        sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
-        remedy = "lower F there, move the part, or turn the tool about its axis"
-        issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
-    issues += result_limits.motion_findings(motion, _lines(targets, motion), cell)
-    planned = replace(motion, issues=tuple(issues))
-    if motion in _ANGLES_KNOWN:
-        _ANGLES_KNOWN[planned] = _ANGLES_KNOWN.pop(motion)
-    return planned
-
-
-def _lines(targets: Targets, motion: Motion) -> Ints32:
-    """Return the G-code line of each sample (m,)."""
-    programmed = targets.move >= 0
-    line = np.zeros(int(max(targets.move.max(), motion.move.max(initial=0))) + 1, dtype=np.int32)
-    line[targets.move[programmed]] = targets.source_line[programmed]
-    return line[motion.move]
+    planned = plan_course(targets, cell, dt_s, keeps=True)
+    if planned.kept is None:
+        raise AssertionError("samples that are asked for are kept")
+    motion, q_rad, qd_rad_s = planned.kept
+    motion = replace(motion, issues=planned.issues)
+    if q_rad is not None and qd_rad_s is not None:
+        _ANGLES_KNOWN[motion] = (cell, q_rad, qd_rad_s)
+    return motion
 
 
 def corner_errors(
@@ -332,16 +348,6 @@ def solve_ptp_joints(targets: Targets, cell: Cell) -> Joints:
         status=bits[0],
         turn=bits[1],
     )
-
-
-def _joint_speed_share(motion: Motion, chain: krc4.Chain, cell: Cell) -> Floats | None:
-    """Return the largest joint speed over its limit (n,) of each move of the chain; None without limits."""
-    if cell.robot.speeds.qd_deg_s is None or len(chain.length_mm) == 0:
-        return None
-    _, qd_rad_s = _motion_angles(motion, cell)
-    rows = int(max(chain.move.max(), motion.move.max())) + 1
-    by_row = robot.speed_share(motion, qd_rad_s, cell, rows)
-    return None if by_row is None else by_row[chain.move]
 
 
 def _motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:

@@ -365,6 +365,8 @@
 
 /* gcode2krl.cutting.reading */
 #define RD_ARCS 3
+#define RD_NODE_NUMBERS 21
+#define RD_PROGRESS 3
 
 /* gcode2krl.cutting.law */
 #define LAW_MM_PER_M 1000.0

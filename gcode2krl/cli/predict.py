@@ -84,7 +84,8 @@ def command(
 
     Findings that would refuse a program are only reported here.
     """
-    from gcode2krl.cli.loads import largest, load_lines
+    from gcode2krl.cli.loads import load_lines
+    from gcode2krl.prediction.forecast import load_figures
     from gcode2krl.prediction.limits import cycle_acceleration
 
     console = Console(quiet, as_json)
@@ -121,6 +122,8 @@ def command(
     motion = prediction.motion
     if motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
+    forces = prediction.forces
+    loads = load_figures(forces, prediction.deflection) if forces is not None else None
     if as_json:
         console.json(
             {
@@ -129,14 +132,8 @@ def command(
                 "time_s": float(motion.time_s[-1]),
                 "path_mm": float(motion.path_mm[-1]),
                 "corner_error_mm": float(corners["error_mm"].max(initial=0.0)),
-                "max_force_N": largest(prediction.forces.force_base_N)
-                if prediction.forces is not None
-                else None,
-                "max_deflection_mm": (
-                    largest(prediction.deflection.deflection_base_mm)
-                    if prediction.deflection is not None
-                    else None
-                ),
+                "max_force_N": loads.force_N if loads is not None else None,
+                "max_deflection_mm": loads.deflection_mm if loads is not None else None,
                 "issues": issue_dicts(prediction.issues),
             }
         )
@@ -150,7 +147,7 @@ def command(
     console.say(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
     )
-    for line in load_lines(prediction):
+    for line in load_lines(loads, prediction.cell):
         console.say(line)
     return 0
 

@@ -4,19 +4,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
-from gcode2krl.prediction import Prediction
+from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
 def summary_lines(
-    part: str, prediction: Prediction, joints: Joints, corner_mm: Floats, written: WrittenProgram
+    part: str, forecast: Forecast, joints: Joints, corner_mm: float, written: WrittenProgram
 ) -> Iterator[str]:
-    """Yield the lines of the summary, from joints at the targets and corner errors of the moves."""
-    toolpath, targets, cell = prediction.toolpath, prediction.targets, prediction.cell
+    """Yield the lines of the summary, from joints at the targets and the largest corner error."""
+    toolpath, targets, cell = forecast.toolpath, forecast.targets, forecast.cell
     size_mb = sum(len(text) for text in written.texts.values()) / BYTES_PER_MB
     report = written.report
     lin = ~targets.ptp
@@ -37,19 +36,18 @@ def summary_lines(
     yield f"{part} -> {_files(written)} ({size_mb:.2f} MB)"
     yield f"  program    {written.name}: {len(toolpath) - 1} moves, {len(targets)} motions, lines {lines}"
     yield from (f"  name       {issue.message}" for issue in written.issues if issue.code == "krl-name")
-    if prediction.motion is not None:
-        yield f"  time       {_duration(prediction.motion.time_s[-1])} of motion, without spindle and tools"
+    yield f"  time       {_duration(forecast.time_s)} of motion, without spindle and tools"
     yield f"  path       {steps_m[feed].sum():.3f} m at feed, {steps_m[rapid].sum():.3f} m rapid"
     yield f"  feed       {_span(targets.speed_mm_s[feed] * S_PER_MIN, 0)} mm/min"
     yield f"  extent     X {x}, Y {y}, Z {z} mm in $BASE"
     yield f"  tools      {', '.join(tools)}"
     yield f"  blending   {np.count_nonzero(blended)} corners, CDIS {_span(targets.cdis_mm[blended], 3)} mm"
-    yield f"  corners    off by at most {corner_mm.max(initial=0.0):.4f} mm"
+    yield f"  corners    off by at most {corner_mm:.4f} mm"
     yield f"  standstill {np.count_nonzero(lin & ~blended)} exact stops, {targets.wait_s.sum():.1f} s dwell"
     yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
-    yield from load_lines(prediction)
+    yield from load_lines(forecast.loads, cell)
     yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
 
 

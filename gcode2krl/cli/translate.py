@@ -31,10 +31,9 @@ from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
-    from gcode2krl.arrays import Floats
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
-    from gcode2krl.prediction import Prediction
+    from gcode2krl.prediction.forecast import Forecast
     from gcode2krl.tables import Targets
 
 
@@ -134,8 +133,17 @@ def command(
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         from gcode2krl.cell.confirmation import future_confirmation
+        from gcode2krl.compiled.memory import give_back
+        from gcode2krl.files.spool import on_disk
         from gcode2krl.krl import suggested_name, write_krl
-        from gcode2krl.pipeline import corner_errors, predict_toolpath, solve_joints, targets_and_joints
+        from gcode2krl.pipeline import (
+            corner_errors,
+            forecast_of,
+            forecast_toolpath,
+            predict_toolpath,
+            solve_joints,
+            targets_and_joints,
+        )
 
         options = _words(
             tolerance=tolerance,
@@ -151,18 +159,25 @@ def command(
             name = suggested_name(Path(part).stem, cell.program.externals)
         with console.progress("planning, writing, verifying", None):
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
-            corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
+            errors_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
+            corner_mm = float(errors_mm.max(initial=0.0))
+            del errors_mm
             dated = future_confirmation(cell)
             targets = replace(targets, issues=(*targets.issues, *corner_issues, *dated))
             _refuse_early(targets, cell, allow, online)
-            prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
+            toolpath, joints = on_disk(toolpath), on_disk(joints)
+            give_back()
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
 
-                prediction = compensated(prediction, compensate_plot, inputs)
-                joints = solve_joints(prediction.targets, cell)
+                prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
+                forecast = forecast_of(compensated(prediction, compensate_plot, inputs))
+                joints = solve_joints(forecast.targets, cell)
+            else:
+                forecast = forecast_toolpath(toolpath, cell, targets, forces=not no_forces)
+            give_back()
             written = write_krl(
-                prediction,
+                forecast,
                 place,
                 joints=joints,
                 name=name,
@@ -185,7 +200,7 @@ def command(
         console.findings(written.issues, part)
         return 0
     if as_json:
-        figures = _figures(prediction, corner_mm)
+        figures = _figures(forecast, corner_mm)
         pilot_figures = written.pilot.as_dict() if written.pilot is not None else None
         result = _result(written.files, written.issues, figures, written.report.as_dict(), pilot_figures)
         console.json(result | restart_record(toolpath))
@@ -193,7 +208,7 @@ def command(
     console.findings(written.issues, part)
     from gcode2krl.cli.summary import summary_lines
 
-    for line in summary_lines(part, prediction, joints, corner_mm, written):
+    for line in summary_lines(part, forecast, joints, corner_mm, written):
         console.say(line)
     for line in restart_words(toolpath):
         console.say(line)
@@ -291,18 +306,16 @@ def _refuse_early(targets: "Targets", cell: "Cell", allow: tuple[str, ...], onli
         released(issues, matching(issues, allow))
 
 
-def _figures(prediction: "Prediction", corner_mm: "Floats") -> dict[str, Any]:
+def _figures(forecast: "Forecast", corner_mm: float) -> dict[str, Any]:
     """Return the figures of the JSON contract that the stages compute."""
-    from gcode2krl.cli.loads import largest
-
-    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
+    loads = forecast.loads
     return {
-        "moves": len(prediction.toolpath) - 1,
-        "time_s": float(motion.time_s[-1]) if motion is not None else None,
-        "path_mm": float(motion.path_mm[-1]) if motion is not None else None,
-        "max_force_N": largest(forces.force_base_N) if forces is not None else None,
-        "max_deflection_mm": largest(deflection.deflection_base_mm) if deflection is not None else None,
-        "corner_error_mm": float(corner_mm.max(initial=0.0)),
+        "moves": len(forecast.toolpath) - 1,
+        "time_s": forecast.time_s,
+        "path_mm": forecast.path_mm,
+        "max_force_N": loads.force_N if loads is not None else None,
+        "max_deflection_mm": loads.deflection_mm if loads is not None else None,
+        "corner_error_mm": corner_mm,
     }
 
 

@@ -5,7 +5,10 @@ The chunks are the same on every machine, whatever its number of cores, and so a
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.compiled.threads import in_threads
 
@@ -18,6 +21,19 @@ Result = TypeVar("Result")
 def chunk_borders(count: int, rows: int = ROWS) -> list[int]:
     """Return the borders of the chunks of ``count`` rows: 0, rows, 2·rows … count."""
     return [*range(0, count, rows), count]
+
+
+def chunked(work: Callable[[slice], NDArray[Any]], count: int) -> NDArray[Any]:
+    """Return ``work(rows)`` of each chunk joined, a column (count,): what it makes on the way stays small."""
+    if count <= ROWS:
+        return work(slice(0, count))
+    column = np.empty(count)
+
+    def write(start: int, end: int) -> None:
+        column[start:end] = work(slice(start, end))
+
+    in_chunks(write, chunk_borders(count))
+    return column
 
 
 def in_chunks(

@@ -9,12 +9,13 @@ from gcode2krl.compliance.deflection import (
     tip_position,
     tip_velocity,
 )
-from gcode2krl.compliance.deflection_table import deflect
+from gcode2krl.compliance.deflection_table import deflect, deflect_at
 from gcode2krl.compliance.model import missing_stiffness
 from gcode2krl.compliance.projection import project_normal
 
 __all__ = [
     "deflect",
+    "deflect_at",
     "deflection_magnitude",
     "deflection_of",
     "displace",

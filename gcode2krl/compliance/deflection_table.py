@@ -2,6 +2,7 @@
 
 import math
 
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.compliance.deflection import deflection_of, feed_direction
 from gcode2krl.tables import Deflection, Forces, Joints
@@ -27,9 +28,14 @@ def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
     """
     if len(joints) != len(forces):
         raise ValueError(f"joints have {len(joints)} rows, forces {len(forces)}")
-    feed = feed_direction(joints.q_rad, joints.qd_rad_s, cell, forces.tool)
+    return deflect_at(joints.q_rad, joints.qd_rad_s, forces, cell)
+
+
+def deflect_at(q_rad: Floats, qd_rad_s: Floats, forces: Forces, cell: Cell) -> Deflection:
+    """Return what `deflect` returns, from joints (m, 6) in rad and their speeds (m, 6) in rad/s."""
+    feed = feed_direction(q_rad, qd_rad_s, cell, forces.tool)
     deflection, correction = deflection_of(
-        joints.q_rad, forces.force_base_N, forces.moment_base_Nmm, feed, cell, forces.tool
+        q_rad, forces.force_base_N, forces.moment_base_Nmm, feed, cell, forces.tool
     )
     return Deflection(
         deflection_base_mm=deflection,

@@ -2,11 +2,24 @@
 
 from gcode2krl.cutting.entry import depth_in_material, highest_below
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
-from gcode2krl.cutting.milling import Removal, cut, force_basis, mean_cut, no_forces, raw_field, remove
+from gcode2krl.cutting.milling import (
+    Milling,
+    Removal,
+    cut,
+    force_basis,
+    mean_cut,
+    no_forces,
+    raw_field,
+    remove,
+)
+from gcode2krl.cutting.outlook import Outlook, Watch, outlook_of
 
 __all__ = [
     "Load",
+    "Milling",
+    "Outlook",
     "Removal",
+    "Watch",
     "cut",
     "cutting_load",
     "depth_in_material",
@@ -15,6 +28,7 @@ __all__ = [
     "mean_cut",
     "mean_force",
     "no_forces",
+    "outlook_of",
     "raw_field",
     "remove",
 ]

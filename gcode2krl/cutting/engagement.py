@@ -7,6 +7,8 @@ any number of threads gives the same result to the last bit.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,14 +18,26 @@ from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.reading import ARCS, Result, cut_strip, mark_corners, mark_nodes
-from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Grid, Path, Samples
+from gcode2krl.cutting.reading import (
+    ARCS,
+    NODE_NUMBERS,
+    PROGRESS,
+    Result,
+    cut_strip,
+    mark_walls,
+    number_walls,
+)
+from gcode2krl.cutting.records import taken
+from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Path, Samples
+from gcode2krl.cutting.way import Points, Way
 from gcode2krl.tables import chord_directions
 
 NODES_PER_DIAMETER = 20.0
-_BALL_STRETCH = 5.0
-"""How much farther apart the nodes of a ball lie: its force hardly depends on how far the field lags."""
-_SETTLED_PER_DIAMETER = 0.1
+_STRETCH = {BALL: 5.0, FLAT: 1.0, OTHER: 0.5}
+"""How much farther apart the nodes of a kind of cutter lie: the force of a ball hardly depends on how far
+the field lags, that of a bull-nose does."""
+_NEW_PER_DIAMETER = 0.1
+"""Way behind a turn or a change for which every sample is read, in diameters."""
 _LONGEST_OF_LAG = 0.5
 """Longest sweep, as a share of the distance by which the field lags: longer ones would lag farther."""
 _BINS = 16
@@ -34,8 +48,23 @@ _CELLS_PER_BAND = 4.0
 _FEWEST_BANDS, _MOST_BANDS = 6, 12
 _BOTTOM_BANDS = 4
 _MARGIN_CELLS = 4
+_BEFORE = 2
+"""Corners before the last sweep that was removed on which the next one depends."""
 _FEW_SAMPLES = 2000
 """Samples below which a second thread does not pay."""
+
+
+class Engaged(NamedTuple):
+    """What `Engagement.take` finds."""
+
+    result: Result
+    """A row for each of the samples that follow those of the call before."""
+    rapid_row: Ints
+    """(r,) samples, counted from the first of the motion, before which a rapid has cut material off."""
+    rapid_mm: Floats
+    """(r,) how deep."""
+    settled: int
+    """Nothing more will be said of rapids on the way to the samples before this one."""
 
 
 def engage(
@@ -53,89 +82,150 @@ def engage(
 ) -> Result:
     """Cut a motion out of a field (in place); return engagement and mean force of every sample.
 
+    Parameters
+    ----------
+    position_mm, tool, rapid, f_z_mm, direction, wanted : columns (k,) of `Points`; ``direction`` is by
+        default that of the chords, ``wanted`` True everywhere.
+    law : (8,) force law of `law.law_array`.
+    threads, nodes_per_diameter : as in `Engagement`.
+    """
+    position = np.ascontiguousarray(position_mm, dtype=np.float64)
+    tool = np.ascontiguousarray(tool, dtype=np.int32)
+    wanted = np.ones(len(position), dtype=np.bool_) if wanted is None else wanted
+    if not wanted.any():
+        return air(0)
+    first = np.concatenate([[True], tool[1:] != tool[:-1]])
+    tangents = _tangents(position, first) if direction is None else direction
+    engagement = Engagement(field, tools, law, position, threads, nodes_per_diameter)
+    found = engagement.take(Points(position, tangents, tool, rapid, f_z_mm, wanted), ends=True)
+    engagement.write_back(field)
+    owner = np.minimum(found.rapid_row, len(found.result.a_p_mm) - 1)
+    np.maximum.at(found.result.overlap_mm[:, 0], owner, found.rapid_mm)
+    return found.result
+
+
+class Engagement:
+    """A motion that is cut out of a field, point after point, and what is read at its samples.
+
     A sample that is read is read at its own position, before the sweep that leads to it is removed; a sample
     between two nodes has what lies between theirs, with its own heading and feed. Forces are means over a
     revolution of a right-hand tool turning clockwise (M3), `slices.arc_force` summed over the edge; the
-    moment is that of heights above the tip times lateral forces, and the torque.
+    moment is that of heights above the tip times lateral forces, and the torque. How many points are given
+    at a time changes nothing.
 
-    Parameters
-    ----------
-    position_mm : (k, 3) tips in the frame of the field, whose z is the tool axis.
-    tool : (k,) row of ``tools``; no sweep joins two points of different tools.
-    rapid : (k,) True where the sweep that leads to the point must not meet material.
-    f_z_mm : (k,) feed per tooth along the path.
-    law : (8,) force law of `law.law_array`.
-    threads : how many; default: all cores.
-    direction : (k, 3) unit tangents; by default those of the chords.
-    wanted : (k,) True at the n samples; False at points that only shape the path. Default: all are samples.
-    nodes_per_diameter : how many nodes there are at least while the tool goes its diameter, of a ball a part
-        of that; between two of them only what is not smooth is read. inf: every sample is read.
-
-    Notes
-    -----
     Material is a height field: exact heights over the middle of cells, walls left by a cutter's rim to a
     twentieth of a cell, edges of a mesh to half a cell. The tool axis does not tilt. The path between
     points is straight.
     """
-    position = np.ascontiguousarray(position_mm, dtype=np.float64)
-    tool = np.ascontiguousarray(tool, dtype=np.int32)
-    rows = np.arange(len(position)) if wanted is None else np.flatnonzero(wanted)
-    result = _air(len(rows))
-    if len(rows) == 0:
-        return result
-    first = np.concatenate([[True], tool[1:] != tool[:-1]])
-    tangents = _tangents(position, first) if direction is None else direction
-    way_mm = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
-    outlines, rapid = outlines_of(tools), np.ascontiguousarray(rapid, dtype=np.bool_)
-    cell_mm = float(field.cell_mm.max())
-    cutters = _cutters(tools, cell_mm)
-    corner = np.empty(len(position), dtype=np.bool_)
-    is_short = outlines[:, -1] == OTHER
-    columns = (position, way_mm, first, rapid, tool)
-    mark_corners(*columns, _LONGEST_OF_LAG * cutters.lag_mm, is_short, corner)
-    path = Path(position[corner], way_mm[corner], tool[corner], rapid[corner], first[corner], outlines)
-    stretch = np.where(outlines[:, -1] == BALL, _BALL_STRETCH, 1.0)
-    apart_mm = 2.0 * outlines[:, 0] / nodes_per_diameter * stretch
-    samples = Samples(
-        position[rows],
-        np.ascontiguousarray(tangents[rows], dtype=np.float64),
-        way_mm[rows],
-        np.ascontiguousarray(f_z_mm[rows], dtype=np.float64),
-        tool[rows],
-        np.cumsum(corner)[rows] - 1,
-        np.empty(len(rows), dtype=np.bool_),
-    )
-    mark_nodes(samples, rapid[rows], apart_mm, _SETTLED_PER_DIAMETER * 2.0 * outlines[:, 0], samples.node)
-    widest_mm = float(max(outlines[:, 0].max(), cutters.above[:, ::2].max()))
-    farthest_mm = 2.0 * float(apart_mm.max())  # nodes are the samples that are nearest to the places meant
-    # how far around itself a strip reads: around a sample, and around the nodes beside it
-    halo_mm = widest_mm + farthest_mm + _MARGIN_CELLS * cell_mm
-    axis = int(np.ptp(position[:, 1]) > np.ptp(position[:, 0]))
-    bounds = _bounds(samples.position_mm[:, axis], halo_mm, threads)
 
-    def cut(strip: int) -> _Piece:
-        low, high = bounds[strip], bounds[strip + 1]
-        begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
-        own_begin, own_end = field.cells(axis, low, high)
-        grid, rapid_mm = field.grid(axis, begin, end), np.zeros(len(path.way_mm))
+    def __init__(
+        self,
+        field: HeightField,
+        tools: Sequence[Tool],
+        law: Floats,
+        outlook_mm: Floats,
+        threads: int | None = None,
+        nodes_per_diameter: float = NODES_PER_DIAMETER,
+    ) -> None:
+        """Take the field, which is left as it is, and what to cut it with.
+
+        Parameters
+        ----------
+        outlook_mm : (o, 3) points all over the path, by which the field is divided into strips.
+        threads : how many; default: all cores.
+        nodes_per_diameter : how many nodes there are while a flat tool goes its diameter; between two of them
+            only what is not smooth is read. inf: every sample is read.
+        """
+        cell_mm = float(field.cell_mm.max())
+        self._law, self._outlines = law, outlines_of(tools)
+        self._cutters = _cutters(tools, cell_mm)
+        widest_mm = float(max(self._outlines[:, 0].max(), self._cutters.above[:, ::2].max()))
+        diameter_mm = 2.0 * self._outlines[:, 0]
+        stretch = np.array([_STRETCH[int(kind)] for kind in self._outlines[:, -1]])
+        self._apart_mm, self._new_mm = (
+            diameter_mm / nodes_per_diameter * stretch,
+            _NEW_PER_DIAMETER * diameter_mm,
+        )
+        # nodes are the samples that are nearest to the places meant
+        self._farthest_mm = 2.0 * float(self._apart_mm.max())
+        # how far around itself a strip reads: around a sample, and around the nodes beside it
+        halo_mm = widest_mm + self._farthest_mm + _MARGIN_CELLS * cell_mm
         # one cell more: the grid begins with a whole one, and a sweep takes the disc at its start as cut
-        reach_mm = halo_mm + float(outlines[:, 0].max()) + cell_mm
-        lengths = (reach_mm, farthest_mm)
-        cut_strip(grid, path, samples, cutters, law, low, high, axis, *lengths, new_work(), rapid_mm, result)
-        return grid, own_begin, own_end, own_begin - begin, rapid_mm
+        self._reach_mm = halo_mm + float(self._outlines[:, 0].max()) + cell_mm
+        self._axis = int(np.ptp(outlook_mm[:, 1]) > np.ptp(outlook_mm[:, 0]))
+        bounds = _bounds(outlook_mm[:, self._axis], halo_mm, threads)
+        self._strips = [_Strip(field, self._axis, *ends, halo_mm) for ends in pairwise(bounds)]
+        self._way = Way(_LONGEST_OF_LAG * self._cutters.lag_mm, self._outlines[:, -1] == OTHER)
 
-    strips = range(len(bounds) - 1)
-    rapid_mm = np.zeros(len(path.way_mm))
-    for grid, begin, end, skip, of_strip_mm in in_threads(cut, strips, len(strips)):
-        field.take_back(grid, axis, begin, end, skip)
-        np.maximum(rapid_mm, of_strip_mm, out=rapid_mm)
-    # what a rapid cuts off on the way to a sample is that sample's
-    owner = np.searchsorted(rows, np.flatnonzero(corner)).clip(max=len(rows) - 1)
-    np.maximum.at(result.overlap_mm[:, 0], owner, rapid_mm)
-    return result
+    def take(self, points: Points, ends: bool) -> Engaged:
+        """Go on along the path; return what is read at the samples up to the last node that is certain.
+
+        The motion ``ends`` with these points: then there is a row for every sample.
+        """
+        way = self._way
+        way.extend(points, ends)
+        samples, begins = way.samples(self._apart_mm, self._new_mm, ends)
+        count = len(samples.way_mm)
+        result = air(count)
+        if count == 0:
+            return Engaged(result, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
+        path, shown = way.path(self._outlines), self._strips[0].shown
+        noted = in_threads(
+            lambda strip: self._cut(strip, path, samples, ends, result), self._strips, len(self._strips)
+        )
+        rapid_mm = np.maximum.reduce(noted)
+        cut = np.flatnonzero(rapid_mm)
+        owner, shown = way.owner(shown + 1 + cut), self._strips[0].shown
+        settled = int(way.owner(np.array([shown]))[0])
+        way.forget()
+        if way.is_long:
+            self._drop_corners(len(path.way_mm), shown)
+        return Engaged(taken(result, slice(begins, None)), owner, rapid_mm[cut], settled)
+
+    def _cut(self, strip: "_Strip", path: Path, samples: Samples, ends: bool, result: Result) -> Floats:
+        rapid_mm = np.zeros(len(path.way_mm) - 1 - strip.shown)
+        cut_strip(
+            *(strip.grid, path, samples, self._cutters, self._law, strip.low, strip.high, self._axis),
+            *(self._reach_mm, self._farthest_mm, ends, new_work()),
+            *(strip.progress, strip.node, rapid_mm, result),
+        )
+        return rapid_mm
+
+    def _drop_corners(self, count: int, shown: int) -> None:
+        """Drop the corners of sweeps that are removed and whose walls no strip shows."""
+        kept = np.zeros(count, dtype=np.bool_)
+        kept[max(shown - _BEFORE, 0) :] = True
+        for strip in self._strips:
+            mark_walls(strip.grid, kept)
+        number = self._way.renumber(kept)
+        for strip in self._strips:
+            number_walls(strip.grid, number)
+            strip.progress[:2] = number[strip.progress[:2]]
+
+    def write_back(self, field: HeightField) -> None:
+        """Write what is left into the field that was cut."""
+        for strip in self._strips:
+            strip.write_back(field, self._axis)
 
 
-_Piece = tuple[Grid, int, int, int, Floats]
+class _Strip:
+    """A strip of the field, and how far it has been cut."""
+
+    def __init__(self, field: HeightField, axis: int, low: float, high: float, halo_mm: float) -> None:
+        self.low, self.high = low, high
+        begin, end = field.cells(axis, low - halo_mm, high + halo_mm)
+        self._own = field.cells(axis, low, high)
+        self._skip = self._own[0] - begin
+        self.grid = field.grid(axis, begin, end)
+        self.progress, self.node = np.zeros(PROGRESS, dtype=np.int64), np.zeros(NODE_NUMBERS)
+
+    @property
+    def shown(self) -> int:
+        """The last point of the path whose sweep has been removed."""
+        return int(self.progress[1])
+
+    def write_back(self, field: HeightField, axis: int) -> None:
+        field.take_back(self.grid, axis, *self._own, self._skip)
 
 
 def _tangents(position_mm: Floats, first: Bools) -> Floats:
@@ -226,7 +316,7 @@ def _above(tool: Tool) -> tuple[float, float, float, float]:
     return shank, shape_of(tool).flute_mm, holder, tool.stick_out_mm or 0.0
 
 
-def _air(count: int) -> Result:
+def air(count: int) -> Result:
     """Return the result of samples that cut nothing."""
     return Result(
         force_N=np.zeros((count, 3)),

@@ -1,6 +1,6 @@
 """Findings of the material removal: collisions, and cuts beyond the limits of tool or spindle."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,17 +12,12 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
-from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.tables import Forces
+from gcode2krl.cutting.stretches import CONTACT_MM as _CONTACT_MM
+from gcode2krl.cutting.stretches import RapidContacts, Stretch, Stretches
+from gcode2krl.errors import Issue
+from gcode2krl.tables import Forces, lengths
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
-_CONTACT_MM = 0.01
-"""Thinner material that rapid, shank or holder meet is rounding of path and cells."""
-_GRAZE_MM = 3.0
-"""Longest way, a little more than that of a sample at 0.2 m/s, on which a rapid may meet material that a
-rounded corner has left."""
-_THIN_MM = 0.3
-"""Thicker material is never ignored as the rest of a rounded corner."""
 _PLUNGE_RAD = 20.0 * RAD_PER_DEG
 """Descent above which a mill that does not cut at its centre cannot follow: assumed, ramps are flatter."""
 _WIDE_PLUNGE_MM = 32.0
@@ -33,11 +28,13 @@ _NEAR_MODE = 0.15
 _HARMONICS = 3
 _SHORT_S = 0.1
 """A thin chip that lasts less than this is an entry, an exit or a corner."""
+Judge = Callable[..., None]
+"""Takes a code, the samples that are wrong, the value of each, and a tool."""
 
 
 @dataclass(frozen=True)
 class Cut:
-    """What is known of each sample (m rows) beside its forces."""
+    """What is known of some samples (m rows) that follow each other, beside their forces."""
 
     source_line: Ints32
     rapid: Bools
@@ -46,126 +43,211 @@ class Cut:
     spindle_rad_s: Floats
     f_z_mm: Floats
     ramp_rad: Floats
-    cycle_s: float
     centre_mm: Floats
     """Material below the middle of a descending tool."""
     overlap_mm: Floats
-    """(m, 3) how far rapid, shank and holder are in the material."""
+    """(m, 2) how far shank and holder are in the material."""
     step_mm: Floats
     """Distance from the sample before."""
     descent_mm: Floats
     """(m,) part of it down the tool axis, 0 where the tool rises."""
-    blend_mm: float
-    """Largest CDIS: a rounded corner leaves material up to that thickness on the rim, where the tool went
-    in."""
 
 
-def findings_of(cut: Cut, forces: Forces, cell: Cell, guessed: bool) -> tuple[Issue, ...]:
-    """Return the findings, by line. Collisions are errors, warnings where the stock is guessed."""
-    severity: Literal["error", "warning"] = "warning" if guessed else "error"
-    issues = [
-        *_collisions(cut, forces, cell, severity),
-        *_spindle(cut, forces, severity),
-        *_plunges(cut, forces, cell, severity),
-        *_limits(cut, forces, cell),
-        *_chips(cut, forces),
-        *_modes(cut, forces, cell),
-    ]
-    if guessed:
-        remedy = "give [stock] box_mm or mesh in the cell"
-        sentence = "the stock is guessed from the feed moves: its findings are warnings"
-        issues.append(Issue("note", "stock-guessed", 0, sentence, remedy))
-    return tuple(sorted(issues, key=lambda issue: issue.line))
+class Findings:
+    """What is found on the samples of a motion, which are taken in order, some at a time."""
 
+    def __init__(
+        self, cell: Cell, tools: Sequence[int], guessed: bool, blend_mm: float, cycle_s: float
+    ) -> None:
+        """Take the cell, the tools that move, whether the stock is guessed, and the time between samples.
 
-def _collisions(
-    cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]
-) -> Iterator[Issue]:
-    kinds = (
-        ("rapid-in-stock", "rapid move through material, {depth:.2f} mm deep", "retract first, or use G1"),
-        (
-            "shank-in-stock",
-            "the shank of T{tool} touches material, {depth:.2f} mm above its edges",
-            "use a tool with longer flutes, or cut in shallower steps",
-        ),
-        (
-            "holder-in-stock",
-            "the holder of T{tool} touches material, {depth:.2f} mm deep",
-            "let the tool stick out further, or cut in shallower steps",
-        ),
-    )
-    for column, (code, sentence, remedy) in enumerate(kinds):
-        depth = cut.overlap_mm[:, column]
-        if column == 0:
-            depth = _below_surface(cut, depth)
-            depth = np.where(_grazes(cut, depth), 0.0, depth)
-        for row in _starts(depth > _CONTACT_MM):
-            worst = row + int(np.argmax(depth[row : _end(depth > _CONTACT_MM, row)]))
-            words = sentence.format(depth=float(depth[worst]), tool=int(forces.tool[row]))
-            yield Issue(severity, code, int(cut.source_line[row]), words, remedy)
+        ``blend_mm`` is the largest CDIS: a rounded corner leaves material up to that thickness on the rim,
+        where the tool went in.
+        """
+        self._cell, self._tools, self._guessed = cell, tools, guessed
+        self._rapids = RapidContacts(blend_mm)
+        self._wrong: dict[tuple[str, int], Stretches] = {}
+        self._chips = _Chips(cycle_s)
+        self._speeds: dict[tuple[float, int], None] = {}
+        self._first_at: dict[float, int] = {}
 
+    def take(self, cut: Cut, forces: Forces) -> None:
+        """Judge the next samples."""
+        if not len(forces):
+            return
+        line, tool = cut.source_line, forces.tool
+        self._rapids.take(cut, tool)
 
-def _below_surface(cut: Cut, depth: Floats) -> Floats:
-    """Return how far (m,) rapids are below the surface that they met.
+        def judge(code: str, wrong: Bools, values: Floats | None = None, number: int = 0) -> None:
+            stretches = self._wrong.setdefault((code, number), Stretches())
+            stretches.take(wrong, line, tool, values)
 
-    Material that one sample has cut off is missing for the next, so the descent is added.
-    """
-    met = depth > _CONTACT_MM
-    begins = met & ~np.concatenate([[False], met[:-1]])
-    first = np.maximum.accumulate(np.where(begins, np.arange(len(met)), 0))
-    down_mm = np.cumsum(cut.descent_mm)
-    result: Floats = np.where(met, np.maximum(depth, depth[first] + down_mm - down_mm[first]), depth)
-    return result
+        for column, code in enumerate(("shank-in-stock", "holder-in-stock")):
+            depth = cut.overlap_mm[:, column]
+            judge(code, depth > _CONTACT_MM, depth)
+        engaged = cut.engaged & ~cut.rapid
+        judge("spindle-off", engaged & (cut.spindle_rad_s == 0.0))
+        judge("spindle-direction", engaged & (cut.spindle_rad_s < 0.0))
+        self._judge_tools(cut, forces, judge)
+        self._judge_spindle(cut, forces, judge)
+        self._chips.take(cut, forces)
+        self._note_speeds(cut, forces)
 
+    def rapids_met(self, row: Ints, depth_mm: Floats, settled: int) -> None:
+        """Note rapids (r) through material; nothing more will be said of the samples before ``settled``."""
+        self._rapids.met(row, depth_mm, settled)
 
-def _grazes(cut: Cut, depth: Floats) -> Bools:
-    """Return where a rapid meets only the rest of a rounded corner: thin and short."""
-    met = depth > _CONTACT_MM
-    stretch = np.cumsum(met & ~np.concatenate([[False], met[:-1]])) * met
-    way_mm = np.bincount(stretch, cut.step_mm)
-    deepest_mm = np.zeros(len(way_mm))
-    np.maximum.at(deepest_mm, stretch, depth)
-    grazing = (way_mm <= _GRAZE_MM) & (deepest_mm <= min(cut.blend_mm, _THIN_MM) + _CONTACT_MM)
-    result: Bools = met & grazing[stretch]
-    return result
+    def issues(self) -> tuple[Issue, ...]:
+        """Return the findings, by line. Collisions are errors, warnings where the stock is guessed."""
+        issues = [
+            *self._collisions(),
+            *self._spindle(),
+            *self._plunges(),
+            *self._limits(),
+            *self._chips.issues(),
+            *self._modes(),
+        ]
+        if self._guessed:
+            remedy = "give [stock] box_mm or mesh in the cell"
+            sentence = "the stock is guessed from the feed moves: its findings are warnings"
+            issues.append(Issue("note", "stock-guessed", 0, sentence, remedy))
+        return tuple(sorted(issues, key=lambda issue: issue.line))
 
+    # --- taking ---
 
-def _spindle(cut: Cut, forces: Forces, severity: Literal["error", "warning"]) -> Iterator[Issue]:
-    engaged = cut.engaged & ~cut.rapid
-    for row in _starts(engaged & (cut.spindle_rad_s == 0.0)):
-        sentence = f"T{forces.tool[row]} cuts material while the spindle is stopped"
-        yield Issue(severity, "spindle-off", int(cut.source_line[row]), sentence, "M3 with S before the cut")
-    for row in _starts(engaged & (cut.spindle_rad_s < 0.0)):
-        sentence = f"T{forces.tool[row]} cuts with M4: a right-hand tool turns the wrong way"
-        yield Issue("error", "spindle-direction", int(cut.source_line[row]), sentence, "use M3")
+    def _judge_tools(self, cut: Cut, forces: Forces, judge: Judge) -> None:
+        size_N = lengths(forces.force_base_N)
+        for number in self._tools:
+            tool: Tool = self._cell.tool[number]
+            with_tool = forces.tool == number
+            if not tool.centre_cutting or _wide_and_silent(tool):
+                into = with_tool & (cut.centre_mm > _CONTACT_MM) & (cut.ramp_rad > _PLUNGE_RAD)
+                judge("plunge", into, None, number)
+            if tool.max_depth_mm is not None:
+                deepest_mm = tool.max_depth_mm * (1.0 + 1e-6) + _CONTACT_MM
+                judge("depth-limit", with_tool & (forces.a_p_mm > deepest_mm), forces.a_p_mm, number)
+            if tool.max_force_N is not None:
+                judge("force-limit", with_tool & (size_N > tool.max_force_N), size_N, number)
 
+    def _judge_spindle(self, cut: Cut, forces: Forces, judge: Judge) -> None:
+        spindle = self._cell.spindle
+        if spindle.max_torque_Nm is not None:
+            torque_Nm = forces.torque_Nmm / MM_PER_M
+            judge("spindle-torque", torque_Nm > spindle.max_torque_Nm, torque_Nm)
+        if spindle.max_power_W is not None:
+            power_W = spindle_power(forces.torque_Nmm, cut.spindle_rad_s)
+            judge("spindle-power", power_W > spindle.max_power_W, power_W)
 
-def _plunges(cut: Cut, forces: Forces, cell: Cell, severity: Literal["error", "warning"]) -> Iterator[Issue]:
-    remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"
-    for number in _tools(forces).tolist():
-        tool: Tool = cell.tool[number]
-        doubtful = _wide_and_silent(tool)
-        if tool.centre_cutting and not doubtful:
-            continue
-        with_tool = forces.tool == number
-        into = with_tool & (cut.centre_mm > _CONTACT_MM) & (cut.ramp_rad > _PLUNGE_RAD)
-        for row in _starts(into)[: 1 if doubtful else None]:
-            line = int(cut.source_line[row])
-            if doubtful:
-                sentence = (
-                    f"T{number}, {tool.diameter_mm:g} mm wide, plunges into material: mills that wide hardly "
-                    "ever cut at their centre"
-                )
-                yield Issue(
-                    "warning",
-                    "plunge-wide",
-                    line,
-                    sentence,
-                    f"{remedy}; or state tool.{number}.centre_cutting = true",
-                )
-            else:
-                sentence = f"T{number} plunges into material and does not cut at its centre"
-                yield Issue(severity, "plunge", line, sentence, remedy)
+    def _note_speeds(self, cut: Cut, forces: Forces) -> None:
+        """Note the spindle speeds and tools that cut, and where each speed cuts first."""
+        rows = np.flatnonzero(cut.engaged)
+        if not len(rows):
+            return
+        speeds, tools = np.abs(cut.spindle_rad_s[rows]), forces.tool[rows]
+        for begin in _runs(speeds, tools).tolist():
+            speed = float(speeds[begin])
+            self._speeds.setdefault((speed, int(tools[begin])))
+            self._first_at.setdefault(speed, int(cut.source_line[rows[begin]]))
+
+    # --- telling ---
+
+    @property
+    def _severity(self) -> Literal["error", "warning"]:
+        return "warning" if self._guessed else "error"
+
+    def _found(self, code: str, number: int = 0) -> list[Stretch]:
+        stretches = self._wrong.get((code, number))
+        return stretches.found if stretches is not None else []
+
+    def _collisions(self) -> Iterator[Issue]:
+        kinds = (
+            (
+                "rapid-in-stock",
+                self._rapids.found(),
+                "rapid move through material, {depth:.2f} mm deep",
+                "retract first, or use G1",
+            ),
+            (
+                "shank-in-stock",
+                self._found("shank-in-stock"),
+                "the shank of T{tool} touches material, {depth:.2f} mm above its edges",
+                "use a tool with longer flutes, or cut in shallower steps",
+            ),
+            (
+                "holder-in-stock",
+                self._found("holder-in-stock"),
+                "the holder of T{tool} touches material, {depth:.2f} mm deep",
+                "let the tool stick out further, or cut in shallower steps",
+            ),
+        )
+        for code, found, sentence, remedy in kinds:
+            for stretch in found:
+                words = sentence.format(depth=stretch.worst, tool=stretch.tool)
+                yield Issue(self._severity, code, stretch.line, words, remedy)
+
+    def _spindle(self) -> Iterator[Issue]:
+        for stretch in self._found("spindle-off"):
+            sentence = f"T{stretch.tool} cuts material while the spindle is stopped"
+            yield Issue(self._severity, "spindle-off", stretch.line, sentence, "M3 with S before the cut")
+        for stretch in self._found("spindle-direction"):
+            sentence = f"T{stretch.tool} cuts with M4: a right-hand tool turns the wrong way"
+            yield Issue("error", "spindle-direction", stretch.line, sentence, "use M3")
+
+    def _plunges(self) -> Iterator[Issue]:
+        remedy = "ramp or helix down, pre-drill, or use a centre-cutting mill"
+        for number in self._tools:
+            tool: Tool = self._cell.tool[number]
+            doubtful = _wide_and_silent(tool)
+            for stretch in self._found("plunge", number)[: 1 if doubtful else None]:
+                if doubtful:
+                    sentence = (
+                        f"T{number}, {tool.diameter_mm:g} mm wide, plunges into material: mills that wide "
+                        "hardly ever cut at their centre"
+                    )
+                    or_so = f"{remedy}; or state tool.{number}.centre_cutting = true"
+                    yield Issue("warning", "plunge-wide", stretch.line, sentence, or_so)
+                else:
+                    sentence = f"T{number} plunges into material and does not cut at its centre"
+                    yield Issue(self._severity, "plunge", stretch.line, sentence, remedy)
+
+    def _limits(self) -> Iterator[Issue]:
+        less = "lower F or the depth of cut"
+        for number in self._tools:
+            tool: Tool = self._cell.tool[number]
+            for stretch in self._found("depth-limit", number):
+                sentence = f"T{number} cuts {stretch.worst:.2f} mm deep, allowed {tool.max_depth_mm:g}"
+                yield Issue("warning", "depth-limit", stretch.line, sentence, "cut in shallower steps")
+            for stretch in self._found("force-limit", number):
+                sentence = f"T{number} is loaded with {stretch.worst:.0f} N, allowed {tool.max_force_N:g}"
+                yield Issue("warning", "force-limit", stretch.line, sentence, less)
+        spindle = self._cell.spindle
+        for stretch in self._found("spindle-torque"):
+            sentence = f"cutting takes {stretch.worst:.2f} Nm, the spindle has {spindle.max_torque_Nm:g}"
+            yield Issue("warning", "spindle-torque", stretch.line, sentence, less)
+        for stretch in self._found("spindle-power"):
+            sentence = f"cutting takes {stretch.worst:.0f} W, the spindle has {spindle.max_power_W:g}"
+            yield Issue("warning", "spindle-power", stretch.line, sentence, less)
+
+    def _modes(self) -> Iterator[Issue]:
+        """A note where spindle or tooth passing meets a structural mode; stability is not predicted."""
+        for speed, number in sorted(self._speeds):
+            teeth = self._cell.tool[number].teeth
+            turns_hz = speed / RAD_PER_REV
+            for mode in self._cell.compliance.modes_hz:
+                for order in sorted(
+                    {*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}
+                ):
+                    if abs(order * turns_hz - mode) <= _NEAR_MODE * mode:
+                        what = "the spindle" if order % teeth else "tooth passing"
+                        yield Issue(
+                            "note",
+                            "near-mode",
+                            self._first_at[speed],
+                            f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{number} ({what}) is near "
+                            f"the mode at {mode:g} Hz; stability is not predicted",
+                            "change the spindle speed",
+                        )
+                        break
 
 
 def _wide_and_silent(tool: Tool) -> bool:
@@ -177,115 +259,43 @@ def _wide_and_silent(tool: Tool) -> bool:
     )
 
 
-def _limits(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
-    size = np.linalg.norm(forces.force_base_N, axis=1)
-    for number in _tools(forces).tolist():
-        tool: Tool = cell.tool[number]
-        with_tool = forces.tool == number
-        deepest = tool.max_depth_mm
-        if deepest is not None:
-            yield from _beyond(
-                cut,
-                with_tool,
-                forces.a_p_mm,
-                deepest * (1.0 + 1e-6) + _CONTACT_MM,
-                "depth-limit",
-                f"T{number} cuts {{value:.2f}} mm deep, allowed {deepest:g}",
-                "cut in shallower steps",
-            )
-        if tool.max_force_N is not None:
-            yield from _beyond(
-                cut,
-                with_tool,
-                size,
-                tool.max_force_N,
-                "force-limit",
-                f"T{number} is loaded with {{value:.0f}} N, allowed {tool.max_force_N:g}",
-                "lower F or the depth of cut",
-            )
-    spindle = cell.spindle
-    if spindle.max_torque_Nm is not None:
-        yield from _beyond(
-            cut,
-            None,
-            forces.torque_Nmm / MM_PER_M,
-            spindle.max_torque_Nm,
-            "spindle-torque",
-            f"cutting takes {{value:.2f}} Nm, the spindle has {spindle.max_torque_Nm:g}",
-            "lower F or the depth of cut",
+class _Chips:
+    """Chips outside the range of the coefficients: once each, with the fraction of the time in cut."""
+
+    def __init__(self, cycle_s: float) -> None:
+        self._cycle_s = cycle_s
+        self._in_cut = 0
+        self._count, self._line = [0, 0], [0, 0]
+        """Of thin chips, of thick ones: how many, and the line of the first."""
+
+    def take(self, cut: Cut, forces: Forces) -> None:
+        cutting = np.flatnonzero(cut.engaged & (cut.f_z_mm > 0.0))
+        self._in_cut += len(cutting)
+
+        def chips(start: int, end: int) -> Floats:
+            rows = cutting[start:end]
+            return largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
+
+        if not len(cutting):
+            return
+        chip_mm = np.concatenate(in_chunks(chips, chunk_borders(len(cutting))))
+        for kind, wrong in enumerate((chip_mm < THIN_CHIP_MM, chip_mm > THICK_CHIP_MM)):
+            count = int(np.count_nonzero(wrong))
+            if count and not self._count[kind]:
+                self._line[kind] = int(cut.source_line[cutting[np.argmax(wrong)]])
+            self._count[kind] += count
+
+    def issues(self) -> Iterator[Issue]:
+        kinds = (
+            ("chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut"),
+            ("chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
         )
-    if spindle.max_power_W is not None:
-        yield from _beyond(
-            cut,
-            None,
-            spindle_power(forces.torque_Nmm, cut.spindle_rad_s),
-            spindle.max_power_W,
-            "spindle-power",
-            f"cutting takes {{value:.0f}} W, the spindle has {spindle.max_power_W:g}",
-            "lower F or the depth of cut",
-        )
-
-
-def _beyond(
-    cut: Cut, own: Bools | None, values: Floats, most: float, code: str, sentence: str, remedy: str
-) -> Iterator[Issue]:
-    beyond = values > most if own is None else own & (values > most)
-    for row in _starts(beyond):
-        worst = float(values[row : _end(beyond, row)].max())
-        yield Issue("warning", code, int(cut.source_line[row]), sentence.format(value=worst), remedy)
-
-
-def _chips(cut: Cut, forces: Forces) -> Iterator[Issue]:
-    """Yield chips outside the range of the coefficients: once each, with the fraction of the time in cut."""
-    cutting = cut.engaged & (cut.f_z_mm > 0.0)
-    thin, thick = np.zeros((2, len(cutting)), dtype=np.bool_)
-
-    def judge(start: int, end: int) -> None:
-        rows = start + np.flatnonzero(cutting[start:end])
-        chip = largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
-        thin[rows], thick[rows] = chip < THIN_CHIP_MM, chip > THICK_CHIP_MM
-
-    in_chunks(judge, chunk_borders(len(cutting)))
-    in_cut = np.count_nonzero(cutting)
-    for wrong, code, words in (
-        (thin, "chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut"),
-        (thick, "chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
-    ):
-        count = np.count_nonzero(wrong)
-        if count * cut.cycle_s < max(_SHORT_S, 0.05 * in_cut * cut.cycle_s):
-            continue
-        sentence = f"{words}, in {count / in_cut:.0%} of the time in cut, first at this line"
-        line = int(cut.source_line[np.argmax(wrong)])
-        yield Issue("note", code, line, sentence, "change F or the spindle speed")
-
-
-def _modes(cut: Cut, forces: Forces, cell: Cell) -> Iterator[Issue]:
-    """A note where spindle or tooth passing meets a structural mode; stability itself is not predicted."""
-    begins = _runs(cut.spindle_rad_s, forces.tool)
-    begins = begins[np.logical_or.reduceat(cut.engaged, begins)]
-    speeds = np.abs(cut.spindle_rad_s[begins])
-    for speed, number in np.unique(np.stack([speeds, forces.tool[begins]], axis=1), axis=0):
-        teeth = cell.tool[int(number)].teeth
-        turns_hz = float(speed) / RAD_PER_REV
-        for mode in cell.compliance.modes_hz:
-            for order in sorted({*range(1, _HARMONICS + 1), *(teeth * n for n in range(1, _HARMONICS + 1))}):
-                if abs(order * turns_hz - mode) <= _NEAR_MODE * mode:
-                    begin = int(begins[np.argmax(speeds == speed)])
-                    row = begin + int(np.argmax(cut.engaged[begin:]))
-                    what = "the spindle" if order % teeth else "tooth passing"
-                    yield Issue(
-                        "note",
-                        "near-mode",
-                        int(cut.source_line[row]),
-                        f"{order} times {turns_hz * S_PER_MIN:.0f}/min of T{int(number)} ({what}) is near "
-                        f"the mode at {mode:g} Hz; stability is not predicted",
-                        "change the spindle speed",
-                    )
-                    break
-
-
-def _tools(forces: Forces) -> Ints32:
-    return np.unique(forces.tool[_runs(forces.tool)])
+        for count, line, (code, words) in zip(self._count, self._line, kinds, strict=True):
+            if count * self._cycle_s < max(_SHORT_S, 0.05 * self._in_cut * self._cycle_s):
+                continue
+            share = count / self._in_cut
+            sentence = f"{words}, in {share:.0%} of the time in cut, first at this line"
+            yield Issue("note", code, line, sentence, "change F or the spindle speed")
 
 
 def _runs(*columns: NDArray[Any]) -> Ints:
@@ -294,15 +304,3 @@ def _runs(*columns: NDArray[Any]) -> Ints:
     for column in columns:
         begins[1:] |= column[1:] != column[:-1]
     return np.flatnonzero(begins)
-
-
-def _starts(wrong: Bools) -> list[int]:
-    """Return where stretches begin, at most `MOST_PLACES`."""
-    begins = np.flatnonzero(wrong & ~np.concatenate([[False], wrong[:-1]]))
-    return [int(row) for row in begins[:MOST_PLACES]]
-
-
-def _end(wrong: Bools, start: int) -> int:
-    """Return the row after a stretch."""
-    length = int(np.argmin(wrong[start:]))  # stops at the first False
-    return start + length if not wrong[start + length] else len(wrong)

@@ -1,27 +1,31 @@
 """The stage: Motion and stock to Forces, and the findings of the material removal."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl import frames as fr
-from gcode2krl.arrays import Floats, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
-from gcode2krl.cutting.engagement import NODES_PER_DIAMETER, engage
-from gcode2krl.cutting.findings import Cut, findings_of
+from gcode2krl.compiled.memory import give_back
+from gcode2krl.cutting.engagement import NODES_PER_DIAMETER, Engaged, Engagement
+from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
+from gcode2krl.cutting.outlook import Outlook, outlook_of, turned
 from gcode2krl.cutting.raw_part import height_field_of
 from gcode2krl.cutting.reading import Result
-from gcode2krl.cutting.stock_checks import Work, stock_findings
-from gcode2krl.cutting.tool_use import uses
-from gcode2krl.cutting.turns import Shaped, shaped
-from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.tables import Forces, Motion, Toolpath
+from gcode2krl.cutting.records import copied, followed, taken
+from gcode2krl.cutting.stock_checks import StockChecks, Work
+from gcode2krl.cutting.tool_use import Uses
+from gcode2krl.cutting.turns import shaped
+from gcode2krl.cutting.way import Points
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.files.spool import let_go
+from gcode2krl.tables import BLOCK_ROWS, Forces, Motion, Toolpath, blocks_of, joined, lengths
 
-_SAME_AXIS = 1e-9
 _ARC_COLUMNS = 6
 _SHANK_MM = 1.0
 _CDIS_OF_TOLERANCE = 2.0 * 2.0**0.5
@@ -76,94 +80,216 @@ def remove(
     *,
     is_checked: bool = True,
     nodes_per_diameter: float = NODES_PER_DIAMETER,
+    rows: int = BLOCK_ROWS,
 ) -> Removal:
     """Return the result of `cut` and the machined part; ``law`` (8,) replaces that of the material.
 
-    Unless ``is_checked``, that of `mean_cut`. ``nodes_per_diameter`` as in `engagement.engage`.
+    Unless ``is_checked``, that of `mean_cut`. ``nodes_per_diameter`` as in `engagement.Engagement`. So many
+    ``rows`` are cut at a time, which changes nothing.
     """
     if cell.material is None:
         raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
-    law = law_array(cell.material) if law is None else law
-    to_field = _set_up(motion)
-    numbers = np.unique(motion.tool)
-    tools = [cell.tool[int(number)] for number in numbers]
-    tool = np.searchsorted(numbers, motion.tool).astype(np.int32)
-    row = np.clip(motion.move, 0, len(toolpath) - 1)
-    spindle = toolpath.spindle_rad_s[row]
-    rapid = toolpath.rapid[row]
-    teeth = np.array([one.teeth for one in tools])[tool]
-    f_z_mm = feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth
-    programmed_f_z_mm = feed_per_tooth(np.where(rapid, 0.0, toolpath.feed_mm_s[row]), spindle, 1) / teeth
-    position = np.ascontiguousarray(motion.position_mm @ to_field.T)
-    field = height_field_of(toolpath, cell, to_field, tools)
-    before = _uncut(field)
-    # the sweep to the first sample of a rapid move began on the feed move before it
-    wholly_rapid = rapid & np.concatenate([rapid[:1], rapid[:-1]])
-    way = _way(position, motion, to_field, tool)
-    rows = way.sample
-    engaged = engage(
-        field,
-        way.position_mm,
-        tool[rows],
-        wholly_rapid[rows],
-        f_z_mm[rows],
-        [_with_shank(one) for one in tools],
-        law,
-        direction=(motion.direction @ to_field.T)[rows],
-        wanted=way.read,
-        nodes_per_diameter=nodes_per_diameter,
+    outlook = outlook_of(block for block, _ in blocks_of(motion, rows))
+    dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
+    milling = Milling(
+        toolpath, cell, outlook, dt_s, law, is_checked=is_checked, nodes_per_diameter=nodes_per_diameter
     )
-    overlap_mm = engaged.overlap_mm
-    flutes_mm = np.array([one.flute_length_mm or np.inf for one in tools])[tool]
-    overlap_mm[:, 1] = np.maximum(overlap_mm[:, 1], engaged.a_p_mm - flutes_mm)
-    # a rapid through material is reported as a collision, and is not a cut
-    force_N, moment_Nmm = (
-        np.where(rapid[:, None], 0.0, each) for each in (engaged.force_N, engaged.moment_Nmm)
-    )
-    mean_N = np.linalg.norm(force_N, axis=1)
-    forces = Forces(
-        force_base_N=force_N @ to_field,
-        moment_base_Nmm=moment_Nmm @ to_field,
-        peak_N=_peaks(engaged, f_z_mm, tool, tools, law, mean_N) if is_checked else mean_N,
-        torque_Nmm=np.where(rapid, 0.0, engaged.torque_Nmm),
-        a_p_mm=engaged.a_p_mm,
-        a_e_mm=engaged.a_e_mm,
-        phi_rad=engaged.phi_rad,
-        tool=motion.tool,
-        relative_band=cell.material.relative_band,
-    )
-    if not is_checked:
-        return Removal(forces, field)
-    steps = np.diff(position, axis=0, prepend=position[:1])
-    seen = Cut(
-        source_line=toolpath.source_line[row],
-        rapid=rapid,
-        engaged=np.isfinite(forces.phi_rad[:, 0]),
-        spindle_rad_s=spindle,
-        f_z_mm=f_z_mm,
-        ramp_rad=engaged.ramp_rad,
-        cycle_s=float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0,
-        centre_mm=engaged.centre_mm,
-        overlap_mm=overlap_mm,
-        step_mm=np.linalg.norm(steps, axis=1),
-        descent_mm=np.maximum(-steps[:, 2], 0.0),
-        blend_mm=_largest_cdis(toolpath, cell),
-    )
-    work = Work(
-        position_mm=position,
-        tool=tool,
-        tools=tuple(tools),
-        numbers=tuple(int(number) for number in numbers),
-        source_line=seen.source_line,
-        feed=~rapid & ~toolpath.machine[row] & (motion.move > 0),
-    )
-    issues = (
-        *findings_of(seen, forces, cell, field.guessed),
-        *stock_findings(work, cell.stock, before, seen.engaged & work.feed, is_raw=toolpath.restart is None),
-        *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
-    )
-    ordered = tuple(sorted(issues, key=lambda issue: issue.line))
-    return Removal(replace(forces, issues=ordered), field)
+    forces = joined(*(milling.take(block, ends) for block, ends in blocks_of(motion, rows)))
+    return Removal(replace(forces, issues=milling.issues()), milling.part())
+
+
+class _Rows(NamedTuple):
+    """What is known of samples (m) before they are cut."""
+
+    position_mm: Floats
+    """(m, 3) in the frame of the field."""
+    direction: Floats
+    """(m, 3) in the frame of the field."""
+    path_mm: Floats
+    number: Ints32
+    """(m,) tool."""
+    tool: Ints32
+    """(m,) row of the tools."""
+    rapid: Bools
+    feed: Bools
+    """(m,) True on feed moves."""
+    source_line: Ints32
+    spindle_rad_s: Floats
+    f_z_mm: Floats
+    programmed_f_z_mm: Floats
+    step_mm: Floats
+    descent_mm: Floats
+
+
+class Milling:
+    """Removes the stock along a motion that comes some samples at a time; see `cut`."""
+
+    def __init__(
+        self,
+        toolpath: Toolpath,
+        cell: Cell,
+        outlook: Outlook,
+        dt_s: float,
+        law: Floats | None = None,
+        *,
+        is_checked: bool = True,
+        nodes_per_diameter: float = NODES_PER_DIAMETER,
+        threads: int | None = None,
+    ) -> None:
+        """Take what is known of the motion, and the time between its samples; the others as in `remove`."""
+        material = cell.material
+        if material is None:
+            raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
+        self._toolpath, self._to_field = toolpath, outlook.to_field
+        self._law = law_array(material) if law is None else law
+        self._band = material.relative_band
+        self._numbers = np.array(outlook.numbers)
+        self._tools = [cell.tool[number] for number in outlook.numbers]
+        self._teeth = np.array([one.teeth for one in self._tools])
+        self._flutes_mm = np.array([one.flute_length_mm or np.inf for one in self._tools])
+        field = height_field_of(toolpath, cell, outlook.to_field, self._tools)
+        let_go(toolpath)
+        give_back()
+        self._before = _uncut(field)
+        shanks = [_with_shank(one) for one in self._tools]
+        places_mm = outlook.places_mm
+        self._engagement = Engagement(field, shanks, self._law, places_mm, threads, nodes_per_diameter)
+        self._checks: _Checks | None = None
+        if is_checked:
+            blend_mm = _largest_cdis(toolpath, cell)
+            self._checks = _Checks(
+                Findings(cell, outlook.numbers, field.guessed, blend_mm, dt_s),
+                StockChecks(self._tools, outlook, cell.stock, self._before, toolpath.restart is None),
+                Uses(cell, outlook.numbers),
+            )
+        self._last: _Rows | None = None
+        self._waiting: _Rows | None = None
+        self._peaks = _Peaks(self._tools, self._law)
+
+    def take(self, motion: Motion, ends: bool) -> Forces:
+        """Cut the next samples; return the forces at those that follow the ones returned before.
+
+        The motion ``ends`` with these samples: then there is a row for every one.
+        """
+        rows = self._rows(motion)
+        engaged = self._engagement.take(self._points(rows), ends)
+        self._last = copied(rows, slice(-1, None))
+        if self._waiting is not None:
+            rows = followed(self._waiting, rows)
+        count = len(engaged.result.a_p_mm)
+        self._waiting = copied(rows, slice(count, None))
+        return self._forces(taken(rows, slice(0, count)), engaged)
+
+    def issues(self) -> tuple[Issue, ...]:
+        """Return what was found, by line."""
+        return self._checks.issues() if self._checks is not None else ()
+
+    def part(self) -> HeightField:
+        """Return the material that is left."""
+        field = self._before.copy()
+        self._engagement.write_back(field)
+        return field
+
+    def _rows(self, motion: Motion) -> _Rows:
+        toolpath, row = self._toolpath, np.clip(motion.move, 0, len(self._toolpath) - 1)
+        position = turned(motion.position_mm, self._to_field)
+        before = position[:1] if self._last is None else self._last.position_mm
+        steps = np.diff(position, axis=0, prepend=before)
+        tool = np.searchsorted(self._numbers, motion.tool).astype(np.int32)
+        rapid, spindle, teeth = toolpath.rapid[row], toolpath.spindle_rad_s[row], self._teeth[tool]
+        programmed_mm_s = np.where(rapid, 0.0, toolpath.feed_mm_s[row])
+        return _Rows(
+            position_mm=position,
+            direction=turned(motion.direction, self._to_field),
+            path_mm=motion.path_mm,
+            number=motion.tool,
+            tool=tool,
+            rapid=rapid,
+            feed=~rapid & ~toolpath.machine[row] & (motion.move > 0),
+            source_line=toolpath.source_line[row],
+            spindle_rad_s=spindle,
+            f_z_mm=feed_per_tooth(motion.speed_mm_s, spindle, 1) / teeth,
+            programmed_f_z_mm=feed_per_tooth(programmed_mm_s, spindle, 1) / teeth,
+            step_mm=lengths(steps),
+            descent_mm=np.maximum(-steps[:, 2], 0.0),
+        )
+
+    def _points(self, rows: _Rows) -> Points:
+        """Return the path of the tip, with the turns between samples."""
+        last = self._last
+        if last is not None:
+            rows = followed(last, rows)
+        is_joined = np.concatenate([[False], rows.tool[1:] == rows.tool[:-1]])
+        way = shaped(rows.position_mm, rows.direction, rows.path_mm, is_joined)
+        # the sweep to the first sample of a rapid move began on the feed move before it
+        wholly_rapid = rows.rapid & np.concatenate([rows.rapid[:1], rows.rapid[:-1]])
+        new = slice(0 if last is None else 1, None)
+        owner = way.sample[new]
+        return Points(
+            position_mm=way.position_mm[new],
+            direction=rows.direction[owner],
+            tool=rows.tool[owner],
+            rapid=wholly_rapid[owner],
+            f_z_mm=rows.f_z_mm[owner],
+            wanted=way.read[new],
+        )
+
+    def _forces(self, rows: _Rows, engaged: Engaged) -> Forces:
+        found, checks = engaged.result, self._checks
+        # a rapid through material is reported as a collision, and is not a cut
+        force_N, moment_Nmm = (
+            np.where(rows.rapid[:, None], 0.0, each) for each in (found.force_N, found.moment_Nmm)
+        )
+        mean_N = lengths(force_N)
+        forces = Forces(
+            force_base_N=turned(force_N, self._to_field.T),
+            moment_base_Nmm=turned(moment_Nmm, self._to_field.T),
+            peak_N=self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N) if checks is not None else mean_N,
+            torque_Nmm=np.where(rows.rapid, 0.0, found.torque_Nmm),
+            a_p_mm=found.a_p_mm,
+            a_e_mm=found.a_e_mm,
+            phi_rad=found.phi_rad,
+            tool=rows.number,
+            relative_band=self._band,
+        )
+        if checks is not None:
+            overlap_mm = found.overlap_mm[:, 1:]
+            overlap_mm[:, 0] = np.maximum(overlap_mm[:, 0], found.a_p_mm - self._flutes_mm[rows.tool])
+            checks.take(rows, engaged, overlap_mm, forces)
+        return forces
+
+
+@dataclass(frozen=True)
+class _Checks:
+    """What is found on the way."""
+
+    findings: Findings
+    stock: StockChecks
+    uses: Uses
+
+    def take(self, rows: _Rows, engaged: Engaged, overlap_mm: Floats, forces: Forces) -> None:
+        found = engaged.result
+        cut = Cut(
+            source_line=rows.source_line,
+            rapid=rows.rapid,
+            engaged=np.isfinite(forces.phi_rad[:, 0]),
+            spindle_rad_s=rows.spindle_rad_s,
+            f_z_mm=rows.f_z_mm,
+            ramp_rad=found.ramp_rad,
+            centre_mm=found.centre_mm,
+            overlap_mm=overlap_mm,
+            step_mm=rows.step_mm,
+            descent_mm=rows.descent_mm,
+        )
+        self.findings.take(cut, forces)
+        self.findings.rapids_met(engaged.rapid_row, engaged.rapid_mm, engaged.settled)
+        self.stock.take(Work(rows.position_mm, rows.tool, rows.source_line, rows.feed, cut.engaged))
+        of_uses = (rows.source_line, rows.rapid, rows.programmed_f_z_mm, found.ramp_rad, found.centre_mm)
+        self.uses.take(*of_uses, forces)
+
+    def issues(self) -> tuple[Issue, ...]:
+        issues = (*self.findings.issues(), *self.stock.issues(), *self.uses.issues())
+        return tuple(sorted(issues, key=lambda issue: issue.line))
 
 
 def raw_field(toolpath: Toolpath, motion: Motion, cell: Cell) -> tuple[HeightField, Floats]:
@@ -171,15 +297,9 @@ def raw_field(toolpath: Toolpath, motion: Motion, cell: Cell) -> tuple[HeightFie
 
     Second the rotation (3, 3) from ``$BASE`` to its frame. Raises what `cut` raises.
     """
-    to_field = _set_up(motion)
-    tools = [cell.tool[int(number)] for number in np.unique(motion.tool)]
-    return height_field_of(toolpath, cell, to_field, tools), to_field
-
-
-def _way(position_mm: Floats, motion: Motion, to_field: Floats, tool: Ints32) -> Shaped:
-    """Return the path of the tip in the frame of the field, with the turns between samples."""
-    joined = np.concatenate([[False], tool[1:] == tool[:-1]])
-    return shaped(position_mm, motion.direction @ to_field.T, motion.path_mm, joined)
+    outlook = outlook_of([motion])
+    tools = [cell.tool[number] for number in outlook.numbers]
+    return height_field_of(toolpath, cell, outlook.to_field, tools), outlook.to_field
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:
@@ -219,46 +339,32 @@ def _with_shank(tool: Tool) -> Tool:
     return tool.model_copy(update={"flute_length_mm": tool.flute_length_mm + _SHANK_MM})
 
 
-def _set_up(motion: Motion) -> Floats:
-    """Return the rotation (3, 3) from ``$BASE`` to a frame whose z is the tool axis of the program."""
-    axis = fr.rotation_from_quaternion(motion.rotation[:1])[0][:, 2]
-    x, y, z, w = motion.rotation.T
-    turned = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
-    if np.abs(turned - axis).max() > 1e-6:
-        raise RefusedError(
-            Issue(
-                "error",
-                "axis-changes",
-                0,
-                "the tool axis changes: material removal needs one direction",
-                "split the program by its set-up directions",
-            )
-        )
-    if axis[2] > 1.0 - _SAME_AXIS:
-        return np.eye(3)
-    helper = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    across = np.cross(axis, helper)
-    across /= np.linalg.norm(across)
-    return np.stack([np.cross(across, axis), across, axis])
-
-
-def _peaks(
-    engaged: Result, f_z_mm: Floats, tool: Ints32, tools: list[Tool], law: Floats, mean_N: Floats
-) -> Floats:
-    """Return the largest force of a revolution (m,), at least the mean; zero in air.
+class _Peaks:
+    """The largest force of a revolution, at least the mean; zero in air.
 
     Between two samples that were read it lies between theirs.
     """
-    peak = np.zeros(len(mean_N))
-    cuts = np.isfinite(engaged.phi_rad[:, 0]) & (mean_N > 0.0)
-    for number, one in enumerate(tools):
-        rows = np.flatnonzero((tool == number) & cuts & engaged.is_read)
-        if len(rows):
-            arcs, depth, ramp = engaged.phi_rad[rows], engaged.a_p_mm[rows], engaged.ramp_rad[rows]
-            peak[rows] = peak_force(one, law, arcs, depth, f_z_mm[rows], ramp)
-    read, between = np.flatnonzero(cuts & engaged.is_read), np.flatnonzero(cuts & ~engaged.is_read)
-    if len(between):
-        # a sample's feed raises its peak as it does its mean
-        peak_N, usual_N = (np.interp(between, read, column[read]) for column in (peak, mean_N))
-        peak[between] = peak_N * mean_N[between] / usual_N
-    return np.maximum(peak, mean_N)
+
+    def __init__(self, tools: list[Tool], law: Floats) -> None:
+        self._tools, self._law = tools, law
+        self._row, self._known_N = np.zeros(0), np.zeros((2, 0))
+        """The last sample that was read in material, counted from the next one; its peak and its mean."""
+
+    def take(self, engaged: Result, f_z_mm: Floats, tool: Ints32, mean_N: Floats) -> Floats:
+        """Return the peaks (m,) of the next samples."""
+        peak = np.zeros(len(mean_N))
+        cuts = np.isfinite(engaged.phi_rad[:, 0]) & (mean_N > 0.0)
+        read, between = np.flatnonzero(cuts & engaged.is_read), np.flatnonzero(cuts & ~engaged.is_read)
+        for number, one in enumerate(self._tools):
+            rows = read[tool[read] == number]
+            if len(rows):
+                arcs, depth, ramp = engaged.phi_rad[rows], engaged.a_p_mm[rows], engaged.ramp_rad[rows]
+                peak[rows] = peak_force(one, self._law, arcs, depth, f_z_mm[rows], ramp)
+        row = np.concatenate([self._row, read])
+        known_N = np.concatenate([self._known_N, [peak[read], mean_N[read]]], axis=1)
+        if len(between):
+            # a sample's feed raises its peak as it does its mean
+            peak_N, usual_N = (np.interp(between, row, column) for column in known_N)
+            peak[between] = peak_N * mean_N[between] / usual_N
+        self._row, self._known_N = row[-1:] - len(mean_N), known_N[:, -1:]
+        return np.maximum(peak, mean_N)

@@ -3,7 +3,7 @@
 Findings about a stated raw part are errors, about a guessed one warnings.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +14,7 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell.sections import Stock, Tool
 from gcode2krl.cutting.cutter import outline
 from gcode2krl.cutting.height_field import HeightField
+from gcode2krl.cutting.outlook import Outlook
 from gcode2krl.errors import Issue
 
 _CONTACT_MM = 0.01
@@ -24,54 +25,148 @@ _CHORDS_RAD = np.array([0.17, 0.48, 0.79, 1.09, 1.40])
 
 @dataclass(frozen=True)
 class Work:
-    """What is known of each sample (m rows), in the frame of the field."""
+    """What is known of some samples (m rows) that follow each other, in the frame of the field."""
 
     position_mm: Floats
     tool: Ints32
-    """(m,) row of ``tools``."""
-    tools: tuple[Tool, ...]
-    numbers: tuple[int, ...]
-    """The tools' numbers."""
+    """(m,) row of the tools."""
     source_line: Ints32
     feed: Bools
     """True on feed moves."""
+    engaged: Bools
+    """True in material."""
 
 
-def stock_findings(
-    work: Work, stock: Stock | None, before: HeightField, engaged: Bools, is_raw: bool = True
-) -> Iterator[Issue]:
-    """Yield the findings from the material ``before`` the first cut; ``engaged`` (m,) is True in material.
+class StockChecks:
+    """What is found of the material ``before`` the first cut, on samples that come some at a time.
 
     Unless it ``is_raw``, a program may end without touching it.
     """
-    yield from _approach(work, before)
-    yield from _above_edges(work, before)
-    if before.guessed or stock is None:
-        return
-    if is_raw and not engaged.any() and work.feed.any():
-        yield Issue(
-            "error",
-            "stock-untouched",
-            int(work.source_line[np.argmax(work.feed)]),
-            "no feed move touches the stock that the cell states",
-            "check the work offset (G54 to G59), the zero point and [stock]",
-        )
-    yield from _underside(work, stock, before)
+
+    def __init__(
+        self,
+        tools: Sequence[Tool],
+        outlook: Outlook,
+        stock: Stock | None,
+        before: HeightField,
+        is_raw: bool = True,
+    ) -> None:
+        """Take the tools in the order of their numbers in the outlook, and what the cell states."""
+        self._tools, self._numbers = tools, outlook.numbers
+        self._stock, self._before = stock, before
+        self._approach: list[Issue] | None = None
+        self._touches = not is_raw
+        self._first_feed: int | None = None
+        self._above = [self._above_edges(row, outlook.lowest_mm[row]) for row in range(len(tools))]
+        self._below = [self._underside(row) for row in range(len(tools))]
+
+    def take(self, work: Work) -> None:
+        """Judge the next samples."""
+        if not len(work.tool):
+            return
+        if self._approach is None:
+            self._approach = list(self._approached(work))
+        if self._first_feed is None and work.feed.any():
+            self._first_feed = int(work.source_line[np.argmax(work.feed)])
+        self._touches |= bool((work.engaged & work.feed).any())
+        for row, (above, below) in enumerate(zip(self._above, self._below, strict=True)):
+            with_tool = work.tool == row
+            for depth, rows in ((above, with_tool), (below, with_tool & work.feed)):
+                if depth is not None:
+                    depth.take(work, rows)
+
+    def issues(self) -> Iterator[Issue]:
+        """Yield the findings."""
+        yield from self._approach or ()
+        yield from self._holders_below_top()
+        if self._before.guessed or self._stock is None:
+            return
+        if not self._touches and self._first_feed is not None:
+            yield Issue(
+                "error",
+                "stock-untouched",
+                self._first_feed,
+                "no feed move touches the stock that the cell states",
+                "check the work offset (G54 to G59), the zero point and [stock]",
+            )
+        yield from self._undersides(self._stock)
+
+    def _approached(self, work: Work) -> Iterator[Issue]:
+        """Yield an error if the approach, a rapid from the clearance plane, ends in material."""
+        depth_mm = standing_mm(self._before, work.position_mm[0], self._tools[work.tool[0]])
+        if depth_mm > _CONTACT_MM:
+            yield Issue(
+                _severity(self._before),
+                "rapid-in-stock",
+                int(work.source_line[0]),
+                f"the approach to the first position is a rapid move into material, {depth_mm:.2f} mm deep",
+                "program the first position above the stock, then go down with G1",
+            )
+
+    def _above_edges(self, row: int, lowest_mm: float) -> "_Depth | None":
+        """Return where the holder or the spindle's nose may go below the top and its width is not known."""
+        tool, before = self._tools[row], self._before
+        if tool.stick_out_mm is not None and tool.holder_diameter_mm is not None:
+            return None  # the removal of material checks whether it touches
+        reach_mm = tool.stick_out_mm if tool.stick_out_mm is not None else tool.length_mm
+        top_mm = float(before.height_mm.max(initial=-np.inf))
+        if reach_mm is None or not top_mm - (lowest_mm + reach_mm) > _CONTACT_MM:
+            return None
+        footprint = Footprint(before, before.height_mm > lowest_mm + reach_mm)
+        return _Depth(footprint, top_mm, reach_mm, tool.diameter_mm / 2.0)
+
+    def _underside(self, row: int) -> "_Depth | None":
+        if self._before.guessed or self._stock is None:
+            return None
+        before, radius_mm = self._before, self._tools[row].diameter_mm / 2.0
+        allowed_mm = before.bottom_mm - self._stock.through_mm
+        return _Depth(Footprint(before, before.height_mm > before.bottom_mm), allowed_mm, 0.0, radius_mm)
+
+    def _holders_below_top(self) -> Iterator[Issue]:
+        for tool, number, depth in zip(self._tools, self._numbers, self._above, strict=True):
+            if depth is not None and depth.line is not None:
+                what = "holder" if tool.stick_out_mm is not None else "spindle nose"
+                yield Issue(
+                    "warning",
+                    "holder-below-top",
+                    depth.line,
+                    f"the {what} of T{number} goes {depth.worst_mm:.2f} mm below the top of the stock, and "
+                    "its width is not known",
+                    f"give tool.{number}.stick_out_mm and holder_diameter_mm, or use a longer tool",
+                )
+
+    def _undersides(self, stock: Stock) -> Iterator[Issue]:
+        for number, depth in zip(self._numbers, self._below, strict=True):
+            if depth is not None and depth.line is not None:
+                through = f" and {stock.through_mm:g} mm are allowed" if stock.through_mm else ""
+                depth_mm = depth.worst_mm + stock.through_mm
+                yield Issue(
+                    "error",
+                    "stock-underside",
+                    depth.line,
+                    f"T{number} cuts up to {depth_mm:.2f} mm below the stock's underside{through}",
+                    f"check Z; [stock] through_mm = {np.ceil(depth_mm * 10.0) / 10.0:g} allows it above a "
+                    "sacrificial board",
+                )
 
 
-def _approach(work: Work, before: HeightField) -> Iterator[Issue]:
-    """Yield an error if the approach, a rapid from the clearance plane, ends in material."""
-    if not len(work.position_mm):
-        return
-    depth_mm = standing_mm(before, work.position_mm[0], work.tools[work.tool[0]])
-    if depth_mm > _CONTACT_MM:
-        yield Issue(
-            _severity(before),
-            "rapid-in-stock",
-            int(work.source_line[0]),
-            f"the approach to the first position is a rapid move into material, {depth_mm:.2f} mm deep",
-            "program the first position above the stock, then go down with G1",
-        )
+class _Depth:
+    """How far a tool, or what is above it, goes below a level where there is stock."""
+
+    def __init__(self, footprint: "Footprint", level_mm: float, reach_mm: float, radius_mm: float) -> None:
+        self._footprint, self._level_mm, self._reach_mm = footprint, level_mm, reach_mm
+        self._radius_mm = radius_mm
+        self.line: int | None = None
+        """G-code line of the first sample below; None without any."""
+        self.worst_mm = 0.0
+
+    def take(self, work: Work, rows: Bools) -> None:
+        depth_mm = self._level_mm - (work.position_mm[:, 2] + self._reach_mm)
+        low = np.flatnonzero(rows & (depth_mm > _CONTACT_MM))
+        low = low[self._footprint.below(work.position_mm[low], self._radius_mm)]
+        if len(low):
+            self.line = int(work.source_line[low[0]]) if self.line is None else self.line
+            self.worst_mm = max(self.worst_mm, float(depth_mm[low].max()))
 
 
 def standing_mm(field: HeightField, tip_mm: Floats, tool: Tool) -> float:
@@ -87,57 +182,6 @@ def standing_mm(field: HeightField, tip_mm: Floats, tool: Tool) -> float:
     if not inside.any():
         return 0.0
     return max(0.0, float((part[inside] - tip_mm[2] - np.interp(r[inside], radii, heights)).max()))
-
-
-def _above_edges(work: Work, before: HeightField) -> Iterator[Issue]:
-    """Yield where the holder or the spindle's nose goes below the top and its width is not known."""
-    top_mm = float(before.height_mm.max(initial=-np.inf))
-    for row, (tool, number) in enumerate(zip(work.tools, work.numbers, strict=True)):
-        if tool.stick_out_mm is not None and tool.holder_diameter_mm is not None:
-            continue  # the removal of material checks whether it touches
-        reach_mm = tool.stick_out_mm if tool.stick_out_mm is not None else tool.length_mm
-        if reach_mm is None:
-            continue
-        depth_mm = top_mm - (work.position_mm[:, 2] + reach_mm)
-        low = np.flatnonzero((work.tool == row) & (depth_mm > _CONTACT_MM))
-        if not len(low):
-            continue
-        mask = before.height_mm > float((work.position_mm[low, 2] + reach_mm).min())
-        low = low[Footprint(before, mask).below(work.position_mm[low], tool.diameter_mm / 2.0)]
-        if len(low):
-            worst = low[np.argmax(depth_mm[low])]
-            what = "holder" if tool.stick_out_mm is not None else "spindle nose"
-            yield Issue(
-                "warning",
-                "holder-below-top",
-                int(work.source_line[low[0]]),
-                f"the {what} of T{number} goes {depth_mm[worst]:.2f} mm below the top of the stock, and its "
-                "width is not known",
-                f"give tool.{number}.stick_out_mm and holder_diameter_mm, or use a longer tool",
-            )
-
-
-def _underside(work: Work, stock: Stock, before: HeightField) -> Iterator[Issue]:
-    allowed_mm = before.bottom_mm - stock.through_mm
-    below_mm = allowed_mm - work.position_mm[:, 2]
-    for row, tool in enumerate(work.tools):
-        low = np.flatnonzero(work.feed & (work.tool == row) & (below_mm > _CONTACT_MM))
-        if not len(low):
-            continue
-        footprint = Footprint(before, before.height_mm > before.bottom_mm)
-        low = low[footprint.below(work.position_mm[low], tool.diameter_mm / 2.0)]
-        if len(low):
-            worst = low[np.argmax(below_mm[low])]
-            through = f" and {stock.through_mm:g} mm are allowed" if stock.through_mm else ""
-            depth_mm = float(below_mm[worst]) + stock.through_mm
-            yield Issue(
-                "error",
-                "stock-underside",
-                int(work.source_line[low[0]]),
-                f"T{work.numbers[row]} cuts up to {depth_mm:.2f} mm below the stock's underside{through}",
-                f"check Z; [stock] through_mm = {np.ceil(depth_mm * 10.0) / 10.0:g} allows it above a "
-                "sacrificial board",
-            )
 
 
 class Footprint:

@@ -1,6 +1,6 @@
 """Cuts that a kind of tool is not made for: a drill sideways, a mill straight down too fast."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,34 +23,42 @@ _SOFTER = 3.0
 """How much faster a mill may plunge in wood and foam: assumed."""
 
 
-def uses(
-    line: Ints32,
-    rapid: Bools,
-    f_z_mm: Floats,
-    ramp_rad: Floats,
-    centre_mm: Floats,
-    forces: Forces,
-    cell: Cell,
-) -> Iterator[Issue]:
-    """Yield one warning for each tool: the first place with a cut that its kind is not made for.
+class Uses:
+    """The first place of each tool with a cut that its kind is not made for."""
 
-    The columns (m,) hold G-code line, rapid or not, programmed feed per tooth, descent, and the material
-    below the tool's middle.
-    """
-    engaged = np.isfinite(forces.phi_rad[:, 0]) & ~rapid
-    for number in np.unique(forces.tool).tolist():
-        tool, with_tool = cell.tool[number], engaged & (forces.tool == number)
-        if tool.kind == "drill":
-            wrong = with_tool & (np.abs(ramp_rad) < _FLAT_RAD) & (forces.a_p_mm > _MET_MM)
+    def __init__(self, cell: Cell, tools: Sequence[int]) -> None:
+        """Take the cell and the tools that move."""
+        self._cell, self._tools = cell, tools
+        self._found: dict[int, Issue] = {}
+
+    def take(
+        self, line: Ints32, rapid: Bools, f_z_mm: Floats, ramp_rad: Floats, centre_mm: Floats, forces: Forces
+    ) -> None:
+        """Judge the next samples (m,).
+
+        The columns hold G-code line, rapid or not, programmed feed per tooth, descent, and the material below
+        the tool's middle.
+        """
+        engaged = np.isfinite(forces.phi_rad[:, 0]) & ~rapid
+        for number in self._tools:
+            if number in self._found:
+                continue
+            tool, with_tool = self._cell.tool[number], engaged & (forces.tool == number)
+            if tool.kind == "drill":
+                wrong = with_tool & (np.abs(ramp_rad) < _FLAT_RAD) & (forces.a_p_mm > _MET_MM)
+                if wrong.any():
+                    self._found[number] = _sideways(number, int(line[np.argmax(wrong)]))
+                continue
+            most_mm = plunge_limit_mm(tool, self._cell.material)
+            down_mm = f_z_mm * np.sin(ramp_rad)
+            wrong = with_tool & (ramp_rad > STEEP_RAD) & (centre_mm > _MET_MM) & (down_mm > most_mm)
             if wrong.any():
-                yield _sideways(number, int(line[np.argmax(wrong)]))
-            continue
-        most_mm = plunge_limit_mm(tool, cell.material)
-        down_mm = f_z_mm * np.sin(ramp_rad)
-        wrong = with_tool & (ramp_rad > STEEP_RAD) & (centre_mm > _MET_MM) & (down_mm > most_mm)
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            yield _fast_plunge(number, tool, float(down_mm[row]), most_mm, int(line[row]))
+                row = int(np.argmax(wrong))
+                self._found[number] = _fast_plunge(number, tool, float(down_mm[row]), most_mm, int(line[row]))
+
+    def issues(self) -> list[Issue]:
+        """Return one warning for each such tool, by its number."""
+        return [self._found[number] for number in sorted(self._found)]
 
 
 def plunge_limit_mm(tool: Tool, material: Material | None) -> float:

@@ -1,10 +1,12 @@
 """What the KRC4 does with LIN motions: corner parabola, time law, look-ahead."""
 
+from gcode2krl.krc4.course import Course, sample_motion
 from gcode2krl.krc4.laws import corner, effective_acceleration, jerk, speed_step
-from gcode2krl.krc4.motion import Chain, build_chain, motion_issues, plan, sample_motion, with_speed
+from gcode2krl.krc4.motion import Chain, build_chain, motion_issues, plan, with_speed
 
 __all__ = [
     "Chain",
+    "Course",
     "build_chain",
     "corner",
     "effective_acceleration",

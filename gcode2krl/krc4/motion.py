@@ -9,14 +9,12 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue
 from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
-from gcode2krl.krc4.sampling import sample, sample_times
-from gcode2krl.tables import Motion, Targets
-from gcode2krl.units import MM_PER_M, RAD_PER_DEG, S_PER_H
+from gcode2krl.tables import Targets
+from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
-_MOST_SAMPLES = 50_000_000
 _WORTH_SAYING = 0.01
 """Fraction of the time above which a loss is reported."""
 _NO_LENGTH_MM = 1e-6
@@ -90,9 +88,9 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         end_mm=end,
         from_rotation=from_rotation,
         to_rotation=to_rotation,
-        length_mm=length / scale,
-        speed_mm_s=speed / scale,
-        acceleration_mm_s2=acceleration / scale,
+        length_mm=_over(length, scale),
+        speed_mm_s=_over(speed, scale),
+        acceleration_mm_s2=_over(acceleration, scale),
         angle_rad=angle,
         blend_mm=d,
         stop=stop,
@@ -103,6 +101,11 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         cos_half=cos_half,
         scale=scale,
     )
+
+
+def _over(column: Floats, scale: Floats) -> Floats:
+    """Return a column in units of the scale, as it is where that is 1."""
+    return column if scale.strides[0] == 0 else column / scale
 
 
 def _owners(move: Ints32) -> Ints32:
@@ -142,40 +145,6 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
         controller.k_s,
         in_view,
         controller.law == "averages",
-    )
-
-
-def sample_motion(targets: Targets, chain: Chain, profile: Profile, cell: Cell, dt_s: float) -> Motion:
-    """Return the Motion of a chain, sampled every ``dt_s`` from 0 to its end."""
-    if not (np.isfinite(dt_s) and dt_s > 0):
-        raise input_error("option-value", f"sample time {dt_s} s is not positive")
-    if profile.total_s / dt_s > _MOST_SAMPLES:
-        hours = profile.total_s / S_PER_H
-        raise input_error(
-            "too-long",
-            f"the motion lasts {hours:.1f} h, more than {_MOST_SAMPLES} samples",
-            "use a larger --dt",
-        )
-    if len(chain.length_mm) == 0:
-        return _standstill(targets, chain)
-    time = sample_times(profile, dt_s)
-    samples = sample(
-        time, profile, chain.start_mm, chain.end_mm, chain.length_mm, chain.blend_mm, cell.controller.k_s
-    )
-    move = chain.move[samples.move]
-    move[0] = targets.move[chain.first]
-    return Motion(
-        time_s=time,
-        position_mm=samples.position_mm,
-        rotation=_rotations(chain, samples.move, samples.part),
-        speed_mm_s=samples.speed_mm_s,
-        acceleration_mm_s2=samples.acceleration_mm_s2,
-        jerk_mm_s3=samples.jerk_mm_s3,
-        path_mm=samples.path_mm,
-        move=move,
-        corner=samples.corner,
-        direction=samples.direction,
-        tool=chain.tool[samples.move],
     )
 
 
@@ -246,9 +215,9 @@ def _with_orientation(
     reorientation on the spot gets the length that takes as much time.
     """
     controller = cell.controller
-    a_cp = np.full(len(length), controller.acc_cp_m_s2 * MM_PER_M)
-    if _one_orientation(from_rotation, to_rotation):
-        return length, speed, a_cp, np.zeros(len(length))
+    a_cp = np.broadcast_to(controller.acc_cp_m_s2 * MM_PER_M, len(length))
+    if one_orientation(from_rotation, to_rotation):
+        return length, speed, a_cp, np.broadcast_to(0.0, len(length))
     angle = fr.angle_between(from_rotation, to_rotation)
     turning = angle > 1e-12
     most_rad_s, most_rad_s2 = controller.vel_ori_deg_s * RAD_PER_DEG, controller.acc_ori_deg_s2 * RAD_PER_DEG
@@ -303,16 +272,18 @@ def _scales(
 ) -> Floats:
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
+    One number stands for all where it is 1.
+
     A corner makes a change of speed where |v2 - v1|/a + k <= T, its duration (our assumption, the paper does
     not say), and where the look-ahead lets the faster of the two be reached.
     """
-    scale = np.ones(len(length))
     rows = _wide_corners(length, speed, acceleration, blend, cdis, stop, cell)
     a, k = np.minimum(acceleration[rows], acceleration[rows + 1]), cell.controller.k_s
     fastest = np.maximum(speed[rows], speed[rows + 1])
     rows = rows[fastest * (fastest / a + k) / 2 <= _in_view(length, rows, cell)]
     if not len(rows):
-        return scale
+        return np.broadcast_to(1.0, len(length))
+    scale = np.ones(len(length))
     ratio = speed[rows + 1] / speed[rows]
     blend[rows] = _widest(length, ratio, cdis, rows)
     scale[rows + 1] = ratio
@@ -364,14 +335,7 @@ def _in_view(length: Floats, rows: Ints, cell: Cell) -> Floats:
     return way[np.minimum(seen, len(way) - 1)] - way[np.minimum(rows + 1, len(way) - 1)]
 
 
-def _rotations(chain: Chain, row: Ints, part: Floats) -> Floats:
-    """Interpolate the orientation with the position along each move (``$ORI_TYPE = #VAR``)."""
-    if _one_orientation(chain.from_rotation, chain.to_rotation):
-        return np.broadcast_to(chain.to_rotation[0], (len(row), 4))
-    return fr.slerp(chain.from_rotation[row], chain.to_rotation[row], part)
-
-
-def _one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
+def one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
     """Tell whether the tool never turns."""
 
     def same(start: int, end: int) -> bool:
@@ -379,24 +343,6 @@ def _one_orientation(from_rotation: Floats, to_rotation: Floats) -> bool:
         return bool((to_rotation[start:end] == first).all() and (from_rotation[start:end] == first).all())
 
     return all(in_chunks(same, chunk_borders(len(to_rotation))))
-
-
-def _standstill(targets: Targets, chain: Chain) -> Motion:
-    """Return the motion of a program with one position: one sample at rest."""
-    row = chain.first
-    zero = np.zeros(1)
-    return Motion(
-        time_s=zero,
-        position_mm=targets.position_mm[row : row + 1],
-        rotation=targets.rotation[row : row + 1],
-        speed_mm_s=zero,
-        acceleration_mm_s2=zero,
-        jerk_mm_s3=zero,
-        path_mm=zero,
-        move=targets.move[row : row + 1],
-        corner=np.zeros(1, dtype=np.bool_),
-        tool=targets.tool[row : row + 1],
-    )
 
 
 def with_speed(chain: Chain, speed_mm_s: Floats) -> Chain:

@@ -40,10 +40,9 @@ class Samples(NamedTuple):
     """(m, 3) unit tangent of the path; zero in a turn on the spot."""
 
 
-def sample_times(profile: Profile, dt_s: float) -> Floats:
-    """Return the sample times (m,) in s, the last one at or after the end of the motion."""
-    count = math.ceil(profile.total_s / dt_s - 1e-9) + 1
-    return np.arange(count, dtype=np.float64) * dt_s
+def count_samples(profile: Profile, dt_s: float) -> int:
+    """Return how many samples a motion has, the last one at or after its end."""
+    return math.ceil(profile.total_s / dt_s - 1e-9) + 1
 
 
 def sample(
@@ -56,29 +55,52 @@ def sample(
     k_s: float,
 ) -> Samples:
     """Return the motion at rising times (m,) along moves (n,); ``blend_mm`` belongs to the end of each."""
-    count = len(time_s)
-    moves = _Moves(*(contiguous(column) for column in (start_mm, end_mm, length_mm, blend_mm)))
-    move, begins = np.empty(count, dtype=np.int64), _sums(length_mm)
-    law = tuple(np.empty((4, count)))  # speed, acceleration, jerk and path
-    part, corner, position = np.empty(count), np.empty(count, dtype=np.bool_), np.empty((count, 3))
-    direction = np.empty((count, 3))
+    return Sampler(profile, start_mm, end_mm, length_mm, blend_mm, k_s).at(time_s)
 
-    def law_of(start: int, end: int) -> None:
-        ends = [time_s[start], time_s[start] - k_s]
-        first = np.maximum(np.searchsorted(profile.time_s, ends, side="right") - 1, 0)
-        figures = (row[start:end] for row in law)
-        _law(time_s[start:end], *profile[:5], k_s, int(first[0]), int(first[1]), *figures)
 
-    def place(start: int, end: int) -> None:
-        written = (row[start:end] for row in (*law, position, direction, part, corner))
-        _place(move[start:end], *moves, begins, way, saved, *written)
+class Sampler:
+    """Moves (n,) with their time law; ``blend_mm`` belongs to the end of each."""
 
-    in_chunks(law_of, chunk_borders(count))
-    _find_moves(law[3], begins, move)
-    way, saved = _way_to_moves(moves)
-    in_chunks(place, chunk_borders(count))
-    speed, acceleration, jerk, path = law
-    return Samples(position, speed, acceleration, jerk, path, move, part, corner, direction)
+    def __init__(
+        self,
+        profile: Profile,
+        start_mm: Floats,
+        end_mm: Floats,
+        length_mm: Floats,
+        blend_mm: Floats,
+        k_s: float,
+    ) -> None:
+        """Take the moves and the pieces of their law."""
+        self._profile, self._k_s = profile, k_s
+        columns = (start_mm, end_mm, length_mm, blend_mm)
+        self._moves = _Moves(*(contiguous(column) for column in columns))
+        self._begins = _sums(length_mm)
+        self._way, self._saved = _way_to_moves(self._moves)
+
+    def at(self, time_s: Floats, first_move: int = 0) -> Samples:
+        """Return the motion at rising times (m,), none of them in a move before ``first_move``."""
+        count, profile, k_s = len(time_s), self._profile, self._k_s
+        move = np.empty(count, dtype=np.int64)
+        law = tuple(np.empty((4, count)))  # speed, acceleration, jerk and path
+        part, corner, position = np.empty(count), np.empty(count, dtype=np.bool_), np.empty((count, 3))
+        direction = np.empty((count, 3))
+
+        def law_of(start: int, end: int) -> None:
+            ends = [time_s[start], time_s[start] - k_s]
+            first = np.maximum(np.searchsorted(profile.time_s, ends, side="right") - 1, 0)
+            figures = (row[start:end] for row in law)
+            _law(time_s[start:end], *profile[:5], k_s, int(first[0]), int(first[1]), *figures)
+
+        def place(start: int, end: int) -> None:
+            written = (row[start:end] for row in (*law, position, direction, part, corner))
+            _place(move[start:end], *self._moves, self._begins, self._way, self._saved, *written)
+
+        in_chunks(law_of, chunk_borders(count))
+        _find_moves(law[3], self._begins[first_move:], move)
+        move += first_move
+        in_chunks(place, chunk_borders(count))
+        speed, acceleration, jerk, path = law
+        return Samples(position, speed, acceleration, jerk, path, move, part, corner, direction)
 
 
 class _Moves(NamedTuple):

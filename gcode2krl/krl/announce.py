@@ -10,7 +10,9 @@ import numpy as np
 from gcode2krl import krc4
 from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.files.spool import let_go
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import most_active, view
 from gcode2krl.krl.cuts import cut_for
@@ -19,10 +21,12 @@ from gcode2krl.krl.pilot_check import PilotCase
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.triggers import Triggers, place_triggers
 from gcode2krl.krl.windows import Windows, windows_of
-from gcode2krl.pilot import Knots, PilotHeader, knots_of, to_pilot_frame
+from gcode2krl.pilot import Knots, PilotHeader, knots_of
 from gcode2krl.pilot.knots import LEAD_DECIMALS
+from gcode2krl.pipeline import forecast_of
 from gcode2krl.prediction import Prediction
-from gcode2krl.tables import Joints, Motion, Targets
+from gcode2krl.prediction.forecast import Forecast
+from gcode2krl.tables import Joints, PilotForce, Targets
 from gcode2krl.units import RAD_PER_DEG
 
 Form = Literal["index", "values"]
@@ -51,21 +55,16 @@ class PilotPlan:
     issues: tuple[Issue, ...]
 
 
-def pilot_forces(prediction: Prediction) -> tuple[Motion, Floats, Floats | None]:
-    """Return the Motion, and forces and deflection (m, 3) in the pilot frame, None where not predicted.
+def pilot_force(source: Prediction | Forecast) -> PilotForce:
+    """Return the samples that a pilot force is made from.
 
     Raises `NotUnderstoodError` for a prediction without forces.
     """
-    motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
-    if motion is None or forces is None:
+    force = (source if isinstance(source, Forecast) else forecast_of(source)).pilot
+    if force is None:
         sentence = "the prediction has no forces to pilot with"
         raise input_error("option-value", sentence, "predict with a material and stock, or --pilot none")
-
-    def turned(vector: Floats) -> Floats:
-        return to_pilot_frame(vector, motion.rotation, motion.tool, prediction.cell)
-
-    bent = turned(deflection.deflection_base_mm) if deflection is not None else None
-    return motion, turned(forces.force_base_N), bent
+    return force
 
 
 class Layout(NamedTuple):
@@ -79,26 +78,29 @@ class Layout(NamedTuple):
 class Planner:
     """A program and its predicted forces; announces sets of knots in it."""
 
-    def __init__(self, prediction: Prediction, joints: Joints, form: Form, sidecar: bool) -> None:
-        self.targets, self.joints, self.cell = prediction.targets, joints, prediction.cell
+    def __init__(self, source: Prediction | Forecast, joints: Joints, form: Form, sidecar: bool) -> None:
+        self.targets, self.joints, self.cell = source.targets, joints, source.cell
         self.form, self.sidecar = form, sidecar
-        self.motion, self.force_N, self.bent_mm = pilot_forces(prediction)
-        self.line = prediction.toolpath.source_line[self.motion.move]
+        self.motion = pilot_force(source)
         self.chain = krc4.build_chain(self.targets, self.cell)
         self.windows = windows_of(self.targets, self.chain, self.motion, self.cell)
+        let_go(self.motion)
+        give_back()
 
     def knots(self, tolerance_N: float | None) -> Knots:
         """Return the knots of a tolerance."""
-        return knots_of(
+        knots = knots_of(
             self.motion.time_s,
             self.motion.path_mm,
-            self.force_N,
-            self.bent_mm,
+            self.motion.force_N,
+            self.motion.deflection_mm,
             _direction_changes(self.chain, self.windows, self.motion),
-            line=self.line,
+            line=self.motion.line,
             tolerance_N=tolerance_N,
             cycle_s=self.cell.controller.cycle_s,
         )
+        let_go(self.motion)
+        return knots
 
     @cached_property
     def whole(self) -> Layout:
@@ -196,7 +198,7 @@ class Planner:
             self.sidecar,
             end_line=end_line,
         )
-        case = PilotCase(text, self.motion, self.force_N, layout.windows)
+        case = PilotCase(text, self.motion, self.motion.force_N, layout.windows)
         issues = (*knots.issues, *_short_leads(announced, self.cell))
         return PilotPlan(text, layout.targets, layout.joints, case, issues)
 
@@ -274,7 +276,7 @@ def _refusal(code: str, line: int, sentence: str) -> Issue:
     return Issue("error", code, line, sentence, "raise [pilot] tolerance_N, or --pilot none")
 
 
-def _direction_changes(chain: Chain, windows: Windows, motion: Motion) -> Rows:
+def _direction_changes(chain: Chain, windows: Windows, motion: PilotForce) -> Rows:
     """Return the samples in the middle of the corners that turn sharply."""
     sharp = chain.first + 1 + np.flatnonzero(chain.cos_half >= _SHARP)
     at = np.flatnonzero(np.isin(windows.row[:-1], sharp) & (np.diff(windows.row) == 1))

@@ -220,17 +220,11 @@ class _Composer:
     def _checksum(self, pilot: PilotText) -> int:
         if pilot.stated is not None:
             return pilot.stated
-        targets, home = self.targets, self.targets.home[:, None]
-        q_deg = self.joints.q_rad * DEG_PER_RAD
-        return checksum(
-            np.where(home, np.nan, self.position),
-            np.where(home, np.nan, self.abc_deg),
-            np.where(home, q_deg, np.nan),
-            targets.ptp,
-            targets.speed_mm_s,
-            targets.cdis_mm,
-            pilot.rows,
-        )
+        targets, home = self.targets, self.targets.home
+        q_deg = np.zeros(self.joints.q_rad.shape)  # pages that no HOME is in cost nothing
+        q_deg[home] = self.joints.q_rad[home] * DEG_PER_RAD
+        columns = (targets.ptp, targets.speed_mm_s, targets.cdis_mm)
+        return checksum(self.position, self.abc_deg, q_deg, *columns, pilot.rows, home)
 
     def _around(self, row: int) -> bytes:
         """Return the PTP, dwell and events of a row; where the row switches RSI, it is off during them."""

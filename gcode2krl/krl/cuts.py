@@ -15,7 +15,7 @@ from gcode2krl.krl.advance import view
 from gcode2krl.krl.pieces import Pieces
 from gcode2krl.krl.triggers import Triggers
 from gcode2krl.krl.windows import Windows
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion, PilotForce, Targets
 from gcode2krl.units import MM_PER_M
 
 _CDIS_MM = 0.1
@@ -35,7 +35,12 @@ _cut = core_function(
 
 
 def cut_for(
-    triggers: Triggers, windows: Windows, chain: Chain, targets: Targets, motion: Motion, cell: Cell
+    triggers: Triggers,
+    windows: Windows,
+    chain: Chain,
+    targets: Targets,
+    motion: Motion | PilotForce,
+    cell: Cell,
 ) -> Pieces | None:
     """Return cuts that bring the number of waiting triggers towards ``[pilot] max_active``.
 

@@ -10,14 +10,16 @@ from gcode2krl import krc4
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import chunked
 from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.files.spool import let_go
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
 from gcode2krl.krl.pilot_text import NO_KNOT_YET, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, force_at, in_contact
 from gcode2krl.pilot.sidecar import NOT_YET
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion, PilotForce, Targets
 from gcode2krl.units import MS_PER_S
 
 _ROUNDING_S = 0.001
@@ -49,7 +51,7 @@ class PilotCase:
     """What the pilot force of a program is checked against."""
 
     text: PilotText
-    motion: Motion
+    motion: Motion | PilotForce
     force_N: Floats | None = None
     """(m, 3) predicted, in the pilot frame, where known."""
     windows: Windows | None = None
@@ -67,6 +69,7 @@ def check_pilot(
     pilot, knots = case.text, case.text.knots
     ends = _ends_early(program, pilot)
     error_N, rms_N = _errors_of(knots, case.motion, case.force_N, ends)
+    let_go(case.motion)
     issues = [*_checksum_issues(program, pilot), *_form_issues(program, pilot)]
     lead_s: float | None = None
     windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
@@ -140,7 +143,7 @@ def _ends_early(program: KrlProgram, pilot: PilotText) -> bool:
 
 
 def _errors_of(
-    knots: Knots, motion: Motion, force_N: Floats | None, ends_early: bool
+    knots: Knots, motion: Motion | PilotForce, force_N: Floats | None, ends_early: bool
 ) -> tuple[float | None, float | None]:
     """Return the largest and the RMS distance of forces to the ramps that the online side makes of knots.
 
@@ -149,12 +152,20 @@ def _errors_of(
     """
     if force_N is None:
         return _known(knots.max_error_N), _known(knots.rms_error_N)
-    off = force_N - force_at(knots, motion.time_s)
+    time_s = motion.time_s
     if ends_early:
-        said = motion.time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
-        off, force_N = off[said], force_N[said]
-    square = np.einsum("ij,ij->i", off, off)
-    acting = in_contact(force_N)
+        said = time_s <= (knots.time_s[-1] if len(knots) else -np.inf)
+        time_s, force_N = time_s[said], force_N[said]
+
+    acting = np.empty(len(time_s), dtype=np.bool_)
+
+    def squares(rows: slice) -> Floats:
+        off = force_N[rows] - force_at(knots, time_s[rows])
+        acting[rows] = in_contact(force_N[rows])
+        let_go(motion)
+        return np.asarray(np.einsum("ij,ij->i", off, off))
+
+    square = chunked(squares, len(time_s))
     mean = float(np.mean(square[acting])) if acting.any() else 0.0
     figures = np.sqrt([float(square.max(initial=0.0)), mean])
     figures = np.fmax(figures, [knots.max_error_N, knots.rms_error_N])

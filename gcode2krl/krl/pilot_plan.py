@@ -6,6 +6,7 @@ from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl.announce import Form, Layout, PilotPlan, Planner
 from gcode2krl.pilot import Knots
 from gcode2krl.prediction import Prediction
+from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints
 
 _COARSER = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0)
@@ -16,7 +17,7 @@ _TRIALS = 8
 
 
 def plan_pilot(
-    prediction: Prediction, joints: Joints, form: Form, sidecar: bool = True, *, asked: bool = True
+    source: Prediction | Forecast, joints: Joints, form: Form, sidecar: bool = True, *, asked: bool = True
 ) -> PilotPlan | Issue:
     """Return the pilot of a prediction with forces, and the targets and joints with the motions it needs.
 
@@ -26,7 +27,7 @@ def plan_pilot(
     left of it the warning is returned instead.
     """
     try:
-        outcome = _fitting(Planner(prediction, joints, form, sidecar), asked)
+        outcome = _fitting(Planner(source, joints, form, sidecar), asked)
     except RefusedError as error:  # the motion is not that of the targets
         outcome = error.issues[0]
     if not isinstance(outcome, Issue):

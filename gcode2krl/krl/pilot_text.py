@@ -110,21 +110,31 @@ def checksum(
     speed_mm_s: Floats,
     cdis_mm: Floats,
     rows: bytes,
+    home: Bools | None = None,
 ) -> int:
     """Return 31 bits over the targets and knots as written; what is not stated of a motion is NaN.
 
     Targets count as the decimals they are written in, so the text's layout does not matter; ``rows`` are
-    those of the sidecar.
+    those of the sidecar. With ``home`` (p,), whatever the columns say, positions count where it is not, and
+    joints where it is.
     """
+    away = None if home is None else ~home
     columns = (
-        *(in_decimals(column, 3) for column in position_mm.T),
-        *(in_decimals(column, 4) for column in abc_deg.T),
-        *(in_decimals(column, 4) for column in q_deg.T),
-        ptp.astype(np.int64),
-        in_decimals(speed_mm_s / MM_PER_M, 7),
-        in_decimals(cdis_mm, 3),
+        *((column, 3, away) for column in position_mm.T),
+        *((column, 4, away) for column in abc_deg.T),
+        *((column, 4, home) for column in q_deg.T),
     )
     value = 0
-    for column in columns:
-        value = zlib.crc32(column.astype("<i8", copy=False).tobytes(), value)
+    for column, decimals, counts in columns:
+        whole = in_decimals(column, decimals)
+        if counts is not None:
+            whole[~counts] = 0  # as what is not stated
+        value = _crc(whole, value)
+    value = _crc(ptp.astype(np.int64), value)
+    value = _crc(in_decimals(speed_mm_s / MM_PER_M, 7), value)
+    value = _crc(in_decimals(cdis_mm, 3), value)
     return zlib.crc32(rows, value) & _CHECKSUM_BITS
+
+
+def _crc(column: Ints, value: int) -> int:
+    return zlib.crc32(np.ascontiguousarray(column, dtype="<i8").data, value)

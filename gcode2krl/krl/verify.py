@@ -12,7 +12,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
-from gcode2krl.krl.announce import pilot_forces
+from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.pieces import pieces_in, split
@@ -92,8 +92,8 @@ def verify_krl(
     case: PilotCase | None = None
     if pilot is not None:
         if prediction is not None:
-            motion, force_N, _ = pilot_forces(prediction)
-            case = PilotCase(pilot, motion, force_N)
+            force = pilot_force(prediction)
+            case = PilotCase(pilot, force, force.force_N)
         else:
             case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s))
     if announced:

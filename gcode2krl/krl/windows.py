@@ -10,11 +10,12 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.chunks import chunked
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import halts_advance, read_order
 from gcode2krl.krl.statements import event_statements
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion, PilotForce, Targets
 from gcode2krl.units import MM_PER_M
 
 COUNTS_FROM_END_OF_ARC = True
@@ -52,7 +53,7 @@ class Windows:
         return np.asarray(self.section_s[np.maximum(section, 0)])
 
 
-def windows_of(targets: Targets, chain: Chain, motion: Motion, cell: Cell) -> Windows:
+def windows_of(targets: Targets, chain: Chain, motion: Motion | PilotForce, cell: Cell) -> Windows:
     """Return the windows of a program's LIN motions.
 
     ``chain`` is that of ``targets``. Path and time of the Motion are taken as they are, so a slower robot or
@@ -103,8 +104,7 @@ def _arc_starts(arrive_mm: Floats) -> Floats:
 
 def _straight_parts(chain: Chain, targets: Targets) -> tuple[Floats, Floats, Floats]:
     """Return (n,) lengths in mm of the straight part of each move, and of its parts in corners."""
-    way = chain.end_mm - chain.start_mm
-    length = np.sqrt(np.einsum("ij,ij->i", way, way))
+    length = chunked(lambda rows: _length(chain, rows), len(chain.length_mm))
     head, tail = np.zeros(len(length)), np.zeros(len(length))
     if len(length) > 1:
         corner = chain.blend_mm[:-1] > 0
@@ -121,10 +121,26 @@ def _arc_lengths(chain: Chain, head_mm: Floats, tail_mm: Floats) -> Floats:
 
     The integral of |p + t·(q - p)| from 0 to 1, in closed form with the root of b·((t + m)² + r2).
     """
-    way = chain.end_mm - chain.start_mm
+    count = max(len(head_mm) - 1, 0)
+    return chunked(lambda rows: _arcs_behind(chain, head_mm, tail_mm, rows), count)
+
+
+def _way(chain: Chain, rows: slice) -> Floats:
+    return np.asarray(chain.end_mm[rows] - chain.start_mm[rows])
+
+
+def _length(chain: Chain, rows: slice) -> Floats:
+    way = _way(chain, rows)
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", way, way)))
+
+
+def _arcs_behind(chain: Chain, head_mm: Floats, tail_mm: Floats, rows: slice) -> Floats:
+    """Return the lengths of the parabolas behind moves."""
+    both = slice(rows.start, rows.stop + 1)
+    way = _way(chain, both)
     size = np.maximum(np.sqrt(np.einsum("ij,ij->i", way, way)), 1e-300)
     unit = way / size[:, None]
-    p, q = unit[:-1] * tail_mm[:-1, None], unit[1:] * head_mm[1:, None]
+    p, q = unit[:-1] * tail_mm[rows, None], unit[1:] * head_mm[both][1:, None]
     pp, pq, qq = (np.einsum("ij,ij->i", a, b) for a, b in ((p, p), (p, q), (q, q)))
     b = pp - 2.0 * pq + qq
     bends = b > 1e-12 * (pp + qq)
@@ -159,7 +175,7 @@ def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats)
 class _Clock:
     """Path to time of a Motion, with its standstills."""
 
-    def __init__(self, motion: Motion, cell: Cell) -> None:
+    def __init__(self, motion: Motion | PilotForce, cell: Cell) -> None:
         self.time_s, self.path_mm, self.speed = motion.time_s, motion.path_mm, motion.speed_mm_s
         self.acceleration = motion.acceleration_mm_s2
         k_s = cell.controller.k_s
@@ -167,17 +183,25 @@ class _Clock:
 
     def arrival(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is reached; at rest it is where the motion ends."""
-        after = np.searchsorted(self.path_mm, path_mm - _AT_REST_MM, side="left")
-        after = np.clip(after, 1, len(self.time_s) - 1)
-        stopping = self.time_s[after - 1] + self._from_rest(after - 1)
-        return np.where(at_rest, np.minimum(stopping, self.time_s[after]), self._between(path_mm, after))
+
+        def arrived(rows: slice) -> Floats:
+            after = np.searchsorted(self.path_mm, path_mm[rows] - _AT_REST_MM, side="left")
+            after = np.clip(after, 1, len(self.time_s) - 1)
+            stopping = np.minimum(self.time_s[after - 1] + self._from_rest(after - 1), self.time_s[after])
+            return np.where(at_rest[rows], stopping, self._between(path_mm[rows], after))
+
+        return chunked(arrived, len(path_mm))
 
     def departure(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is left; at rest it is where the motion begins."""
-        after = np.searchsorted(self.path_mm, path_mm + _AT_REST_MM, side="right")
-        after = np.clip(after, 1, len(self.time_s) - 1)
-        starting = self.time_s[after] - self._from_rest(after)
-        return np.where(at_rest, np.maximum(starting, self.time_s[after - 1]), self._between(path_mm, after))
+
+        def left(rows: slice) -> Floats:
+            after = np.searchsorted(self.path_mm, path_mm[rows] + _AT_REST_MM, side="right")
+            after = np.clip(after, 1, len(self.time_s) - 1)
+            starting = np.maximum(self.time_s[after] - self._from_rest(after), self.time_s[after - 1])
+            return np.where(at_rest[rows], starting, self._between(path_mm[rows], after))
+
+        return chunked(left, len(path_mm))
 
     def _from_rest(self, sample: Rows) -> Floats:
         """Return how long before a sample the motion began: v = J·t²/2 at first, then v = a·(t - a/(2·J))."""

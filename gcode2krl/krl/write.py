@@ -10,6 +10,7 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
@@ -25,6 +26,7 @@ from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.verify import VerifyReport, compare
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
+from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import BYTES_PER_MB
 
@@ -52,7 +54,7 @@ class WrittenProgram:
 
 
 def write_krl(
-    source: Targets | Prediction,
+    source: Targets | Prediction | Forecast,
     path: str | Path | None,
     cell: Cell | None = None,
     *,
@@ -71,10 +73,11 @@ def write_krl(
 
     Parameters
     ----------
-    source : Targets from `set_targets`, or a Prediction; errors among its ``issues`` refuse the program.
+    source : Targets from `set_targets`, a Prediction or a Forecast; errors among its ``issues`` refuse the
+        program.
     path : the ``.src``, or the folder that it is written into under a name that a controller takes; None
         composes and verifies without writing (everything in one ``.src`` text).
-    cell : needed with Targets; a Prediction has its own.
+    cell : needed with Targets; the others have their own.
     joints : joints at the targets where they are known already.
     name : program name; default: the file's stem. A controller needs both alike.
     allow : findings released by hand, ``CODE:LINE`` or ``CODE`` for all of a kind; the header lists them.
@@ -97,7 +100,7 @@ def write_krl(
         Where the output cannot be written or is an input, or a name or release is wrong.
     """
     # the steps of writing in their order, kept together: most branches are the function's options
-    targets, cell = (source.targets, source.cell) if isinstance(source, Prediction) else (source, cell)
+    targets, cell = (source, cell) if isinstance(source, Targets) else (source.targets, source.cell)
     if cell is None:
         raise input_error("option-value", "write_krl needs a cell with Targets")
     file, issues = _named(path, name, targets.source, cell)
@@ -109,7 +112,8 @@ def write_krl(
     issues = list(released([*issues, *source.issues], allow, strict))
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
     plan = _pilot_plan(source, pilot, joints, file is not None)
-    known = isinstance(source, Prediction) and source.forces is not None
+    give_back()
+    known = not isinstance(source, Targets) and source.has_forces
     layout = Layout(
         guard,
         split if file is not None else "defs",
@@ -158,13 +162,14 @@ def _composed(
     """Return the files of a program, and what reading them back finds."""
     targets, joints = content.targets, content.joints
     texts = compose(targets, joints, cell, name, layout, content.text)
+    give_back()
     return texts, compare(
         read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
     )
 
 
 def _pilot_plan(
-    source: Targets | Prediction, form: PilotForm | None, joints: Joints, sidecar: bool
+    source: Targets | Prediction | Forecast, form: PilotForm | None, joints: Joints, sidecar: bool
 ) -> PilotPlan | Issue | None:
     """Return the pilot force to write, None where there is none to write or it is not wanted.
 
@@ -177,7 +182,7 @@ def _pilot_plan(
             raise input_error("option-value", sentence, "give write_krl a prediction with forces")
         return None
     if form is None:
-        form = source.cell.pilot.form if sidecar and source.forces is not None else "none"
+        form = source.cell.pilot.form if sidecar and source.has_forces else "none"
     if form == "none":
         return None
     if form == "index" and not sidecar:

@@ -13,6 +13,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import FLOAT, FLOATS, INTS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Table, _column
@@ -86,25 +87,27 @@ def knots_of(
     """
     acting = in_contact(force_N)
     lines = np.zeros(len(time_s), dtype=np.int32) if line is None else line
-    size = np.sqrt(np.einsum("ij,ij->i", force_N, force_N))
     if tolerance_N is None:
-        tolerance_N = max(LEAST_TOLERANCE_N, TOLERANCE_SHARE * float(size.max(initial=0.0)))
+        tolerance_N = max(LEAST_TOLERANCE_N, TOLERANCE_SHARE * _largest(force_N))
     least_s = cycle_s * (1.0 - 1e-6)
     kept = _always_kept(time_s, acting, np.zeros(0, dtype=np.int64) if breaks is None else breaks, least_s)
     inner_N = tolerance_N - min(_WRITTEN_N, 0.05 * tolerance_N)
     force = np.ascontiguousarray(force_N)
     ends = np.empty(len(time_s), dtype=np.int64)
     _thin(time_s, path_mm, force, np.flatnonzero(kept), inner_N, least_s, ends, kept)
+    del ends  # as long as the motion
     rows = np.flatnonzero(kept)
     knot_force = _rounded(force[rows], FORCE_DECIMALS)
     knot_time, knot_path = _rounded(time_s[rows], TIME_DECIMALS), _rounded(path_mm[rows], PATH_DECIMALS)
     error = np.zeros(len(time_s))
     _errors(time_s, path_mm, force, rows, knot_time, knot_path, knot_force, error)
     largest = float(error.max(initial=0.0))
-    touched = error[acting]
     issues: tuple[Issue, ...] = ()
     if largest > tolerance_N:
         issues = (_too_steep(largest, tolerance_N, cycle_s, int(lines[np.argmax(error)])),)
+    touched = error[acting]
+    del error
+    touched *= touched
     return Knots(
         line=lines[rows],
         path_mm=knot_path,
@@ -114,15 +117,31 @@ def knots_of(
         deflection_mm=_deflection_at(rows, deflection_mm),
         tolerance_N=tolerance_N,
         max_error_N=largest,
-        rms_error_N=float(np.sqrt(np.mean(touched**2))) if len(touched) else 0.0,
+        rms_error_N=float(np.sqrt(np.mean(touched))) if len(touched) else 0.0,
         issues=issues,
     )
 
 
+def _largest(force_N: Floats) -> float:
+    """Return the largest of forces (m, 3)."""
+    parts = in_chunks(lambda start, end: _largest_square(force_N[start:end]), chunk_borders(len(force_N)))
+    return float(np.sqrt(max(parts, default=0.0)))
+
+
+def _largest_square(vectors: Floats) -> float:
+    return float(np.einsum("ij,ij->i", vectors, vectors).max(initial=0.0))
+
+
 def in_contact(force_N: Floats) -> Bools:
     """Mark the samples (m,) at which a force acts."""
-    x, y, z = force_N.T
-    return np.asarray((x != 0.0) | (y != 0.0) | (z != 0.0))
+    acting = np.empty(len(force_N), dtype=np.bool_)
+
+    def mark(start: int, end: int) -> None:
+        x, y, z = force_N[start:end].T
+        np.logical_or((x != 0.0) | (y != 0.0), z != 0.0, out=acting[start:end])
+
+    in_chunks(mark, chunk_borders(len(force_N)))
+    return acting
 
 
 def force_at(knots: Knots, time_s: Floats) -> Floats:

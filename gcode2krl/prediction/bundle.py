@@ -59,6 +59,11 @@ class Prediction:
         stage_issues = (issue for table in later if table is not None for issue in table.issues)
         return (*self.targets.issues, *stage_issues, *self.skipped)
 
+    @property
+    def has_forces(self) -> bool:
+        """True where forces are known."""
+        return self.forces is not None
+
     def save(self, folder: str | Path, csv: bool = False, inputs: Iterable[str | Path] = ()) -> list[Path]:
         """Write the folder (made if missing); with ``csv`` the tables as CSV too. Returns the files.
 

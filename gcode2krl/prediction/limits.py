@@ -15,7 +15,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
-from gcode2krl.tables import Deflection, Forces, Motion
+from gcode2krl.tables import Deflection, Forces, Motion, lengths
 from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, NMM_PER_NM
 
 GUESSED_FACTOR = 2.0
@@ -38,102 +38,203 @@ def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
     if len(motion) < 3:
         return result
     dt_s = float(motion.time_s[1] - motion.time_s[0])
-    n = min(max(1, round(cycle_s / dt_s)), (len(motion) - 1) // 2)
-    position = motion.position_mm
-    bend = position[2 * n :] - 2.0 * position[n:-n] + position[: -2 * n]
-    result[n:-n] = np.sqrt(np.einsum("ij,ij->i", bend, bend)) / (n * dt_s) ** 2
-    same = motion.tool[2 * n :] == motion.tool[: -2 * n]
-    result[n:-n][~same] = 0.0
+    n = _apart(cycle_s, dt_s, len(motion))
+    result[n:-n] = _bends(motion.position_mm, motion.tool, n, dt_s)
     return result
 
 
-def motion_findings(motion: Motion, line: Ints32, cell: Cell) -> Iterator[Issue]:
-    """Yield what exceeds the limits in a Motion; ``line`` (m,) is the G-code line of each sample."""
-    acceleration = cycle_acceleration(motion, cell.controller.cycle_s)
-    most = cell.limits.acceleration_mm_s2
-    if len(motion) and acceleration.max() > most:
-        row = int(acceleration.argmax())
-        sentence = (
-            f"the tip is accelerated by {acceleration[row] / MM_PER_M:.1f} m/s2 over one cycle, "
-            f"more than {most / MM_PER_M:g}: no robot follows that"
+def _apart(cycle_s: float, dt_s: float, count: int) -> int:
+    """Return how many samples a cycle is, of so many in all."""
+    return min(max(1, round(cycle_s / dt_s)), (count - 1) // 2)
+
+
+def _bends(position_mm: Floats, tool: Ints32, n: int, dt_s: float) -> Floats:
+    """Return the acceleration (m - 2n,) of all but the first and the last n samples, from those n apart."""
+    bend = position_mm[2 * n :] - 2.0 * position_mm[n:-n] + position_mm[: -2 * n]
+    result = np.sqrt(np.einsum("ij,ij->i", bend, bend)) / (n * dt_s) ** 2
+    result[tool[2 * n :] != tool[: -2 * n]] = 0.0
+    return np.asarray(result)
+
+
+class AccelerationLimit:
+    """The largest acceleration of a Motion that comes block after block, over one interpolation cycle."""
+
+    def __init__(self, cell: Cell, dt_s: float, count: int) -> None:
+        """Take the limit of the cell, the time between samples and how many there are in all."""
+        self._most = cell.limits.acceleration_mm_s2
+        self._dt_s, self._apart = dt_s, _apart(cell.controller.cycle_s, dt_s, count) if count > 2 else 0
+        self._position, self._tool = np.zeros((0, 3)), np.zeros(0, dtype=np.int32)
+        self._line = np.zeros(0, dtype=np.int32)
+        self._largest = Largest()
+
+    def take(self, motion: Motion, line: Ints32) -> None:
+        """Judge the next samples; ``line`` (m,) is the G-code line of each."""
+        n = self._apart
+        if not n:
+            return
+        position = np.concatenate([self._position, motion.position_mm])
+        tool, lines = np.concatenate([self._tool, motion.tool]), np.concatenate([self._line, line])
+        if len(position) > 2 * n:
+            self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])
+        self._position, self._tool, self._line = (
+            column[-2 * n :].copy() for column in (position, tool, lines)
         )
-        remedy = "lower F or [controller] rapid_m_s, or raise CDIS there ([limits] acceleration_mm_s2 judges)"
-        yield Issue("warning", "acceleration-high", int(line[row]), sentence, remedy)
+
+    def issues(self) -> Iterator[Issue]:
+        """Yield a warning where no robot follows."""
+        largest = self._largest
+        if largest.value > self._most:
+            sentence = (
+                f"the tip is accelerated by {largest.value / MM_PER_M:.1f} m/s2 over one cycle, "
+                f"more than {self._most / MM_PER_M:g}: no robot follows that"
+            )
+            remedy = (
+                "lower F or [controller] rapid_m_s, or raise CDIS there ([limits] acceleration_mm_s2 judges)"
+            )
+            yield Issue("warning", "acceleration-high", largest.line, sentence, remedy)
 
 
-def force_findings(forces: Forces, line: Ints32, cell: Cell) -> Iterator[Issue]:
-    """Yield what exceeds the limits and the robot's payload; one finding, at the largest value, each."""
-    size_N, limits = np.linalg.norm(forces.force_base_N, axis=1), cell.limits
-    if not len(size_N):
-        return
-    remedy = (
-        "check S, F and the depth of cut; [limits] {key} judges, [stock] and [material] decide the figure"
-    )
-    row = int(size_N.argmax())
-    overload = _payload(forces, line, cell)
-    if overload is not None:
-        yield overload
-    elif size_N[row] > limits.force_N:
-        sentence = f"T{forces.tool[row]} is loaded with {size_N[row]:.0f} N, more than {limits.force_N:g} N"
-        yield Issue("warning", "force-high", int(line[row]), sentence, remedy.format(key="force_N"))
-    torque_Nm = forces.torque_Nmm / NMM_PER_NM
-    row = int(torque_Nm.argmax())
-    if torque_Nm[row] > limits.torque_Nm:
-        sentence = f"T{forces.tool[row]} takes {torque_Nm[row]:.1f} Nm, more than {limits.torque_Nm:g} Nm"
-        yield Issue("warning", "torque-high", int(line[row]), sentence, remedy.format(key="torque_Nm"))
+class ForceLimits:
+    """Forces that come block after block, beyond the limits and the robot's payload, or absurd."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Take the limits of the cell."""
+        self._cell = cell
+        self.force, self.torque, self.load = Largest(), Largest(), Largest()
+        self._cut_N, self._whole_N = 0.0, 0.0
+        self.absurd: Issue | None = None
+        """The first force that is absurd, None if there is none: then no other finding counts."""
+
+    def take(self, forces: Forces, line: Ints32) -> None:
+        """Judge the next samples; ``line`` (m,) is the G-code line of each."""
+        if self.absurd is not None or not len(forces):
+            return
+        with np.errstate(over="ignore", invalid="ignore"):
+            size_N = lengths(forces.force_base_N)
+        self.absurd = _absurd_forces(forces, size_N, line)
+        if self.absurd is None:
+            self.force.take(size_N, line, forces.tool)
+            self.torque.take(forces.torque_Nmm / NMM_PER_NM, line, forces.tool)
+            self._take_load(forces, size_N, line)
+
+    def _take_load(self, forces: Forces, cut_N: Floats, line: Ints32) -> None:
+        """Keep the largest load on the flange: the cut, or the cut and the weight."""
+        own_kg = self._cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
+        down = -self._cell.base_matrix()[2, :3]  # the root's -z along the axes of $BASE
+        whole_N = lengths(forces.force_base_N + own_kg * GRAVITY_M_S2 * down)
+        load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
+        row = self.load.take(load_N, line, forces.tool)
+        if row is not None:
+            self._cut_N, self._whole_N = float(cut_N[row]), float(whole_N[row])
+
+    def issues(self, is_guessed: bool) -> Iterator[Issue]:
+        """Yield what exceeds the limits: one finding, at the largest value, each."""
+        limits, force, torque = self._cell.limits, self.force, self.torque
+        remedy = (
+            "check S, F and the depth of cut; [limits] {key} judges, [stock] and [material] decide the figure"
+        )
+        overload = self._payload(is_guessed)
+        if overload is not None:
+            yield overload
+        elif force.value > limits.force_N:
+            sentence = f"T{force.tool} is loaded with {force.value:.0f} N, more than {limits.force_N:g} N"
+            yield Issue("warning", "force-high", force.line, sentence, remedy.format(key="force_N"))
+        if torque.value > limits.torque_Nm:
+            sentence = f"T{torque.tool} takes {torque.value:.1f} Nm, more than {limits.torque_Nm:g} Nm"
+            yield Issue("warning", "torque-high", torque.line, sentence, remedy.format(key="torque_Nm"))
+
+    def _payload(self, is_guessed: bool) -> Issue | None:
+        rated_kg, own_kg = self._cell.robot.payload.mass_kg, self._cell.load.mass_kg or 0.0
+        if rated_kg is None:
+            return None
+        load, rated_N = self.load, rated_kg * GRAVITY_M_S2
+        if load.value <= rated_N:
+            return None
+        with_own = (
+            f", with the {own_kg:g} kg on the flange {self._whole_N:.0f} N" if self._cut_N < rated_N else ""
+        )
+        sentence = (
+            f"T{load.tool} is loaded with {self._cut_N:.0f} N{with_own}; the {self._cell.robot.model} is "
+            f"rated for {rated_kg:g} kg ({rated_N:.0f} N)"
+        )
+        remedy = "check S, F and the depth of cut, [stock], [material] and [load] mass_kg of the cell"
+        sure = not is_guessed or load.value > GUESSED_FACTOR * rated_N
+        return Issue("error" if sure else "warning", "payload", load.line, sentence, remedy)
 
 
-def _payload(forces: Forces, line: Ints32, cell: Cell) -> Issue | None:
-    rated_kg = cell.robot.payload.mass_kg
-    own_kg = cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
-    if rated_kg is None:
-        return None
-    down = -cell.base_matrix()[2, :3]  # the root's -z along the axes of $BASE
-    cut_N = np.linalg.norm(forces.force_base_N, axis=1)
-    whole_N = np.linalg.norm(forces.force_base_N + own_kg * GRAVITY_M_S2 * down, axis=1)
-    load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
-    row, rated_N = int(load_N.argmax()), rated_kg * GRAVITY_M_S2
-    if load_N[row] <= rated_N:
-        return None
-    with_own = f", with the {own_kg:g} kg on the flange {whole_N[row]:.0f} N" if cut_N[row] < rated_N else ""
-    sentence = (
-        f"T{forces.tool[row]} is loaded with {cut_N[row]:.0f} N{with_own}; the {cell.robot.model} is rated "
-        f"for {rated_kg:g} kg ({rated_N:.0f} N)"
-    )
-    remedy = "check S, F and the depth of cut, [stock], [material] and [load] mass_kg of the cell"
-    guessed = any(issue.code == "stock-guessed" for issue in forces.issues)
-    sure = not guessed or load_N[row] > GUESSED_FACTOR * rated_N
-    return Issue("error" if sure else "warning", "payload", int(line[row]), sentence, remedy)
+class DeflectionLimit:
+    """Deflections that come block after block, beyond the limit, or absurd."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Take the limit of the cell."""
+        self._most = cell.limits.deflection_mm
+        self.bent, self.across = Largest(), Largest()
+        self.absurd: Issue | None = None
+        """The first deflection that is absurd, None if there is none: then no other finding counts."""
+
+    def take(self, deflection: Deflection, reached: Bools, line: Ints32) -> None:
+        """Judge the next samples, of which ``line`` (m,) is the G-code line.
+
+        ``reached`` (m,) is False where the robot has no joint angles, which is reported separately.
+        """
+        if self.absurd is not None or not len(line):
+            return
+        with np.errstate(over="ignore", invalid="ignore"):
+            size_mm = lengths(deflection.deflection_base_mm)
+            across_mm = lengths(deflection.correction_base_mm)
+        self.absurd = _absurd_deflection(deflection, size_mm, reached, line)
+        tool = np.zeros(len(line), dtype=np.int32)
+        self.bent.take(np.nan_to_num(size_mm), line, tool)
+        self.across.take(np.nan_to_num(across_mm), line, tool)
+
+    def issues(self) -> Iterator[Issue]:
+        """Yield the deflection that exceeds the limit, at its largest value."""
+        if self.bent.value > self._most:
+            sentence = f"the tool bends away by {self.bent.value:.2f} mm, more than {self._most:g} mm"
+            remedy = (
+                "cut less deep or slower, or state [stock] and a measured [compliance]; "
+                "[limits] deflection_mm judges"
+            )
+            yield Issue("warning", "deflection-high", self.bent.line, sentence, remedy)
 
 
-def absurd_forces(forces: Forces, line: Ints32) -> Issue | None:
+class Largest:
+    """The largest of values that come some at a time, the first of equal ones, with its place."""
+
+    def __init__(self) -> None:
+        """Begin without a value."""
+        self.value = -np.inf
+        self.line, self.tool = 0, 0
+
+    def take(self, values: Floats, line: Ints32, tool: Ints32) -> int | None:
+        """Take values (m,) with lines and tools; return the row of a new largest one, None without."""
+        row = int(values.argmax())
+        if not values[row] > self.value:
+            return None
+        self.value, self.line, self.tool = float(values[row]), int(line[row]), int(tool[row])
+        return row
+
+
+def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None:
     """Return the finding on absurd forces, None if there are none."""
-    columns = (
-        forces.force_base_N,
-        forces.moment_base_Nmm,
-        forces.torque_Nmm[:, None],
-        forces.peak_N[:, None],
-    )
-    finite = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])
-    with np.errstate(over="ignore", invalid="ignore"):
-        wrong = ~finite | ~(np.linalg.norm(forces.force_base_N, axis=1) <= ABSURD_FORCE_N)
-    if not wrong.any():
+    columns = (forces.force_base_N, forces.moment_base_Nmm, forces.torque_Nmm, forces.peak_N)
+    if all(np.isfinite(column).all() for column in columns) and size_N.max() <= ABSURD_FORCE_N:
         return None
-    sentence = f"the forces on T{forces.tool[np.argmax(wrong)]} are absurd: they are left out"
+    rows = len(forces)
+    finite = np.logical_and.reduce([np.isfinite(column.reshape(rows, -1)).all(axis=1) for column in columns])
+    wrong = int(np.argmax(~finite | ~(size_N <= ABSURD_FORCE_N)))
+    sentence = f"the forces on T{forces.tool[wrong]} are absurd: they are left out"
     remedy = "check [material] (N/mm2, N/mm), the tool's diameter_mm and teeth, S and F"
-    return Issue("error", "force-absurd", int(line[np.argmax(wrong)]), sentence, remedy)
+    return Issue("error", "force-absurd", int(line[wrong]), sentence, remedy)
 
 
-def absurd_deflection(deflection: Deflection, reached: Bools, line: Ints32) -> Issue | None:
-    """Return the finding on an absurd deflection, None if there is none.
-
-    ``reached`` (m,) is False where the robot has no joint angles, which is reported separately.
-    """
+def _absurd_deflection(deflection: Deflection, size_mm: Floats, reached: Bools, line: Ints32) -> Issue | None:
+    """Return the finding on an absurd deflection, None if there is none."""
     columns = (deflection.deflection_base_mm, deflection.correction_base_mm)
+    if all(np.isfinite(column).all() for column in columns) and size_mm.max() <= ABSURD_DEFLECTION_MM:
+        return None
     finite = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])
-    with np.errstate(over="ignore", invalid="ignore"):
-        small = np.linalg.norm(deflection.deflection_base_mm, axis=1) <= ABSURD_DEFLECTION_MM
-    wrong = reached & ~(finite & small)
+    wrong = reached & ~(finite & (size_mm <= ABSURD_DEFLECTION_MM))
     if not wrong.any():
         return None
     sentence = f"the deflection comes out beyond {ABSURD_DEFLECTION_MM:g} mm: it is left out"
@@ -142,16 +243,3 @@ def absurd_deflection(deflection: Deflection, reached: Bools, line: Ints32) -> I
         "1e8 to 1e11), and the forces"
     )
     return Issue("error", "deflection-absurd", int(line[np.argmax(wrong)]), sentence, remedy)
-
-
-def deflection_findings(deflection: Deflection, line: Ints32, cell: Cell) -> Iterator[Issue]:
-    """Yield the deflection that exceeds the limit, at its largest value."""
-    size_mm = np.linalg.norm(deflection.deflection_base_mm, axis=1)
-    row, most = int(np.argmax(np.nan_to_num(size_mm))) if len(size_mm) else 0, cell.limits.deflection_mm
-    if len(size_mm) and size_mm[row] > most:
-        sentence = f"the tool bends away by {size_mm[row]:.2f} mm, more than {most:g} mm"
-        remedy = (
-            "cut less deep or slower, or state [stock] and a measured [compliance]; "
-            "[limits] deflection_mm judges"
-        )
-        yield Issue("warning", "deflection-high", int(line[row]), sentence, remedy)

@@ -1,6 +1,7 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
 from gcode2krl.robot.joints import (
+    Follower,
     angles_near,
     follow,
     follow_motion,
@@ -8,13 +9,15 @@ from gcode2krl.robot.joints import (
     joints_from_angles,
     motion_angles,
     ptp_joints,
-    speed_share,
     target_angles,
+    trial_rows,
 )
 from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
 from gcode2krl.robot.quality import pose_quality
+from gcode2krl.robot.standing import raise_shares
 
 __all__ = [
+    "Follower",
     "angles_near",
     "flange_frames",
     "follow",
@@ -27,6 +30,7 @@ __all__ = [
     "motion_angles",
     "pose_quality",
     "ptp_joints",
-    "speed_share",
+    "raise_shares",
     "target_angles",
+    "trial_rows",
 ]

@@ -19,9 +19,9 @@ from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinn
 from gcode2krl.robot.findings import joint_findings
 from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.lines import Line, count_samples, sample_lines, samples_at
-from gcode2krl.robot.standing import Bits, limit_margin, speed_share_of_rows, what_is_wrong
+from gcode2krl.robot.standing import Bits, limit_margin, what_is_wrong
 from gcode2krl.robot.velocity_kinematics import smallest_singular_value
-from gcode2krl.tables import Joints, Motion, Targets
+from gcode2krl.tables import Joints, Motion, Targets, blocks_of, joined, rows_at, rows_of
 
 _ANGLE_GRID_RAD = 1e-9
 _AGREEMENT_RAD = 1e-9
@@ -78,58 +78,90 @@ def angles_near(motion: Motion, q_rad: Floats, cell: Cell) -> Floats:
 
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
     """Return angles (m, 6) in rad and speeds (m, 6) in rad/s of a Motion; speeds are central differences."""
-    count = len(motion)
-    starts = np.zeros(count, dtype=np.bool_)
-    starts[0] = True
+    rows = trial_rows(len(motion))
+    dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
+    follower = Follower(rows_at(motion, rows), rows, dt_s, cell)
+    parts = [follower.take(block, ends) for block, ends in blocks_of(motion)]
+    q_rad, qd_rad_s = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return q_rad, qd_rad_s
 
-    def path(rows: slice | Ints) -> Path:
-        return Path(motion.position_mm[rows], motion.rotation[rows], motion.tool[rows], starts[rows])
 
-    samples = thinned(np.zeros(1, dtype=np.int64), count)
-    branch = best_branch(path(samples), samples, cell)
-    q = np.empty((count, 6))
+def trial_rows(count: int) -> Ints:
+    """Return the samples of a Motion of so many on which the branch is tried."""
+    return thinned(np.zeros(1, dtype=np.int64), count)
 
-    def solve(start: int, end: int, before: Floats | None) -> Floats:
-        first = max(start - 1, 0)
-        angles = branch.joints(
-            path(slice(first, end)), cell, branch.guess(first) if before is None else before
+
+class Follower:
+    """Joints along a Motion that comes block after block, one branch for all."""
+
+    def __init__(self, trial: Motion, rows: Ints, dt_s: float, cell: Cell) -> None:
+        """Take the samples of the trial, which rows of the Motion they are, and the time between two rows."""
+        self._cell, self._window_s = cell, 2.0 * dt_s
+        starts = np.zeros(len(trial), dtype=np.bool_)
+        starts[0] = True
+        self._branch = best_branch(Path(trial.position_mm, trial.rotation, trial.tool, starts), rows, cell)
+        self._before: Motion | None = None
+        self._row = 0
+        self._reached = cell.home_q_rad()
+        self._q, self._tool = np.zeros((0, 6)), np.zeros(0, dtype=np.int32)
+
+    def take(self, motion: Motion, ends: bool) -> tuple[Floats, Floats]:
+        """Return angles and speeds (m, 6) of the rows that follow those returned before.
+
+        The last row waits for the one behind it, unless the Motion ``ends`` with it.
+        """
+        known, tool = (
+            np.concatenate([self._q, self._angles(motion)]),
+            np.concatenate([self._tool, motion.tool]),
         )
-        q[start:end] = angles[start - first :]
-        row_before: Floats = angles[0]
-        return row_before
+        qd = self._speeds(known, tool)
+        first, last = max(len(self._q) - 1, 0), len(known) - (not ends)
+        self._q, self._tool = known[-2:].copy(), tool[-2:].copy()
+        return known[first:last], qd[first:last]
 
-    _solve_parts(solve, q, chunk_borders(count), cell)
-    return q, _speeds(q, motion)
+    def _angles(self, motion: Motion) -> Floats:
+        """Return the angles (m, 6) of the next rows."""
+        shared = int(self._before is not None)
+        whole = motion if self._before is None else joined(self._before, motion)
+        starts = np.zeros(len(whole), dtype=np.bool_)
+        starts[0] = not shared
+        q = np.concatenate([self._q[-1:], np.empty((len(motion), 6))])
+
+        def path(rows: slice) -> Path:
+            return Path(whole.position_mm[rows], whole.rotation[rows], whole.tool[rows], starts[rows])
+
+        def solve(start: int, end: int, before: Floats | None) -> Floats:
+            first = max(start - 1, 0)
+            guess = self._branch.guess(self._row - shared + first) if before is None else before
+            angles = self._branch.joints(path(slice(first, end)), self._cell, guess)
+            q[start:end] = angles[start - first :]
+            row_before: Floats = angles[0]
+            return row_before
+
+        borders = [shared + border for border in chunk_borders(len(motion))]
+        self._reached = _solve_parts(solve, q, borders, self._reached)
+        self._before, self._row = rows_of(motion, len(motion) - 1, len(motion)), self._row + len(motion)
+        return q[shared:]
+
+    def _speeds(self, q: Floats, tool: Ints32) -> Floats:
+        """Return the central differences (m, 6), 0 in the first and last row and while the tool changes."""
+        qd = np.zeros_like(q)
+        if len(q) > 2:
+
+            def differences(start: int, end: int) -> None:
+                inner = qd[start + 1 : end + 1]
+                np.subtract(q[start + 2 : end + 2], q[start:end], out=inner)
+                inner /= self._window_s
+
+            in_chunks(differences, chunk_borders(len(q) - 2))
+        changed = np.flatnonzero(tool[1:] != tool[:-1])
+        qd[changed], qd[changed + 1] = 0.0, 0.0
+        return qd
 
 
 def joints_from_angles(motion: Motion, q_rad: Floats, qd_rad_s: Floats, cell: Cell) -> Joints:
     """Return the table of angles and speeds from `motion_angles`."""
     return _joints(q_rad, qd_rad_s, motion.tool, cell)
-
-
-def speed_share(motion: Motion, qd_rad_s: Floats, cell: Cell, rows: int) -> Floats | None:
-    """Return the largest joint speed over its limit (rows,) in each row of the Toolpath that moves.
-
-    None where the limits are not known; 0 in rows without a sample.
-    """
-    return speed_share_of_rows(qd_rad_s, motion.move, rows, cell)
-
-
-def _speeds(q: Floats, motion: Motion) -> Floats:
-    """Return the central differences (m, 6); at both ends, and while the tool changes, the robot rests."""
-    qd = np.zeros_like(q)
-    if len(q) > 2:
-        window_s = 2.0 * (motion.time_s[1] - motion.time_s[0])
-
-        def differences(start: int, end: int) -> None:
-            inner = qd[start + 1 : end + 1]
-            np.subtract(q[start + 2 : end + 2], q[start:end], out=inner)
-            inner /= window_s
-
-        in_chunks(differences, chunk_borders(len(q) - 2))
-    changed = np.flatnonzero(motion.tool[1:] != motion.tool[:-1])
-    qd[changed], qd[changed + 1] = 0.0, 0.0
-    return qd
 
 
 def _branch_of(targets: Targets, counts: Ints, cell: Cell) -> Branch:
@@ -159,7 +191,7 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
         q[target[ends]] = found_own[ends]
         return found[0] if shared else np.full(6, np.nan)
 
-    _solve_parts(solve, q, chunk_borders(len(targets)), cell)
+    _solve_parts(solve, q, chunk_borders(len(targets)), cell.home_q_rad())
     q[targets.home] = cell.home_q_rad()
     return q, wrong
 
@@ -173,15 +205,14 @@ def _with_row_before(targets: Targets, counts: Ints, start: int, end: int, cell:
 
 
 def _solve_parts(
-    solve: Callable[[int, int, Floats | None], Floats], q: Floats, borders: list[int], cell: Cell
-) -> None:
+    solve: Callable[[int, int, Floats | None], Floats], q: Floats, borders: list[int], last: Floats
+) -> Floats:
     """Solve the parts; solve a part again where it and the part before disagree on their common row.
 
     ``solve(start, end, before)`` writes the joints of its rows into ``q`` and returns those (6,) it has for
-    the row before them.
+    the row before them. Takes and returns the joints (6,) that were reached last.
     """
     shared = in_chunks(lambda start, end: solve(start, end, None), borders)
-    last = cell.home_q_rad()
     for (start, end), row_before in zip(itertools.pairwise(borders), shared, strict=True):
         reached = np.flatnonzero(~np.isnan(q[start:end, 0]))  # that does not depend on the row before
         if not len(reached):
@@ -189,6 +220,7 @@ def _solve_parts(
         if start and not (np.abs(row_before - q[start - 1]) <= _AGREEMENT_RAD).all():  # NaN does not agree
             solve(start, end, last)
         last = np.array(q[start + reached[-1]])
+    return last
 
 
 def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:

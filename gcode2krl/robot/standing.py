@@ -48,18 +48,20 @@ def what_is_wrong(q_rad: Floats, duration_s: Floats, cell: Cell) -> Bits:
     return wrong
 
 
-def speed_share_of_rows(qd_rad_s: Floats, row: Ints32, count: int, cell: Cell) -> Floats | None:
-    """Return the largest ratio (count,) of a joint speed to its limit in each row, 0 without samples.
+def raise_shares(share: Floats, qd_rad_s: Floats, row: Ints32, cell: Cell) -> None:
+    """Raise the shares (n,) in place to the largest ratio of a joint speed to its limit in each row.
 
-    ``row`` (m,) is the row that each of the speeds (m, 6) belongs to. None where the limits are not known.
+    ``row`` (m,) is the row that each of the speeds (m, 6) belongs to.
     """
     speeds = cell.robot.speeds.qd_deg_s
-    if speeds is None:
-        return None
-    share = np.zeros(count)
+    if speeds is None or not len(row):
+        return
+    first = int(row.min())
+    found = np.zeros(int(row.max()) + 1 - first)
     most = shaped("most", np.array(speeds) * RAD_PER_DEG, 6)
-    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row), share)
-    return share
+    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row - first), found)
+    part = share[first : first + len(found)]
+    np.maximum(part, found, out=part)
 
 
 def _judged(q_rad: Floats, duration_s: Floats, cell: Cell) -> tuple[Floats, Bits]:

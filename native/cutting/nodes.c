@@ -49,27 +49,31 @@ static int64_t at_multiple(const Samples *samples, int64_t i, double apart_mm) {
 /* Mark the nodes of a motion: where the way passes multiples of apart_mm (a row a tool; 0 = every sample), so that the
    same ones are read however densely samples lie.
 
-   Behind a turn or a change the engagement is a new one, and every sample is a node for settled_mm (a row a tool). */
-EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Floats settled_mm, Bools node) {
+   Behind a turn or a change the engagement is a new one, and every sample is a node for new_mm (a row a tool): up to
+   settled_mm, at a node at which the samples may be divided (NaN at others). The first sample is one, with its
+   settled_mm given; the last one is a node where the motion `ends`. */
+EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart_mm, Floats new_mm, int64_t ends,
+                               Bools node, Floats settled_mm) {
     int64_t last = 0;
-    double settled_at_mm = -INFINITY;
+    double settled = AT(settled_mm, 0);
     for (int64_t i = 0; i < node.rows; i++)
-        AT(node, i) = i == 0 || i == node.rows - 1;
+        AT(node, i) = i == 0 || (ends && i == node.rows - 1);
     for (int64_t i = 1; i < node.rows; i++) {
         const int64_t tool = AT(samples->tool, i);
         const double way_mm = AT(samples->way_mm, i), apart = AT(apart_mm, tool);
         const bool is_new = changes(samples, rapid, i) || has_turned(samples, last, i);
         if (is_new) {
-            settled_at_mm = way_mm + AT(settled_mm, tool);
+            settled = way_mm + AT(new_mm, tool);
             AT(node, i - 1) = 1;
         }
         const int64_t near = apart > 0.0 ? at_multiple(samples, i, apart) : i;
         if (near >= 0)
             AT(node, near) = 1;
-        if (is_new || way_mm < settled_at_mm)
+        if (is_new || way_mm < settled)
             AT(node, i) = 1;
         if (AT(node, i) || near >= 0)
             last = AT(node, i) ? i : i - 1;
+        AT(settled_mm, i) = last == i ? settled : NAN;
     }
 }
 

@@ -1,12 +1,14 @@
-"""Findings on chips and modes, against a plain loop over all samples."""
+"""Findings on samples that come some at a time, against a plain loop over all of them."""
+
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 from gcode2krl.cell import resolve_cell
-from gcode2krl.cutting.findings import Cut, _chips, _modes
+from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip
-from gcode2krl.tables import Forces
+from gcode2krl.tables import Forces, rows_of
 
 SPEEDS_RPM = np.array([0.0, -600.0, 600.0, 590.0, 6000.0, 12000.0])
 CYCLE_S = 0.012
@@ -34,12 +36,10 @@ def random_cut(seed, count, cell):
         spindle_rad_s=speeds[run],
         f_z_mm=feed,
         ramp_rad=random.uniform(-0.5, 0.5, count),
-        cycle_s=CYCLE_S,
         centre_mm=zero,
-        overlap_mm=np.zeros((count, 3)),
+        overlap_mm=np.zeros((count, 2)),
         step_mm=zero,
         descent_mm=zero,
-        blend_mm=0.0,
     )
     three = np.zeros((count, 3))
     forces = Forces(
@@ -55,6 +55,18 @@ def random_cut(seed, count, cell):
     return cut, forces
 
 
+def found_in(cut, forces, cell, codes, rows=7_000):
+    """Return the findings of these codes on samples that are taken so many rows at a time."""
+    findings = Findings(cell, sorted(cell.tool), guessed=False, blend_mm=0.0, cycle_s=CYCLE_S)
+    for start in range(0, len(forces), rows):
+        columns = {spec.name: getattr(cut, spec.name)[start : start + rows] for spec in fields(cut)}
+        findings.take(Cut(**columns), rows_of(forces, start, start + rows))
+    return [issue for issue in findings.issues() if issue.code in codes]
+
+
+CHIPS, MODES = {"chip-thin", "chip-thick"}, {"near-mode"}
+
+
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("count", [1, 300, 40_000])
 def test_chips_are_counted_as_one_by_one(seed, count):
@@ -68,7 +80,8 @@ def test_chips_are_counted_as_one_by_one(seed, count):
     ):
         if wrong and len(wrong) * CYCLE_S >= 0.1 and len(wrong) >= 0.05 * len(rows):
             expected.append((code, wrong[0] + 10, f"in {len(wrong) / len(rows):.0%} of the time"))
-    found = list(_chips(cut, forces))
+    found = found_in(cut, forces, cell_with_modes(), CHIPS)
+    expected.sort(key=lambda entry: entry[1])
     assert [(issue.code, issue.line) for issue in found] == [(code, line) for code, line, _ in expected]
     for issue, (_, _, words) in zip(found, expected, strict=True):
         assert words in issue.message
@@ -92,7 +105,8 @@ def test_modes_are_found_for_each_speed_and_tool_at_the_first_cut_with_it(seed, 
             orders = {1, 2, 3, teeth, 2 * teeth, 3 * teeth}
             if any(abs(order * turns_hz - mode) <= 0.15 * mode for order in orders):
                 expected.append((first_of_speed[speed] + 10, f" of T{tool} (", f" {mode:g} Hz"))
-    found = list(_modes(cut, forces, cell))
+    found = found_in(cut, forces, cell, MODES)
+    expected.sort(key=lambda entry: entry[0])
     assert [issue.line for issue in found] == [line for line, _, _ in expected]
     for issue, (_, tool_words, mode_words) in zip(found, expected, strict=True):
         assert tool_words in issue.message
@@ -102,5 +116,5 @@ def test_modes_are_found_for_each_speed_and_tool_at_the_first_cut_with_it(seed, 
 def test_the_constructed_cuts_meet_modes_and_wrong_chips():
     cell = cell_with_modes()
     cuts = [random_cut(seed, 40_000, cell) for seed in range(8)]
-    assert sum(len(list(_modes(*cut, cell))) for cut in cuts) >= 8
-    assert {issue.code for cut in cuts for issue in _chips(*cut)} == {"chip-thin", "chip-thick"}
+    assert sum(len(found_in(*cut, cell, MODES)) for cut in cuts) >= 8
+    assert {issue.code for cut in cuts for issue in found_in(*cut, cell, CHIPS)} == CHIPS

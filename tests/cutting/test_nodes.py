@@ -62,7 +62,7 @@ def nodes_of(position, direction, apart_mm, rapid=None, tool=None):
     samples = Samples(position, direction, way, np.zeros(count), tool, np.zeros(count, np.int64), node)
     rapid = np.zeros(count, bool) if rapid is None else rapid
     apart = np.full(tool.max() + 1, apart_mm)
-    mark_nodes(samples, rapid, apart, 2.0 * apart, node)
+    mark_nodes(samples, rapid, apart, 2.0 * apart, True, node, np.full(len(node), -np.inf))
     return node, way
 
 

@@ -1,0 +1,262 @@
+"""The stages on a Motion, block after block, so that no stage keeps all samples."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gcode2krl import compliance, cutting, krc4, program, robot
+from gcode2krl.arrays import Floats, Ints32
+from gcode2krl.cell import Cell
+from gcode2krl.compiled.memory import give_back
+from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.files.spool import Spool, let_go
+from gcode2krl.pilot import to_pilot_frame
+from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
+from gcode2krl.tables import Deflection, Forces, Motion, PilotForce, Targets, Toolpath, joined, rows_of
+
+_SLOWING_ROUNDS = 3
+_LEAST_SHARE = 1.0 + 1e-3
+"""Joint speed over its limit above which a move is slowed down."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A motion that is planned, and what was seen on a first way along it."""
+
+    course: krc4.Course
+    issues: tuple[Issue, ...]
+    outlook: Callable[[], cutting.Outlook]
+    """Raises `RefusedError` where the motion cannot be cut out of one field."""
+    kept: "Kept | None"
+
+
+class Kept(NamedTuple):
+    """The samples of a motion, where they were asked for."""
+
+    motion: Motion
+    q_rad: Floats | None
+    """(m, 6) None where joints were not needed."""
+    qd_rad_s: Floats | None
+
+
+def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False) -> Planned:
+    """Plan the motion that the controller will command; see `pipeline.plan_motion`.
+
+    Only where it ``keeps`` them are the samples of the first way along it returned.
+    """
+    chain = krc4.build_chain(targets, cell)
+    profile = krc4.plan(chain, cell)
+    issues = list(krc4.motion_issues(chain, profile, cell))
+    slower, slowed, planned_s = chain, chain.speed_mm_s, profile.total_s
+    for trial in range(_SLOWING_ROUNDS + 1):
+        course = krc4.Course(targets, slower, profile, cell, dt_s)
+        is_last = trial == _SLOWING_ROUNDS
+        seen = _seen_along(course, targets, chain, cell, judges_joints=not is_last, keeps=keeps)
+        if seen.share is None or seen.share.max(initial=0.0) <= _LEAST_SHARE:
+            break
+        slowed = slowed / np.maximum(seen.share, 1.0)
+        slower = krc4.with_speed(chain, slowed)
+        profile = krc4.plan(slower, cell)
+        lost_s = profile.total_s - planned_s
+        worst = int(np.argmin(slowed / chain.speed_mm_s))
+        issues = [issue for issue in issues if issue.code != "joint-speed"]
+        sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
+        remedy = "lower F there, move the part, or turn the tool about its axis"
+        issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
+    issues += seen.acceleration.issues()
+    return Planned(course, tuple(issues), seen.watch.outlook, seen.kept)
+
+
+class _Seen(NamedTuple):
+    """What is seen on a way along a motion."""
+
+    share: Floats | None
+    """(n,) largest joint speed over its limit of each move of the chain; None where it is not judged."""
+    acceleration: AccelerationLimit
+    watch: cutting.Watch
+    kept: Kept | None
+
+
+def _seen_along(
+    course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, *, judges_joints: bool, keeps: bool
+) -> _Seen:
+    """Go along a motion, and look at joint speeds, accelerations and tools."""
+    line = _line_of_move(targets, chain)
+    acceleration, watch = AccelerationLimit(cell, course.dt_s, course.count), cutting.Watch()
+    judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
+    follower = follower_of(course, cell) if judges_joints else None
+    share = np.zeros(len(line)) if judges_joints else None
+    motions, angles, waiting = [], [], np.zeros(0, dtype=np.int32)
+    for motion, ends in course.blocks():
+        acceleration.take(motion, line[motion.move])
+        watch.take(motion)
+        if follower is not None and share is not None:
+            q, qd = follower.take(motion, ends)
+            waiting = np.concatenate([waiting, motion.move])
+            robot.raise_shares(share, qd, waiting[: len(qd)], cell)
+            waiting = waiting[len(qd) :]
+            if keeps:
+                angles.append((q, qd))
+        if keeps:
+            motions.append(motion)
+    kept = None
+    if keeps:
+        found = (np.concatenate(columns) for columns in zip(*angles, strict=True)) if angles else (None, None)
+        kept = Kept(joined(*motions), *found)
+    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, kept)
+
+
+def follower_of(course: krc4.Course, cell: Cell) -> robot.Follower:
+    """Return what solves the joints along a motion."""
+    rows = robot.trial_rows(course.count)
+    return robot.Follower(course.at(rows), rows, course.dt_s, cell)
+
+
+def _line_of_move(targets: Targets, chain: krc4.Chain) -> Ints32:
+    """Return the G-code line of each row of the Toolpath up to the last that moves."""
+    programmed = targets.move >= 0
+    line = np.zeros(int(max(targets.move.max(), chain.move.max(initial=0))) + 1, dtype=np.int32)
+    line[targets.move[programmed]] = targets.source_line[programmed]
+    return line
+
+
+class Block(NamedTuple):
+    """Samples that have passed all stages."""
+
+    motion: Motion
+    line: Ints32
+    """(m,) line of the G-code."""
+    forces: Forces
+    deflection: Deflection | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was found of the forces of a whole motion."""
+
+    force_issues: tuple[Issue, ...] | None
+    """None where there are no forces."""
+    deflection_issues: tuple[Issue, ...] | None
+    """None where there is no deflection."""
+    skipped: tuple[Issue, ...]
+    """Why a stage did not run."""
+
+
+class Loads:
+    """Forces and deflection along a motion that comes block after block, and what is found of them."""
+
+    def __init__(
+        self, toolpath: Toolpath, cell: Cell, outlook: Callable[[], cutting.Outlook], dt_s: float
+    ) -> None:
+        """Set up the stock; raises `NotUnderstoodError` where it cannot be read."""
+        self._toolpath, self._cell = toolpath, cell
+        self._milling: cutting.Milling | None = None
+        self._skipped: tuple[Issue, ...] = ()
+        self._missing = compliance.missing_stiffness(cell)
+        self._force_limits, self._deflection_limit = ForceLimits(cell), DeflectionLimit(cell)
+        self._cuts = np.zeros(len(toolpath), dtype=np.bool_)
+        self._waiting: tuple[Motion, Floats, Floats] | None = None
+        if cell.material is None:
+            remedy = "give [material] in the cell"
+            self._skipped = (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
+            return
+        try:
+            self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s)
+            give_back()
+        except RefusedError as error:
+            self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
+
+    @property
+    def possible(self) -> bool:
+        """True where there are forces to take."""
+        return self._milling is not None
+
+    def take(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, ends: bool) -> Block:
+        """Cut the next samples; return those that are done, which follow the ones returned before.
+
+        The joints may be those of fewer samples, as long as they follow each other. The motion ``ends`` with
+        these samples.
+        """
+        if self._milling is None:
+            raise ValueError("there are no forces")
+        forces = self._milling.take(motion, ends)
+        if self._waiting is not None:
+            old, q_old, qd_old = self._waiting
+            motion = joined(old, motion)
+            q_rad, qd_rad_s = np.concatenate([q_old, q_rad]), np.concatenate([qd_old, qd_rad_s])
+        count = len(forces)
+        rest = rows_of(motion, count, len(motion))
+        self._waiting = (rest, q_rad[count:].copy(), qd_rad_s[count:].copy())
+        return self._judged(rows_of(motion, 0, count), q_rad[:count], qd_rad_s[:count], forces)
+
+    def _judged(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, forces: Forces) -> Block:
+        line = self._toolpath.source_line[np.clip(motion.move, 0, len(self._toolpath) - 1)]
+        let_go(self._toolpath)
+        self._force_limits.take(forces, line)
+        self._cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
+        deflection = None
+        if self._missing is None and self._force_limits.absurd is None:
+            with np.errstate(all="ignore"):  # an absurd result becomes a finding
+                deflection = compliance.deflect_at(q_rad, qd_rad_s, forces, self._cell)
+            reached = np.asarray(np.isfinite(q_rad).all(axis=1))
+            self._deflection_limit.take(deflection, reached, line)
+        return Block(motion, line, forces, deflection)
+
+    def outcome(self) -> Outcome:
+        """Return what was found, once the motion has ended."""
+        if self._milling is None:
+            return Outcome(None, None, self._skipped)
+        found = self._milling.issues()
+        limits, bent = self._force_limits, self._deflection_limit
+        if limits.absurd is not None:
+            return Outcome(None, None, (*found, limits.absurd))
+        guessed = any(issue.code == "stock-guessed" for issue in found)
+        feeds = program.feeds_per_tooth(self._toolpath, self._cell, self._cuts)
+        force_issues = (*found, *limits.issues(guessed), *feeds)
+        let_go(self._toolpath)
+        if self._missing is not None:
+            return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
+        if bent.absurd is not None:
+            return Outcome(force_issues, None, (bent.absurd,))
+        return Outcome(force_issues, tuple(bent.issues()), ())
+
+
+class PilotSamples:
+    """What the pilot force of a program is made from, gathered from samples that have passed all stages."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Begin without a sample."""
+        self._cell = cell
+        names = ("time_s", "path_mm", "speed_mm_s", "acceleration_mm_s2")
+        self._columns = {name: Spool(np.float64) for name in names}
+        self._columns |= {"line": Spool(np.int32), "force_N": Spool(np.float64, 3)}
+        self._bent = Spool(np.float64, 3)
+
+    def take(self, motion: Motion, line: Ints32, forces: Forces, deflection: Deflection | None) -> None:
+        """Add the next samples."""
+        for name, spool in self._columns.items():
+            if name in ("line", "force_N"):
+                continue
+            spool.append(getattr(motion, name))
+        self._columns["line"].append(line)
+        self._columns["force_N"].append(self._turned(forces.force_base_N, motion))
+        if deflection is not None:
+            self._bent.append(self._turned(deflection.deflection_base_mm, motion))
+
+    def _turned(self, vectors: Floats, motion: Motion) -> Floats:
+        return to_pilot_frame(vectors, motion.rotation, motion.tool, self._cell) if len(motion) else vectors
+
+    def force(self, with_deflection: bool) -> PilotForce:
+        """Return all samples; a deflection that is not known is NaN."""
+        columns: dict[str, Any] = {name: spool.column() for name, spool in self._columns.items()}
+        unknown = np.broadcast_to(np.nan, columns["force_N"].shape)
+        return PilotForce(**columns, deflection_mm=self._bent.column() if with_deflection else unknown)
+
+
+def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[tuple[Motion, Floats, Floats, bool]]:
+    """Yield the blocks of a motion with the joints and speeds that are known so far, see `Loads.take`."""
+    follower = follower_of(course, cell)
+    for motion, ends in course.blocks():
+        yield motion, *follower.take(motion, ends), ends

@@ -1,0 +1,121 @@
+"""Samples that pass the stages in blocks are the tables of `predict`; memory does not grow by them."""
+
+import tracemalloc
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcode2krl import load_cell, read_gcode, set_targets
+from gcode2krl.blockwise import Loads, follower_of, plan_course
+from gcode2krl.cli.main import main
+from gcode2krl.pipeline import forecast_of, forecast_toolpath, plan_motion, predict_toolpath, solve_joints
+from gcode2krl.tables import joined, lengths, rows_of
+
+REPOSITORY = Path(__file__).parents[1]
+GOLDEN = REPOSITORY / "tests" / "golden" / "programs"
+BYTES_A_LINE = 1500.0
+"""Of Python's and numpy's memory, most that a line of G-code may add to the peak of a translation."""
+
+
+@pytest.fixture(scope="module")
+def part():
+    cell = load_cell(GOLDEN / "everything.toml")
+    toolpath = read_gcode(GOLDEN / "everything.nc", cell)
+    return toolpath, set_targets(toolpath, cell), cell
+
+
+def same(one, other):
+    for spec in fields(one):
+        if "tail" in spec.metadata:
+            assert np.array_equal(getattr(one, spec.name), getattr(other, spec.name), equal_nan=True), (
+                spec.name
+            )
+
+
+def test_lengths_are_those_of_numpy_to_the_bit():
+    vectors = np.random.default_rng(3).normal(size=(10_000, 3)) * [1e3, 1.0, 1e-3]
+    assert (lengths(vectors) == np.linalg.norm(vectors, axis=1)).all()
+
+
+@pytest.mark.parametrize("rows", [1, 23, 1000])
+def test_motion_joints_forces_and_deflection_in_blocks_are_those_as_a_whole(part, rows):
+    toolpath, targets, cell = part
+    whole = predict_toolpath(toolpath, cell, targets=targets)
+    planned = plan_course(targets, cell, cell.controller.cycle_s)
+    follower = follower_of(planned.course, cell)
+    loads = Loads(toolpath, cell, planned.outlook, planned.course.dt_s)
+    angles, blocks = [], []
+    for motion, ends in planned.course.blocks(rows):
+        angles.append(follower.take(motion, ends))
+        blocks.append(loads.take(motion, *angles[-1], ends))
+    same(joined(*(block.motion for block in blocks)), whole.motion)
+    same(joined(*(block.forces for block in blocks)), whole.forces)
+    bent_mm = np.concatenate([block.deflection.deflection_base_mm for block in blocks])
+    np.testing.assert_allclose(bent_mm, whole.deflection.deflection_base_mm, rtol=0, atol=1e-10)
+    q_rad, qd_rad_s = (np.concatenate(columns) for columns in zip(*angles, strict=True))
+    # a product of matrices is rounded by how many rows it has
+    np.testing.assert_allclose(q_rad, whole.joints.q_rad, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(qd_rad_s, whole.joints.qd_rad_s, rtol=0, atol=1e-9)
+    outcome = loads.outcome()
+    assert outcome.force_issues == whole.forces.issues
+    assert outcome.deflection_issues == whole.deflection.issues
+    assert planned.issues == whole.motion.issues
+
+
+def test_a_forecast_says_what_the_prediction_says(part):
+    toolpath, targets, cell = part
+    whole = forecast_of(predict_toolpath(toolpath, cell, targets=targets))
+    passed = forecast_toolpath(toolpath, cell, targets)
+    assert passed.issues == whole.issues
+    assert passed.loads == whole.loads
+    assert (passed.time_s, passed.path_mm) == (whole.time_s, whole.path_mm)
+    same(passed.pilot, whole.pilot)
+
+
+def test_rows_of_a_table_joined_are_the_table(part):
+    _, targets, cell = part
+    motion = plan_motion(targets, cell)
+    borders = [0, 1, 500, 501, len(motion)]
+    same(joined(*(rows_of(motion, start, end) for start, end in pairwise(borders))), motion)
+    assert len(solve_joints(motion, cell)) == len(motion)
+
+
+def peak_bytes(part, folder):
+    tracemalloc.start()
+    try:
+        main([str(part), "-o", str(folder / "part.src"), "-q"])
+    except SystemExit:
+        pass
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return peak
+
+
+def raster(folder, lines):
+    """Write a raster with a wave, so that no line is like the one before."""
+    x = np.abs(np.arange(lines) * 0.4 % 160.0 - 80.0)
+    y, z = np.floor(np.arange(lines) * 0.4 / 80.0) * 0.5, -1.0 + 0.5 * np.sin(x / 5.0)
+    head = [
+        "G21 G90 G17 G94 G54 G64",
+        "T13 M6",
+        "G43 H13",
+        "S12000 M3",
+        "G0 X0 Y0 Z5",
+        "G1 Z-1 F1000",
+        "F3000",
+    ]
+    body = [f"X{a:.3f} Y{b:.3f} Z{c:.3f}" for a, b, c in zip(x, y, z, strict=True)]
+    file = folder / f"raster_{lines}.nc"
+    file.write_text("\n".join([*head, "F3000", *body, "G0 Z20", "M5", "M30", ""]), encoding="ascii")
+    return file
+
+
+def test_the_memory_of_a_translation_grows_by_little_a_line(tmp_path):
+    few, many = 30_000, 75_000
+    peaks = [peak_bytes(raster(tmp_path, lines), tmp_path) for lines in (2_000, few, many)]
+    assert (tmp_path / "part.src").stat().st_size > 60 * many
+    assert (peaks[2] - peaks[1]) / (many - few) < BYTES_A_LINE
