@@ -20,6 +20,8 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     yield "$TRAFONAME[] contains", robot.trafo_name or "not compared", "memory"
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
     yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s", "unknown"), robot.speeds.sure
+    if cell.frames.robroot is not None:
+        yield "$ROBROOT", _frame(cell.frames.robroot), cell.frames.sure
     yield "$BASE", _frame(cell.frames.base) + _number("BASE_DATA", cell.frames.base_data), cell.frames.sure
     length_mm = cell.frames.tool_length_mm
     length = f"length {length_mm:g} mm" if length_mm is not None else f"length {MISSING}"

@@ -88,7 +88,7 @@ def _payload(forces: Forces, line: Ints32, cell: Cell) -> Issue | None:
     own_kg = cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
     if rated_kg is None:
         return None
-    down = -cell.base_matrix()[2, :3]  # the root's -z along the axes of $BASE
+    down = -cell.base_in_world()[2, :3]  # the world's -z along the axes of $BASE
     cut_N = np.linalg.norm(forces.force_base_N, axis=1)
     whole_N = np.linalg.norm(forces.force_base_N + own_kg * GRAVITY_M_S2 * down, axis=1)
     load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
