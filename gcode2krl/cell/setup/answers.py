@@ -189,6 +189,10 @@ def unanswered(answers: Answers) -> Iterator[Issue]:
     numbers = [tool.get("number") for tool in answers.get("tools", ())]
     if len(set(numbers)) < len(numbers):
         yield _issue("tools", f"two tools have one number: {', '.join(map(str, numbers))}"[:200])
+    if answers.get("tool_change") == "none" and len(numbers) > 1:
+        yield _issue("tool_change", f"found none, and {len(numbers)} tools: nothing would change them")
+    if answers.get("mounted_tool") is not None and answers["mounted_tool"] not in numbers:
+        yield _issue("mounted_tool", f"found {answers['mounted_tool']}, which is none of the tools")
 
 
 def left_out(answers: Answers) -> list[Question]:

@@ -4,6 +4,7 @@ Nothing is made up: a key without an answer stands in a comment with an example,
 person who compares the file with the real cell.
 """
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,8 @@ from gcode2krl.cell.setup.controller import Controller
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, Answers
 from gcode2krl.units import DEG_PER_RAD
 
-_COMMENT_COLUMN = 44
+_COMMENT_COLUMN = 30
+_LONGEST_LINE = 110
 _HEAD = """#:schema {schema}
 # Cell file of gcode2krl: what the G-code cannot say. Written by `gcode2krl init`.
 #
@@ -71,6 +73,7 @@ class _Writer:
         text = {
             "hand": "HALT ; change to tool {{ tool }} by hand, then start",
             "magazine": f"{magazine}({{{{ tool }}}})",
+            "none": "; tool {{ tool }} stays in the spindle",
         }.get(str(change))
         if text is not None:
             yield from self._key(Cell, "tool_change", text, "tool_change")
@@ -113,7 +116,7 @@ class _Writer:
         if answers.get("tools_by") == "length":
             yield from self._reference()
             stated.append("reference_frame")
-        yield '# spin = "auto"  # ' + descriptions(Frames)["spin"].sentence()
+        yield from _commented('# spin = "auto"', descriptions(Frames)["spin"].sentence())
         yield from self._said("BASE_DATA and TOOL_DATA", all(map(self.is_of_archive.get, stated)))
 
     def _reference(self) -> Iterator[str]:
@@ -209,16 +212,15 @@ class _Writer:
             yield from _line(section, name, value)
         elif question in _NEEDED_BY_PROGRAMS:
             known = descriptions(section)[name]
-            yield f"# NOT ANSWERED: {known.sentence()}"
-            yield f"# {name} = {_value(known.example)}"
+            yield from _commented(f"# {name} = {_value(known.example)}", f"NOT ANSWERED: {known.sentence()}")
 
     def _frame(self, name: str, numbers: Sequence[float] | None) -> Iterator[str]:
         known = descriptions(Frames)[name]
-        yield f"# {known.sentence()}"
         if numbers is None:
-            yield f"# NOT ANSWERED: {name} = {_frame(list(known.example.values()))}"
+            example = f"# {name} = {_frame(list(known.example.values()))}"
+            yield from _commented(example, f"NOT ANSWERED: {known.sentence()}")
         else:
-            yield f"{name} = {_frame(numbers)}"
+            yield from _commented(f"{name} = {_frame(numbers)}", known.sentence())
 
     def _said(self, what: str, is_read: bool) -> Iterator[str]:
         """Yield where the values of a table come from: read in the archive, or typed."""
@@ -280,11 +282,17 @@ def _turned(numbers: Sequence[float], axis: Any) -> list[float]:
 def _line(section: Any, name: str, value: Any) -> Iterator[str]:
     """Yield ``key = value  # what it is``, the comment above it where the line would be too long."""
     known: Description = descriptions(section)[name]
-    stated = f"{name} = {_value(value)}"
-    if len(stated) < _COMMENT_COLUMN - 2:
-        yield f"{stated:<{_COMMENT_COLUMN - 2}}  # {known.sentence()}"
+    yield from _commented(f"{name} = {_value(value)}", known.sentence())
+
+
+def _commented(stated: str, comment: str) -> Iterator[str]:
+    """Yield a line with its comment behind it, or above it where that would be too long."""
+    beside = f"{stated:<{_COMMENT_COLUMN}}# {comment}"
+    if len(beside) <= _LONGEST_LINE and len(stated) < _COMMENT_COLUMN:
+        yield beside
     else:
-        yield from (f"# {known.sentence()}", stated)
+        yield from textwrap.wrap(comment, _LONGEST_LINE, initial_indent="# ", subsequent_indent="# ")
+        yield stated
 
 
 def _value(value: Any) -> str:
