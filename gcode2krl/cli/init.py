@@ -116,7 +116,8 @@ def _resolved(text: str, cell_path: Path) -> "Cell":
     try:
         return resolve_cell(parse_toml(text, str(cell_path)), beside=cell_path.parent, source=str(cell_path))
     except NotUnderstoodError as error:
-        raise RefusedError(_quoted(with_lines(error.issues, text), text), "nothing is written") from None
+        issues = _quoted(with_lines(error.issues, text), text)
+        raise RefusedError(issues, f"{cell_path}, not written") from None
 
 
 def _quoted(issues: tuple[Issue, ...], text: str) -> list[Issue]:
@@ -132,7 +133,7 @@ def _write(cell_path: Path, text: str, inputs: list[Path]) -> None:
     from gcode2krl.cell import cell_schema
     from gcode2krl.files import write_together
 
-    schema = json.dumps(cell_schema(), indent=1) + "\n"
+    schema = json.dumps(cell_schema(), indent=2) + "\n"
     files: dict[Path, Any] = {
         cell_path: text.encode("utf-8"),
         cell_path.with_name(SCHEMA): schema.encode("ascii"),

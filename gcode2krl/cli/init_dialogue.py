@@ -41,8 +41,14 @@ def _ask_each(
     taken: set[Any] | None = None,
 ) -> None:
     for question in questions:
-        if question.when(answers):
+        if is_asked(question, answers, controller):
             answers[question.key] = _ask_one(question, answers, controller, taken or set())
+
+
+def is_asked(question: Question, answers: dict[str, Any], controller: Controller) -> bool:
+    """Tell whether a question applies; one about the archive does if that has something to choose from."""
+    listed = question.choices(controller) if question.of_archive and question.choices else [None]
+    return question.when(answers) and bool(listed)
 
 
 def _ask_one(question: Question, answers: dict[str, Any], controller: Controller, taken: set[Any]) -> Any:

@@ -87,8 +87,8 @@ class _Writer:
             yield from self._key(Robot, "model", robot, "robot")
         else:
             name = controller.trafo_name.partition(" ")[0]
-            yield from _line(Robot, "model", name)
             yield from _line(Robot, "trafo_name", name)
+            yield from _line(Robot, "note", f"not in the library; $TRAFONAME[] is {controller.trafo_name}")
         if robot == OTHER and controller.lengths_mm is not None:
             yield from ("", "[robot.geometry]")
             keys = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")

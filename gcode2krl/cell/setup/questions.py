@@ -43,6 +43,8 @@ class Question:
     """Dotted key of the cell whose possible range the answer must keep."""
     count: int = 1
     needed: bool = False
+    of_archive: bool = False
+    """Asked at a terminal only where the archive has something to choose from."""
     when: Callable[[Answers], bool] = _always
     choices: Callable[[Controller], list[Choice]] | None = None
     proposal: Callable[[Controller, Answers], Any] = _nothing
@@ -128,7 +130,7 @@ _AXIS_PLACE = "jog with TOOL as the coordinate system: which direction pulls the
 # --- the questions ----------------------------------------------------------------------------------------
 
 PLACE_QUESTIONS = (
-    Question("name", "What is the cell called?", "a name of your own", "name", "Milling cell 2"),
+    Question("name", "What is the cell called?", "yours to choose", "name", "Milling cell 2"),
     Question(
         "robot",
         "Which robot is it?",
@@ -232,6 +234,7 @@ REFERENCE_QUESTIONS = (
         "whole",
         1,
         "tool.1.tool_data",
+        of_archive=True,
         when=_is("tools_by", "length"),
         choices=lambda controller: [(str(one.number), one.text()) for one in controller.tools],
         proposal=lambda controller, _: _only(controller.tools),

@@ -8,7 +8,7 @@ from gcode2krl.cell.setup.questions import (
     REFERENCE_QUESTIONS,
     TOOL_QUESTIONS,
 )
-from gcode2krl.cli.init_dialogue import shown
+from gcode2krl.cli.init_dialogue import is_asked, shown
 
 DOWN, ENTER, CLEAR = "\x1b[B", "\r", "\x15"
 
@@ -26,7 +26,7 @@ def keys(given, controller=None):
 
 
 def _typed(question, answers, controller):
-    if not question.when(answers):
+    if not is_asked(question, answers, controller):
         return None
     proposal, answer = question.proposal(controller, answers), answers.get(question.key)
     if question.kind == "choice":
