@@ -101,7 +101,7 @@ class _Writer:
             yield from self._said("$SOFTN_END and $SOFTP_END", True)
         if robot == OTHER and controller.speeds_deg_s is not None:
             yield from ("", "[robot.speeds]")
-            yield f"qd_deg_s = {_value(list(controller.speeds_deg_s))}"
+            yield f"qd_deg_s = {toml_value(list(controller.speeds_deg_s))}"
             yield from self._said("$VEL_AXIS_MA over $RAT_MOT_AX", True)
 
     def _frames(self) -> Iterator[str]:
@@ -157,13 +157,13 @@ class _Writer:
             names = ["model", "length_mm"]
         for name in names:
             if tool.get(name) is not None:
-                yield f"{name} = {_value(tool[name])}"
+                yield f"{name} = {toml_value(tool[name])}"
         if "length_mm" not in tool and tool.get("frame") is None:
             yield "# NOT ANSWERED: length_mm, from the spindle's gauge line to the tip"
         if tool.get("frame") is not None:
             if tool.get("data"):
                 yield f"tool_data = {tool['data']}"
-            yield f"axis = {_value(tool['axis'])}"
+            yield f"axis = {toml_value(tool['axis'])}"
             yield f"frame = {_frame(tool['frame'])}"
         elif tool.get("tools_by") == "number":
             yield "# NOT ANSWERED: tool_data, axis and frame of this tool"
@@ -189,7 +189,7 @@ class _Writer:
     def _program(self) -> Iterator[str]:
         if self.answers.get("tool_change") == "magazine":
             yield "[program]"
-            yield f"externals = {_value([self.answers['magazine'] + '(INT :IN)'])}"
+            yield f"externals = {toml_value([self.answers['magazine'] + '(INT :IN)'])}"
 
     def _m_codes(self) -> Iterator[str]:
         codes = dict(_m_codes(self.answers))
@@ -198,7 +198,7 @@ class _Writer:
             yield "# NOT ANSWERED: the output that runs the spindle, so that M3 and M5 have no KRL"
         for code, lines in codes.items():
             text = "\n".join(lines)
-            yield f'{code} = """\n{text}"""' if len(lines) > 1 else f"{code} = {_value(text)}"
+            yield f'{code} = """\n{text}"""' if len(lines) > 1 else f"{code} = {toml_value(text)}"
 
     def _further(self) -> Iterator[str]:
         yield "# For forces and deflection, as your part needs them (docs/cell.md):"
@@ -212,7 +212,9 @@ class _Writer:
             yield from _line(section, name, value)
         elif question in _NEEDED_BY_PROGRAMS:
             known = descriptions(section)[name]
-            yield from _commented(f"# {name} = {_value(known.example)}", f"NOT ANSWERED: {known.sentence()}")
+            yield from _commented(
+                f"# {name} = {toml_value(known.example)}", f"NOT ANSWERED: {known.sentence()}"
+            )
 
     def _frame(self, name: str, numbers: Sequence[float] | None) -> Iterator[str]:
         known = descriptions(Frames)[name]
@@ -225,7 +227,7 @@ class _Writer:
     def _said(self, what: str, is_read: bool) -> Iterator[str]:
         """Yield where the values of a table come from: read in the archive, or typed."""
         source = f"archive {self.controller.source}, {what}" if is_read else "typed at gcode2krl init"
-        yield f"source = {_value(source)}"
+        yield f"source = {toml_value(source)}"
         yield f'sure = "{"verified" if is_read else "memory"}"'
 
 
@@ -282,7 +284,7 @@ def _turned(numbers: Sequence[float], axis: Any) -> list[float]:
 def _line(section: Any, name: str, value: Any) -> Iterator[str]:
     """Yield ``key = value  # what it is``, the comment above it where the line would be too long."""
     known: Description = descriptions(section)[name]
-    yield from _commented(f"{name} = {_value(value)}", known.sentence())
+    yield from _commented(f"{name} = {toml_value(value)}", known.sentence())
 
 
 def _commented(stated: str, comment: str) -> Iterator[str]:
@@ -295,12 +297,12 @@ def _commented(stated: str, comment: str) -> Iterator[str]:
         yield stated
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """Return a value as TOML on one line."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_value(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     return _number(value) if isinstance(value, float) else tomli_w.dumps({"v": value})[4:].rstrip("\n")
 
 
@@ -309,7 +311,7 @@ def _number(value: float) -> str:
 
 
 def _frame(numbers: Iterable[float]) -> str:
-    return _value(frame_table(list(numbers)))
+    return toml_value(frame_table(list(numbers)))
 
 
 def _krl_frame(numbers: Sequence[float]) -> str:
