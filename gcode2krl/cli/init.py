@@ -40,14 +40,15 @@ def command(
 ) -> int:
     """Write the cell file of your robot from your answers and the controller's archive.
 
-    \b
-    gcode2krl init
-    gcode2krl init --controller archive.zip
-    gcode2krl init --questions > answers.toml
-    gcode2krl init cell.toml --answers answers.toml
-
     Each question says where the smartPAD shows the value. What is not answered is left out and named; nothing
     is made up. CELL.toml is cell.toml if it is not given.
+
+    \b
+    Examples:
+      gcode2krl init
+      gcode2krl init --controller archive.zip
+      gcode2krl init --questions > answers.toml
+      gcode2krl init cell.toml --answers answers.toml
     """
     from gcode2krl.cell.setup.answers import completed, left_out, read_answers
     from gcode2krl.cell.setup.cell_text import cell_text
