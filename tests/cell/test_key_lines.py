@@ -58,7 +58,8 @@ def test_each_number_stands_in_the_line_that_it_says():
     numbers = [(key, value) for key, value in leaves(tomllib.loads(TEXT)) if isinstance(value, int)]
     assert len(numbers) == 14
     assert {key: found[key] for key, _ in numbers} == dict(numbers)
-    assert (found["frames"], found["frames.text"], found["guard_inputs"], found["guard_inputs.1"]) == (4, 12, 20, 24)
+    tables = {"frames": 4, "frames.text": 12, "guard_inputs": 20, "guard_inputs.1": 24}
+    assert {key: found[key] for key in tables} == tables
 
 
 NAMES = st.from_regex(r"\A[a-z_]{1,3}\Z")

@@ -267,6 +267,21 @@ def test_enter_accepts_what_the_archive_states(tmp_path, name):
     assert answers["home"] == list(controller.home_deg)
 
 
+def test_an_archive_of_another_arm_is_refused(run, tmp_path):
+    archive_of(tmp_path / "archive.zip", "tool_magazine")
+    answers = FOLDER / "answers" / "upside_down.toml"
+    done = run("init", "--controller", "archive.zip", "--answers", answers)
+    assert done.code == 2
+    assert "robot: found 'KR 60 HA', allowed: KR 300 R2500 ultra" in done.err
+
+
+def test_what_is_cleared_at_the_terminal_is_left_out(tmp_path):
+    controller = read_controller(archive_of(tmp_path / "archive.zip", "tool_magazine"))
+    words = keys(answers_of("tool_magazine"), controller)
+    words[3] = "\x15" + ENTER
+    assert "home" not in completed(typed(words, controller), controller)
+
+
 def test_a_robot_that_is_not_in_the_library_comes_from_the_archive(run, tmp_path):
     name = "upright_without_rail"
     cell = load_cell(FOLDER / f"{name}.toml")

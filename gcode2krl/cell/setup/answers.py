@@ -130,9 +130,8 @@ def _completed_tool(given: Answers, general: Answers, controller: Controller) ->
 def _take(question: Question, given: Answers, answers: dict[str, Any], controller: Controller) -> None:
     if not question.when(answers):
         return
-    value = given.get(question.key)
-    if value is None:
-        value = question.proposal(controller, answers)
+    is_answered = question.key in given  # with None by who left it out at the terminal
+    value = given[question.key] if is_answered else question.proposal(controller, answers)
     if value is not None:
         answers[question.key] = value
 

@@ -167,6 +167,12 @@ def _lengths(values: Mapping[str, Value]) -> Numbers | None:
     return a1, -wrist[2] + 0.0, foot[2], c2, wrist[0], flange[2]
 
 
+def robots_of_lengths(lengths_mm: Numbers | None) -> list[str]:
+    """Return the robots of the library whose lengths agree with those of an arm, all where none is known."""
+    names = library.names("robots")
+    return [name for name in names if _has_lengths(library.read_model("robots", name), lengths_mm)]
+
+
 def _machine_name(values: Mapping[str, Value]) -> str:
     machine = values.get("MACHINE_DEF[1]")
     return str(machine.get("NAME", "")) if isinstance(machine, Mapping) else ""
@@ -174,8 +180,8 @@ def _machine_name(values: Mapping[str, Value]) -> str:
 
 def _model(machine_name: str, trafo_name: str, lengths_mm: Numbers | None) -> str:
     """Return the robot of the library that the archive means; empty where none or several could be it."""
-    robots = {name: library.read_model("robots", name) for name in library.names("robots")}
-    fits = [name for name, robot in robots.items() if _has_lengths(robot, lengths_mm)]
+    fits = robots_of_lengths(lengths_mm)
+    robots = {name: library.read_model("robots", name) for name in fits}
     by_name = [name for name in fits if _fold(name) == _fold(machine_name)]
     by_trafo = [
         name

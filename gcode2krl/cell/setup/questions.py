@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gcode2krl.cell import library
-from gcode2krl.cell.setup.controller import Controller, NamedFrame, Payload
+from gcode2krl.cell.setup.controller import Controller, NamedFrame, Payload, robots_of_lengths
 
 Answers = Mapping[str, Any]
 """Key of a question → its answer; ``tools`` is a list of such tables."""
@@ -75,7 +75,8 @@ def _only(frames: tuple[NamedFrame, ...]) -> int | None:
 
 
 def _robots(controller: Controller) -> list[Choice]:
-    listed = [(name, "") for name in library.names("robots")]
+    """Return the robots that can be it: an archive of another arm is no archive of this robot."""
+    listed = [(name, "") for name in robots_of_lengths(controller.lengths_mm)]
     own = [(OTHER, "not in this list: lengths and limits from the archive")] if controller.lengths_mm else []
     return [*listed, *own]
 
