@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from gcode2krl.cell.definition import Cell
-from gcode2krl.cell.descriptions import descriptions, sections_in
+from gcode2krl.cell.descriptions import descriptions_of, sections_in
 from gcode2krl.cell.ranges import all_ranges, general
 from gcode2krl.cell.sections import Frame, Provenance
 from gcode2krl.cell.setup.cell_text import toml_value
@@ -47,7 +47,7 @@ def _places() -> Iterator[tuple[str, type[BaseModel]]]:
 
 
 def _below(place: str, section: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
-    for key in descriptions(section):
+    for key in descriptions_of(section):
         for child in dict.fromkeys(sections_in(section.model_fields[key].annotation)):
             if child is not Frame:
                 name = f"{place}.{key}" if place else key
@@ -59,14 +59,14 @@ def _below(place: str, section: type[BaseModel]) -> Iterator[tuple[str, type[Bas
 def _table(place: str, section: type[BaseModel]) -> str:
     is_list = place in ("effects", "guard_inputs", "online.axis_gains")
     title = _TITLES.get(place) or (f"`[[{place}]]`" if is_list else f"`[{place}]`")
-    keys = [key for key in descriptions(section) if key not in _ONCE or place in (_VALUES, "effects")]
+    keys = [key for key in descriptions_of(section) if key not in _ONCE or place in (_VALUES, "effects")]
     rows = [_row(place, section, key) for key in keys]
     head = "| key | unit | meaning | default | usual | example |\n| --- | --- | --- | --- | --- | --- |\n"
     return f"### {title}\n\n{head}{''.join(rows)}\n"
 
 
 def _row(place: str, section: type[BaseModel], key: str) -> str:
-    known = descriptions(section)[key]
+    known = descriptions_of(section)[key]
     example = f"`{toml_value(known.example)}`" if known.example is not None else ""
     cells = (f"`{key}`", known.unit, known.text, _default(section, key), _usual(place, key), example)
     return "| " + " | ".join(cell.replace("|", "\\|").replace("<", "&lt;") for cell in cells) + " |\n"

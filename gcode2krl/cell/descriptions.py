@@ -32,7 +32,7 @@ def _table() -> Mapping[str, Mapping[str, Any]]:
     return tomllib.loads(text)
 
 
-def descriptions(section: type[BaseModel]) -> dict[str, Description]:
+def descriptions_of(section: type[BaseModel]) -> dict[str, Description]:
     """Return key → description of a section, in the section's order; a key without one is a `KeyError`."""
     known: dict[str, Any] = {}
     for kind in reversed(section.__mro__):
@@ -60,7 +60,7 @@ def described_schema(cell: type[BaseModel]) -> dict[str, Any]:
     }
     for section in _all_sections(cell):
         node = schema if section is cell else schema["$defs"].get(section.__name__)
-        for key, description in descriptions(section).items() if node else ():
+        for key, description in descriptions_of(section).items() if node else ():
             node["properties"][key]["description"] = description.sentence()
             if description.example is not None:
                 node["properties"][key]["examples"] = [description.example]

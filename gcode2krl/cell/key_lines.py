@@ -26,7 +26,7 @@ class _NotTomlError(Exception):
     pass
 
 
-def key_lines(text: str) -> dict[str, int]:
+def lines_of_keys(text: str) -> dict[str, int]:
     """Return dotted key → line (1-based) of each key, table and element of a list, ``guard_inputs.0``."""
     scanner = _Scanner(text.removeprefix("\ufeff"))
     with contextlib.suppress(_NotTomlError, RecursionError):
@@ -40,7 +40,7 @@ def with_lines(issues: Iterable[Issue], text: str) -> tuple[Issue, ...]:
     A key that the file does not state has the line of the table that lacks it, or of ``based_on``.
     """
     issues = tuple(issues)
-    lines = key_lines(text) if any(issue.key for issue in issues) else {}
+    lines = lines_of_keys(text) if any(issue.key for issue in issues) else {}
     return tuple(
         replace(issue, line=_line(issue.key, lines)) if issue.key and not issue.line else issue
         for issue in issues

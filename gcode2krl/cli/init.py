@@ -51,7 +51,7 @@ def command(
       gcode2krl init cell.toml --answers answers.toml
     """
     from gcode2krl.cell.setup.answers import completed, left_out, read_answers
-    from gcode2krl.cell.setup.cell_text import cell_text
+    from gcode2krl.cell.setup.cell_text import text_of_cell
     from gcode2krl.cell.setup.controller import Controller, read_controller
     from gcode2krl.cli.cell_list import findings, missing_keys
     from gcode2krl.cli.init_dialogue import ask, questions_text
@@ -69,7 +69,7 @@ def command(
     _say_read(console, controller)
     given = ask(controller) if answers_path is None else read_answers(answers_path, controller)
     answers = completed(given, controller)
-    text = cell_text(answers, controller, SCHEMA)
+    text = text_of_cell(answers, controller, SCHEMA)
     cell = _resolved(text, cell_path)
     _write(cell_path, text, [path for path in (answers_path, archive) if path is not None and path.is_file()])
 

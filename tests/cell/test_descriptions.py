@@ -12,12 +12,12 @@ from pydantic import TypeAdapter
 from docs import make_cell
 from gcode2krl.cell import cell_schema
 from gcode2krl.cell.definition import Cell
-from gcode2krl.cell.descriptions import _all_sections, descriptions, sections_in
+from gcode2krl.cell.descriptions import _all_sections, descriptions_of, sections_in
 from gcode2krl.cell.ranges import all_ranges
 from gcode2krl.cell.setup.cell_text import toml_value
 
 SECTIONS = _all_sections(Cell)
-KEYS = [(section, key) for section in SECTIONS for key in descriptions(section)]
+KEYS = [(section, key) for section in SECTIONS for key in descriptions_of(section)]
 UNITS = {
     "mm": "mm", "deg": "deg", "s": "s", "N": "N", "Nm": "N·m", "W": "W", "rpm": "rpm", "kg": "kg", "hz": "Hz",
     "mb": "MB", "percent": "%", "kgm2": "kg·m²", "deg_s": "deg/s", "deg_s2": "deg/s²", "m_s": "m/s",
@@ -39,7 +39,7 @@ def test_nothing_is_described_that_does_not_exist():
 
 @pytest.mark.parametrize(("section", "key"), KEYS, ids=lambda part: getattr(part, "__name__", part))
 def test_a_key_has_a_description_and_an_example_that_is_allowed(section, key):
-    known, field = descriptions(section)[key], section.model_fields[key]
+    known, field = descriptions_of(section)[key], section.model_fields[key]
     assert len(known.text) > 8
     assert not known.text.endswith(".")
     if known.example is None:
@@ -52,7 +52,7 @@ def test_a_key_has_a_description_and_an_example_that_is_allowed(section, key):
 
 @pytest.mark.parametrize(("section", "key"), KEYS, ids=lambda part: getattr(part, "__name__", part))
 def test_the_unit_is_that_of_the_name(section, key):
-    unit = descriptions(section)[key].unit
+    unit = descriptions_of(section)[key].unit
     if key in NO_UNITS:
         assert unit
         return
@@ -66,7 +66,7 @@ def test_the_unit_is_that_of_the_name(section, key):
 def test_examples_are_usual():
     """An example beyond the usual range would be copied with its warning."""
     for place, section in make_cell._places():
-        for key, known in descriptions(section).items():
+        for key, known in descriptions_of(section).items():
             name = re.sub(r"<\w+>", "*", f"{place}.{key}")
             usual = all_ranges().get(name)
             if usual is not None and known.example not in ("auto", "none"):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import load_cell
-from gcode2krl.cell.key_lines import key_lines, with_lines
+from gcode2krl.cell.key_lines import lines_of_keys, with_lines
 from gcode2krl.errors import Issue, NotUnderstoodError
 from tests.conftest import ROOT
 
@@ -54,7 +54,7 @@ def leaves(value, place=()):
 
 
 def test_each_number_stands_in_the_line_that_it_says():
-    found = key_lines(TEXT)
+    found = lines_of_keys(TEXT)
     numbers = [(key, value) for key, value in leaves(tomllib.loads(TEXT)) if isinstance(value, int)]
     assert len(numbers) == 14
     assert {key: found[key] for key, _ in numbers} == dict(numbers)
@@ -95,14 +95,14 @@ def written(tree, blanks):
 @given(TREES, st.integers(0, 2))
 def test_any_file(tree, blanks):
     text = written(tree, blanks)
-    found = key_lines(text)
+    found = lines_of_keys(text)
     assert {key: found[key] for key, _ in leaves(tomllib.loads(text))} == dict(leaves(tomllib.loads(text)))
 
 
 def test_every_value_of_the_examples_stands_in_its_line():
     for file in (ROOT / "examples" / "cells").glob("*.toml"):
         text = file.read_text(encoding="utf-8")
-        lines, found = text.split("\n"), key_lines(text)
+        lines, found = text.split("\n"), lines_of_keys(text)
         for key, _ in leaves(tomllib.loads(text)):
             last = next(part for part in reversed(key.split(".")) if not part.isdigit())
             assert re.search(rf"\b{last}\b\s*=", lines[found[key] - 1]), key
@@ -120,7 +120,7 @@ def test_a_key_that_is_not_stated_has_the_line_of_its_table():
 )
 def test_what_is_not_toml_ends_at_once(text):
     started = time.perf_counter()
-    key_lines(text)
+    lines_of_keys(text)
     assert time.perf_counter() - started < 2.0
 
 

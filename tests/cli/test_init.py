@@ -11,7 +11,7 @@ from prompt_toolkit.output import DummyOutput
 from examples import make_cells
 from gcode2krl import load_cell
 from gcode2krl.cell.setup.answers import completed, read_answers
-from gcode2krl.cell.setup.cell_text import cell_text
+from gcode2krl.cell.setup.cell_text import text_of_cell
 from gcode2krl.cell.setup.controller import Controller, read_controller
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, TOOL_QUESTIONS
 from gcode2krl.cli.init import SCHEMA
@@ -90,7 +90,7 @@ def test_the_spindles_are_switched_as_the_cells_say(run, tmp_path):
 def test_keys_at_a_terminal_give_the_same_cell(name):
     given = answers_of(name)
     answers = completed(typed(keys(given)), NOBODY)
-    assert cell_text(answers, NOBODY, SCHEMA) == (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    assert text_of_cell(answers, NOBODY, SCHEMA) == (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def test_a_wrong_answer_is_asked_again():

@@ -15,7 +15,7 @@ import tomli_w
 from gcode2krl import frames as fr
 from gcode2krl.cell import controller_axes
 from gcode2krl.cell.definition import Cell
-from gcode2krl.cell.descriptions import Description, descriptions
+from gcode2krl.cell.descriptions import Description, descriptions_of
 from gcode2krl.cell.sections import Clearance, Frame, Frames, Home, Load, Robot, Spindle
 from gcode2krl.cell.setup.answers import frame_table
 from gcode2krl.cell.setup.controller import Controller
@@ -116,7 +116,7 @@ class _Writer:
         if answers.get("tools_by") == "length":
             yield from self._reference()
             stated.append("reference_frame")
-        yield from _commented('# spin = "auto"', descriptions(Frames)["spin"].sentence())
+        yield from _commented('# spin = "auto"', descriptions_of(Frames)["spin"].sentence())
         yield from self._said("BASE_DATA and TOOL_DATA", all(map(self.is_of_archive.get, stated)))
 
     def _reference(self) -> Iterator[str]:
@@ -211,13 +211,13 @@ class _Writer:
         if value is not None:
             yield from _line(section, name, value)
         elif question in _NEEDED_BY_PROGRAMS:
-            known = descriptions(section)[name]
+            known = descriptions_of(section)[name]
             yield from _commented(
                 f"# {name} = {toml_value(known.example)}", f"NOT ANSWERED: {known.sentence()}"
             )
 
     def _frame(self, name: str, numbers: Sequence[float] | None) -> Iterator[str]:
-        known = descriptions(Frames)[name]
+        known = descriptions_of(Frames)[name]
         if numbers is None:
             example = f"# {name} = {_frame(list(known.example.values()))}"
             yield from _commented(example, f"NOT ANSWERED: {known.sentence()}")
@@ -245,7 +245,7 @@ _NEEDED_BY_PROGRAMS = (
 """Questions whose key stands in a comment where nobody answered."""
 
 
-def cell_text(answers: Answers, controller: Controller, schema: str) -> str:
+def text_of_cell(answers: Answers, controller: Controller, schema: str) -> str:
     """Return the text of the cell file; ``schema`` is the path of its JSON schema, for editors."""
     proposed = {one.key: one.proposal(controller, answers) for one in GENERAL_QUESTIONS}
     equal = {key: value is not None and answers.get(key) == value for key, value in proposed.items()}
@@ -283,7 +283,7 @@ def _turned(numbers: Sequence[float], axis: Any) -> list[float]:
 
 def _line(section: Any, name: str, value: Any) -> Iterator[str]:
     """Yield ``key = value  # what it is``, the comment above it where the line would be too long."""
-    known: Description = descriptions(section)[name]
+    known: Description = descriptions_of(section)[name]
     yield from _commented(f"{name} = {toml_value(value)}", known.sentence())
 
 
