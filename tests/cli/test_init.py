@@ -189,6 +189,18 @@ def test_what_nobody_answers_is_left_out_and_named(run, tmp_path):
     assert run(FOLDER / "part.nc", "--cell", "cell.toml", "-o", "part.src").code == 1
 
 
+def test_limits_that_the_library_lacks_are_asked(run, tmp_path):
+    text = (FOLDER / "answers" / "spindle_on_analog_output.toml").read_text(encoding="utf-8")
+    text = text.replace('"KR 120 R2700-2"', '"KR 120 R2500 pro"')
+    (tmp_path / "answers.toml").write_text(text, encoding="utf-8")
+    done = run("init", "--answers", "answers.toml", "--json")
+    assert json.loads(done.out)["missing"] == ["robot.limits.q_deg"]
+    typed_limits = "limits_deg = [-185, 185, -140, -5, -120, 155, -350, 350, -125, 125, -350, 350]\n"
+    (tmp_path / "answers.toml").write_text(typed_limits + text, encoding="utf-8")
+    assert json.loads(run("init", "--answers", "answers.toml", "--json", "--force").out)["missing"] == []
+    assert load_cell(tmp_path / "cell.toml").robot.limits.q_deg[1:3] == ((-140.0, -5.0), (-120.0, 155.0))
+
+
 def test_the_printed_questions_are_all_and_their_examples_are_answers(run, tmp_path):
     text = run("init", "--questions").out
     assert text == questions_text()

@@ -94,15 +94,20 @@ class _Writer:
             keys = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
             yield from (f"{key} = {_number(v)}" for key, v in zip(keys, controller.lengths_mm, strict=True))
             yield from self._said("$LENGTH_A, $LENGTH_B, $TIRORO, $TX3P3, $TFLWP", True)
-        if controller.limits_deg is not None:
-            yield from ("", "[robot.limits]")
-            pairs = ", ".join(f"[{_number(low)}, {_number(high)}]" for low, high in controller.limits_deg)
-            yield f"q_deg = [{pairs}]"
-            yield from self._said("$SOFTN_END and $SOFTP_END", True)
+        yield from self._limits()
         if robot == OTHER and controller.speeds_deg_s is not None:
             yield from ("", "[robot.speeds]")
             yield f"qd_deg_s = {toml_value(list(controller.speeds_deg_s))}"
             yield from self._said("$VEL_AXIS_MA over $RAT_MOT_AX", True)
+
+    def _limits(self) -> Iterator[str]:
+        """Write the limits that were typed, else those of the archive; the library's need not be written."""
+        typed = self.answers.get("limits_deg")
+        pairs = list(zip(typed[::2], typed[1::2], strict=True)) if typed else self.controller.limits_deg
+        if pairs:
+            yield from ("", "[robot.limits]", f"q_deg = {toml_value(pairs)}")
+            is_read = self.controller.limits_deg is not None and tuple(pairs) == self.controller.limits_deg
+            yield from self._said("$SOFTN_END and $SOFTP_END", is_read)
 
     def _frames(self) -> Iterator[str]:
         answers = self.answers

@@ -85,6 +85,18 @@ def _robot(controller: Controller, answers: Answers) -> str | None:
     return controller.model or (OTHER if controller.lengths_mm else None)
 
 
+def _lacks_limits(answers: Answers) -> bool:
+    """Tell whether the robot is one whose joint limits the library does not know."""
+    robot = str(answers.get("robot"))
+    return robot in library.names("robots") and "q_deg" not in library.read_model("robots", robot).get(
+        "limits", {}
+    )
+
+
+def _limits(controller: Controller, answers: Answers) -> list[float] | None:
+    return [limit for pair in controller.limits_deg for limit in pair] if controller.limits_deg else None
+
+
 def _mounting(controller: Controller, answers: Answers) -> str | None:
     if controller.robroot is None:
         return None
@@ -141,6 +153,17 @@ PLACE_QUESTIONS = (
         needed=True,
         choices=_robots,
         proposal=_robot,
+    ),
+    Question(
+        "limits_deg",
+        "Joint limits in degrees: low and high of A1, then of A2 to A6",
+        "Start-up > Service > Software limit switch",
+        "numbers",
+        [-185.0, 185.0, -140.0, -5.0, -120.0, 155.0, -350.0, 350.0, -125.0, 125.0, -350.0, 350.0],
+        "robot.limits.q_deg",
+        12,
+        when=_lacks_limits,
+        proposal=_limits,
     ),
     Question(
         "mounting",
