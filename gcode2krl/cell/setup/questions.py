@@ -1,7 +1,9 @@
 """What a person is asked about a cell, in order: each question with the place where the smartPAD shows it.
 
 Menus are those of KUKA System Software 8.x, from memory; versions name some of them differently, and newer
-ones have tools and bases under *Start-up > Tool/base management*. A question is data; `answers` checks what is answered, `cell_text` writes it.
+ones have tools and bases under *Start-up > Tool/base management*.
+
+A question is data; `answers` checks what is answered, `cell_text` writes it.
 """
 
 from collections.abc import Callable, Mapping
