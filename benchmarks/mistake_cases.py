@@ -478,7 +478,7 @@ CELL_MISTAKES = (
     Mistake("frame key in metres", r"x_m\b", cell="[frames.base]\nx_m = 1.5\n"),
     Mistake("tool frame key misspelt", r"b_degree", cell="[frames.tool]\nb_degree = -90.0\n"),
     Mistake("section misspelt", r"clearence", cell="[clearence]\nz_mm = 50.0\n"),
-    Mistake("TOML syntax: bracket missing", r"line 3", cell="[frames\nspin = 0\n"),
+    Mistake("TOML syntax: bracket missing", r"end of a table declaration", cell="[frames\nspin = 0\n"),
     Mistake("negative diameter", r"diameter_mm", cell="[tool.1]\ndiameter_mm = -16.0\n"),
     Mistake(
         "corner radius above half the diameter",

@@ -28,7 +28,7 @@ class Issue:
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
     kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``. ``excerpt`` quotes the
-    input, with a caret before the culprit.
+    input, with a caret before the culprit. ``key`` is the dotted key of the cell file that is meant, if any.
     """
 
     severity: Severity
@@ -37,6 +37,7 @@ class Issue:
     message: str
     remedy: str = ""
     excerpt: str = ""
+    key: str = ""
 
     def advice(self) -> str:
         """Return the remedy of the finding, or else that of its code in the table."""

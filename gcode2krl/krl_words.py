@@ -63,7 +63,7 @@ RSI_SLOW_CYCLE_S = 0.012
 
 VEL_CP, APO_CDIS = "$VEL.CP", "$APO.CDIS"
 BASE, TOOL, LOAD, ACT_BASE, ACT_TOOL = "$BASE", "$TOOL", "$LOAD", "$ACT_BASE", "$ACT_TOOL"
-BASE_DATA, TOOL_DATA = "BASE_DATA", "TOOL_DATA"
+BASE_DATA, TOOL_DATA, ROBROOT = "BASE_DATA", "TOOL_DATA", "$ROBROOT"
 OUT = "$OUT"
 OWN_PREFIX = "GK_"
 """Of the subprograms and variables inside our programs."""

@@ -125,6 +125,9 @@ def test_commands(command, folder, run):
         measured(folder)
     if "trace.csv" in words:
         traced(folder, run)
+    if "milling_cell.toml" in words and "init" not in words:
+        answers = "examples/cells/answers/upside_down.toml"
+        assert run("init", "milling_cell.toml", "--answers", answers).code == 0
     done = run(*words[1:])
     assert done.code == 0, done.err
 

@@ -188,7 +188,7 @@ def _merge(base: Table, over: Table, path: tuple[str, ...]) -> Table:
 
 def _is_frame(path: tuple[str, ...]) -> bool:
     return (
-        path in (("frames", "base"), ("frames", "tool"))
+        path in (("frames", "base"), ("frames", "tool"), ("frames", "robroot"))
         or (len(path) == 3 and path[0] == "tool" and path[2] == "frame")
         or (len(path) == 2 and path[0] == "work_offsets")
     )

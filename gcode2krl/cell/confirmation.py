@@ -21,4 +21,4 @@ def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple
         return ()
     text = f"verified.date = {cell.verified.date} is in the future (today is {today})"
     remedy = "write the day on which verified.by confirmed the cell, or set this computer's clock"
-    return (Issue("warning", "verified-future", 0, text, remedy),)
+    return (Issue("warning", "verified-future", 0, text, remedy, key="verified.date"),)

@@ -19,6 +19,8 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import library
 from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE, described_schema
+from gcode2krl.cell.key_lines import with_lines
 from gcode2krl.cell.keys import meant_key
 from gcode2krl.cell.sections import (
     Axis,
@@ -51,8 +53,6 @@ from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.units import RAD_PER_DEG
 
-_RESOLVED = ("taken_over", "defaults")
-"""Keys of a resolved cell that no file may state."""
 _REACHING = ("controller", "frames", "load", "spindle", "program", "pilot", "online")
 """Sections with defaults that go into a program."""
 _MODELS = (("robot", "robots"), ("controller", "controllers"), ("material", "materials"))
@@ -125,6 +125,15 @@ class Cell(Section):
 
     def base_matrix(self) -> Floats:
         """Return ``$BASE`` in the robot root (4, 4); raises `RefusedError` where it is not stated."""
+        base = self.base_in_world()
+        robroot = self.frames.robroot
+        return base if robroot is None else fr.invert(robroot.matrix()) @ base
+
+    def base_in_world(self) -> Floats:
+        """Return ``$BASE`` in ``$WORLD`` (4, 4), as KRL states it; raises `RefusedError` where it is missing.
+
+        The z of ``$WORLD`` points upwards, however the robot is mounted.
+        """
         if self.frames.base is None:
             raise missing("frames.base")
         return self.frames.base.matrix()
@@ -194,7 +203,14 @@ def load_cell(path: str | Path | None = None) -> Cell:
     if path is None:
         return _default_cell()
     file = Path(path)
-    return resolve_cell(library.read_toml(file), beside=file.parent, source=str(file))
+    text = library.read_text(file)
+    data = library.parse_toml(text, str(file))
+    try:
+        return resolve_cell(data, beside=file.parent, source=str(file))
+    except NotUnderstoodError as error:
+        if error.source != str(file):
+            raise
+        raise NotUnderstoodError(with_lines(error.issues, text), error.source) from None
 
 
 def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str = "cell") -> Cell:
@@ -249,9 +265,7 @@ def cell_from_resolved(record: dict[str, Any], source: str) -> Cell:
 
 def cell_schema() -> dict[str, Any]:
     """Return the JSON schema of a cell file for editors; nothing is required, as a file may be partial."""
-    schema = Cell.model_json_schema()
-    for key in _RESOLVED:
-        del schema["properties"][key]
+    schema = described_schema(Cell)
     _drop_required(schema)
     schema["title"] = "gcode2krl cell file"
     return schema
@@ -288,14 +302,14 @@ def _refuse_keys_of_tools(data: Mapping[str, Any]) -> None:
 
     ``[tool.01]`` beside ``[tool.1]`` would be the same tool twice, and one of them would be lost.
     """
-    for key in _RESOLVED:
+    for key in NOT_OF_A_FILE:
         if key in data:
-            raise NotUnderstoodError(_key_issue(f"{key}: there is no such key"))
+            raise NotUnderstoodError(_key_issue(key, "there is no such key"))
     tools = data.get("tool")
     for number in tools if isinstance(tools, dict) else ():
         if not re.fullmatch(r"[1-9][0-9]{0,4}", str(number), re.ASCII):
             raise NotUnderstoodError(
-                _key_issue(f"tool.{str(number)[:40]}: not a tool number, allowed: 1 to 99999")
+                _key_issue(f"tool.{number}"[:45], "not a tool number, allowed: 1 to 99999")
             )
 
 
@@ -306,7 +320,7 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     yield from (issue for issue in ranges.range_issues(cell) if issue.severity == "error")
     if cell.mounted_tool is not None and cell.mounted_tool not in cell.tool:
         number = cell.mounted_tool
-        yield _key_issue(f"mounted_tool: found {number}, and the cell has no [tool.{number}]")
+        yield _key_issue("mounted_tool", f"found {number}, and the cell has no [tool.{number}]")
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
     texts = switching.rendered(templates, view)
@@ -324,6 +338,7 @@ def _split_pairs(stated: StatedCell) -> Iterator[Issue]:
             0,
             f"{stated_key} is stated here, and {other}, which belongs to it, comes from {whose[other]!r}",
             f"state {number} and {frame} in one file, as the controller has them",
+            key=stated_key,
         )
 
 
@@ -388,15 +403,15 @@ def _validation_issues(error: ValidationError) -> Iterator[Issue]:
         remedy = ""
         message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
         if detail["type"] == "missing":
-            text = f"{key}: missing"
+            text = "missing"
         elif detail["type"] == "extra_forbidden":
-            text = f"{key}: there is no such key"
+            text = "there is no such key"
             remedy = _did_you_mean(place)
         elif detail["type"] == "value_error":
-            text = f"{key}: {message}"
+            text = message
         else:
-            text = f"{key}: found {_brief(detail['input'])}, allowed: {message}"
-        yield _key_issue(text, remedy)
+            text = f"found {_brief(detail['input'])}, allowed: {message}"
+        yield _key_issue(key, text, remedy)
 
 
 def _did_you_mean(place: list[str | int]) -> str:
@@ -407,8 +422,8 @@ def _did_you_mean(place: list[str | int]) -> str:
 _KEYS_LISTED = "docs/cell.md and `gcode2krl models schema` list the keys"
 
 
-def _key_issue(text: str, remedy: str = "") -> Issue:
-    return Issue("error", "cell-key", 0, text, remedy or _KEYS_LISTED)
+def _key_issue(key: str, text: str, remedy: str = "") -> Issue:
+    return Issue("error", "cell-key", 0, f"{key}: {text}", remedy or _KEYS_LISTED, key=key)
 
 
 def _brief(value: Any) -> str:

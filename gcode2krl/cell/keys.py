@@ -1,14 +1,11 @@
 """The key of a cell that a mistyped one most likely means: the closest key of its section."""
 
-from collections.abc import Iterator, Sequence
-from typing import Any, get_args
+from collections.abc import Sequence
 
 from pydantic import BaseModel
 
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE, sections_in
 from gcode2krl.codes import closest
-
-NOT_OF_A_FILE = ("taken_over", "defaults")
-"""Keys that only a resolved cell has."""
 
 
 def meant_key(cell: type[BaseModel], place: Sequence[str | int]) -> str:
@@ -19,17 +16,9 @@ def meant_key(cell: type[BaseModel], place: Sequence[str | int]) -> str:
     for step in above:
         below = [kind.model_fields[str(step)].annotation for kind in kinds if str(step) in kind.model_fields]
         if below:  # else the number of a tool, an entry of a list or the name of a work offset
-            kinds = [model for annotation in below for model in _models_in(annotation)]
+            kinds = [model for annotation in below for model in sections_in(annotation)]
         written.append(str(step))
     known = [name for kind in kinds for name in kind.model_fields if name not in NOT_OF_A_FILE]
     without_unit = [name for name in known if name.rpartition("_")[0] == str(last)]
     near = without_unit[0] if without_unit else closest(str(last), known)
     return ".".join([*written, near]) if near else ""
-
-
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the sections that a value of this type may be or hold."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)

@@ -19,6 +19,8 @@ _MANY_DOTS = re.compile(rf"(?<![A-Za-z0-9_\-\"'])(?:{_PART}[ \t]*+\.[ \t]*+){{{M
 _PLAIN_MODEL = re.compile(r'model = "([^"\\\x00-\x1f\x7f\ufffd]*)"\n')
 """A first line that TOML could not read otherwise."""
 _LONGEST_LINE = 1000
+_AT_LINE = re.compile(r"at line (\d{1,9}), (?=column \d+\)$)")
+"""How `tomllib` says where it stopped."""
 KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
@@ -56,6 +58,11 @@ def _of_library(file: Path) -> dict[str, Any]:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; raises `NotUnderstoodError` naming the file and line where it cannot."""
+    return parse_toml(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read a cell or model file as text; raises `NotUnderstoodError` naming the file where it cannot."""
     try:
         with path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
@@ -72,7 +79,7 @@ def read_toml(path: Path) -> dict[str, Any]:
             source=str(path),
         )
     try:
-        return parse_toml(data.decode("utf-8-sig"), str(path))
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise input_error(
             "not-utf8", f"byte {error.start} is not UTF-8", "save it as UTF-8", source=str(path)
@@ -84,14 +91,18 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     remedy = "see docs/cell.md for the format"
     for number, line in enumerate(text.split("\n"), start=1):
         if _MANY_DOTS.search(line):
-            sentence = f"line {number}: a key of more than {MOST_LEVELS} parts: nested too deeply"
-            raise input_error("not-toml", sentence, remedy, source=source)
+            sentence = f"a key of more than {MOST_LEVELS} parts: nested too deeply"
+            raise input_error("not-toml", sentence, remedy, line=number, source=source)
     try:
         tables = tomllib.loads(text)
     except RecursionError:
         raise input_error("not-toml", "nested too deeply", remedy, source=source) from None
     except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
-        raise input_error("not-toml", str(error)[:200], remedy, source=source) from None
+        place = _AT_LINE.search(str(error))
+        sentence = _AT_LINE.sub("", str(error))[:200]
+        raise input_error(
+            "not-toml", sentence, remedy, line=int(place[1]) if place else 0, source=source
+        ) from None
     if _levels(tables) > MOST_LEVELS:
         raise input_error("not-toml", f"more than {MOST_LEVELS} levels", remedy, source=source)
     return tables

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from gcode2krl.errors import Issue
 
 _ANGLES = re.compile(
-    r"((?:frames\.(?:base|tool)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
+    r"((?:frames\.(?:base|tool|robroot)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
 )
 _EIGHTH_TURN_RAD = math.pi / 4
 _NEAR_RAD = 2e-4
@@ -107,6 +107,7 @@ def _issue(
         0,
         text,
         f"correct {key}: check its unit and digits",
+        key=key,
     )
 
 
@@ -129,4 +130,5 @@ def _radians(cell: BaseModel) -> Iterator[Issue]:
                 0,
                 f"{name}: the angles {shown} are multiples of pi/4: radians, where degrees are meant",
                 f"write the angles of {name} in degrees",
+                key=name,
             )

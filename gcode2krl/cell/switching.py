@@ -17,7 +17,8 @@ _SPINDLE, _COOLANT = ("M3", "M4"), ("M7", "M8")
 
 def template_issue(key: str, what: str) -> Issue:
     """Return the finding on a template of the cell; ``key`` names it: ``m_code.M8``."""
-    return Issue("error", "template", 0, f"{key} of the cell: {what}", f"correct {key} in the cell file")
+    text = f"{key} of the cell: {what}"
+    return Issue("error", "template", 0, text, f"correct {key} in the cell file", key=key)
 
 
 def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, str]:
@@ -177,11 +178,11 @@ def _same_number(named: Mapping[str, int | None], what: str, may_share: Any) -> 
 
 
 def _pair(key: str, text: str, severity: Severity = "error") -> Issue:
-    return Issue(
-        severity, "cell-pair", 0, text, f"give {key} in the cell file, so that it switches all of them off"
-    )
+    remedy = f"give {key} in the cell file, so that it switches all of them off"
+    return Issue(severity, "cell-pair", 0, text, remedy, key=key)
 
 
 def _two_meanings(signal: str, one: str, other: str) -> Issue:
     text = f"{signal} has two meanings: {one}, and {other}"
-    return Issue("error", "signal-twice", 0, text, f"give {other} a signal of its own")
+    key = other.partition(" ")[0]  # "guard_inputs (door closed)": the list
+    return Issue("error", "signal-twice", 0, text, f"give {other} a signal of its own", key=key)

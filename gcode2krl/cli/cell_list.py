@@ -20,10 +20,13 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     yield "$TRAFONAME[] contains", robot.trafo_name or "not compared", "memory"
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
     yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s", "unknown"), robot.speeds.sure
+    if cell.frames.robroot is not None:
+        yield "$ROBROOT", _frame(cell.frames.robroot), cell.frames.sure
     yield "$BASE", _frame(cell.frames.base) + _number("BASE_DATA", cell.frames.base_data), cell.frames.sure
     length_mm = cell.frames.tool_length_mm
     length = f"length {length_mm:g} mm" if length_mm is not None else f"length {MISSING}"
-    yield "$TOOL (reference tool)", f"{_frame(cell.frames.tool)}, {length}", cell.frames.sure
+    if cell.frames.tool is not None or not cell.tool or any(one.frame is None for one in cell.tool.values()):
+        yield "$TOOL (reference tool)", f"{_frame(cell.frames.tool)}, {length}", cell.frames.sure
     yield from _tools(cell)
     centre = f"at X {load.x_mm:g} Y {load.y_mm:g} Z {load.z_mm:g}"
     inertia = f"J {load.jx_kgm2:g} {load.jy_kgm2:g} {load.jz_kgm2:g} kgm2"

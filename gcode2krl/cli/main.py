@@ -14,6 +14,7 @@ from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
 
 _COMMANDS = {
+    "init": "Write the cell file of your robot from your answers and the controller's archive.",
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
     "verify": "Read a KRL program back and compare it with its G-code.",

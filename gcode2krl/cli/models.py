@@ -1,6 +1,7 @@
 """``gcode2krl models``: what is in the library, and what a person must confirm of a cell."""
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -60,6 +61,7 @@ def schema() -> None:
 def check(cell_path: str | None, as_json: bool) -> int:
     """Check a cell file and list what a person must confirm at the real cell."""
     from gcode2krl.cell import load_cell
+    from gcode2krl.cell.key_lines import with_lines
     from gcode2krl.cli.cell_list import findings, missing_keys, to_confirm
     from gcode2krl.krl.provenance import default_values
 
@@ -73,6 +75,8 @@ def check(cell_path: str | None, as_json: bool) -> int:
         return error.exit_code
     rows = list(to_confirm(cell))
     lacking, issues = missing_keys(cell), findings(cell)
+    if cell_path is not None:
+        issues = list(with_lines(issues, library.read_text(Path(cell_path))))
     wrong = any(issue.severity == "error" for issue in issues)
     if as_json:
         console.json(

@@ -107,8 +107,8 @@ class Inputs:
 
     @cached_property
     def gravity(self) -> Floats:
-        """(3,) unit vector downwards along ``$BASE``, of a robot that stands upright."""
-        down: Floats = self.cell.base_matrix()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+        """(3,) unit vector downwards along ``$BASE``, however the robot is mounted."""
+        down: Floats = self.cell.base_in_world()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
         return down
 
     @of_the_command

@@ -47,7 +47,7 @@ def base_statement(cell: Cell) -> str:
     number = cell.frames.base_data
     if number is not None:
         return f"{w.BAS} (#BASE,{number} )"
-    return f"{w.BASE}={frame_text(cell.base_matrix())}"
+    return f"{w.BASE}={frame_text(cell.base_in_world())}"
 
 
 def unnumbered(cell: Cell, tools: list[int]) -> str:
@@ -85,13 +85,19 @@ def written_tool(cell: Cell, number: int) -> Floats:
 
 
 def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
-    """Return what the guard compares: frames set by number, with the inverse of what they should be."""
+    """Return what the guard compares: the mounting where the cell states it, and frames set by number.
+
+    Each with the inverse of what it should be.
+    """
     checks = []
+    if cell.frames.robroot is not None:
+        inverse = frame_text(fr.invert(cell.frames.robroot.matrix()))
+        checks.append({"variable": w.ROBROOT, "inverse": inverse})
     if cell.frames.base_data is not None:
         checks.append(
             {
                 "variable": f"{w.BASE_DATA}[{cell.frames.base_data}]",
-                "inverse": frame_text(fr.invert(cell.base_matrix())),
+                "inverse": frame_text(fr.invert(cell.base_in_world())),
             }
         )
     for number in tools:

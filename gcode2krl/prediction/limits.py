@@ -120,7 +120,7 @@ class ForceLimits:
     def _take_load(self, forces: Forces, cut_N: Floats, line: Ints32) -> None:
         """Keep the largest load on the flange: the cut, or the cut and the weight."""
         own_kg = self._cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
-        down = -self._cell.base_matrix()[2, :3]  # the root's -z along the axes of $BASE
+        down = -self._cell.base_in_world()[2, :3]  # the world's -z along the axes of $BASE
         whole_N = lengths(forces.force_base_N + own_kg * GRAVITY_M_S2 * down)
         load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
         row = self.load.take(load_N, line, forces.tool)

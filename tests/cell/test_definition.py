@@ -72,7 +72,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
         ("[robot.limits]\nq_deg = [[1,0],[0,1],[0,1],[0,1],[0,1],[0,1]]", ("robot.limits.q_deg", "A1")),
         ("verified = { by = '', date = 'today' }", ("verified.by", "verified.date")),
         ("[nonsense]\na = 1", ("nonsense", "no such key")),
-        ("[frames\n", ("line 1",)),
+        ("[frames\n", (":1: error:",)),
     ],
 )
 def test_an_error_names_file_key_found_and_allowed(tmp_path, text, words):

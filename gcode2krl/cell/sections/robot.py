@@ -128,8 +128,10 @@ class Controller(Provenance):
 class Frames(Provenance):
     """Where the work and the tool are."""
 
+    robroot: Frame | None = None
+    """``$ROBROOT`` in ``$WORLD``, of a robot that hangs or stands on a slope; None: zero."""
     base: Frame | None = None
-    """``$BASE`` in ``$ROBROOT``."""
+    """``$BASE`` in ``$WORLD``, as the controller has it: in ``$ROBROOT`` where `robroot` is not stated."""
     base_data: DataNumber | None = None
     """Number of ``BASE_DATA`` on the controller; without it ``$BASE`` is written as a frame."""
     tool: Frame | None = None

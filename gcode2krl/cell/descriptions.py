@@ -1,0 +1,84 @@
+"""What each key of a cell file means, in which unit, with an example: from ``descriptions.toml``."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+NOT_OF_A_FILE = ("taken_over", "defaults")
+"""Keys that only a resolved cell has."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a key means; ``example`` is None for a table of further keys."""
+
+    text: str
+    unit: str
+    example: Any
+
+    def sentence(self) -> str:
+        """Return text and unit on one line."""
+        return f"{self.text} [{self.unit}]" if self.unit else self.text
+
+
+@lru_cache(maxsize=1)
+def _table() -> Mapping[str, Mapping[str, Any]]:
+    text = resources.files("gcode2krl.cell").joinpath("descriptions.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def descriptions_of(section: type[BaseModel]) -> dict[str, Description]:
+    """Return key → description of a section, in the section's order; a key without one is a `KeyError`."""
+    known: dict[str, Any] = {}
+    for kind in reversed(section.__mro__):
+        known |= _table().get(kind.__name__, {})
+    return {
+        key: Description(known[key]["text"], known[key].get("unit", ""), known[key].get("example"))
+        for key in section.model_fields
+        if key not in NOT_OF_A_FILE
+    }
+
+
+def sections_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the sections that a value of this type may be or hold."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from sections_in(part)
+
+
+def described_schema(cell: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON schema of a cell, each key with its description, unit and example."""
+    schema = cell.model_json_schema()
+    schema["properties"] = {
+        key: value for key, value in schema["properties"].items() if key not in NOT_OF_A_FILE
+    }
+    for section in _all_sections(cell):
+        node = schema if section is cell else schema["$defs"].get(section.__name__)
+        for key, description in descriptions_of(section).items() if node else ():
+            node["properties"][key]["description"] = description.sentence()
+            if description.example is not None:
+                node["properties"][key]["examples"] = [description.example]
+    _drop_unused(schema)
+    return schema
+
+
+def _all_sections(cell: type[BaseModel]) -> list[type[BaseModel]]:
+    """Return the sections of a cell as far as a file can state them, the cell first."""
+    found = [cell]
+    for section in found:  # grows while it is read
+        for key, field in section.model_fields.items():
+            if key not in NOT_OF_A_FILE:
+                found += [one for one in dict.fromkeys(sections_in(field.annotation)) if one not in found]
+    return found
+
+
+def _drop_unused(schema: dict[str, Any]) -> None:
+    """Leave out the definitions that only keys of a resolved cell refer to."""
+    text = repr({key: value for key, value in schema.items() if key != "$defs"}) + repr(schema["$defs"])
+    schema["$defs"] = {name: value for name, value in schema["$defs"].items() if f"'#/$defs/{name}'" in text}

@@ -1,0 +1,216 @@
+"""What the data lists of a controller say of its cell: robot, limits, frames, loads, HOME, mounting.
+
+Lengths and speeds come from ``$machine.dat`` as the planner there uses them; both were compared with the
+library's KR 210 R2700-2, whose values were read elsewhere: the lengths are equal, the speeds to 0.1 deg/s.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gcode2krl.cell import library
+from gcode2krl.cell.setup.archive import read_archive
+from gcode2krl.cell.setup.krl_data import Value, krl_values
+
+Numbers = tuple[float, ...]
+FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
+_AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
+_LENGTH_KEYS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
+_MOST_NUMBER = 32
+"""Largest number of TOOL_DATA and BASE_DATA that a cell may name."""
+_SAME_MM = 0.5
+"""Two arms whose lengths differ by no more are the same model."""
+_DEG_S_PER_RPM = 6.0
+
+
+@dataclass(frozen=True)
+class NamedFrame:
+    """An entry of ``TOOL_DATA`` or ``BASE_DATA``."""
+
+    number: int
+    name: str
+    frame: Numbers
+    """X, Y, Z in mm, A, B, C in degrees."""
+
+    def text(self) -> str:
+        """Return number, name and position, as a list of them shows it."""
+        x_mm, y_mm, z_mm = self.frame[:3]
+        return f"{self.number}  {self.name or 'without a name'}  (X {x_mm:g}, Y {y_mm:g}, Z {z_mm:g})"
+
+
+@dataclass(frozen=True)
+class Payload:
+    """An entry of ``LOAD_DATA``: mass, centre of gravity in the flange, inertia about its axes."""
+
+    mass_kg: float
+    centre_mm: Numbers
+    inertia_kgm2: Numbers | None
+    """None where its axes are turned against the flange, which a cell file cannot state."""
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What an archive states; None or empty where it does not."""
+
+    source: str
+    trafo_name: str = ""
+    model: str = ""
+    """Robot of the library, where its name and its lengths agree."""
+    lengths_mm: Numbers | None = None
+    """a1, a2, c1, c2, c3, c4 of the arm."""
+    limits_deg: tuple[tuple[float, float], ...] | None = None
+    speeds_deg_s: Numbers | None = None
+    robroot: Numbers | None = None
+    home_deg: Numbers | None = None
+    tools: tuple[NamedFrame, ...] = ()
+    bases: tuple[NamedFrame, ...] = ()
+    loads: Mapping[int, Payload] | None = None
+    external_axes: int = 0
+
+
+def read_controller(path: Path) -> Controller:
+    """Read the archive of a controller, a folder or a zip; raises `NotUnderstoodError` where it cannot."""
+    lists = read_archive(path)
+    values: dict[str, Value] = {}
+    for one in lists.values():
+        values |= krl_values(one.text)
+    return controller_of(values, path.name or str(path))
+
+
+def controller_of(values: Mapping[str, Value], source: str) -> Controller:
+    """Return what the values of the data lists mean."""
+    trafo_name = str(values.get("$TRAFONAME[]", "")).removeprefix("#").strip()
+    lengths = _lengths(values)
+    return Controller(
+        source=source,
+        trafo_name=trafo_name,
+        model=_model(_machine_name(values), trafo_name, lengths),
+        lengths_mm=lengths,
+        limits_deg=_limits(values),
+        speeds_deg_s=_speeds(values),
+        robroot=_members(values.get("$ROBROOT"), FRAME_KEYS),
+        home_deg=_members(values.get("XHOME"), _AXES) or _members(values.get("$H_POS"), _AXES),
+        tools=_named(values, "TOOL"),
+        bases=_named(values, "BASE"),
+        loads=_loads(values),
+        external_axes=int(_number(values.get("$EX_AX_NUM")) or 0),
+    )
+
+
+def _named(values: Mapping[str, Value], kind: str) -> tuple[NamedFrame, ...]:
+    """Return the entries that were measured: those with a frame other than zero.
+
+    Left out are tools that stand in the room (``#TCP``) and bases on an external kinematic system.
+    """
+    entries = []
+    for number in range(1, _MOST_NUMBER + 1):
+        frame = _members(values.get(f"{kind}_DATA[{number}]"), FRAME_KEYS)
+        of_room = values.get(f"{kind}_TYPE[{number}]") == "#TCP"
+        parent = values.get(f"MACHINE_FRAME_DAT[{number}]")
+        moves = kind == "BASE" and isinstance(parent, Mapping) and parent.get("PARENT") not in ("WORLD", "")
+        if frame is not None and any(frame) and not of_room and not moves:
+            name = str(values.get(f"{kind}_NAME[{number},]", "")).strip()
+            entries.append(NamedFrame(number, name, frame))
+    return tuple(entries)
+
+
+def _loads(values: Mapping[str, Value]) -> dict[int, Payload]:
+    """Return the loads that were stated; a mass of -1 says that none was."""
+    loads = {}
+    for number in range(1, _MOST_NUMBER + 1):
+        entry = values.get(f"LOAD_DATA[{number}]")
+        if not isinstance(entry, Mapping):
+            continue
+        mass_kg = _number(entry.get("M"))
+        centre = _members(entry.get("CM"), FRAME_KEYS)
+        inertia = _members(entry.get("J"), ("X", "Y", "Z"))
+        if mass_kg is not None and mass_kg > 0.0 and centre is not None and inertia is not None:
+            is_turned = any(centre[3:]) and len(set(inertia)) > 1
+            loads[number] = Payload(mass_kg, centre[:3], None if is_turned else inertia)
+    return loads
+
+
+def _limits(values: Mapping[str, Value]) -> tuple[tuple[float, float], ...] | None:
+    pairs = []
+    for axis in range(1, 7):
+        low = _number(values.get(f"$SOFTN_END[{axis}]"))
+        high = _number(values.get(f"$SOFTP_END[{axis}]"))
+        if low is None or high is None or low >= high:
+            return None
+        pairs.append((low, high))
+    return tuple(pairs)
+
+
+def _speeds(values: Mapping[str, Value]) -> Numbers | None:
+    """Return the joints' largest speeds: those of the motors in rpm over the ratios of the gears."""
+    speeds = []
+    for axis in range(1, 7):
+        motor_rpm = _number(values.get(f"$VEL_AXIS_MA[{axis}]"))
+        ratio = _members(values.get(f"$RAT_MOT_AX[{axis}]"), ("N", "D"))
+        if not motor_rpm or ratio is None or not all(ratio):
+            return None
+        speeds.append(round(abs(motor_rpm * ratio[1] / ratio[0]) * _DEG_S_PER_RPM, 1))
+    return tuple(speeds)
+
+
+def _lengths(values: Mapping[str, Value]) -> Numbers | None:
+    """Return a1 … c4 of an arm with spherical wrist; None of any other kinematics."""
+    a1, c2 = (_number(values.get(name)) for name in ("$LENGTH_A", "$LENGTH_B"))
+    foot, wrist, flange = (_members(values.get(name), FRAME_KEYS) for name in ("$TIRORO", "$TX3P3", "$TFLWP"))
+    if a1 is None or c2 is None or foot is None or wrist is None or flange is None:
+        return None
+    others = (*foot[:2], *foot[3:], wrist[1], wrist[3], wrist[4] - 90.0, wrist[5], *flange[:2], *flange[3:])
+    wrists = [_members(values.get(name), ("DHART_A", "DHART_D")) for name in ("$DH_4", "$DH_5")]
+    twisted = any(wrist not in (None, (0.0, 0.0)) for wrist in wrists)
+    if any(abs(other) > 1e-3 for other in others) or twisted or min(c2, wrist[0], flange[2]) <= 0.0:
+        return None
+    return a1, -wrist[2] + 0.0, foot[2], c2, wrist[0], flange[2]
+
+
+def robots_of_lengths(lengths_mm: Numbers | None) -> list[str]:
+    """Return the robots of the library whose lengths agree with those of an arm, all where none is known."""
+    names = library.names("robots")
+    return [name for name in names if _has_lengths(library.read_model("robots", name), lengths_mm)]
+
+
+def _machine_name(values: Mapping[str, Value]) -> str:
+    machine = values.get("MACHINE_DEF[1]")
+    return str(machine.get("NAME", "")) if isinstance(machine, Mapping) else ""
+
+
+def _model(machine_name: str, trafo_name: str, lengths_mm: Numbers | None) -> str:
+    """Return the robot of the library that the archive means; empty where none or several could be it."""
+    fits = robots_of_lengths(lengths_mm)
+    robots = {name: library.read_model("robots", name) for name in fits}
+    by_name = [name for name in fits if _fold(name) == _fold(machine_name)]
+    by_trafo = [
+        name
+        for name in fits
+        if trafo_name and _fold(str(robots[name].get("trafo_name", "?"))) in _fold(trafo_name)
+    ]
+    named = by_name or by_trafo
+    return named[0] if len(named) == 1 else ""
+
+
+def _has_lengths(robot: Mapping[str, object], lengths_mm: Numbers | None) -> bool:
+    geometry = robot.get("geometry")
+    if lengths_mm is None or not isinstance(geometry, dict) or "a1_mm" not in geometry:
+        return True
+    stated = (float(geometry[key]) for key in _LENGTH_KEYS)
+    return all(abs(a - b) <= _SAME_MM for a, b in zip(stated, lengths_mm, strict=True))
+
+
+def _members(value: Value | None, keys: tuple[str, ...]) -> Numbers | None:
+    if not isinstance(value, Mapping):
+        return None
+    numbers = [_number(value.get(key)) for key in keys]
+    known = [number for number in numbers if number is not None]
+    return tuple(known) if len(known) == len(keys) else None
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, float) and abs(value) < 1e9 else None
+
+
+def _fold(name: str) -> str:
+    return "".join(name.split()).casefold()
