@@ -10,7 +10,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.compiled.threads import THREADS_VARIABLE
-from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
@@ -67,6 +67,18 @@ def gcode_options(function: Any) -> Any:
     return function
 
 
+def job_option(function: Any) -> Any:
+    """Add --job to a command that reads a part."""
+    option = click.option(
+        "--job",
+        "job_path",
+        type=click.Path(),
+        metavar="JOB.toml",
+        help="What the CAM knows: its cutters and stock, laid over the cell.",
+    )
+    return option(function)
+
+
 def read_part(
     part: str, cell: "Cell", console: Console, chord_tolerance_mm: float, block_delete: bool
 ) -> "Toolpath":
@@ -100,6 +112,25 @@ def read_cell(path: str | None) -> "Cell":
     from gcode2krl.cell import load_cell
 
     return load_cell(path)
+
+
+def read_cell_under_job(path: str | None, job_path: str | None) -> "tuple[Cell, tuple[Issue, ...]]":
+    """Read the cell of a command and lay a job over it; the findings say where the two differ."""
+    cell = read_cell(path)
+    if job_path is None:
+        return cell, ()
+    from gcode2krl.cell.job import lay_job_over
+
+    return lay_job_over(cell, Path(job_path))
+
+
+def files_of_job(job_path: str | None) -> list[Path]:
+    """Return the files of a job, which are inputs."""
+    if job_path is None:
+        return []
+    from gcode2krl.cell.job import job_files
+
+    return job_files(Path(job_path))
 
 
 def require_other(output: Path, *inputs: str | Path | None) -> None:

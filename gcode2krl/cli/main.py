@@ -25,6 +25,7 @@ _COMMANDS = {
     "and joint by joint.",
     "make-test": "Write a test program of air moves.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
+    "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",
 }
 _OWN_OPTIONS = ("-h", "--help", "--version")

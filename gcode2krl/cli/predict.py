@@ -1,5 +1,6 @@
 """``gcode2krl predict part.nc -o prediction/``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,10 @@ from gcode2krl.cli.inputs import (
     common_options,
     effect_files,
     existing,
+    files_of_job,
     gcode_options,
-    read_cell,
+    job_option,
+    read_cell_under_job,
     read_part,
     require_folder,
     require_other,
@@ -47,6 +50,7 @@ _FIGURES = (
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
 @common_options
 @gcode_options
+@job_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
 )
@@ -72,6 +76,7 @@ def command(
     tolerance: float | None,
     chord_tolerance: float,
     block_delete: bool,
+    job_path: str | None,
     dt_s: float | None,
     csv: bool,
     plot: bool,
@@ -91,10 +96,13 @@ def command(
     try:
         require_part(part)
         folder = _folder(part, output)
-        inputs = existing(part, *cell_files(cell_path), *effect_files(effect_folders))
+        inputs = existing(
+            part, *cell_files(cell_path), *files_of_job(job_path), *effect_files(effect_folders)
+        )
         _require_outputs(folder, part_mesh, inputs)
-        cell = read_cell(cell_path)
+        cell, of_job = read_cell_under_job(cell_path, job_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.progress("predicting", None):

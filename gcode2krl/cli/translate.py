@@ -13,8 +13,10 @@ from gcode2krl.cli.inputs import (
     cell_files,
     common_options,
     existing,
+    files_of_job,
     gcode_options,
-    read_cell,
+    job_option,
+    read_cell_under_job,
     read_part,
     require_figure,
     require_outputs,
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 )
 @common_options
 @gcode_options
+@job_option
 @click.option("--name", help="Program name, where -o names no file; a controller needs both alike.")
 @click.option(
     "--allow",
@@ -92,6 +95,7 @@ def command(
     tolerance: float | None,
     chord_tolerance: float,
     block_delete: bool,
+    job_path: str | None,
     name: str | None,
     allow: tuple[str, ...],
     strict: bool,
@@ -117,11 +121,13 @@ def command(
         require_part(part)
         place = _place(part, output, name)
         _refuse_online(online, both, compensate, place)
-        cell = _with_options(read_cell(cell_path), max_lines, comment_every)
-        inputs = existing(part, *cell_files(cell_path))
+        own_cell, of_job = read_cell_under_job(cell_path, job_path)
+        cell = _with_options(own_cell, max_lines, comment_every)
+        inputs = existing(part, *cell_files(cell_path), *files_of_job(job_path))
         require_figure(compensate_plot)
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.cell.confirmation import future_confirmation
         from gcode2krl.krl import suggested_name, write_krl
         from gcode2krl.pipeline import corner_errors, predict_toolpath, solve_joints, targets_and_joints
@@ -130,6 +136,7 @@ def command(
             tolerance=tolerance,
             chord_tolerance=chord_tolerance,
             block_delete=block_delete,
+            job=Path(job_path).name if job_path is not None else None,
             spin=cell.frames.spin,
             compensate=compensate,
             online=online,
