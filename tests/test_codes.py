@@ -18,6 +18,7 @@ SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
     "bull-nose",
+    "install-hook",
     "kilograms-force",
     "latin-1",
     "make-test",

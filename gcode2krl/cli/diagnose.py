@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, effect_files, require_folder, require_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -14,7 +15,14 @@ if TYPE_CHECKING:
     from gcode2krl.gap import Gap
 
 
-@click.command("diagnose")
+@click.command(
+    "diagnose",
+    epilog=examples(
+        "gcode2krl diagnose prediction/ run-1/ run-2/",
+        "gcode2krl diagnose prediction/ run-1/ run-2/ --holdout run-3/ --html gap.html",
+        "gcode2krl diagnose --from-log run-1/",
+    ),
+)
 @click.argument("folders", nargs=-1, required=True, metavar="[PREDICTION] RUN…")
 @click.option("--holdout", multiple=True, metavar="RUN", help="Run that only tests; may be repeated.")
 @click.option("--effects", multiple=True, metavar="FOLDER", help="Folder with your own effects; repeatable.")

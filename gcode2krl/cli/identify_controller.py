@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
 from gcode2krl.units import MS_PER_S
@@ -24,7 +25,13 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 
 
-@click.command("controller")
+@click.command(
+    "controller",
+    epilog=examples(
+        "gcode2krl identify controller trace.csv",
+        "gcode2krl identify controller trace.csv --plot fit.png --apply cell.toml",
+    ),
+)
 @click.argument("trace")
 @click.option(
     "--part", metavar="TEST.nc", help="The program that was run; default: that of `make-test controller`."

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import read_cell
 from gcode2krl.errors import input_error
 
@@ -17,7 +18,14 @@ _SOURCE = Path(__file__).parent / "hooks" / "freecad_post.py"
 _MACRO_PATH = re.compile(r'<FCText Name="MacroPath">([^<]+)</FCText>')
 
 
-@click.command("install-hook")
+@click.command(
+    "install-hook",
+    epilog=examples(
+        "gcode2krl install-hook freecad --cell cell.toml",
+        "gcode2krl install-hook freecad --folder macros/",
+        "gcode2krl install-hook freecad --remove",
+    ),
+)
 @click.argument("cam", type=click.Choice(["freecad"]))
 @click.option(
     "--cell", "cell_path", type=click.Path(), help="Cell file of the programs; absolute or from here."

@@ -7,6 +7,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import (
     cell_files,
     common_options,
@@ -31,7 +32,9 @@ _FIGURES = ("deviation", "signals")
 _RUN_FILES = ("run.toml", "rsi.log", "force.csv", "events.csv")
 
 
-@click.group("online")
+@click.group(
+    "online", epilog=examples("gcode2krl online simulate part.nc", "gcode2krl online serve --files rsi/")
+)
 def command() -> None:
     """Compensate online: the twin, the RSI server, replay.
 
@@ -39,7 +42,14 @@ def command() -> None:
     """
 
 
-@command.command("simulate")
+@command.command(
+    "simulate",
+    epilog=examples(
+        "gcode2krl online simulate",
+        "gcode2krl online simulate part.nc --cell cell.toml --plot twin/",
+        "gcode2krl online simulate part.nc --late-ms 40 --noise-N 5 --json",
+    ),
+)
 @click.argument("part", required=False)
 @common_options
 @gcode_options
@@ -248,7 +258,10 @@ def _draw(
     return save_figures(dict(zip(_FIGURES, drawn, strict=True)), folder, inputs)
 
 
-@command.command("replay")
+@command.command(
+    "replay",
+    epilog=examples("gcode2krl online replay run-1/", "gcode2krl online replay run-1/ -o cycles.csv"),
+)
 @click.argument("run", type=click.Path())
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that ran.")
@@ -305,7 +318,13 @@ def replay_command(
     return 0
 
 
-@command.command("serve")
+@command.command(
+    "serve",
+    epilog=examples(
+        "gcode2krl online serve --files rsi/ --most-mm 0.5",
+        "gcode2krl online serve --pilot part.pilot.csv --cycle-ms 4 -o run-4/",
+    ),
+)
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that will run.")
 @click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")

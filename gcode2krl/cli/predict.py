@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
     cell_files,
@@ -45,7 +46,14 @@ _FIGURES = (
 )
 
 
-@click.command("predict")
+@click.command(
+    "predict",
+    epilog=examples(
+        "gcode2krl predict part.nc -o prediction/ --plot",
+        "gcode2krl predict part.nc --cell cell.toml -o out/ --csv --part left.stl",
+        "gcode2krl predict part.nc -o out/ --effect backlash:target=A2,gap_deg=0.02",
+    ),
+)
 @click.argument("part")
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
 @common_options

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
     cell_files,
@@ -33,7 +34,15 @@ if TYPE_CHECKING:
     from gcode2krl.tables import Targets
 
 
-@click.command("translate")
+@click.command(
+    "translate",
+    epilog=examples(
+        "gcode2krl part.nc -o part.src",
+        "gcode2krl part.nc --cell cell.toml -o part.src --tolerance 0.05",
+        "cat part.nc | gcode2krl - -o - --name PART > part.src",
+        "gcode2krl part.nc --cell cell.toml --compensate offline --json",
+    ),
+)
 @click.argument("part")
 @click.option(
     "-o",

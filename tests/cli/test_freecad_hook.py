@@ -46,9 +46,8 @@ def post(tmp_path):
     def made(output="part.src", stock="box", drill_tool=2, arguments=""):
         result = tmp_path / "result.json"
         place = "-" if output == "-" else str(home / output)
-        wanted = dict(
-            output=place, stock=stock, drill_tool=drill_tool, arguments=arguments, result=str(result)
-        )
+        wanted = {"output": place, "stock": stock, "drill_tool": drill_tool, "arguments": arguments}
+        wanted["result"] = str(result)
         kept = {
             key: value
             for key, value in os.environ.items()
