@@ -18,6 +18,7 @@ from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_erro
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction import limits as result_limits
+from gcode2krl.progress import Begin, unseen
 from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
@@ -94,15 +95,23 @@ def predict_toolpath(
     settings: dict[str, Any] | None = None,
     targets: Targets | None = None,
     forces: bool = True,
+    begin: Begin = unseen,
 ) -> Prediction:
-    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already."""
+    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already.
+
+    ``begin`` is told the name of each stage as it begins.
+    """
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     if targets is None:
+        begin("planning")
         targets = set_targets(toolpath, cell, tolerance_mm)
+    begin("motion")
     motion = plan_motion(targets, cell, dt_s)
+    begin("joints")
     joints = solve_joints(motion, cell)
     loads: tuple[Forces | None, Deflection | None, tuple[Issue, ...]] = (None, None, ())
     if forces:
+        begin("material, forces, deflection")
         loads = forces_and_deflection(toolpath, motion, joints, cell)
     inputs: dict[str, Any] = {
         "program": toolpath.source,

@@ -101,7 +101,7 @@ def _written(
     from gcode2krl.gap.tell.html.pictures import write_pictures
 
     written = []
-    with console.progress("drawing", None):
+    with console.stage("drawing"):
         if plot is not None:
             written += write_pictures(gap, Path(plot), inputs)
         if html is not None:
@@ -127,17 +127,16 @@ def _diagnosis(
         remedy = "name a prediction and its runs, or use --from-log"
         raise input_error("no-runs", "there is no run to diagnose", remedy, source=folders[0])
     names = folders if from_log else folders[1:]
-    with console.progress("reading", len(names) + len(holdout)) as advance:
-        runs, held = [], []
-        for name in names:
-            runs.append(load_run(name, partial=from_log))
-            advance(1)
-        for name in holdout:
-            held.append(load_run(name, partial=from_log))
-            advance(1)
-    if from_log:
-        return diagnose_log(runs, _cell(cell_path), held, effects=effects)
-    return diagnose(Prediction.load(folders[0]), runs, held, effects=effects)
+    with console.stages() as begin:
+        reading = begin("reading runs")
+        read = []
+        for name in (*names, *holdout):
+            read.append(load_run(name, partial=from_log))
+            reading(len(read), len(names) + len(holdout))
+        runs, held = read[: len(names)], read[len(names) :]
+        if from_log:
+            return diagnose_log(runs, _cell(cell_path), held, effects=effects, begin=begin)
+        return diagnose(Prediction.load(folders[0]), runs, held, effects=effects, begin=begin)
 
 
 def _cell(path: str | None) -> "Cell | None":

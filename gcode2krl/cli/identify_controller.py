@@ -94,7 +94,7 @@ def _identify(
     if part is None:
         return _identify_test(trace, cell, console)
     targets = set_targets(read_part(part, cell, console, 0.01, False), cell, tolerance_mm)
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         return identify_controller(trace, targets, cell)
 
 
@@ -103,7 +103,7 @@ def _identify_test(trace: "ControllerTrace", cell: "Cell", console: Console) -> 
     from gcode2krl.identify.controller import identify_controller
     from gcode2krl.pipeline import controller_test_targets
 
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         try:
             return identify_controller(trace, controller_test_targets(cell), cell)
         except NotUnderstoodError:

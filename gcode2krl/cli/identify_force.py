@@ -50,7 +50,7 @@ def command(
     try:
         require_fit_outputs(plot, apply_to, None, run_folder, prediction)
         run, predicted = _inputs(run_folder, prediction)
-        with console.progress("fitting", None):
+        with console.stage("fitting"):
             fit = _fit(run, predicted)
         files = [_save_figure(fit, Path(plot))] if plot is not None else []
         if not as_json:

@@ -74,7 +74,7 @@ def _run(
     cell = read_cell(cell_path)
     readings = read_measurements(measurements)
     require_fit_outputs(plot, apply_to, cell_path, measurements, readings.source)
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         result = identify_stiffness(readings, cell)
     files = []
     if plot is not None:

@@ -85,8 +85,15 @@ def read_part(
     """Read the G-code of a command, from a file or from standard input."""
     from gcode2krl.gcode import read_gcode, read_stream
 
-    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else None
-    with console.progress("reading", size) as advance:
+    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else 0
+    read = 0
+    with console.stage("reading") as progress:
+
+        def advance(amount: int) -> None:
+            nonlocal read
+            read += amount
+            progress(read, size)
+
         if part == STANDARD:
             if sys.stdin is None:
                 raise input_error("file-unreadable", "standard input is closed", "name a file")

@@ -97,8 +97,8 @@ def simulate_command(
     world = World(**world_values)
     twin = twin_of(prediction, settings, world)
     judged = judge(prediction, settings.memory_s, world.late_s)
-    with console.progress("simulating", None):
-        runs = simulate_all(twin)
+    with console.stage("simulating") as progress:
+        runs = simulate_all(twin, progress)
     motion = prediction.motion
     lines = prediction.toolpath.source_line[motion.move] if motion is not None else np.zeros(0, np.int32)
     outcome = outcome_json(twin, runs, judged, lines)
@@ -201,8 +201,10 @@ def _predicted(
 
     try:
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        with console.progress("predicting", None):
-            return predict_toolpath(toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance)
+        with console.stages() as begin:
+            return predict_toolpath(
+                toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance, begin=begin
+            )
     except Gcode2KrlError as error:
         error.source = error.source or part
         raise

@@ -113,11 +113,18 @@ def command(
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
-        with console.progress("predicting", None):
+        with console.stages() as begin:
             settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
             prediction = predict_toolpath(
-                toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings, forces=not no_forces
+                toolpath,
+                cell,
+                dt_s=dt_s,
+                tolerance_mm=tolerance,
+                settings=settings,
+                forces=not no_forces,
+                begin=begin,
             )
+            begin("effects and files")
             prediction = add_effects(prediction, effects, effect_folders)
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
@@ -125,6 +132,7 @@ def command(
             if part_mesh is not None:
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
+                begin("figures")
                 files += _draw(prediction, folder, inputs)
     except Gcode2KrlError as error:
         if not as_json:

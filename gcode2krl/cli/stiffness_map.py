@@ -81,7 +81,7 @@ def command(
         require_folder(folder, [f"{name}{kind}" for name in _TABLES for kind in (".png", ".csv")], inputs)
         cell = read_cell(cell_path)
         case = Case.of(cell, load, feed, tool)
-        with console.progress("mapping", None):
+        with console.stage("mapping"):
             plane, spins = plane_map(case, at[2], step), spin_map(case, at)
             result, shares = pose_cost(case, at)
             files = _save(case, at, plane, spins, shares, folder, inputs)

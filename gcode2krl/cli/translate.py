@@ -153,18 +153,21 @@ def command(
         )
         if place is None and name is None and part != STANDARD:
             name = suggested_name(Path(part).stem, cell.program.externals)
-        with console.progress("planning, writing, verifying", None):
+        with console.stages() as begin:
+            begin("planning")
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             corner_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
             dated = future_confirmation(cell)
             targets = replace(targets, issues=(*targets.issues, *corner_issues, *dated))
             _refuse_early(targets, cell, allow, online)
-            prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
+            prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces, begin=begin)
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
 
+                begin("compensation")
                 prediction = compensated(prediction, compensate_plot, inputs)
                 joints = solve_joints(prediction.targets, cell)
+            begin("writing and reading back")
             written = write_krl(
                 prediction,
                 place,

@@ -10,13 +10,18 @@ from gcode2krl.errors import Issue
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
+from gcode2krl.progress import Progress, unheard
 
 Runs = Mapping[Case, Run]
 
 
-def simulate_all(twin: Twin) -> dict[Case, Run]:
+def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, Run]:
     """Return the four cases."""
-    return {case: simulate(twin, case) for case in CASES}
+    runs = {}
+    for case in CASES:
+        runs[case] = simulate(twin, case)
+        progress(len(runs), len(CASES))
+    return runs
 
 
 def figures_of(runs: Runs, judged: Judged) -> dict[str, float | None]:
