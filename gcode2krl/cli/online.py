@@ -1,5 +1,6 @@
 """``gcode2krl online``: the twin, the RSI server, and the replay of a recorded run."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,12 +109,9 @@ def simulate_command(
         console.json({**outcome, "files": [str(file) for file in files], "issues": issue_dicts(issues)})
         return 0
     console.findings(issues, part or "test piece", notes=False)
-    console.say(f"{part or 'test piece'}: largest deviation normal to the feed of what stays on the part")
-    for case, words in _WORDS.items():
-        value = outcome[f"{case}_mm"]
-        console.say(f"  {words:<42} {'-' if value is None else f'{value:.3f} mm'}")
-    if outcome["reduction_percent"] is not None:
-        console.say(f"  with pilot {outcome['reduction_percent']:.0f} % less")
+    console.say(f"{part or 'test piece'}: deviation normal to the feed of what stays on the part")
+    for line in _table(outcome):
+        console.say(line)
     for file in files:
         console.say(f"  {file}")
     return 0
@@ -125,6 +123,35 @@ _WORDS = {
     "pilot": "Cartesian with pilot",
     "axis": "axis-specific with pilot, drives with play",
 }
+
+
+def _table(outcome: dict[str, Any]) -> Iterator[str]:
+    """Yield RMS and largest deviation of each case, then what the pilot gains and where it does not."""
+    yield f"  {'':<42} {'RMS':>9} {'largest':>9} {'in line':>8}"
+    for case, words in _WORDS.items():
+        gain, largest_mm = outcome["gain"][case], outcome[f"{case}_mm"]
+        if gain is None or largest_mm is None:
+            yield f"  {words:<42} {'-':>9} {'-':>9}"
+            continue
+        yield f"  {words:<42} {gain['rms_mm']:>6.3f} mm {largest_mm:>6.3f} mm {gain['worst_line']:>8}"
+    gain = outcome["gain"]["pilot"]
+    if gain is None or gain["rms_less_percent"] is None or outcome["reduction_percent"] is None:
+        return
+    yield f"  with pilot RMS {_less(gain['rms_less_percent'])}, largest {_less(outcome['reduction_percent'])}"
+    yield (
+        f"  nearer to nominal {100.0 * gain['better_share']:.0f} % of the time in the cut, "
+        f"farther {100.0 * gain['worse_share']:.0f} %{_where(gain['worse'])}"
+    )
+
+
+def _less(percent: float) -> str:
+    return f"{percent:.0f} % less" if percent >= 0.0 else f"{-percent:.0f} % more"
+
+
+def _where(worse: list[dict[str, Any]]) -> str:
+    """Return the lines in which the compensation makes it worse."""
+    lines = ", ".join(f"{each['line']} (by {each['excess_mm']:.2f} mm)" for each in worse[:3])
+    return f", most in line {lines}" if len(worse) == 1 else f", most in lines {lines}" if worse else ""
 
 
 def _changed(settings: "Online", options: dict[str, Any]) -> "Online":
@@ -237,7 +264,9 @@ def _draw(
 
     maps = {
         words.capitalize() if words[0] != "C" else words: Map(
-            *surface_of(prediction, runs[case], judged), outcome[f"{case}_mm"]
+            *surface_of(prediction, runs[case], judged),
+            outcome[f"{case}_mm"],
+            outcome["gain"][case]["rms_mm"] if outcome["gain"][case] is not None else None,
         )
         for case, words in _WORDS.items()
     }
