@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem, ShellComplete, add_completion_class, get_completion_class
 
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 
 PROGRAM = "gcode2krl"
 VARIABLE = "_GCODE2KRL_COMPLETE"

@@ -67,7 +67,7 @@ class Console:
         if self.quiet or not sys.stderr.isatty():
             yield unseen
             return
-        from gcode2krl.cli.bars import bars
+        from gcode2krl.cli.terminal_bars import bars
 
         with bars() as begin:
             yield begin

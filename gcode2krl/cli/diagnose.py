@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, effect_files, require_folder, require_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 

@@ -6,7 +6,7 @@ from textwrap import TextWrapper, shorten
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.codes import Code, all_codes, closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 

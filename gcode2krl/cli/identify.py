@@ -2,7 +2,7 @@
 
 import click
 
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
 
 _WHAT = {

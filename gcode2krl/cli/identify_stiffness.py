@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import UM_PER_MM

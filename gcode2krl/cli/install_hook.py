@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import read_cell
 from gcode2krl.errors import input_error
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 

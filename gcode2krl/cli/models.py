@@ -7,7 +7,7 @@ import click
 
 from gcode2krl.cell import library
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:

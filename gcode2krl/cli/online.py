@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     cell_files,
     common_options,

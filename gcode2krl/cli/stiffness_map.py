@@ -9,7 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG

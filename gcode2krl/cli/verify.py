@@ -6,7 +6,7 @@ from typing import Literal
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
-from gcode2krl.cli.examples import examples
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, read_part
 from gcode2krl.errors import Gcode2KrlError
 

@@ -93,7 +93,7 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 
 def _diagnosed(context: Context, begin: Begin) -> Gap:
     """Return the answer: slips first, then each link on what earlier ones have shown, then the verdict."""
-    begin("set-up")
+    begin("slips of the set-up")
     set_up = examine_set_up(context)
     context, slips, issues = set_up.context, set_up.slips, set_up.issues
     if set_up.is_final:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, predict
-from gcode2krl.cli.examples import lines_of
+from gcode2krl.cli.help_examples import lines_of
 from gcode2krl.cli.main import commands
 from tests.cli.test_help import groups
 from tests.conftest import ROOT

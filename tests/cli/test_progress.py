@@ -11,8 +11,8 @@ from itertools import pairwise
 import pytest
 from rich.console import Console as Terminal
 
-from gcode2krl.cli.bars import bars
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.terminal_bars import bars
 from gcode2krl.progress import LEAST_S, Paced, unheard, unseen
 from tests.conftest import ROOT
 

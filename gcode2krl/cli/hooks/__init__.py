@@ -1,1 +1,0 @@
-"""What `install-hook` puts into CAM systems: files that run in their Python, not in ours."""
