@@ -158,6 +158,8 @@ class Loads:
         self._force_limits, self._deflection_limit = ForceLimits(cell), DeflectionLimit(cell)
         self._cuts = np.zeros(len(toolpath), dtype=np.bool_)
         self._waiting: tuple[Motion, Floats, Floats] | None = None
+        self.count = 0
+        """Samples that are done."""
         if cell.material is None:
             remedy = "give [material] in the cell"
             self._skipped = (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
@@ -187,6 +189,7 @@ class Loads:
             motion = joined(old, motion)
             q_rad, qd_rad_s = np.concatenate([q_old, q_rad]), np.concatenate([qd_old, qd_rad_s])
         count = len(forces)
+        self.count += count
         rest = rows_of(motion, count, len(motion))
         self._waiting = (rest, q_rad[count:].copy(), qd_rad_s[count:].copy())
         return self._judged(rows_of(motion, 0, count), q_rad[:count], qd_rad_s[:count], forces)

@@ -22,6 +22,7 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
+from gcode2krl.progress import Begin, Progress, unheard, unseen
 from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath, blocks_of, joined
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
@@ -97,16 +98,24 @@ def predict_toolpath(
     settings: dict[str, Any] | None = None,
     targets: Targets | None = None,
     forces: bool = True,
+    begin: Begin = unseen,
 ) -> Prediction:
-    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already."""
+    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already.
+
+    ``begin`` is told the name of each stage as it begins.
+    """
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     if targets is None:
+        begin("planning")
         targets = set_targets(toolpath, cell, tolerance_mm)
+    begin("motion")
     motion = plan_motion(targets, cell, dt_s)
+    begin("joints")
     joints = solve_joints(motion, cell)
     loads: tuple[Forces | None, Deflection | None, tuple[Issue, ...]] = (None, None, ())
     if forces:
-        loads = forces_and_deflection(toolpath, motion, joints, cell)
+        cutting_begins = begin("material, forces, deflection")
+        loads = forces_and_deflection(toolpath, motion, joints, cell, cutting_begins)
     inputs: dict[str, Any] = {
         "program": toolpath.source,
         "version": __version__,
@@ -121,21 +130,26 @@ def predict_toolpath(
     return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
 
 
-def forecast_toolpath(toolpath: Toolpath, cell: Cell, targets: Targets, *, forces: bool = True) -> Forecast:
+def forecast_toolpath(
+    toolpath: Toolpath, cell: Cell, targets: Targets, *, forces: bool = True, begin: Begin = unseen
+) -> Forecast:
     """Run the stages of `predict_toolpath` at the controller's cycle, and keep what a program needs.
 
     The samples pass by in blocks: memory does not grow by their tables.
     """
+    begin("motion")
     planned = plan_course(targets, cell, cell.controller.cycle_s)
     give_back()
     course, figures, samples = planned.course, LargestLoads(), PilotSamples(cell)
     outcome = Outcome(None, None, ())
     if forces:
+        tell = begin("material, forces, deflection")
         loads = Loads(toolpath, cell, planned.outlook, course.dt_s)
         for motion, q_rad, qd_rad_s, ends in blocks_with_joints(course, cell) if loads.possible else ():
             block = loads.take(motion, q_rad, qd_rad_s, ends)
             figures.take(block.forces, block.deflection)
             samples.take(block.motion, block.line, block.forces, block.deflection)
+            tell(loads.count, course.count)
         outcome = loads.outcome()
     known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
     found = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
@@ -173,11 +187,12 @@ def forecast_of(prediction: Prediction) -> Forecast:
 
 
 def forces_and_deflection(
-    toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell
+    toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell, tell: Progress = unheard
 ) -> tuple[Forces | None, Deflection | None, tuple[Issue, ...]]:
     """Return forces and deflection, None where a stage cannot run, and the findings that say why.
 
-    Raises `NotUnderstoodError` where the stock that the cell names cannot be read.
+    ``tell`` is told how many samples are done. Raises `NotUnderstoodError` where the stock that the cell
+    names cannot be read.
     """
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
@@ -186,6 +201,7 @@ def forces_and_deflection(
         zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ()
     ):
         done.append(loads.take(block, at.q_rad, at.qd_rad_s, ends))
+        tell(loads.count, len(motion))
     outcome = loads.outcome()
     forces: Forces | None = None
     deflection: Deflection | None = None

@@ -18,10 +18,12 @@ SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
     "bull-nose",
+    "install-hook",
     "kilograms-force",
     "latin-1",
     "make-test",
     "single-joint",
+    "steps-mid",
     "on-tool",
     "pounds-force",
     "steps-post",

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -10,6 +10,7 @@ import click
 
 from gcode2krl.cli.standard_files import closed, tell
 from gcode2krl.errors import Issue, told
+from gcode2krl.progress import Begin, Progress, unseen
 
 _COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
 
@@ -58,18 +59,24 @@ class Console:
         click.echo(json.dumps(result, indent=2, allow_nan=False))
 
     @contextmanager
-    def progress(self, what: str, total: int | None) -> Iterator[Callable[[int], None]]:
-        """Show a progress bar on a terminal; yields the function that advances it."""
-        if self.quiet or self.as_json or not sys.stderr.isatty():
-            yield lambda amount: None
-            return
-        from rich.console import Console as RichConsole
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    def stages(self) -> Iterator[Begin]:
+        """Show a bar a stage while a command works: share, remaining time; nothing but on a terminal.
 
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=RichConsole(stderr=True), transient=True) as bar:
-            task = bar.add_task(what, total=total)
-            yield lambda amount: bar.advance(task, amount)
+        Yields the function that begins a stage; see `gcode2krl.progress`. The bars vanish at the end.
+        """
+        if self.quiet or not sys.stderr.isatty():
+            yield unseen
+            return
+        from gcode2krl.cli.terminal_bars import bars
+
+        with bars() as begin:
+            yield begin
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Progress]:
+        """Show the bar of a single stage; yields the function that tells how far it is."""
+        with self.stages() as begin:
+            yield begin(name)
 
 
 def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, effect_files, require_folder, require_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -14,7 +15,14 @@ if TYPE_CHECKING:
     from gcode2krl.gap import Gap
 
 
-@click.command("diagnose")
+@click.command(
+    "diagnose",
+    epilog=examples(
+        "gcode2krl diagnose prediction/ run-1/ run-2/",
+        "gcode2krl diagnose prediction/ run-1/ run-2/ --holdout run-3/ --html gap.html",
+        "gcode2krl diagnose --from-log run-1/",
+    ),
+)
 @click.argument("folders", nargs=-1, required=True, metavar="[PREDICTION] RUN…")
 @click.option("--holdout", multiple=True, metavar="RUN", help="Run that only tests; may be repeated.")
 @click.option("--effects", multiple=True, metavar="FOLDER", help="Folder with your own effects; repeatable.")
@@ -93,7 +101,7 @@ def _written(
     from gcode2krl.gap.tell.html.pictures import write_pictures
 
     written = []
-    with console.progress("drawing", None):
+    with console.stage("drawing"):
         if plot is not None:
             written += write_pictures(gap, Path(plot), inputs)
         if html is not None:
@@ -119,17 +127,16 @@ def _diagnosis(
         remedy = "name a prediction and its runs, or use --from-log"
         raise input_error("no-runs", "there is no run to diagnose", remedy, source=folders[0])
     names = folders if from_log else folders[1:]
-    with console.progress("reading", len(names) + len(holdout)) as advance:
-        runs, held = [], []
-        for name in names:
-            runs.append(load_run(name, partial=from_log))
-            advance(1)
-        for name in holdout:
-            held.append(load_run(name, partial=from_log))
-            advance(1)
-    if from_log:
-        return diagnose_log(runs, _cell(cell_path), held, effects=effects)
-    return diagnose(Prediction.load(folders[0]), runs, held, effects=effects)
+    with console.stages() as begin:
+        reading = begin("reading runs")
+        read = []
+        for name in (*names, *holdout):
+            read.append(load_run(name, partial=from_log))
+            reading(len(read), len(names) + len(holdout))
+        runs, held = read[: len(names)], read[len(names) :]
+        if from_log:
+            return diagnose_log(runs, _cell(cell_path), held, effects=effects, begin=begin)
+        return diagnose(Prediction.load(folders[0]), runs, held, effects=effects, begin=begin)
 
 
 def _cell(path: str | None) -> "Cell | None":

@@ -6,6 +6,7 @@ from textwrap import TextWrapper, shorten
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.codes import Code, all_codes, closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -13,7 +14,7 @@ _WIDTH = 100
 _FIELDS = ("why", "example", "remedy", "allow")
 
 
-@click.command("explain")
+@click.command("explain", epilog=examples("gcode2krl explain spindle-off", "gcode2krl explain"))
 @click.argument("code", required=False, metavar="[CODE]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 def command(code: str | None, as_json: bool) -> int:

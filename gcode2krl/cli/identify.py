@@ -2,6 +2,7 @@
 
 import click
 
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
 
 _WHAT = {
@@ -12,6 +13,14 @@ _WHAT = {
 }
 
 
-@click.command("identify", cls=CommandsOnUse, summaries=_WHAT, module="gcode2krl.cli.identify_{}")
+@click.command(
+    "identify",
+    epilog=examples(
+        "gcode2krl identify controller trace.csv", "gcode2krl identify stiffness examples/identify/robot.toml"
+    ),
+    cls=CommandsOnUse,
+    summaries=_WHAT,
+    module="gcode2krl.cli.identify_{}",
+)
 def command() -> None:
     """Fit the cell to measurements: controller, stiffness, sensor, cutting force."""

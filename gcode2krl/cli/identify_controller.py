@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
 from gcode2krl.units import MS_PER_S
@@ -24,7 +25,13 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 
 
-@click.command("controller")
+@click.command(
+    "controller",
+    epilog=examples(
+        "gcode2krl identify controller trace.csv",
+        "gcode2krl identify controller trace.csv --plot fit.png --apply cell.toml",
+    ),
+)
 @click.argument("trace")
 @click.option(
     "--part", metavar="TEST.nc", help="The program that was run; default: that of `make-test controller`."
@@ -87,7 +94,7 @@ def _identify(
     if part is None:
         return _identify_test(trace, cell, console)
     targets = set_targets(read_part(part, cell, console, 0.01, False), cell, tolerance_mm)
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         return identify_controller(trace, targets, cell)
 
 
@@ -96,7 +103,7 @@ def _identify_test(trace: "ControllerTrace", cell: "Cell", console: Console) -> 
     from gcode2krl.identify.controller import identify_controller
     from gcode2krl.pipeline import controller_test_targets
 
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         try:
             return identify_controller(trace, controller_test_targets(cell), cell)
         except NotUnderstoodError:

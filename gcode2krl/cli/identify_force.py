@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.units import MS_PER_S
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
     from gcode2krl.runs import Run
 
 
-@click.command("force")
+@click.command(
+    "force",
+    epilog=examples("gcode2krl identify force run-1/", "gcode2krl identify force run-1/ --plot fit.png"),
+)
 @click.argument("run_folder", metavar="RUN")
 @click.option("--prediction", metavar="FOLDER", help="Prediction of the program; default: that of run.toml.")
 @click.option("--plot", metavar="FIGURE.png", help="Draw measured and fitted forces.")
@@ -46,7 +50,7 @@ def command(
     try:
         require_fit_outputs(plot, apply_to, None, run_folder, prediction)
         run, predicted = _inputs(run_folder, prediction)
-        with console.progress("fitting", None):
+        with console.stage("fitting"):
             fit = _fit(run, predicted)
         files = [_save_figure(fit, Path(plot))] if plot is not None else []
         if not as_json:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError
 
@@ -14,7 +15,9 @@ if TYPE_CHECKING:
     from gcode2krl.identify.sensor import SensorIdentification
 
 
-@click.command("sensor")
+@click.command(
+    "sensor", epilog=examples("gcode2krl identify sensor examples/identify/orientations.csv -o sensor.toml")
+)
 @click.argument("poses")
 @common_options
 @click.option("-o", "--output", metavar="SENSOR.toml", help="Write the calibration for the online side.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.units import UM_PER_MM
@@ -17,7 +18,13 @@ if TYPE_CHECKING:
     from gcode2krl.identify.stiffness import JointFit, StiffnessIdentification
 
 
-@click.command("stiffness")
+@click.command(
+    "stiffness",
+    epilog=examples(
+        "gcode2krl identify stiffness examples/identify/robot.toml",
+        "gcode2krl identify stiffness examples/identify/robot.toml --plot fit.png --apply cell.toml",
+    ),
+)
 @click.argument("measurements")
 @common_options
 @click.option(
@@ -67,7 +74,7 @@ def _run(
     cell = read_cell(cell_path)
     readings = read_measurements(measurements)
     require_fit_outputs(plot, apply_to, cell_path, measurements, readings.source)
-    with console.progress("fitting", None):
+    with console.stage("fitting"):
         result = identify_stiffness(readings, cell)
     files = []
     if plot is not None:

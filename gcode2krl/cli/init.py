@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 
 if TYPE_CHECKING:
@@ -18,7 +19,12 @@ SCHEMA = "gcode2krl-cell.schema.json"
 """Name of the schema that is written beside a cell file, for editors."""
 
 
-@click.command("init")
+@click.command(
+    "init",
+    epilog=examples(
+        "gcode2krl init --questions > answers.toml", "gcode2krl init mine.toml --answers answers.toml"
+    ),
+)
 @click.argument("cell_path", default="cell.toml", metavar="[CELL.toml]", type=click.Path(path_type=Path))
 @click.option(
     "--controller",

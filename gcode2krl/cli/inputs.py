@@ -10,7 +10,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.compiled.threads import THREADS_VARIABLE
-from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
@@ -67,14 +67,33 @@ def gcode_options(function: Any) -> Any:
     return function
 
 
+def job_option(function: Any) -> Any:
+    """Add --job to a command that reads a part."""
+    option = click.option(
+        "--job",
+        "job_path",
+        type=click.Path(),
+        metavar="JOB.toml",
+        help="What the CAM knows: its cutters and stock, laid over the cell.",
+    )
+    return option(function)
+
+
 def read_part(
     part: str, cell: "Cell", console: Console, chord_tolerance_mm: float, block_delete: bool
 ) -> "Toolpath":
     """Read the G-code of a command, from a file or from standard input."""
     from gcode2krl.gcode import read_gcode, read_stream
 
-    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else None
-    with console.progress("reading", size) as advance:
+    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else 0
+    read = 0
+    with console.stage("reading") as progress:
+
+        def advance(amount: int) -> None:
+            nonlocal read
+            read += amount
+            progress(read, size)
+
         if part == STANDARD:
             if sys.stdin is None:
                 raise input_error("file-unreadable", "standard input is closed", "name a file")
@@ -100,6 +119,25 @@ def read_cell(path: str | None) -> "Cell":
     from gcode2krl.cell import load_cell
 
     return load_cell(path)
+
+
+def read_cell_under_job(path: str | None, job_path: str | None) -> "tuple[Cell, tuple[Issue, ...]]":
+    """Read the cell of a command and lay a job over it; the findings say where the two differ."""
+    cell = read_cell(path)
+    if job_path is None:
+        return cell, ()
+    from gcode2krl.cell.job import lay_job_over
+
+    return lay_job_over(cell, Path(job_path))
+
+
+def files_of_job(job_path: str | None) -> list[Path]:
+    """Return the files of a job, which are inputs."""
+    if job_path is None:
+        return []
+    from gcode2krl.cell.job import job_files
+
+    return job_files(Path(job_path))
 
 
 def require_other(output: Path, *inputs: str | Path | None) -> None:

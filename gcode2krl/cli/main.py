@@ -1,17 +1,22 @@
 """Entry point ``gcode2krl``: the commands, the default command, and how errors leave the program."""
 
+import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 _COMMANDS = {
     "init": "Write the cell file of your robot from your answers and the controller's archive.",
@@ -28,6 +33,8 @@ _COMMANDS = {
     "a check list.",
     "make-test": "Write a test program of air moves.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
+    "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
+    "completion": "Print the script that completes commands, options and files in a shell.",
     "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",
 }
 _OWN_OPTIONS = ("-h", "--help", "--version")
@@ -37,10 +44,20 @@ class _Commands(CommandsOnUse):
     """The commands; a first word that is none of them is a part to translate."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if not args and not ctx.resilient_parsing:
+            args = ["--help"]
         if args and args[0] not in _COMMANDS and args[0] not in _OWN_OPTIONS:
-            _refuse_mistyped(args[0])
+            if not ctx.resilient_parsing:  # while a shell completes, a word may be half written
+                _refuse_mistyped(args[0])
             args = ["translate", *args]
         return super().parse_args(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
+        """Return commands and options, and files: the first word may be a part."""
+        from click.shell_completion import CompletionItem
+
+        files = [] if incomplete.startswith("-") else [CompletionItem(incomplete, type="file")]
+        return [*super().shell_complete(ctx, incomplete), *files]
 
 
 def _refuse_mistyped(word: str) -> None:
@@ -63,10 +80,15 @@ def _is_there(word: str) -> bool:
 
 @click.command(
     cls=_Commands,
+    epilog=examples(
+        "gcode2krl part.nc -o part.src",
+        "gcode2krl part.nc --cell cell.toml",
+        "gcode2krl predict part.nc -o prediction/ --plot",
+        "gcode2krl models check cell.toml",
+    ),
     summaries=_COMMANDS,
     module="gcode2krl.cli.{}",
     context_settings={"help_option_names": ["-h", "--help"]},
-    no_args_is_help=True,
 )
 @click.version_option(__version__, prog_name="gcode2krl")
 def commands() -> None:
@@ -80,6 +102,8 @@ def commands() -> None:
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     reserve_standard_files()
+    if "_GCODE2KRL_COMPLETE" in os.environ:
+        import gcode2krl.cli.completion  # noqa: F401  (PowerShell is added to click's shells)
     code = _run(args)
     sys.exit(code if flushed() else 2)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
@@ -45,7 +46,13 @@ class _Test:
     """For the header of the KRL form."""
 
 
-@click.command("make-test")
+@click.command(
+    "make-test",
+    epilog=examples(
+        "gcode2krl make-test controller -o test.src",
+        "gcode2krl make-test reversals -o reversals.nc --at 100 0 60 --size 80",
+    ),
+)
 @click.argument("what", type=click.Choice(NAMES))
 @click.argument("part", metavar="[PART.nc]", type=click.Path(), required=False)
 @click.option(

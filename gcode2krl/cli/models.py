@@ -8,18 +8,19 @@ import click
 
 from gcode2krl.cell import library
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
 
 
-@click.group("models")
+@click.group("models", epilog=examples("gcode2krl models list robots", "gcode2krl models check cell.toml"))
 def command() -> None:
     """Robots, controllers, tools and cells: list, show, check, schema."""
 
 
-@command.command("list")
+@command.command("list", epilog=examples("gcode2krl models list", "gcode2krl models list robots --json"))
 @click.argument("kind", required=False, type=click.Choice(library.KINDS))
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def list_models(kind: str | None, as_json: bool) -> None:
@@ -35,7 +36,12 @@ def list_models(kind: str | None, as_json: bool) -> None:
             click.echo(f"  {name}")
 
 
-@command.command("show")
+@command.command(
+    "show",
+    epilog=examples(
+        "gcode2krl models show kr300_demonstration > cell.toml", 'gcode2krl models show "KR 210 R2700 prime"'
+    ),
+)
 @click.argument("name")
 def show(name: str) -> None:
     """Print a model's file: its values with their source and reliability."""
@@ -47,7 +53,7 @@ def show(name: str) -> None:
     raise input_error("model-unknown", f"no model {name!r}", "`gcode2krl models list` lists them")
 
 
-@command.command("schema")
+@command.command("schema", epilog=examples("gcode2krl models schema > cell.schema.json"))
 def schema() -> None:
     """Print the JSON schema of a cell file, for editors."""
     from gcode2krl.cell import cell_schema
@@ -55,7 +61,9 @@ def schema() -> None:
     click.echo(json.dumps(cell_schema(), indent=2))
 
 
-@command.command("check")
+@command.command(
+    "check", epilog=examples("gcode2krl models check cell.toml", "gcode2krl models check --json")
+)
 @click.argument("cell_path", required=False, metavar="[CELL.toml]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def check(cell_path: str | None, as_json: bool) -> int:

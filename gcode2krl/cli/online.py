@@ -1,5 +1,6 @@
 """``gcode2krl online``: the twin, the RSI server, and the replay of a recorded run."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,6 +8,7 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     cell_files,
     common_options,
@@ -31,7 +33,9 @@ _FIGURES = ("deviation", "signals")
 _RUN_FILES = ("run.toml", "rsi.log", "force.csv", "events.csv")
 
 
-@click.group("online")
+@click.group(
+    "online", epilog=examples("gcode2krl online simulate part.nc", "gcode2krl online serve --files rsi/")
+)
 def command() -> None:
     """Compensate online: the twin, the RSI server, replay.
 
@@ -39,7 +43,14 @@ def command() -> None:
     """
 
 
-@command.command("simulate")
+@command.command(
+    "simulate",
+    epilog=examples(
+        "gcode2krl online simulate",
+        "gcode2krl online simulate part.nc --cell cell.toml --plot twin/",
+        "gcode2krl online simulate part.nc --late-ms 40 --noise-N 5 --json",
+    ),
+)
 @click.argument("part", required=False)
 @common_options
 @gcode_options
@@ -87,8 +98,8 @@ def simulate_command(
     world = World(**world_values)
     twin = twin_of(prediction, settings, world)
     judged = judge(prediction, settings.memory_s, world.late_s)
-    with console.progress("simulating", None):
-        runs = simulate_all(twin)
+    with console.stage("simulating") as progress:
+        runs = simulate_all(twin, progress)
     motion = prediction.motion
     lines = prediction.toolpath.source_line[motion.move] if motion is not None else np.zeros(0, np.int32)
     outcome = outcome_json(twin, runs, judged, lines)
@@ -98,12 +109,9 @@ def simulate_command(
         console.json({**outcome, "files": [str(file) for file in files], "issues": issue_dicts(issues)})
         return 0
     console.findings(issues, part or "test piece", notes=False)
-    console.say(f"{part or 'test piece'}: largest deviation normal to the feed of what stays on the part")
-    for case, words in _WORDS.items():
-        value = outcome[f"{case}_mm"]
-        console.say(f"  {words:<42} {'-' if value is None else f'{value:.3f} mm'}")
-    if outcome["reduction_percent"] is not None:
-        console.say(f"  with pilot {outcome['reduction_percent']:.0f} % less")
+    console.say(f"{part or 'test piece'}: deviation normal to the feed of what stays on the part")
+    for line in _table(outcome):
+        console.say(line)
     for file in files:
         console.say(f"  {file}")
     return 0
@@ -115,6 +123,35 @@ _WORDS = {
     "pilot": "Cartesian with pilot",
     "axis": "axis-specific with pilot, drives with play",
 }
+
+
+def _table(outcome: dict[str, Any]) -> Iterator[str]:
+    """Yield RMS and largest deviation of each case, then what the pilot gains and where it does not."""
+    yield f"  {'':<42} {'RMS':>9} {'largest':>9} {'in line':>8}"
+    for case, words in _WORDS.items():
+        gain, largest_mm = outcome["gain"][case], outcome[f"{case}_mm"]
+        if gain is None or largest_mm is None:
+            yield f"  {words:<42} {'-':>9} {'-':>9}"
+            continue
+        yield f"  {words:<42} {gain['rms_mm']:>6.3f} mm {largest_mm:>6.3f} mm {gain['worst_line']:>8}"
+    gain = outcome["gain"]["pilot"]
+    if gain is None or gain["rms_less_percent"] is None or outcome["reduction_percent"] is None:
+        return
+    yield f"  with pilot RMS {_less(gain['rms_less_percent'])}, largest {_less(outcome['reduction_percent'])}"
+    yield (
+        f"  nearer to nominal {100.0 * gain['better_share']:.0f} % of the time in the cut, "
+        f"farther {100.0 * gain['worse_share']:.0f} %{_where(gain['worse'])}"
+    )
+
+
+def _less(percent: float) -> str:
+    return f"{percent:.0f} % less" if percent >= 0.0 else f"{-percent:.0f} % more"
+
+
+def _where(worse: list[dict[str, Any]]) -> str:
+    """Return the lines in which the compensation makes it worse."""
+    lines = ", ".join(f"{each['line']} (by {each['excess_mm']:.2f} mm)" for each in worse[:3])
+    return f", most in line {lines}" if len(worse) == 1 else f", most in lines {lines}" if worse else ""
 
 
 def _changed(settings: "Online", options: dict[str, Any]) -> "Online":
@@ -191,8 +228,10 @@ def _predicted(
 
     try:
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
-        with console.progress("predicting", None):
-            return predict_toolpath(toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance)
+        with console.stages() as begin:
+            return predict_toolpath(
+                toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance, begin=begin
+            )
     except Gcode2KrlError as error:
         error.source = error.source or part
         raise
@@ -225,7 +264,9 @@ def _draw(
 
     maps = {
         words.capitalize() if words[0] != "C" else words: Map(
-            *surface_of(prediction, runs[case], judged), outcome[f"{case}_mm"]
+            *surface_of(prediction, runs[case], judged),
+            outcome[f"{case}_mm"],
+            outcome["gain"][case]["rms_mm"] if outcome["gain"][case] is not None else None,
         )
         for case, words in _WORDS.items()
     }
@@ -248,7 +289,10 @@ def _draw(
     return save_figures(dict(zip(_FIGURES, drawn, strict=True)), folder, inputs)
 
 
-@command.command("replay")
+@command.command(
+    "replay",
+    epilog=examples("gcode2krl online replay run-1/", "gcode2krl online replay run-1/ -o cycles.csv"),
+)
 @click.argument("run", type=click.Path())
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that ran.")
@@ -305,7 +349,13 @@ def replay_command(
     return 0
 
 
-@command.command("serve")
+@command.command(
+    "serve",
+    epilog=examples(
+        "gcode2krl online serve --files rsi/ --most-mm 0.5",
+        "gcode2krl online serve --pilot part.pilot.csv --cycle-ms 4 -o run-4/",
+    ),
+)
 @common_options
 @click.option("--pilot", "sidecar", type=click.Path(), help="Sidecar of the program that will run.")
 @click.option("--tool", type=int, default=1, show_default=True, help="Tool in the spindle.")

@@ -1,5 +1,6 @@
 """``gcode2krl predict part.nc -o prediction/``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,14 +8,17 @@ import click
 import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
     cell_files,
     common_options,
     effect_files,
     existing,
+    files_of_job,
     gcode_options,
-    read_cell,
+    job_option,
+    read_cell_under_job,
     read_part,
     require_folder,
     require_other,
@@ -42,11 +46,19 @@ _FIGURES = (
 )
 
 
-@click.command("predict")
+@click.command(
+    "predict",
+    epilog=examples(
+        "gcode2krl predict part.nc -o prediction/ --plot",
+        "gcode2krl predict part.nc --cell cell.toml -o out/ --csv --part left.stl",
+        "gcode2krl predict part.nc -o out/ --effect backlash:target=A2,gap_deg=0.02",
+    ),
+)
 @click.argument("part")
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
 @common_options
 @gcode_options
+@job_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
 )
@@ -72,6 +84,7 @@ def command(
     tolerance: float | None,
     chord_tolerance: float,
     block_delete: bool,
+    job_path: str | None,
     dt_s: float | None,
     csv: bool,
     plot: bool,
@@ -92,17 +105,27 @@ def command(
     try:
         require_part(part)
         folder = _folder(part, output)
-        inputs = existing(part, *cell_files(cell_path), *effect_files(effect_folders))
+        inputs = existing(
+            part, *cell_files(cell_path), *files_of_job(job_path), *effect_files(effect_folders)
+        )
         _require_outputs(folder, part_mesh, inputs)
-        cell = read_cell(cell_path)
+        cell, of_job = read_cell_under_job(cell_path, job_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
-        with console.progress("predicting", None):
+        with console.stages() as begin:
             settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
             prediction = predict_toolpath(
-                toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings, forces=not no_forces
+                toolpath,
+                cell,
+                dt_s=dt_s,
+                tolerance_mm=tolerance,
+                settings=settings,
+                forces=not no_forces,
+                begin=begin,
             )
+            begin("effects and files")
             prediction = add_effects(prediction, effects, effect_folders)
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
@@ -110,6 +133,7 @@ def command(
             if part_mesh is not None:
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
+                begin("figures")
                 files += _draw(prediction, folder, inputs)
     except Gcode2KrlError as error:
         if not as_json:

@@ -65,7 +65,7 @@ def read_restarted(
         return toolpath
     from gcode2krl.restart import restarted
 
-    with console.progress("cutting the lines before", None):
+    with console.stage("cutting the lines before"):
         return restarted(toolpath, from_line, cell, tolerance_mm)
 
 

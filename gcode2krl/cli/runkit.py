@@ -5,11 +5,18 @@ from pathlib import Path
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 
-@click.command("runkit")
+@click.command(
+    "runkit",
+    epilog=examples(
+        "gcode2krl runkit part.src --cell cell.toml",
+        "gcode2krl runkit part.src -o kit/ --lift 50 --cell cell.toml",
+    ),
+)
 @click.argument("program", metavar="PART.src")
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the kit; default: part_runkit beside it.")
 @click.option(
@@ -39,7 +46,7 @@ def command(
         from gcode2krl.runkit import make_kit
 
         folder = Path(output) if output is not None else path.with_name(f"{path.stem}_runkit")
-        with console.progress("planning, writing", None):
+        with console.stage("planning, writing"):
             kit = make_kit(path, folder, cell, lift_mm=lift, inputs=cell_files(cell_path))
     except Gcode2KrlError as error:
         if not as_json:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
@@ -29,7 +30,7 @@ _MOST_POSES = 100_000
 _TABLES = ("workspace", "spin", "joints")
 
 
-@click.command("stiffness-map")
+@click.command("stiffness-map", epilog=examples("gcode2krl stiffness-map", "gcode2krl stiffness-map --json"))
 @common_options
 @click.option(
     "--load",
@@ -80,7 +81,7 @@ def command(
         require_folder(folder, [f"{name}{kind}" for name in _TABLES for kind in (".png", ".csv")], inputs)
         cell = read_cell(cell_path)
         case = Case.of(cell, load, feed, tool)
-        with console.progress("mapping", None):
+        with console.stage("mapping"):
             plane, spins = plane_map(case, at[2], step), spin_map(case, at)
             result, shares = pose_cost(case, at)
             files = _save(case, at, plane, spins, shares, folder, inputs)

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
     cell_files,
     common_options,
     existing,
+    files_of_job,
     gcode_options,
-    read_cell,
+    job_option,
+    read_cell_under_job,
     require_figure,
     require_outputs,
     require_part,
@@ -37,7 +40,15 @@ if TYPE_CHECKING:
     from gcode2krl.tables import Targets
 
 
-@click.command("translate")
+@click.command(
+    "translate",
+    epilog=examples(
+        "gcode2krl part.nc -o part.src",
+        "gcode2krl part.nc --cell cell.toml -o part.src --tolerance 0.05",
+        "cat part.nc | gcode2krl - -o - --name PART > part.src",
+        "gcode2krl part.nc --cell cell.toml --compensate offline --json",
+    ),
+)
 @click.argument("part")
 @click.option(
     "-o",
@@ -47,6 +58,7 @@ if TYPE_CHECKING:
 )
 @common_options
 @gcode_options
+@job_option
 @click.option("--name", help="Program name, where -o names no file; a controller needs both alike.")
 @click.option(
     "--allow",
@@ -99,6 +111,7 @@ def command(
     tolerance: float | None,
     chord_tolerance: float,
     block_delete: bool,
+    job_path: str | None,
     name: str | None,
     allow: tuple[str, ...],
     strict: bool,
@@ -126,12 +139,14 @@ def command(
         place = _place(part, output, name)
         _refuse_online(online, both, compensate, place)
         refuse_without_forces(from_line, no_forces)
-        cell = _with_options(read_cell(cell_path), max_lines, comment_every)
+        own_cell, of_job = read_cell_under_job(cell_path, job_path)
+        cell = _with_options(own_cell, max_lines, comment_every)
         name = restart_name(part, name, output, from_line, cell)
-        inputs = existing(part, *cell_files(cell_path))
+        inputs = existing(part, *cell_files(cell_path), *files_of_job(job_path))
         require_figure(compensate_plot)
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.cell.confirmation import future_confirmation
         from gcode2krl.compiled.memory import give_back
         from gcode2krl.files.spool import on_disk
@@ -149,6 +164,7 @@ def command(
             tolerance=tolerance,
             chord_tolerance=chord_tolerance,
             block_delete=block_delete,
+            job=Path(job_path).name if job_path is not None else None,
             spin=cell.frames.spin,
             compensate=compensate,
             online=online,
@@ -157,7 +173,8 @@ def command(
         )
         if place is None and name is None and part != STANDARD:
             name = suggested_name(Path(part).stem, cell.program.externals)
-        with console.progress("planning, writing, verifying", None):
+        with console.stages() as begin:
+            begin("planning")
             targets, joints = targets_and_joints(toolpath, cell, tolerance)
             errors_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance)
             corner_mm = float(errors_mm.max(initial=0.0))
@@ -170,12 +187,16 @@ def command(
             if compensate == "offline":
                 from gcode2krl.cli.compensation import compensated
 
-                prediction = predict_toolpath(toolpath, cell, targets=targets, forces=not no_forces)
+                prediction = predict_toolpath(
+                    toolpath, cell, targets=targets, forces=not no_forces, begin=begin
+                )
+                begin("compensation")
                 forecast = forecast_of(compensated(prediction, compensate_plot, inputs))
                 joints = solve_joints(forecast.targets, cell)
             else:
-                forecast = forecast_toolpath(toolpath, cell, targets, forces=not no_forces)
+                forecast = forecast_toolpath(toolpath, cell, targets, forces=not no_forces, begin=begin)
             give_back()
+            begin("writing and reading back")
             written = write_krl(
                 forecast,
                 place,

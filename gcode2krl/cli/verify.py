@@ -6,12 +6,18 @@ from typing import Literal
 import click
 
 from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell
 from gcode2krl.cli.restart import from_line_option, read_restarted, refuse_other_start, restart_record
 from gcode2krl.errors import Gcode2KrlError
 
 
-@click.command("verify")
+@click.command(
+    "verify",
+    epilog=examples(
+        "gcode2krl verify part.src part.nc", "gcode2krl verify part.src part.nc --cell cell.toml --json"
+    ),
+)
 @click.argument("program", metavar="PART.src")
 @click.argument("part", metavar="PART.nc")
 @common_options

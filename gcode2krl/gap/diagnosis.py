@@ -23,6 +23,7 @@ from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.prediction import Prediction
+from gcode2krl.progress import Begin, unseen
 from gcode2krl.runs import Run
 
 
@@ -35,6 +36,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     mismatch: Mismatch | None = None,
     seed: int = 0,
+    begin: Begin = unseen,
 ) -> Gap:
     """Return where runs differ from their prediction, why, and how much is gone with the causes in the model.
 
@@ -45,6 +47,7 @@ def diagnose(
     effects : effects besides the library's, or folders of them.
     exclude : names of effects that are no candidates; as normal mismatch they still count.
     mismatch : what is no gap; by default the bounds of `Mismatch`.
+    begin : told the name of each stage as it begins.
 
     Raises
     ------
@@ -55,7 +58,9 @@ def diagnose(
         raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")
     pairs = tuple(pairs_of(prediction, [*runs, *holdout]))
     known = known_effects(effects)
-    return _diagnosed(Context(pairs, len(runs), known, mismatch or Mismatch(), frozenset(exclude), seed))
+    return _diagnosed(
+        Context(pairs, len(runs), known, mismatch or Mismatch(), frozenset(exclude), seed), begin
+    )
 
 
 def diagnose_log(
@@ -66,6 +71,7 @@ def diagnose_log(
     effects: Sequence[str | Path | Effect] = (),
     mismatch: Mismatch | None = None,
     seed: int = 0,
+    begin: Begin = unseen,
 ) -> Gap:
     """Return what logs alone tell, without a prediction: servo, gear and, with a known robot, mechanics.
 
@@ -76,7 +82,7 @@ def diagnose_log(
         raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")
     pairs = tuple(log_pairs([*runs, *holdout], cell))
     known = known_effects(effects)
-    return _diagnosed(Context(pairs, len(runs), known, mismatch or Mismatch(), seed=seed))
+    return _diagnosed(Context(pairs, len(runs), known, mismatch or Mismatch(), seed=seed), begin)
 
 
 def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
@@ -85,20 +91,24 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
     return known | {each.name: each for each in extra if isinstance(each, Effect)}
 
 
-def _diagnosed(context: Context) -> Gap:
+def _diagnosed(context: Context, begin: Begin) -> Gap:
     """Return the answer: slips first, then each link on what earlier ones have shown, then the verdict."""
+    begin("slips of the set-up")
     set_up = examine_set_up(context)
     context, slips, issues = set_up.context, set_up.slips, set_up.issues
     if set_up.is_final:
         return answer(context, slips, issues)
     context = _with_data(with_controller_clocks(context, PATH))
-    for link in SIGNALS:
+    links = begin("links")
+    for count, link in enumerate(SIGNALS):
+        links(count, len(SIGNALS))
         traces = link.traces(context.pairs, link.base(context))
         if traces:
             explain, held = split(traces, context.explaining)
             explain, held = (without_hum(without_bursts(each)) for each in (explain, held))
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
+    begin("part and answer")
     surface = judge_surface(PART, context)
     if surface is not None:
         context = context.with_judgement(surface)

@@ -7,16 +7,22 @@ import numpy as np
 
 from gcode2krl.arrays import Ints32
 from gcode2krl.errors import Issue
+from gcode2krl.online.gain import gain_of
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
+from gcode2krl.progress import Progress, unheard
 
 Runs = Mapping[Case, Run]
 
 
-def simulate_all(twin: Twin) -> dict[Case, Run]:
+def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, Run]:
     """Return the four cases."""
-    return {case: simulate(twin, case) for case in CASES}
+    runs = {}
+    for case in CASES:
+        runs[case] = simulate(twin, case)
+        progress(len(runs), len(CASES))
+    return runs
 
 
 def figures_of(runs: Runs, judged: Judged) -> dict[str, float | None]:
@@ -32,6 +38,7 @@ def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints32) -> dict
     return {
         **figures,
         "reduction_percent": reduction,
+        "gain": {case: _gain(runs, case, judged, source_line) for case in runs},
         "depth_mm": {case: _depth(twin, run, judged) for case, run in runs.items()},
         "descents_mm": {case: _worst(run, judged.ploughs) for case, run in runs.items()},
         "lines": [
@@ -41,6 +48,14 @@ def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints32) -> dict
         "max_force_N": float(np.linalg.norm(runs["uncompensated"].force_N, axis=1).max(initial=0.0)),
         "settings": as_settings(twin),
     }
+
+
+def _gain(runs: Runs, case: Case, judged: Judged, source_line: Ints32) -> dict[str, Any] | None:
+    """Return what a case gains over no compensation; see `gain.Gain`."""
+    run, before = runs[case], runs["uncompensated"]
+    cycle_s = float(run.time_s[1] - run.time_s[0]) if len(run.time_s) > 1 else 0.0
+    gain = gain_of(before.normal_mm, run.normal_mm, judged.counts, source_line, cycle_s)
+    return gain.as_dict() if gain is not None else None
 
 
 def pilot_of(twin: Twin, runs: Runs) -> dict[str, Any]:

@@ -33,6 +33,8 @@ class Map(NamedTuple):
     """(w,)"""
     stated_mm: float | None
     """The largest deviation normal to the feed, for the title."""
+    rms_mm: float | None = None
+    """Its root mean square over the time in the cut, for the title."""
 
 
 def deviation_figure(maps: Mapping[str, Map]) -> Figure:
@@ -69,10 +71,7 @@ def deviation_figure(maps: Mapping[str, Map]) -> Figure:
             )
             axes.set_aspect("equal")
             axes.set_facecolor("#F2F2F2")
-            number = (
-                "nothing to judge" if surface.stated_mm is None else f"at most {surface.stated_mm:.2f} mm"
-            )
-            axes.set_title(f"{title}: {number}", loc="left")
+            axes.set_title(f"{title}: {_stated(surface)}", loc="left")
         for axes in panels[len(maps) :]:
             axes.set_axis_off()
         for axes in panels[2:]:
@@ -84,6 +83,14 @@ def deviation_figure(maps: Mapping[str, Map]) -> Figure:
             figure.colorbar(drawn, ax=panels.tolist(), label=label, aspect=40, shrink=0.8, extend="both")
         figure.suptitle("Machined part against nominal")
     return figure
+
+
+def _stated(surface: Map) -> str:
+    """Return the figures of a title."""
+    if surface.stated_mm is None:
+        return "nothing to judge"
+    rms = f"RMS {surface.rms_mm:.2f}, " if surface.rms_mm is not None else ""
+    return f"{rms}at most {surface.stated_mm:.2f} mm"
 
 
 class Signals(NamedTuple):
