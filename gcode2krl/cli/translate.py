@@ -20,6 +20,7 @@ from gcode2krl.cli.inputs import (
     require_outputs,
     require_part,
 )
+from gcode2krl.cli.report import report_refused, report_written, require_report
 from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
-    from gcode2krl.tables import Targets
+    from gcode2krl.tables import Targets, Toolpath
 
 
 @click.command("translate")
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
 )
+@click.option("--report", metavar="PART.html", help="Write a page to look at, also of a refused program.")
 @click.option(
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
@@ -105,12 +107,15 @@ def command(
     online: str | None,
     both: bool,
     comment_every: int | None,
+    report: str | None,
 ) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 
     Exit code 0: written (warnings allowed); 1: understood and refused; 2: not understood.
     """
     console = Console(quiet or output == STANDARD, as_json)
+    toolpath: "Toolpath | None" = None
+    cell: "Cell | None" = None
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
@@ -120,7 +125,8 @@ def command(
         cell = _with_options(read_cell(cell_path), max_lines, comment_every)
         inputs = existing(part, *cell_files(cell_path))
         require_figure(compensate_plot)
-        require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
+        require_report(report, inputs)
+        require_outputs(_outputs(place, name, part, cell, online, compensate_plot, report), *inputs)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
         from gcode2krl.cell.confirmation import future_confirmation
         from gcode2krl.krl import suggested_name, write_krl
@@ -163,7 +169,9 @@ def command(
                 online=online,
                 inputs=inputs,
             )
+            report_written(report, part, prediction, written.issues, inputs)
     except Gcode2KrlError as error:
+        report_refused(report, part, error, toolpath, cell, cell_path)
         if not as_json:
             raise _from_part(error, part) from None
         console.json(_result((), error.issues))
@@ -238,12 +246,12 @@ def _place(part: str, output: str | None, name: str | None) -> Path | None:
 
 
 def _outputs(
-    place: Path | None, name: str | None, part: str, cell: "Cell", online: str | None, plot: str | None
+    place: Path | None, name: str | None, part: str, cell: "Cell", online: str | None, *more: str | None
 ) -> list[Path]:
     """Return the files to write, without the parts of a long program; raises where a name is bad."""
     from gcode2krl.krl import output_files, program_file
 
-    outputs = [Path(plot)] if plot is not None else []
+    outputs = [Path(file) for file in more if file is not None]
     if place is not None:
         file, _ = program_file(place, name, part, cell.program.externals)
         outputs += output_files(file, online)
