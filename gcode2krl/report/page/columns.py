@@ -17,7 +17,8 @@ from gcode2krl.arrays import Ints
 MISSING = -(2**31)
 """Stands for a value that is not known (NaN)."""
 _LARGEST = 2.0**30
-_LEVEL = 9
+_LEVEL = 6
+"""9 saves 3 % of the size and takes twelve times as long."""
 
 
 def packed(columns: Mapping[str, tuple[npt.ArrayLike, float]]) -> tuple[str, list[dict[str, Any]]]:

@@ -59,6 +59,7 @@ class Listing {
 
   choose(line) {
     if (line === this.chosen) return;
+    this.list.querySelector('[aria-selected="true"]')?.setAttribute("aria-selected", "false");
     this.chosen = line;
     if (line > 0) {
       this.place.setAttribute("aria-activedescendant", `line-${line}`);
@@ -67,9 +68,10 @@ class Listing {
         const hidden = Math.max(this.lines.length * LINE_PX - this.place.clientHeight, 1);
         const scrolls = Math.max(this.height - this.place.clientHeight, 1);
         this.place.scrollTop = (Math.max(0, at - this.place.clientHeight / 2) / hidden) * scrolls;
+        this.draw();
       }
     }
-    this.draw();
+    byId(`line-${line}`)?.setAttribute("aria-selected", "true");
   }
 
   setHeat(heat) {

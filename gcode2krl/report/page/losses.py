@@ -8,8 +8,11 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 
 _WINDOWS = 60
 _SHORTEST_WINDOW_S = 0.5
-_WORTH_SAYING = 0.005
-"""Share of the whole time from which a window with lost time is named."""
+_WORTH_SAYING = 0.01
+"""Share of the whole time from which lost time is worth a word."""
+_WORTH_SHOWING = 0.0005
+_WORTH_NAMING = 0.04
+"""Share of the lost time from which a window is named."""
 _APART = 0.02
 """Share of the whole time by which two worst places lie apart."""
 _STILL_MM_S = 1e-3
@@ -46,7 +49,8 @@ def durations(time_s: Floats) -> Floats:
 def time_shares(
     time_s: Floats, speed_mm_s: Floats, rapid: Bools, cutting: Bools | None
 ) -> list[tuple[str, float]]:
-    """Return what the time is spent on and how long, in s; the parts add up to the whole."""
+    """Return what the time is spent on and how long, in s; the parts add up to the whole, but for those below
+    a thousandth."""
     each_s = durations(time_s)
     still = speed_mm_s < _STILL_MM_S
     feed = ~rapid & ~still
@@ -55,7 +59,8 @@ def time_shares(
         parts = {"at feed": feed, **parts}
     else:
         parts = {"cutting": feed & cutting, "at feed in air": feed & ~cutting, **parts}
-    return [(name, float(each_s[mask].sum())) for name, mask in parts.items() if mask.any()]
+    sums = {name: float(each_s[mask].sum()) for name, mask in parts.items()}
+    return [(name, spent_s) for name, spent_s in sums.items() if spent_s > _WORTH_SHOWING * sum(sums.values())]
 
 
 def lost_time(time_s: Floats, speed_mm_s: Floats, feed_mm_s: Floats) -> Floats:
@@ -70,8 +75,8 @@ def lost_time(time_s: Floats, speed_mm_s: Floats, feed_mm_s: Floats) -> Floats:
 
 def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -> list[Window]:
     """Return the windows in which most time is lost, the worst first."""
-    whole_s = float(time_s[-1] - time_s[0])
-    if whole_s <= 0.0:
+    whole_s, whole_lost_s = float(time_s[-1] - time_s[0]), float(lost_s.sum())
+    if whole_lost_s <= _WORTH_SAYING * whole_s:
         return []
     width_s = max(whole_s / _WINDOWS, _SHORTEST_WINDOW_S)
     slot = ((time_s - time_s[0]) / width_s).astype(np.int64)
@@ -79,7 +84,7 @@ def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -
     found = []
     for one in np.argsort(-sums, kind="stable")[:most]:
         rows = np.flatnonzero(slot == one)
-        if sums[one] < _WORTH_SAYING * whole_s:
+        if sums[one] < _WORTH_NAMING * whole_lost_s:
             continue
         lines = line[rows][line[rows] > 0]
         first, last = (int(lines.min()), int(lines.max())) if len(lines) else (0, 0)

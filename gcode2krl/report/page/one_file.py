@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import jinja2
+from markupsafe import Markup, escape
 
 from gcode2krl.files import write_together
 from gcode2krl.report.page.content import Content, duration
@@ -15,6 +16,7 @@ HERE = Path(__file__).parent
 LIBRARIES = HERE / "vendor"
 _SCRIPTS = ("data.js", "simplify.js", "scene.js", "robot.js", "plots.js", "listing.js", "page.js")
 _EXPORT = re.compile(r"export\s*\{([^{}]*)\}\s*;?\s*$")
+_BACKTICKS = re.compile("`([^`]+)`")
 _IMPORT = re.compile(r"import\s*\{([^{}]*)\}\s*from\s*['\"]three['\"]\s*;")
 
 
@@ -53,7 +55,7 @@ def environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"duration": duration, "figure": figure}
+    made.filters |= {"duration": duration, "figure": figure, "coded": coded}
     return made
 
 
@@ -62,6 +64,11 @@ def figure(value: float) -> str:
     if abs(value) >= 100.0:
         return f"{value:.0f}"
     return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.2f}"
+
+
+def coded(text: str) -> Markup:
+    """Return a sentence as HTML, with what stands between backticks as code."""
+    return Markup(_BACKTICKS.sub(r"<code>\1</code>", str(escape(text))))
 
 
 @cache

@@ -34,7 +34,7 @@ class Page {
     this.fillMenu();
     this.listenToTools();
     this.paint();
-    this.select(this.firstFeed());
+    this.select(this.worstRow());
   }
 
   addBodies() {
@@ -48,6 +48,7 @@ class Page {
       this.robot.wanted = true;
       scene.scene.add(this.robot.root);
       this.robot.show(this.firstFeed());
+      scene.scene.updateMatrixWorld(true);
       scene.robotBox = new THREE.Box3().setFromObject(this.robot.root);
     }
     byId("show-stock").parentElement.hidden = !this.stock;
@@ -65,6 +66,15 @@ class Page {
 
   firstFeed() {
     return Math.max(this.columns.pass.findIndex((pass) => pass >= 0), 0);
+  }
+
+  // Where the tool bends away or is loaded most; without either, where it first cuts.
+  worstRow() {
+    const values = this.columns.deflection ?? this.columns.force;
+    if (!values) return this.firstFeed();
+    let worst = this.firstFeed();
+    for (let i = 0; i < this.rows; i++) if (values[i] > values[worst]) worst = i;
+    return worst;
   }
 
   // ---- choosing a row

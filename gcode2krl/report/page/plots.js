@@ -15,8 +15,8 @@ class Plots {
   }
 
   height() {
-    const room = Math.max(0.36 * window.innerHeight, 200);
-    return Math.max(52, Math.floor((room - 26) / head.quantities.length));
+    const room = Math.max(0.38 * window.innerHeight, 200);
+    return Math.max(58, Math.floor((room - 26) / head.quantities.length));
   }
 
   plot(quantity, isLast) {
@@ -29,7 +29,7 @@ class Plots {
     const u = new uPlot({
       width: this.place.clientWidth,
       height: this.height() + (isLast ? 26 : 0),
-      padding: [4, 10, isLast ? 0 : 4, 0],
+      padding: [14, 12, isLast ? 0 : 4, 0],
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { show: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => this.ends(quantity, low, high) } },
       series: [{}, { stroke: PLOT_COLOURS[quantity.name], width: 1.2, points: { show: false }, spanGaps: false }],

@@ -88,7 +88,7 @@ function stockBox([low, high]) {
   const size = high.map((value, k) => value - low[k]);
   const shape = new THREE.BoxGeometry(...size);
   const group = new THREE.Group();
-  const faces = new THREE.MeshLambertMaterial({ color: 0xc9b48a, transparent: true, opacity: 0.16, depthWrite: false, side: THREE.DoubleSide });
+  const faces = new THREE.MeshLambertMaterial({ color: 0xc9b48a, transparent: true, opacity: 0.22, depthWrite: false, side: THREE.DoubleSide });
   group.add(new THREE.Mesh(shape, faces), new THREE.LineSegments(new THREE.EdgesGeometry(shape), new THREE.LineBasicMaterial({ color: 0x8a7a55 })));
   group.position.set(...low.map((value, k) => (value + high[k]) / 2));
   return group;

@@ -1,54 +1,57 @@
-// The path in 3D, drawn on demand: a coarse level while something moves, every row as soon as it rests.
+// The path in 3D, drawn on demand: a coarse level while something moves; at rest every row in sight, without
+// those that lie within half a pixel of the line between others.
 
 const REST_MS = 250;
 const GOAL_MS = 30;
-const FEWEST_ROWS = 4000;
+const FEWEST_ROWS = 3000;
+const ROWS = { software: { moving: 12000, resting: 30000 }, hardware: { moving: 80000, resting: 250000 } };
+const IN_SIGHT = 1.3;
 const RAPID = -1, PALE = -2, NONE = -3;
 const PASS_COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"];
 
 const LINE_VERTEX = `
-attribute vec3 start; attribute vec3 end; attribute vec2 shades;
-uniform vec2 size; uniform float width; varying float shade;
+in vec3 end; in vec2 shades;
+uniform vec2 size; uniform float width; out float shade;
 void main() {
-  vec4 a = projectionMatrix * modelViewMatrix * vec4(start, 1.0);
+  int corner = gl_VertexID & 3;
+  float along = corner == 1 || corner == 2 ? 1.0 : 0.0, side = corner > 1 ? 1.0 : -1.0;
+  vec4 a = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   vec4 b = projectionMatrix * modelViewMatrix * vec4(end, 1.0);
   float near = 0.001;
   if (a.w < near && b.w >= near) a = mix(a, b, (near - a.w) / (b.w - a.w));
   if (b.w < near && a.w >= near) b = mix(b, a, (near - b.w) / (a.w - b.w));
-  vec2 across = b.xy / b.w * size - a.xy / a.w * size;
-  across = dot(across, across) > 0.0 ? normalize(across) : vec2(1.0, 0.0);
+  vec2 way = b.xy / b.w * size - a.xy / a.w * size;
+  way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
   float thick = shades.x < -0.5 ? 0.5 * width : width;
-  vec4 at = mix(a, b, position.x);
-  vec2 shift = thick * (position.y * vec2(-across.y, across.x) + (2.0 * position.x - 1.0) * 0.4 * across);
-  at.xy += shift / size * at.w;
-  shade = shades.x < -0.5 ? shades.x : mix(shades.x, shades.y, position.x);
+  vec4 at = mix(a, b, along);
+  at.xy += thick * (side * vec2(-way.y, way.x) + (2.0 * along - 1.0) * 0.4 * way) / size * at.w;
+  shade = shades.x < -0.5 ? shades.x : mix(shades.x, shades.y, along);
   gl_Position = at;
 }`;
 const LINE_FRAGMENT = `
-uniform sampler2D colours; uniform vec3 flat_colour; uniform float is_flat; varying float shade;
+uniform sampler2D colours; uniform vec3 flat_colour; uniform float is_flat; in float shade; out vec4 painted;
 void main() {
-  vec3 colour = texture2D(colours, vec2(clamp(shade, 0.002, 0.998), 0.5)).rgb;
+  vec3 colour = texture(colours, vec2(clamp(shade, 0.002, 0.998), 0.5)).rgb;
   if (shade < -1.5) colour = vec3(0.83, 0.86, 0.88);
   else if (shade < -0.5) colour = vec3(0.62, 0.66, 0.69);
-  gl_FragColor = vec4(mix(colour, flat_colour, is_flat), 1.0);
+  painted = vec4(mix(colour, flat_colour, is_flat), 1.0);
 }`;
 
 class Scene {
   constructor(canvas, columns) {
     this.canvas = canvas;
     this.columns = columns;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware(), preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware(), preserveDrawingBuffer: false });
     this.software = isSoftware();
-    this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setClearColor(0xf4f6f8);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 1, 1e5);
     this.camera.up.set(0, 0, 1);
     this.controls = new CONTROLS.OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
-    this.budget = this.software ? 12000 : 60000;
+    this.most = this.software ? ROWS.software : ROWS.hardware;
+    this.budget = this.most.moving;
     this.frames = 0;
-    this.listeners = [];
     this.measure();
     this.makePath();
     this.makeMarker();
@@ -76,7 +79,7 @@ class Scene {
   makePath() {
     this.colours = new THREE.DataTexture(new Uint8Array(4 * 256), 256, 1);
     this.material = lineMaterial(this.colours, this.software ? 2.2 : 2.6);
-    this.whole = new Lines(this.material);
+    this.fine = new Lines(this.material);
     this.coarse = new Lines(this.material);
     const thick = lineMaterial(this.colours, 7);
     thick.uniforms.is_flat.value = 1;
@@ -84,10 +87,10 @@ class Scene {
     thick.transparent = true;
     this.current = new Lines(thick);
     this.current.mesh.renderOrder = 5;
-    this.scene.add(this.whole.mesh, this.coarse.mesh, this.current.mesh, axesAt(this.extent));
+    this.scene.add(this.fine.mesh, this.coarse.mesh, this.current.mesh, axesAt(this.extent));
     this.materials = [this.material, thick];
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a94a0, 2.6));
-    const light = new THREE.DirectionalLight(0xffffff, 1.2);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa4b0, 2.2));
+    const light = new THREE.DirectionalLight(0xffffff, 1.0);
     light.position.set(-1, -2, 3);
     this.scene.add(light);
   }
@@ -118,14 +121,45 @@ class Scene {
     this.colours.magFilter = this.colours.minFilter = steps ? THREE.NearestFilter : THREE.LinearFilter;
     this.colours.needsUpdate = true;
     for (let i = 0; i < shades.length; i++) this.kind[i] = shades[i] < 0 ? shades[i] : this.columns.pass[i];
-    this.whole.fill(this.points, shades, null);
     this.fillCoarse();
+    this.isStale = true;
     this.changed(false);
   }
 
   fillCoarse() {
-    this.level = levelWithin(this.points, this.shade, this.kind, this.extent, this.budget);
+    this.level = levelWithin(this.points, this.shade, this.kind, this.extent / 4000, this.budget);
     this.coarse.fill(this.points, this.shade, this.level);
+  }
+
+  // Every row that is in sight, to half a pixel.
+  fillFine() {
+    this.isStale = false;
+    if (this.shade.length <= this.most.resting) {
+      this.fine.fill(this.points, this.shade, null);
+      return;
+    }
+    const [shade, kind] = this.inSight();
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const pixel = (2 * distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
+    this.fine.fill(this.points, shade, levelWithin(this.points, shade, kind, 0.5 * pixel, this.most.resting));
+  }
+
+  // Shades and kinds with NONE where a row is out of sight.
+  inSight() {
+    const m = this.screenMatrix(), points = this.points;
+    const shade = Float32Array.from(this.shade), kind = Int32Array.from(this.kind);
+    for (let i = 0; i < shade.length; i++) {
+      const a = points[3 * i], b = points[3 * i + 1], c = points[3 * i + 2];
+      const w = (m[3] * a + m[7] * b + m[11] * c + m[15]) * IN_SIGHT;
+      const isIn = w > 0 && Math.abs(m[0] * a + m[4] * b + m[8] * c + m[12]) < w && Math.abs(m[1] * a + m[5] * b + m[9] * c + m[13]) < w;
+      if (!isIn) shade[i] = kind[i] = NONE;
+    }
+    return [shade, kind];
+  }
+
+  screenMatrix() {
+    this.camera.updateMatrixWorld();
+    return new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse).elements;
   }
 
   showRow(row, first, last) {
@@ -137,8 +171,7 @@ class Scene {
   changed(moves) {
     if (moves) {
       this.moving = true;
-      clearTimeout(this.rest);
-      this.rest = setTimeout(() => { this.moving = false; this.last = 0; this.changed(false); }, REST_MS);
+      this.isStale ||= this.shade.length > this.most.resting;
     }
     if (this.asked) return;
     this.asked = true;
@@ -147,17 +180,21 @@ class Scene {
 
   draw(now) {
     this.asked = false;
-    if (this.moving) this.adapt(now);
-    const fine = !this.moving || this.points.length / 3 <= this.budget;
-    this.whole.mesh.visible = fine;
-    this.coarse.mesh.visible = !fine;
-    this.drawn = (fine ? this.whole : this.coarse).count;
+    clearTimeout(this.rest);
+    if (this.moving) {
+      this.adapt(now);
+      this.rest = setTimeout(() => { this.moving = false; this.last = 0; this.changed(false); }, REST_MS);
+    }
+    const isFine = !this.moving || this.shade.length <= this.budget;
     this.camera.near = this.camera.position.distanceTo(this.controls.target) / 200;
     this.camera.far = this.camera.near * 200 + 20 * this.extent + 2e4;
     this.camera.updateProjectionMatrix();
+    if (isFine && this.isStale) this.fillFine();
+    this.fine.mesh.visible = isFine;
+    this.coarse.mesh.visible = !isFine;
+    this.drawn = (isFine ? this.fine : this.coarse).count;
     this.renderer.render(this.scene, this.camera);
     this.frames++;
-    this.listeners.forEach((listener) => listener());
   }
 
   // Fewer rows where frames come too late, more where there is time left.
@@ -169,8 +206,8 @@ class Scene {
     if (this.since < 8 || this.shade.length <= FEWEST_ROWS) return;
     this.since = 0;
     if (this.slow > 1.25 * GOAL_MS && this.budget > FEWEST_ROWS) {
-      this.budget = Math.max(FEWEST_ROWS, Math.min(this.budget, this.level.length) / 2);
-      if (this.level.length > this.budget) this.fillCoarse();
+      this.budget = Math.max(FEWEST_ROWS, Math.min(this.budget, this.coarse.count) / 2);
+      this.fillCoarse();
     }
   }
 
@@ -181,6 +218,7 @@ class Scene {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.materials.forEach((material) => material.uniforms.size.value.set(clientWidth / 2, clientHeight / 2));
     this.camera.aspect = clientWidth / clientHeight;
+    this.isStale = true;
     this.changed(false);
   }
 
@@ -207,7 +245,7 @@ class Scene {
   // The visible row nearest to a place on the canvas, -1 where none is near; of near ones the one in front.
   rowUnder(x, y) {
     const reach = 14, { clientWidth, clientHeight } = this.canvas;
-    const m = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse).elements;
+    const m = this.screenMatrix();
     let best = -1, least = Infinity;
     for (let i = 0; i < this.shade.length; i++) {
       if (this.shade[i] <= PALE) continue;
@@ -225,12 +263,11 @@ class Scene {
   }
 }
 
-// Line segments as thick as stated in pixels, one instance each.
+// Line segments as thick as stated in pixels, four corners each. Instances would need a quarter of the memory
+// and take twenty times as long where the browser draws by software.
 class Lines {
   constructor(material) {
-    this.geometry = new THREE.InstancedBufferGeometry();
-    this.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array([0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]), 3));
-    this.geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    this.geometry = new THREE.BufferGeometry();
     this.mesh = new THREE.Mesh(this.geometry, material);
     this.mesh.frustumCulled = false;
     this.count = 0;
@@ -239,37 +276,43 @@ class Lines {
   // Fill with the segments between consecutive rows, all of them where level is null.
   fill(points, shade, level) {
     const rows = level ? level.length : shade.length;
-    if (!this.values || this.values.length < 8 * rows) this.allocate(Math.max(rows, 2));
+    if (!this.values || this.values.length < 32 * rows) this.allocate(Math.max(rows, 2));
     const values = this.values;
     let n = 0;
     for (let k = 1; k < rows; k++) {
       const i = level ? level[k - 1] : k - 1, j = level ? level[k] : k;
       const before = shade[i], after = shade[j];
       if (after === NONE) continue;
-      values[n] = points[3 * i]; values[n + 1] = points[3 * i + 1]; values[n + 2] = points[3 * i + 2];
-      values[n + 3] = points[3 * j]; values[n + 4] = points[3 * j + 1]; values[n + 5] = points[3 * j + 2];
-      values[n + 6] = after < 0 || before < 0 ? after : before;
-      values[n + 7] = after;
-      n += 8;
+      const from = n;
+      values[n++] = points[3 * i]; values[n++] = points[3 * i + 1]; values[n++] = points[3 * i + 2];
+      values[n++] = points[3 * j]; values[n++] = points[3 * j + 1]; values[n++] = points[3 * j + 2];
+      values[n++] = after < 0 || before < 0 ? after : before;
+      values[n++] = after;
+      for (let corner = 1; corner < 4; corner++, n += 8) values.copyWithin(n, from, from + 8);
     }
-    this.count = n / 8;
-    this.geometry.instanceCount = this.count;
+    this.count = n / 32;
+    this.geometry.setDrawRange(0, 6 * this.count);
     this.buffer.clearUpdateRanges();
     this.buffer.addUpdateRange(0, n);
     this.buffer.needsUpdate = true;
   }
 
   allocate(rows) {
-    this.values = new Float32Array(8 * rows);
-    this.buffer = new THREE.InstancedInterleavedBuffer(this.values, 8);
-    [["start", 3, 0], ["end", 3, 3], ["shades", 2, 6]].forEach(([name, size, offset]) => {
-      this.geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(this.buffer, size, offset));
-    });
+    this.geometry.dispose();
+    this.values = new Float32Array(32 * rows);
+    this.buffer = new THREE.InterleavedBuffer(this.values, 8);
+    this.geometry.setAttribute("position", new THREE.InterleavedBufferAttribute(this.buffer, 3, 0));
+    this.geometry.setAttribute("end", new THREE.InterleavedBufferAttribute(this.buffer, 3, 3));
+    this.geometry.setAttribute("shades", new THREE.InterleavedBufferAttribute(this.buffer, 2, 6));
+    const corners = new Uint32Array(6 * rows);
+    for (let k = 0; k < rows; k++) corners.set([4 * k, 4 * k + 1, 4 * k + 2, 4 * k, 4 * k + 2, 4 * k + 3], 6 * k);
+    this.geometry.setIndex(new THREE.BufferAttribute(corners, 1));
   }
 }
 
 function lineMaterial(colours, width) {
   return new THREE.ShaderMaterial({
+    glslVersion: THREE.GLSL3,
     vertexShader: LINE_VERTEX,
     fragmentShader: LINE_FRAGMENT,
     side: THREE.DoubleSide,

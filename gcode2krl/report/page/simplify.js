@@ -40,12 +40,12 @@ function fits(points, shade, first, last, limit, shadeTolerance) {
   return true;
 }
 
-// The finest level with at most so many rows.
-function levelWithin(points, shade, kind, extent, most) {
-  if (shade.length <= most) return Uint32Array.from(shade, (_, i) => i);
+// The finest level with at most so many rows, null where all rows are not more. The last one tried may have more.
+function levelWithin(points, shade, kind, tolerance, most) {
+  if (shade.length <= most) return null;
   let rows;
-  for (let tolerance = extent / 4000, tint = 0.03; tolerance < extent / 30; tolerance *= 2.5, tint *= 1.8) {
-    rows = keptRows(points, shade, kind, tolerance, tint);
+  for (let round = 0; round < 6; round++) {
+    rows = keptRows(points, shade, kind, tolerance * 2.5 ** round, 0.03 * 1.8 ** round);
     if (rows.length <= most) break;
   }
   return rows;
