@@ -4,8 +4,9 @@
 raster of so many lines (three samples a line), writes its page and opens it in a headless browser through
 playwright. Printed are the time to make the page, its size and what of it is data and libraries, the first
 paint, the time until everything can be used, and frames per second while the view turns and while the robot
-moves along the path, with the renderer: without a graphics card the browser draws by software on the machine's
-cores, so that only the same machine can be compared. Without playwright or browser the size alone is printed.
+moves along the path, with the renderer: without a graphics card the browser draws by software on the
+machine's cores, so that only the same machine can be compared. Without playwright or browser the size alone
+is printed.
 """
 
 import argparse
@@ -106,7 +107,9 @@ def browse(file: Path, browser: str) -> None:
         print(f"no browser at {browser}: not opened")
         return
     with sync_playwright() as tool:
-        opened = tool.chromium.launch(executable_path=browser, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
+        opened = tool.chromium.launch(
+            executable_path=browser, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
+        )
         window = opened.new_page(viewport={"width": 1280, "height": 800})
         window.goto(file.as_uri())
         window.wait_for_function("window.report !== undefined", timeout=120_000)

@@ -59,7 +59,9 @@ def command(
         console.json({"files": [str(file)], "issues": issue_dicts(prediction.issues)})
         return 0
     if text is None:
-        console.hint(f"{prediction.toolpath.source or 'the G-code'} is not at hand: the page has no G-code text")
+        console.hint(
+            f"{prediction.toolpath.source or 'the G-code'} is not at hand: the page has no G-code text"
+        )
     console.say(f"{folder} -> {file} ({file.stat().st_size / 1e6:.2f} MB): open it in a browser")
     return 0
 
@@ -83,9 +85,7 @@ def report_written(
     from gcode2krl.report.page import content_of
 
     stock_mm = _stock_mm(prediction.toolpath, prediction.cell)
-    content = content_of(
-        prediction, verdict="written", issues=issues, text=_text_of(part), stock_mm=stock_mm
-    )
+    content = content_of(prediction, verdict="written", issues=issues, text=_text_of(part), stock_mm=stock_mm)
     _write(content, report, inputs)
 
 

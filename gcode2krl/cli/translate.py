@@ -114,8 +114,8 @@ def command(
     Exit code 0: written (warnings allowed); 1: understood and refused; 2: not understood.
     """
     console = Console(quiet or output == STANDARD, as_json)
-    toolpath: "Toolpath | None" = None
-    cell: "Cell | None" = None
+    toolpath: Toolpath | None = None
+    cell: Cell | None = None
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")

@@ -1,7 +1,7 @@
 """Columns of numbers as the page carries them: whole multiples of a step, differences, bytes by their weight.
 
-Neighbouring samples differ little, so that the upper bytes of the differences are nearly all alike and deflate
-takes them to almost nothing. `data.js` reads it back.
+Neighbouring samples differ little, so that the upper bytes of the differences are nearly all alike and
+deflate takes them to almost nothing. `data.js` reads it back.
 """
 
 import zlib

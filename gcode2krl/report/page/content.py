@@ -1,7 +1,7 @@
 """What the page shows, from the tables of a prediction or from what is known of a refused program."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
 
@@ -12,7 +12,15 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.columns import packed, packed_text
-from gcode2krl.report.page.losses import Place, Window, lost_time, time_shares, worst_places, worst_windows
+from gcode2krl.report.page.losses import (
+    Place,
+    Window,
+    is_worth_saying,
+    lost_time,
+    time_shares,
+    worst_places,
+    worst_windows,
+)
 from gcode2krl.report.page.passes import passes_of
 from gcode2krl.report.page.robot_sketch import robot_sketch
 from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
@@ -122,7 +130,7 @@ def _content(
     stock_mm: Floats | None,
     facts: list[tuple[str, str]],
 ) -> Content:
-    """Return the page of samples; figures come from all of them, the drawing has at most as many as it can."""
+    """Return the page of samples; the figures come from all of them, also where fewer are drawn."""
     rows = thinned(whole)
     shown = whole.at(rows)
     number, passes = passes_of(shown.position_mm[:, 2], shown.rapid, shown.tool, shown.line)
@@ -183,7 +191,7 @@ def _head_without_path(issues: Sequence[Issue], text: str | None) -> dict[str, A
 
 def _on_page(window: Window, rows: Ints) -> Window:
     """Return a window whose row is one of those on the page."""
-    return Window(**(vars(window) | {"row": _nearest(rows, window.row)}))
+    return replace(window, row=_nearest(rows, window.row))
 
 
 def _worst(quantity: Quantity, whole: Samples, rows: Ints) -> Worst:
@@ -242,11 +250,11 @@ def _sentence(whole: Samples, lost_s: float, findings: Told, verdict: str) -> st
         return f"{length_m:.2f} m of programmed path"
     time_s = float(whole.time_s[-1] - whole.time_s[0])
     lost = (
-        f"{duration(lost_s)} ({lost_s / time_s:.0%}) of it below the programmed feed"
-        if lost_s > 0.01 * time_s
-        else "nearly all of it at the programmed feed"
+        f"{duration(lost_s)} ({lost_s / time_s:.0%}) are lost where it is slower than programmed"
+        if is_worth_saying(lost_s, time_s)
+        else "nearly all of it as fast as programmed"
     )
-    return f"{duration(time_s)} for {length_m:.2f} m, {lost}"
+    return f"{duration(time_s)} for {length_m:.2f} m; {lost}"
 
 
 def _refusal(findings: Told, verdict: str) -> str:

@@ -35,7 +35,8 @@ async function readColumns() {
 
 async function readLines() {
   if (!head.has_text) return [];
-  return new TextDecoder().decode(await inflated("gcode")).split(/\r\n|\n|\r/);
+  const lines = new TextDecoder().decode(await inflated("gcode")).split(/\r\n|\n|\r/);
+  return lines.at(-1) === "" ? lines.slice(0, -1) : lines;
 }
 
 // The last row whose value in a rising column is at most the given one.

@@ -60,7 +60,9 @@ def time_shares(
     else:
         parts = {"cutting": feed & cutting, "at feed in air": feed & ~cutting, **parts}
     sums = {name: float(each_s[mask].sum()) for name, mask in parts.items()}
-    return [(name, spent_s) for name, spent_s in sums.items() if spent_s > _WORTH_SHOWING * sum(sums.values())]
+    return [
+        (name, spent_s) for name, spent_s in sums.items() if spent_s > _WORTH_SHOWING * sum(sums.values())
+    ]
 
 
 def lost_time(time_s: Floats, speed_mm_s: Floats, feed_mm_s: Floats) -> Floats:
@@ -73,10 +75,15 @@ def lost_time(time_s: Floats, speed_mm_s: Floats, feed_mm_s: Floats) -> Floats:
     return durations(time_s) * np.clip(1.0 - ratio, 0.0, 1.0)
 
 
+def is_worth_saying(lost_s: float, whole_s: float) -> bool:
+    """Tell whether so much lost time of a whole is worth a word."""
+    return lost_s > _WORTH_SAYING * whole_s
+
+
 def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -> list[Window]:
     """Return the windows in which most time is lost, the worst first."""
     whole_s, whole_lost_s = float(time_s[-1] - time_s[0]), float(lost_s.sum())
-    if whole_lost_s <= _WORTH_SAYING * whole_s:
+    if not is_worth_saying(whole_lost_s, whole_s):
         return []
     width_s = max(whole_s / _WINDOWS, _SHORTEST_WINDOW_S)
     slot = ((time_s - time_s[0]) / width_s).astype(np.int64)

@@ -35,7 +35,9 @@ def page(content: Content) -> str:
             base_css=base_css(),
             page_css=_text(HERE / "page.css"),
             plot_css=_text(LIBRARIES / "uPlot.min.css"),
-            script=_script() if content.head["rows"] or content.head["has_text"] else "",
+            script=_script(content.head["rows"] > 0)
+            if content.head["rows"] or content.head["has_text"]
+            else "",
             version=__version__,
         )
     )
@@ -72,15 +74,17 @@ def coded(text: str) -> Markup:
 
 
 @cache
-def _script() -> str:
-    """Return libraries and scripts as one module."""
-    parts = [
+def _script(has_path: bool) -> str:
+    """Return the scripts as one module, with the libraries where there is a path to draw."""
+    scripts = [_text(HERE / name) for name in _SCRIPTS]
+    if not has_path:
+        return "\n".join(scripts)
+    libraries = [
         as_constant(_text(LIBRARIES / "three.module.min.js"), "THREE"),
         as_constant(_text(LIBRARIES / "OrbitControls.js"), "CONTROLS"),
         _text(LIBRARIES / "uPlot.iife.min.js"),
-        *(_text(HERE / name) for name in _SCRIPTS),
     ]
-    return "\n".join(parts)
+    return "\n".join([*libraries, *scripts])
 
 
 def as_constant(module: str, name: str) -> str:

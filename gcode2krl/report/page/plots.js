@@ -42,6 +42,7 @@ class Plots {
         draw: [() => this.place1 !== undefined && this.mark(this.place1)],
       },
     }, [[], []], holder);
+    u.over.addEventListener("mousedown", () => { this.active = u; });
     u.over.addEventListener("click", (event) => this.clicked(u, quantity, event));
     u.over.addEventListener("dblclick", () => this.stretch(...this.whole));
     const now = u.over.appendChild(document.createElement("div"));
@@ -73,9 +74,10 @@ class Plots {
   }
 
   dragged(u) {
-    if (u.select.width <= NEAR_PX) return;
+    if (u !== this.active || u.select.width <= NEAR_PX) return;  // the others only show the same stretch
+    this.active = null;
     const start = u.posToVal(u.select.left, "x"), end = u.posToVal(u.select.left + u.select.width, "x");
-    u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+    this.plots.forEach((one) => one.u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false));
     this.wasDrag = true;
     this.stretch(Math.max(start, this.whole[0]), Math.min(end, this.whole[1]));
   }

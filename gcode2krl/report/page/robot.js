@@ -77,7 +77,7 @@ function capsule(from, to, radius, colour) {
   const along = to.clone().sub(from), length = along.length();
   const mesh = new THREE.Mesh(
     new THREE.CapsuleGeometry(radius, length, 4, 16),
-    new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity: 0.72 }),
+    new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity: 0.5, depthWrite: false }),
   );
   mesh.position.copy(from).addScaledVector(along, 0.5);
   if (length > 0) mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));

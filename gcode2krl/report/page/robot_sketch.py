@@ -1,8 +1,8 @@
 """The robot as the page draws it: capsules between its joint centres, and the axes that they turn about.
 
-No robot of the library states the shape of its links, so the thickness is a sketch; the joint centres are those
-of the kinematics. Everything is stated in the robot root with all joints at zero: link k is moved there by
-the turns about axes 1 to k, one after the other (a product of exponentials), which is all that the page needs.
+No robot of the library states the shape of its links, so the thickness is a sketch; the joint centres are
+those of the kinematics. Everything is stated in the robot root with all joints at zero; from there the turns
+about axes 1 to k, the last first, move link k (a product of exponentials), which is all that the page needs.
 """
 
 from typing import Any
@@ -16,6 +16,7 @@ from gcode2krl.errors import RefusedError
 _THICKNESS = (0.10, 0.095, 0.07, 0.065, 0.05, 0.042, 0.035)
 """Radius of each link as a share of the arm's length c2 + c3, as on robots of this build."""
 _SPINDLE = 0.035
+_FORWARD = np.array([1.0, 0.0, 0.0])
 _FALLBACK_CUTTER_MM = 50.0
 
 
@@ -45,7 +46,7 @@ def joint_axes(geometry: Floats) -> list[tuple[Floats, Floats]]:
     """
     a1, _, c1, c2, _, _ = geometry
     wrist = _wrist(geometry)
-    down, across, back = np.eye(3)[2] * -1.0, np.eye(3)[1], np.eye(3)[0] * -1.0
+    down, across, back = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), -_FORWARD
     points = (np.zeros(3), np.array([a1, 0.0, c1]), np.array([a1 + c2, 0.0, c1]), wrist, wrist, wrist)
     return list(zip(points, (down, across, across, back, across, back), strict=True))
 
@@ -59,7 +60,7 @@ def _flange_at_zero(geometry: Floats) -> Floats:
     """Return the flange (4, 4) in the root with all joints at zero; its z points out of it, along x."""
     flange = np.eye(4)
     flange[:3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-    flange[:3, 3] = _wrist(geometry) + [geometry[5], 0.0, 0.0]
+    flange[:3, 3] = _wrist(geometry) + geometry[5] * _FORWARD
     return flange
 
 
@@ -74,13 +75,13 @@ def _capsules(geometry: Floats) -> list[tuple[int, Floats, Floats]]:
         (2, shoulder, elbow),
         (3, elbow, half),
         (4, half, wrist),
-        (5, wrist, wrist + [0.4 * c4, 0.0, 0.0]),
-        (6, wrist + [0.7 * c4, 0.0, 0.0], wrist + [c4, 0.0, 0.0]),
+        (5, wrist, wrist + 0.4 * c4 * _FORWARD),
+        (6, wrist + 0.7 * c4 * _FORWARD, wrist + c4 * _FORWARD),
     ]
 
 
 def _tool(cell: Cell, number: int, flange: Floats, reach_mm: float) -> dict[str, Any] | None:
-    """Return tip, axis, flange and sizes of a tool, in the root with all joints at zero; None if not known."""
+    """Return tip, axis, flange and sizes of a tool, all joints at zero; None where it is not known."""
     try:
         frame = flange @ cell.tool_matrix(number)
     except RefusedError:

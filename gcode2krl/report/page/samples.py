@@ -1,6 +1,6 @@
 """The samples that the page shows: where, when, how fast, how loaded; of a motion or of a mere path."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,14 +85,11 @@ class Samples:
         """Return some of the samples."""
         if len(rows) == len(self):
             return self
-        own = {
-            name: values[rows] if isinstance(values, np.ndarray) else values
-            for name, values in vars(self).items()
+        columns: dict[str, Any] = {
+            name: one[rows] for name, one in vars(self).items() if isinstance(one, np.ndarray)
         }
-        own["quantities"] = tuple(
-            Quantity(**(vars(quantity) | {"values": quantity.values[rows]})) for quantity in self.quantities
-        )
-        return Samples(**own)
+        quantities = tuple(replace(one, values=one.values[rows]) for one in self.quantities)
+        return replace(self, quantities=quantities, **columns)
 
 
 def samples_of(prediction: Prediction) -> Samples | None:
@@ -160,7 +157,9 @@ def thinned(samples: Samples, most: int = MOST_SAMPLES) -> Ints:
     kept = [np.array([0, count - 1]), starts]
     for quantity in samples.quantities:
         for sign in (1.0, -1.0):
-            kept.append(_extremes(np.where(np.isfinite(quantity.values), sign * quantity.values, -np.inf), starts))
+            kept.append(
+                _extremes(np.where(np.isfinite(quantity.values), sign * quantity.values, -np.inf), starts)
+            )
     return np.unique(np.concatenate(kept))
 
 

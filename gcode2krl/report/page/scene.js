@@ -84,9 +84,9 @@ class Scene {
     const thick = lineMaterial(this.colours, 7);
     thick.uniforms.is_flat.value = 1;
     thick.depthTest = false;
-    thick.transparent = true;
     this.current = new Lines(thick);
     this.current.mesh.renderOrder = 5;
+    this.fine.mesh.renderOrder = this.coarse.mesh.renderOrder = 4;  // over the robot, which must not hide the path
     this.scene.add(this.fine.mesh, this.coarse.mesh, this.current.mesh, axesAt(this.extent));
     this.materials = [this.material, thick];
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa4b0, 2.2));
@@ -313,6 +313,7 @@ class Lines {
 function lineMaterial(colours, width) {
   return new THREE.ShaderMaterial({
     glslVersion: THREE.GLSL3,
+    transparent: true,
     vertexShader: LINE_VERTEX,
     fragmentShader: LINE_FRAGMENT,
     side: THREE.DoubleSide,

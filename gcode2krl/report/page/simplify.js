@@ -1,6 +1,6 @@
 // Level of detail: fewer rows that look the same, in place and in colour.
 
-const MOST_SKIPPED = 48;
+const MOST_SKIPPED = 160;
 
 // Rows that a polyline needs so that no row left out is further than tolerance from it (mm), nor its shade
 // (0 to 1) further than shadeTolerance. Stretches that are told apart by kind are never joined.
