@@ -118,11 +118,13 @@ def test_python(code, folder, predicted):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_commands(command, folder, run):
+def test_commands(command, folder, run, predicted):
     words = shlex.split(command, comments=True)
     assert words[0] == "gcode2krl"
     if "diagnose" in words:
         measured(folder)
+    if words[1] == "report":
+        shutil.copytree(predicted, "prediction")
     if "trace.csv" in words:
         traced(folder, run)
     done = run(*words[1:])

@@ -81,11 +81,11 @@ class Scene {
     this.material = lineMaterial(this.colours, this.software ? 2.2 : 2.6);
     this.fine = new Lines(this.material);
     this.coarse = new Lines(this.material);
-    const thick = lineMaterial(this.colours, 7);
+    const thick = lineMaterial(this.colours, 9);
     thick.uniforms.is_flat.value = 1;
     thick.depthTest = false;
     this.current = new Lines(thick);
-    this.current.mesh.renderOrder = 5;
+    this.current.mesh.renderOrder = 3;
     this.fine.mesh.renderOrder = this.coarse.mesh.renderOrder = 4;  // over the robot, which must not hide the path
     this.scene.add(this.fine.mesh, this.coarse.mesh, this.current.mesh, axesAt(this.extent));
     this.materials = [this.material, thick];
