@@ -80,8 +80,10 @@ def _script(has_path: bool) -> str:
     if not has_path:
         return "\n".join(scripts)
     libraries = [
+        _comment(LIBRARIES / "three.LICENSE"),
         as_constant(_text(LIBRARIES / "three.module.min.js"), "THREE"),
         as_constant(_text(LIBRARIES / "OrbitControls.js"), "CONTROLS"),
+        _comment(LIBRARIES / "uPlot.LICENSE"),
         _text(LIBRARIES / "uPlot.iife.min.js"),
     ]
     return "\n".join([*libraries, *scripts])
@@ -100,6 +102,11 @@ def as_constant(module: str, name: str) -> str:
     members = ",".join(f"{pair[-1]}:{pair[0]}" for pair in exported)
     body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = THREE;", module[: ending.start()])
     return f"const {name} = (() => {{\n{body}\nreturn {{{members}}};\n}})();"
+
+
+def _comment(file: Path) -> str:
+    """Return a licence as a comment: every copy of the library carries it."""
+    return f"/*\n{_text(file)}*/"
 
 
 def _text(file: Path) -> str:

@@ -44,6 +44,11 @@ def test_the_libraries_are_as_published():
     assert {file.name: sha256(file.read_bytes()).hexdigest() for file in LIBRARIES.iterdir()} == PINNED
 
 
+def test_each_copy_carries_the_licences(text):
+    for name in ("three.LICENSE", "uPlot.LICENSE"):
+        assert (LIBRARIES / name).read_text(encoding="utf-8") in text
+
+
 def test_nothing_is_fetched(text):
     markup = re.sub(r"<script type=\"module\">.*?</script>", "", text, flags=re.S)
     assert not re.search(r"(src|href)\s*=|@import|url\(", markup)
