@@ -17,6 +17,7 @@ from gcode2krl.cutting.cutter import shape_of
 from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
+from gcode2krl.cutting.solids import mesh_of, solid_of
 from gcode2krl.errors import input_error
 from gcode2krl.tables import Toolpath
 
@@ -79,7 +80,8 @@ def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:
 def load_mesh(file: Path) -> "trimesh.Trimesh":
     """Return the mesh of a raw part in mm.
 
-    Raises `NotUnderstoodError` where the file is missing, not a mesh, has holes or is not in mm.
+    Cracks are closed (`solids.solid_of`). Raises `NotUnderstoodError` where the file is missing, not a mesh,
+    has holes or is not in mm.
     """
     if not file.is_file():
         raise input_error("file-unreadable", "cannot read the stock: no such file", REMEDY, source=str(file))
@@ -97,9 +99,12 @@ def load_mesh(file: Path) -> "trimesh.Trimesh":
     if span > _LARGEST_MM:
         sentence = f"the mesh is {span:.4g} mm large, so probably not in mm"
         raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
-    if not mesh.is_watertight:
-        raise input_error("stock-mesh", "the mesh is not closed", REMEDY, source=str(file))
-    return mesh
+    if mesh.is_watertight:
+        return mesh
+    try:
+        return mesh_of(solid_of(mesh))
+    except MeshError as error:
+        raise input_error("stock-mesh", str(error), REMEDY, source=str(file)) from None
 
 
 def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
