@@ -20,12 +20,14 @@ from gcode2krl.cli.inputs import (
     require_other,
     require_part,
 )
+from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, solids, with_comparison
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gcode2krl.arrays import Floats
+    from gcode2krl.cutting.nominal import Comparison
     from gcode2krl.prediction import Prediction
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
@@ -54,6 +56,9 @@ _FIGURES = (
 @click.option("--plot", is_flag=True, help="Draw path, speed, joints, forces and deflection as PNG.")
 @click.option("--part", "part_mesh", metavar="OUT.stl", help="Write the machined stock as a mesh.")
 @click.option(
+    "--nominal", metavar="PART.stl", help="Compare what is left with this part: gouges and rest as solids."
+)
+@click.option(
     "--effect",
     "effects",
     multiple=True,
@@ -76,6 +81,7 @@ def command(
     csv: bool,
     plot: bool,
     part_mesh: str | None,
+    nominal: str | None,
     no_forces: bool,
     effects: tuple[str, ...],
     effect_folders: tuple[str, ...],
@@ -91,7 +97,7 @@ def command(
     try:
         require_part(part)
         folder = _folder(part, output)
-        inputs = existing(part, *cell_files(cell_path), *effect_files(effect_folders))
+        inputs = existing(part, nominal, *cell_files(cell_path), *effect_files(effect_folders))
         _require_outputs(folder, part_mesh, inputs)
         cell = read_cell(cell_path)
         toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
@@ -103,9 +109,13 @@ def command(
                 toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance, settings=settings, forces=not no_forces
             )
             prediction = add_effects(prediction, effects, effect_folders)
+            comparison = compared(prediction, nominal) if nominal is not None else None
+            if comparison is not None and nominal is not None:
+                prediction = with_comparison(prediction, comparison, nominal)
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
             files.append(_save_corners(corners, folder, inputs))
+            files += _save_solids(comparison, folder, inputs)
             if part_mesh is not None:
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
@@ -137,6 +147,7 @@ def command(
                     if prediction.deflection is not None
                     else None
                 ),
+                **({"nominal": as_dict(comparison)} if comparison is not None else {}),
                 "issues": issue_dicts(prediction.issues),
             }
         )
@@ -150,7 +161,7 @@ def command(
     console.say(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
     )
-    for line in load_lines(prediction):
+    for line in (*load_lines(prediction), *(comparison_lines(comparison) if comparison is not None else ())):
         console.say(line)
     return 0
 
@@ -161,7 +172,7 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
-    names = [*tables, RECORD, _CORNERS, *(f"{name}.png" for name in _FIGURES)]
+    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in _FIGURES)]
     require_folder(folder, names, inputs)
     if part_mesh is None:
         return
@@ -184,6 +195,19 @@ def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path
     content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
     write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)
     return file
+
+
+def _save_solids(comparison: "Comparison | None", folder: Path, inputs: list[Path]) -> list[Path]:
+    """Write gouges and rest as meshes; those of an earlier prediction go."""
+    from gcode2krl.files import write_together
+
+    contents = solids(comparison) if comparison is not None else {}
+    for name in FILES.values():
+        if name not in contents:
+            (folder / name).unlink(missing_ok=True)
+    files = {folder / name: content for name, content in contents.items()}
+    write_together(files, inputs)
+    return list(files)
 
 
 def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> Path:

@@ -7,6 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.inputs import STANDARD, cell_files, existing, require_outputs
+from gcode2krl.cli.nominal import HASH_KEY, KEY, compared, on_page
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
@@ -26,11 +27,20 @@ _LARGEST_TEXT = 400_000_000
 @click.option(
     "--gcode", metavar="PART.nc", help="The G-code, where it no longer lies where it was predicted from."
 )
+@click.option(
+    "--nominal", metavar="PART.stl", help="The nominal part, where it no longer lies where it was given."
+)
 @click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 def command(
-    folder: str, output: str | None, gcode: str | None, verbose: bool, quiet: bool, as_json: bool
+    folder: str,
+    output: str | None,
+    gcode: str | None,
+    nominal: str | None,
+    verbose: bool,
+    quiet: bool,
+    as_json: bool,
 ) -> int:
     """Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.
 
@@ -41,7 +51,7 @@ def command(
         place = Path(folder)
         file = Path(output) if output is not None else place.with_name(f"{place.resolve().name}.html")
         files = [*place.glob("*")] if place.is_dir() else []
-        require_report(str(file), existing(gcode, *files))
+        require_report(str(file), existing(gcode, nominal, *files))
         from gcode2krl.prediction import Prediction
         from gcode2krl.report.page import content_of, write_page
 
@@ -49,7 +59,10 @@ def command(
             prediction = Prediction.load(place)
             text = _text_of(_gcode_file(prediction, place, gcode))
             stock_mm = _stock_mm(prediction.toolpath, prediction.cell)
-            write_page(content_of(prediction, text=text, stock_mm=stock_mm), file, files)
+            mesh = _nominal_file(prediction, place, nominal)
+            beside = on_page(compared(prediction, mesh)) if mesh is not None else None
+            content = content_of(prediction, text=text, stock_mm=stock_mm, nominal=beside)
+            write_page(content, file, files)
     except Gcode2KrlError as error:
         if not as_json:
             raise
@@ -58,6 +71,10 @@ def command(
     if as_json:
         console.json({"files": [str(file)], "issues": issue_dicts(prediction.issues)})
         return 0
+    if mesh is None and KEY in prediction.inputs:
+        console.hint(
+            f"{prediction.inputs[KEY]} is not at hand: the page does not compare with it; --nominal names it"
+        )
     if text is None:
         console.hint(
             f"{prediction.toolpath.source or 'the G-code'} is not at hand: the page has no G-code text"
@@ -153,20 +170,26 @@ def _predicted(toolpath: "Toolpath | None", cell: "Cell | None") -> "Prediction 
 
 def _gcode_file(prediction: "Prediction", folder: Path, given: str | None) -> str | None:
     """Return the file with the program's G-code: as given, or where it was predicted from if unchanged."""
-    from hashlib import sha256
-
     if given is not None:
         if not Path(given).is_file():
             raise input_error("file-unreadable", "cannot read: no such file", "name the G-code", source=given)
         return given
-    named = prediction.toolpath.source
-    if not named:
-        return None
-    for file in (Path(named), folder.parent / Path(named).name):
-        if file.is_file():
-            wanted = prediction.inputs.get("program_sha256")
-            if wanted is None or sha256(file.read_bytes()).hexdigest() == wanted:
-                return str(file)
+    return _unchanged(prediction.toolpath.source, folder, prediction.inputs.get("program_sha256"))
+
+
+def _nominal_file(prediction: "Prediction", folder: Path, given: str | None) -> str | None:
+    """Return the mesh of the nominal part: as given, or that of the prediction if unchanged."""
+    named = prediction.inputs.get(KEY, "")
+    return given or _unchanged(str(named), folder, prediction.inputs.get(HASH_KEY))
+
+
+def _unchanged(named: str, folder: Path, wanted_sha256: object) -> str | None:
+    """Return a file where it is named, or beside the prediction, if its content is still the same."""
+    from hashlib import sha256
+
+    for file in (Path(named), folder.parent / Path(named).name) if named else ():
+        if file.is_file() and wanted_sha256 in (None, sha256(file.read_bytes()).hexdigest()):
+            return str(file)
     return None
 
 

@@ -35,6 +35,8 @@ class Removal:
     forces: Forces
     part: HeightField
     """The material that is left."""
+    to_field: Floats
+    """(3, 3) rotation from ``$BASE`` to the frame of ``part``."""
 
 
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
@@ -133,7 +135,7 @@ def remove(
         relative_band=cell.material.relative_band,
     )
     if not is_checked:
-        return Removal(forces, field)
+        return Removal(forces, field, to_field)
     steps = np.diff(position, axis=0, prepend=position[:1])
     seen = Cut(
         source_line=toolpath.source_line[row],
@@ -163,7 +165,7 @@ def remove(
         *uses(seen.source_line, rapid, programmed_f_z_mm, seen.ramp_rad, seen.centre_mm, forces, cell),
     )
     ordered = tuple(sorted(issues, key=lambda issue: issue.line))
-    return Removal(replace(forces, issues=ordered), field)
+    return Removal(replace(forces, issues=ordered), field, to_field)
 
 
 def _way(position_mm: Floats, motion: Motion, to_field: Floats, tool: Ints32) -> Shaped:

@@ -44,6 +44,28 @@ class Worst:
 
 
 @dataclass(frozen=True)
+class Deviation:
+    """A gouge, or a place with rest."""
+
+    kind: str
+    volume_mm3: float
+    depth_mm: float
+    place_mm: list[float]
+    row: int
+    line: int
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The finished part against the nominal one."""
+
+    found: list[Deviation]
+    left_out: int
+    """Smaller ones."""
+    volume_mm3: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Content:
     """One page."""
 
@@ -62,6 +84,8 @@ class Content:
     """What `page.js` reads; ``rows`` is 0 where no path is known."""
     data: str = ""
     text: str = ""
+    compared: Compared | None = None
+    solids: str = ""
 
 
 def content_of(
@@ -71,6 +95,7 @@ def content_of(
     issues: Iterable[Issue] | None = None,
     text: str | None = None,
     stock_mm: Floats | None = None,
+    nominal: dict[str, Any] | None = None,
 ) -> Content:
     """Return the page of a prediction.
 
@@ -80,6 +105,9 @@ def content_of(
     issues : its findings; default: those of the prediction.
     text : the G-code; None where it is not at hand.
     stock_mm : (2, 3) low and high corner of the raw part in ``$BASE``, None where it is not known.
+    nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
+        ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
+        ``triangles_mm`` (t, 3, 3). None where nobody compared.
     """
     found = tuple(prediction.issues if issues is None else issues)
     whole = samples_of(prediction)
@@ -87,9 +115,10 @@ def content_of(
         return content_of_refused(
             found, title=_name(prediction.toolpath), verdict=verdict, toolpath=prediction.toolpath, text=text
         )
-    return _content(
+    made = _content(
         _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
     )
+    return made if nominal is None else _with_nominal(made, nominal, whole)
 
 
 def content_of_refused(
@@ -168,6 +197,28 @@ def _content(
         data=data,
         text=packed_text(text or ""),
     )
+
+
+def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> Content:
+    """Return a page with the differences to the nominal part, as a table and as solids."""
+    rows = thinned(whole)
+    found = [
+        Deviation(
+            **{key: one[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
+            row=_nearest(rows, one["row"]),
+            line=int(whole.line[one["row"]]),
+        )
+        for one in nominal["differences"]
+    ]
+    corners = [one["triangles_mm"].reshape(-1, 3) for one in nominal["differences"]]
+    counts = [len(part) for part in corners]
+    points = np.concatenate(corners) if corners else np.empty((0, 3))
+    solids, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
+    head = content.head | {
+        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in found]},
+    }
+    compared = Compared(found, sum(nominal["left_out"].values()), nominal["volume_mm3"])
+    return replace(content, head=head, solids=solids, compared=compared)
 
 
 def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:

@@ -23,14 +23,16 @@ function column(bytes, start, rows, step) {
   return values;
 }
 
-async function readColumns() {
-  if (head.rows === 0) return {};
-  const bytes = await inflated("columns");
-  const columns = {};
-  head.columns.forEach(({ name, step }, number) => {
-    columns[name] = column(bytes, 4 * head.rows * number, head.rows, step);
-  });
-  return columns;
+async function readColumns(id, described, rows) {
+  if (rows === 0) return {};
+  const bytes = await inflated(id);
+  return Object.fromEntries(described.map(({ name, step }, number) => [name, column(bytes, 4 * rows * number, rows, step)]));
+}
+
+// The corners of the solids by which the finished part differs from the nominal one.
+async function readSolids() {
+  if (!head.solids) return {};
+  return readColumns("solids", head.solids.columns, head.solids.counts.reduce((sum, count) => sum + count, 0));
 }
 
 async function readLines() {

@@ -3,8 +3,9 @@
 const PASS = "pass";
 
 class Page {
-  constructor(columns, lines) {
+  constructor(columns, lines, solids) {
     this.columns = columns;
+    this.solidColumns = solids;
     this.row = 0;
     this.rows = head.rows;
     this.stretch = null;
@@ -33,6 +34,7 @@ class Page {
     this.fillColours();
     this.fillMenu();
     this.listenToTools();
+    this.listenToPrinter();
     this.paint();
     this.select(this.worstRow());
   }
@@ -50,6 +52,10 @@ class Page {
       this.robot.show(this.firstFeed());
       scene.scene.updateMatrixWorld(true);
       scene.robotBox = new THREE.Box3().setFromObject(this.robot.root);
+    }
+    if (head.solids) {
+      this.solids = solidsOf(head.solids, this.solidColumns);
+      scene.scene.add(this.solids);
     }
     byId("show-stock").parentElement.hidden = !this.stock;
     byId("show-robot").parentElement.hidden = !this.robot;
@@ -234,6 +240,7 @@ class Page {
     byId("colour").addEventListener("change", () => this.paint());
     byId("show-rapids").addEventListener("change", () => this.paint());
     byId("show-stock").addEventListener("change", (event) => { this.stock.visible = event.target.checked; this.scene.changed(false); });
+    byId("show-solids")?.addEventListener("change", (event) => { this.solids.visible = event.target.checked; this.scene.changed(false); });
     byId("show-robot").addEventListener("change", (event) => {
       this.robot.wanted = event.target.checked;
       this.select(this.row);
@@ -245,6 +252,19 @@ class Page {
     }));
     byId("slider").addEventListener("input", (event) => this.select(Number(event.target.value)));
     byId("play").addEventListener("click", () => this.play(!this.playing));
+  }
+
+  // ---- printing: as wide as a sheet, and drawn at once, since a browser does not wait for it
+
+  listenToPrinter() {
+    const fit = (isPrinted) => {
+      document.body.classList.toggle("printed", isPrinted);
+      this.plots.resize();
+      this.scene?.resize();
+      this.scene?.draw(0);
+    };
+    window.addEventListener("beforeprint", () => fit(true));
+    window.addEventListener("afterprint", () => fit(false));
   }
 
   // ---- playing and keys
@@ -313,6 +333,6 @@ function say(words) {
 if (typeof DecompressionStream === "undefined") {
   say("This browser is too old for the 3D view, the plots and the G-code: Chrome or Edge 103, Firefox 113, Safari 16.4 or newer shows them.");
 } else {
-  const [columns, lines] = await Promise.all([readColumns(), readLines()]);
-  window.report = new Page(columns, lines);
+  const [columns, lines, solids] = await Promise.all([readColumns("columns", head.columns, head.rows), readLines(), readSolids()]);
+  window.report = new Page(columns, lines, solids);
 }

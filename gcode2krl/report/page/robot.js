@@ -1,4 +1,4 @@
-// Stock and robot: capsules that turn about the joint axes, one group within the other.
+// Stock, gouges, rest and robot: capsules that turn about the joint axes, one group within the other.
 
 const LINK_COLOUR = 0xe8a468, FOOT_COLOUR = 0x70777f, SPINDLE_COLOUR = 0x4a5560, CUTTER_COLOUR = 0xb8c0c8;
 
@@ -91,5 +91,24 @@ function stockBox([low, high]) {
   const faces = new THREE.MeshLambertMaterial({ color: 0xc9b48a, transparent: true, opacity: 0.22, depthWrite: false, side: THREE.DoubleSide });
   group.add(new THREE.Mesh(shape, faces), new THREE.LineSegments(new THREE.EdgesGeometry(shape), new THREE.LineBasicMaterial({ color: 0x8a7a55 })));
   group.position.set(...low.map((value, k) => (value + high[k]) / 2));
+  return group;
+}
+
+const SOLID_COLOURS = { gouge: 0xd55e00, rest: 0x0072b2 };
+
+// Gouges and rest as solids, each with flat faces.
+function solidsOf({ counts, kinds }, { x, y, z }) {
+  const group = new THREE.Group();
+  let first = 0;
+  counts.forEach((count, number) => {
+    const corners = new Float32Array(3 * count);
+    for (let i = 0; i < count; i++) corners.set([x[first + i], y[first + i], z[first + i]], 3 * i);
+    first += count;
+    const shape = new THREE.BufferGeometry();
+    shape.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+    shape.computeVertexNormals();
+    const material = new THREE.MeshLambertMaterial({ color: SOLID_COLOURS[kinds[number]], transparent: true, opacity: 0.8, side: THREE.DoubleSide });
+    group.add(new THREE.Mesh(shape, material));
+  });
   return group;
 }
