@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from gcode2krl import Prediction, load_cell, predict
 from tests.conftest import ROOT
@@ -73,6 +74,7 @@ def folder(tmp_path, monkeypatch):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
     shutil.copy(ROOT / "examples" / "test_piece.nc", "part.nc")
     Path("cell.toml").write_text(CELL, encoding="ascii")
+    trimesh.creation.box(bounds=[[0, -100, -30], [300, 100, -9]]).export("nominal.stl")
     return tmp_path
 
 

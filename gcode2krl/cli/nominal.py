@@ -5,8 +5,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gcode2krl.errors import Issue
 
 if TYPE_CHECKING:
@@ -112,6 +110,8 @@ def solids(comparison: "Comparison") -> dict[str, bytes]:
 
 def on_page(comparison: "Comparison") -> dict[str, Any]:
     """Return what the report shows: the same, with nearest samples and the corners of triangles (t, 3, 3)."""
+    import numpy as np
+
     plain = as_dict(comparison)
     for one, shown in zip(comparison.differences, plain["differences"], strict=True):
         shown |= {"row": one.row, "triangles_mm": np.asarray(one.solid.triangles)}

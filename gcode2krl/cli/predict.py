@@ -206,7 +206,8 @@ def _save_solids(comparison: "Comparison | None", folder: Path, inputs: list[Pat
         if name not in contents:
             (folder / name).unlink(missing_ok=True)
     files = {folder / name: content for name, content in contents.items()}
-    write_together(files, inputs)
+    if files:
+        write_together(files, inputs)
     return list(files)
 
 

@@ -322,7 +322,7 @@ function lineMaterial(colours, width) {
       width: { value: width / 2 },
       colours: { value: colours },
       is_flat: { value: 0 },
-      flat_colour: { value: new THREE.Color(0xff8c1a) },
+      flat_colour: { value: new THREE.Color().setHex(0xffb23e, THREE.LinearSRGBColorSpace) },
     },
   });
 }

@@ -284,6 +284,56 @@ def test_what_is_printed_has_the_findings_and_no_buttons(window):
     assert window.evaluate("getComputedStyle(document.getElementById('findings')).overflowY") == "visible"
 
 
+def test_a_sheet_is_filled_and_left_again(window):
+    """A browser prints what is there when it says so; it does not wait."""
+    wide = window.evaluate("report.plots.plots[0].u.width")
+    window.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert window.evaluate("report.plots.plots.every(({u}) => u.width <= 690)")
+    assert window.evaluate("document.getElementById('scene').clientWidth") <= 690
+    window.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert window.evaluate("report.plots.plots[0].u.width") == wide
+
+
+def test_gouges_and_rest_are_drawn_where_they_are(browser, prediction, tmp_path):
+    corners = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0.0]])
+    found = [
+        {
+            "kind": kind,
+            "volume_mm3": 5.0,
+            "depth_mm": 0.5,
+            "place_mm": place,
+            "row": 900,
+            "triangles_mm": solid,
+        }
+        for kind, place, solid in (
+            ("gouge", [1.0, 2.0, 3.0], np.stack([corners, corners + 5.0])),
+            ("rest", [100.0, 0.0, 0.0], corners[None] + 100.0),
+        )
+    ]
+    nominal = {
+        "volume_mm3": {"gouge": 5.0, "rest": 5.0},
+        "left_out": {"gouge": 0, "rest": 3},
+        "differences": found,
+    }
+    made = tmp_path / "nominal.html"
+    write_page(content_of(prediction, nominal=nominal), made)
+    window = opened_page(browser, made)
+    drawn = window.evaluate(
+        "report.solids.children.map((one) => [one.material.color.getHex(),"
+        " Array.from(one.geometry.attributes.position.array)])"
+    )
+    assert [colour for colour, _ in drawn] == [0xD55E00, 0x0072B2]
+    for (_, points), one in zip(drawn, found, strict=True):
+        assert points == pytest.approx(one["triangles_mm"].ravel(), abs=6e-3)
+    assert "3 smaller places" in window.locator("#compared").inner_text()
+    window.locator("#show-solids").uncheck()
+    assert window.evaluate("report.solids.visible") is False
+    window.locator("#compared button.go").first.click()
+    assert row(window) == 900
+    assert window.said == []
+    window.context.close()
+
+
 def test_a_refused_program(browser, tmp_path):
     issue = Issue("error", "out-of-reach", 25, "X 1 is out of reach", "move it")
     toolpath = read_gcode(PIECE, load_cell())
