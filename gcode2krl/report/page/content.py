@@ -22,8 +22,8 @@ from gcode2krl.report.page.losses import (
     worst_windows,
 )
 from gcode2krl.report.page.passes import passes_of
-from gcode2krl.report.page.robot_sketch import robot_sketch
 from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
+from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
