@@ -98,7 +98,7 @@ class Plots {
     this.place1 = row;
     this.plots.forEach(({ u, now }) => {
       const x = u.valToPos(this.time[row], "x");
-      now.style.display = x < 0 || x > u.over.clientWidth ? "none" : "";
+      now.style.display = x < 0 || x > u.bbox.width / devicePixelRatio ? "none" : "";  // asks for no layout
       now.style.left = `${x - 1}px`;
     });
   }
