@@ -12,7 +12,7 @@ from gcode2krl.report.page.one_file import HERE
 from tests.conftest import ROOT
 from tests.report.page.browser import opened_browser, opened_page
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("browser")]
+pytestmark = pytest.mark.browser
 PIECE = ROOT / "examples" / "test_piece.nc"
 
 
@@ -349,19 +349,24 @@ def test_a_refused_program(browser, tmp_path):
     window.context.close()
 
 
-def test_a_program_that_is_not_understood(browser, tmp_path):
+@pytest.mark.parametrize(("lines", "wrong"), [(2000, 900), (600_000, 512_345)])
+def test_a_program_that_is_not_understood(browser, tmp_path, lines, wrong):
+    """The second is longer than a browser can scroll line by line."""
     made = tmp_path / "text.html"
     content = content_of_refused(
-        [Issue("error", "no-number", 900, "X is not followed by a number")],
+        [Issue("error", "no-number", wrong, "X is not followed by a number")],
         title="part.nc",
         verdict="not understood",
-        text="\n".join(f"G1 X{k}" for k in range(2000)),
+        text="\n".join(f"G1 X{k}" for k in range(lines)),
     )
     write_page(content, made)
     window = opened_page(browser, made)
     window.locator("#findings button.go").click()
-    assert chosen_line(window) == 900
-    assert window.locator("#listing li[aria-selected=true]").inner_text().endswith("G1 X899")
+    assert chosen_line(window) == wrong
+    chosen = window.locator("#listing li[aria-selected=true]")
+    assert chosen.inner_text().endswith(f"G1 X{wrong - 1}")
+    place, listing = chosen.bounding_box(), window.locator("#listing").bounding_box()
+    assert listing["y"] <= place["y"] <= listing["y"] + listing["height"] - 18
     assert window.said == []
     window.context.close()
 
