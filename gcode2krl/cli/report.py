@@ -94,7 +94,12 @@ def require_report(report: str | None, inputs: list[Path]) -> None:
 
 
 def report_written(
-    report: str | None, part: str, prediction: "Prediction", issues: tuple[Issue, ...], inputs: list[Path]
+    report: str | None,
+    part: str,
+    prediction: "Prediction",
+    issues: tuple[Issue, ...],
+    inputs: list[Path],
+    console: Console,
 ) -> None:
     """Write the page of a program that was written; nothing where none is asked for."""
     if report is None:
@@ -103,7 +108,7 @@ def report_written(
 
     stock_mm = _stock_mm(prediction.toolpath, prediction.cell)
     content = content_of(prediction, verdict="written", issues=issues, text=_text_of(part), stock_mm=stock_mm)
-    _write(content, report, inputs)
+    _write(content, report, inputs, console)
 
 
 def report_refused(
@@ -113,6 +118,7 @@ def report_refused(
     toolpath: "Toolpath | None",
     cell: "Cell | None",
     cell_path: str | None,
+    console: Console,
 ) -> None:
     """Write the page of a program that was not written, with as much of its path as is known.
 
@@ -139,7 +145,7 @@ def report_refused(
             text=text,
             stock_mm=stock_mm,
         )
-    _write(content, report, inputs)
+    _write(content, report, inputs, console)
 
 
 def _is_writable(report: str, inputs: list[Path]) -> bool:
@@ -150,10 +156,11 @@ def _is_writable(report: str, inputs: list[Path]) -> bool:
     return True
 
 
-def _write(content: "Content", report: str, inputs: list[Path]) -> None:
+def _write(content: "Content", report: str, inputs: list[Path], console: Console) -> None:
     from gcode2krl.report.page import write_page
 
     write_page(content, Path(report), inputs)
+    console.hint(f"{report} written: open it in a browser")
 
 
 def _predicted(toolpath: "Toolpath | None", cell: "Cell | None") -> "Prediction | None":

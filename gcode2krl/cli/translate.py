@@ -169,9 +169,9 @@ def command(
                 online=online,
                 inputs=inputs,
             )
-            report_written(report, part, prediction, written.issues, inputs)
+            report_written(report, part, prediction, written.issues, inputs, console)
     except Gcode2KrlError as error:
-        report_refused(report, part, error, toolpath, cell, cell_path)
+        report_refused(report, part, error, toolpath, cell, cell_path, console)
         if not as_json:
             raise _from_part(error, part) from None
         console.json(_result((), error.issues))

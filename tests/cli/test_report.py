@@ -97,6 +97,7 @@ def test_a_refused_program_has_its_page_with_line_remedy_and_path(run, folder):
     (folder / "far.nc").write_text(OUT_OF_REACH, encoding="ascii")
     done = run("far.nc", "-o", "far.src", "--report", "far.html")
     assert done.code == 1
+    assert "far.html written" in done.err
     assert not (folder / "far.src").exists()
     text = (folder / "far.html").read_text(encoding="utf-8")
     assert 'class="badge refused">refused' in text
