@@ -14,7 +14,7 @@ from gcode2krl.version import __version__
 
 HERE = Path(__file__).parent
 LIBRARIES = HERE / "vendor"
-_SCRIPTS = ("data.js", "simplify.js", "scene.js", "robot.js", "plots.js", "listing.js", "page.js")
+_SCRIPTS = ("data.js", "simplify.js", "lines.js", "scene.js", "robot.js", "plots.js", "listing.js", "page.js")
 _EXPORT = re.compile(r"export\s*\{([^{}]*)\}\s*;?\s*$")
 _BACKTICKS = re.compile("`([^`]+)`")
 _IMPORT = re.compile(r"import\s*\{([^{}]*)\}\s*from\s*['\"]three['\"]\s*;")
