@@ -76,9 +76,11 @@ class Finding:
 
     def text(self, source: str = "") -> str:
         """Return the first as `Issue.text` does, with the lines of the others."""
-        return self.first.text(source, self._others())
+        return self.first.text(source, self.others)
 
-    def _others(self) -> str:
+    @property
+    def others(self) -> str:
+        """Where else the same was found, empty if nowhere."""
         count = len(self.issues)
         lines = sorted({issue.line for issue in self.issues} - {self.first.line})
         if not lines:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from gcode2krl import Prediction, load_cell, predict
 from tests.conftest import ROOT
@@ -73,6 +74,7 @@ def folder(tmp_path, monkeypatch):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
     shutil.copy(ROOT / "examples" / "test_piece.nc", "part.nc")
     Path("cell.toml").write_text(CELL, encoding="ascii")
+    trimesh.creation.box(bounds=[[0, -100, -30], [300, 100, -9]]).export("nominal.stl")
     return tmp_path
 
 
@@ -118,11 +120,13 @@ def test_python(code, folder, predicted):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_commands(command, folder, run):
+def test_commands(command, folder, run, predicted):
     words = shlex.split(command, comments=True)
     assert words[0] == "gcode2krl"
     if "diagnose" in words:
         measured(folder)
+    if words[1] == "report":
+        shutil.copytree(predicted, "prediction")
     if "trace.csv" in words:
         traced(folder, run)
     if "milling_cell.toml" in words and "init" not in words:

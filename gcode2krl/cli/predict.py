@@ -24,12 +24,14 @@ from gcode2krl.cli.inputs import (
     require_other,
     require_part,
 )
+from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, solids, with_comparison
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gcode2krl.arrays import Floats
+    from gcode2krl.cutting.nominal import Comparison
     from gcode2krl.prediction import Prediction
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
@@ -66,6 +68,9 @@ _FIGURES = (
 @click.option("--plot", is_flag=True, help="Draw path, speed, joints, forces and deflection as PNG.")
 @click.option("--part", "part_mesh", metavar="OUT.stl", help="Write the machined stock as a mesh.")
 @click.option(
+    "--nominal", metavar="PART.stl", help="Compare what is left with this part: gouges and rest as solids."
+)
+@click.option(
     "--effect",
     "effects",
     multiple=True,
@@ -89,6 +94,7 @@ def command(
     csv: bool,
     plot: bool,
     part_mesh: str | None,
+    nominal: str | None,
     no_forces: bool,
     effects: tuple[str, ...],
     effect_folders: tuple[str, ...],
@@ -106,7 +112,7 @@ def command(
         require_part(part)
         folder = _folder(part, output)
         inputs = existing(
-            part, *cell_files(cell_path), *files_of_job(job_path), *effect_files(effect_folders)
+            part, nominal, *cell_files(cell_path), *files_of_job(job_path), *effect_files(effect_folders)
         )
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
@@ -127,9 +133,13 @@ def command(
             )
             begin("effects and files")
             prediction = add_effects(prediction, effects, effect_folders)
+            comparison = compared(prediction, nominal) if nominal is not None else None
+            if comparison is not None and nominal is not None:
+                prediction = with_comparison(prediction, comparison, nominal)
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
             files.append(_save_corners(corners, folder, inputs))
+            files += _save_solids(comparison, folder, inputs)
             if part_mesh is not None:
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
@@ -158,6 +168,7 @@ def command(
                 "corner_error_mm": float(corners["error_mm"].max(initial=0.0)),
                 "max_force_N": loads.force_N if loads is not None else None,
                 "max_deflection_mm": loads.deflection_mm if loads is not None else None,
+                **({"nominal": as_dict(comparison)} if comparison is not None else {}),
                 "issues": issue_dicts(prediction.issues),
             }
         )
@@ -171,7 +182,8 @@ def command(
     console.say(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
     )
-    for line in load_lines(loads, prediction.cell):
+    compared_lines = comparison_lines(comparison) if comparison is not None else ()
+    for line in (*load_lines(loads, prediction.cell), *compared_lines):
         console.say(line)
     return 0
 
@@ -182,7 +194,7 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
-    names = [*tables, RECORD, _CORNERS, *(f"{name}.png" for name in _FIGURES)]
+    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in _FIGURES)]
     require_folder(folder, names, inputs)
     if part_mesh is None:
         return
@@ -205,6 +217,20 @@ def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path
     content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
     write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)
     return file
+
+
+def _save_solids(comparison: "Comparison | None", folder: Path, inputs: list[Path]) -> list[Path]:
+    """Write gouges and rest as meshes; those of an earlier prediction go."""
+    from gcode2krl.files import write_together
+
+    contents = solids(comparison) if comparison is not None else {}
+    for name in FILES.values():
+        if name not in contents:
+            (folder / name).unlink(missing_ok=True)
+    files = {folder / name: content for name, content in contents.items()}
+    if files:
+        write_together(files, inputs)
+    return list(files)
 
 
 def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> Path:

@@ -22,6 +22,7 @@ from gcode2krl.cli.inputs import (
     require_outputs,
     require_part,
 )
+from gcode2krl.cli.report import report_refused, report_written, require_report
 from gcode2krl.cli.restart import (
     from_line_option,
     read_restarted,
@@ -36,8 +37,9 @@ from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
+    from gcode2krl.prediction import Prediction
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Targets
+    from gcode2krl.tables import Targets, Toolpath
 
 
 @click.command(
@@ -96,6 +98,7 @@ if TYPE_CHECKING:
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
 )
+@click.option("--report", metavar="PART.html", help="Write a page to look at, also of a refused program.")
 @click.option(
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
@@ -126,12 +129,15 @@ def command(
     both: bool,
     comment_every: int | None,
     from_line: int | None,
+    report: str | None,
 ) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 
     Exit code 0: written (warnings allowed); 1: understood and refused; 2: not understood.
     """
     console = Console(quiet or output == STANDARD, as_json)
+    toolpath: Toolpath | None = None
+    cell: Cell | None = None
     try:
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
@@ -144,7 +150,8 @@ def command(
         name = restart_name(part, name, output, from_line, cell)
         inputs = existing(part, *cell_files(cell_path), *files_of_job(job_path))
         require_figure(compensate_plot)
-        require_outputs(_outputs(place, name, part, cell, online, compensate_plot), *inputs)
+        require_report(report, inputs)
+        require_outputs(_outputs(place, name, part, cell, online, compensate_plot, report), *inputs)
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.cell.confirmation import future_confirmation
@@ -184,15 +191,19 @@ def command(
             _refuse_early(targets, cell, allow, online)
             toolpath, joints = on_disk(toolpath), on_disk(joints)
             give_back()
-            if compensate == "offline":
-                from gcode2krl.cli.compensation import compensated
-
+            prediction: Prediction | None = None
+            if compensate == "offline" or report is not None:  # they need whole tables
                 prediction = predict_toolpath(
                     toolpath, cell, targets=targets, forces=not no_forces, begin=begin
                 )
+            if compensate == "offline" and prediction is not None:
+                from gcode2krl.cli.compensation import compensated
+
                 begin("compensation")
-                forecast = forecast_of(compensated(prediction, compensate_plot, inputs))
-                joints = solve_joints(forecast.targets, cell)
+                prediction = compensated(prediction, compensate_plot, inputs)
+                joints = solve_joints(prediction.targets, cell)
+            if prediction is not None:
+                forecast = forecast_of(prediction)
             else:
                 forecast = forecast_toolpath(toolpath, cell, targets, forces=not no_forces, begin=begin)
             give_back()
@@ -211,7 +222,10 @@ def command(
                 online=online,
                 inputs=inputs,
             )
+            if prediction is not None:
+                report_written(report, part, prediction, written.issues, inputs, console)
     except Gcode2KrlError as error:
+        report_refused(report, part, error, toolpath, cell, cell_path, console)
         if not as_json:
             raise _from_part(error, part) from None
         console.json(_result((), error.issues))
@@ -289,12 +303,12 @@ def _place(part: str, output: str | None, name: str | None) -> Path | None:
 
 
 def _outputs(
-    place: Path | None, name: str | None, part: str, cell: "Cell", online: str | None, plot: str | None
+    place: Path | None, name: str | None, part: str, cell: "Cell", online: str | None, *more: str | None
 ) -> list[Path]:
     """Return the files to write, without the parts of a long program; raises where a name is bad."""
     from gcode2krl.krl import output_files, program_file
 
-    outputs = [Path(plot)] if plot is not None else []
+    outputs = [Path(file) for file in more if file is not None]
     if place is not None:
         file, _ = program_file(place, name, part, cell.program.externals)
         outputs += output_files(file, online)

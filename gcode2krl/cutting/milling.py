@@ -39,6 +39,8 @@ class Removal:
     forces: Forces
     part: HeightField
     """The material that is left."""
+    to_field: Floats
+    """(3, 3) rotation from ``$BASE`` to the frame of ``part``."""
 
 
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
@@ -95,7 +97,7 @@ def remove(
         toolpath, cell, outlook, dt_s, law, is_checked=is_checked, nodes_per_diameter=nodes_per_diameter
     )
     forces = joined(*(milling.take(block, ends) for block, ends in blocks_of(motion, rows)))
-    return Removal(replace(forces, issues=milling.issues()), milling.part())
+    return Removal(replace(forces, issues=milling.issues()), milling.part(), outlook.to_field)
 
 
 class _Rows(NamedTuple):

@@ -17,6 +17,7 @@ from gcode2krl.cutting.cutter import shape_of
 from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
+from gcode2krl.cutting.solids import mesh_of, solid_of
 from gcode2krl.errors import input_error
 from gcode2krl.tables import Toolpath
 
@@ -79,17 +80,20 @@ def block(box_mm: Floats, cell_mm: float, guessed: bool = False) -> HeightField:
     return HeightField(height, low[:2].copy(), size, float(low[2]), guessed)
 
 
-def load_mesh(file: Path) -> "trimesh.Trimesh":
-    """Return the mesh of a raw part in mm.
+def load_mesh(file: Path, what: str = "stock") -> "trimesh.Trimesh":
+    """Return the mesh of a raw part, or of ``what`` else, in mm.
 
-    Raises `NotUnderstoodError` where the file is missing, not a mesh, has holes or is not in mm.
+    Cracks are closed (`solids.solid_of`). Raises `NotUnderstoodError` where the file is missing, not a mesh,
+    has holes or is not in mm.
     """
     if not file.is_file():
-        raise input_error("file-unreadable", "cannot read the stock: no such file", REMEDY, source=str(file))
+        raise input_error(
+            "file-unreadable", f"cannot read the {what}: no such file", REMEDY, source=str(file)
+        )
     try:
         mesh = _solid_of(*read_mesh_file(file))
     except OSError as error:
-        words = f"cannot read the stock: {error.strerror}"
+        words = f"cannot read the {what}: {error.strerror}"
         raise input_error("file-unreadable", words, REMEDY, source=str(file)) from None
     except MeshError as error:
         raise input_error("stock-mesh", str(error), REMEDY, source=str(file)) from None
@@ -100,9 +104,12 @@ def load_mesh(file: Path) -> "trimesh.Trimesh":
     if span > _LARGEST_MM:
         sentence = f"the mesh is {span:.4g} mm large, so probably not in mm"
         raise input_error("stock-unit", sentence, "export it in mm", source=str(file))
-    if not mesh.is_watertight:
-        raise input_error("stock-mesh", "the mesh is not closed", REMEDY, source=str(file))
-    return mesh
+    if mesh.is_watertight:
+        return mesh
+    try:
+        return mesh_of(solid_of(mesh))
+    except MeshError as error:
+        raise input_error("stock-mesh", str(error), REMEDY, source=str(file)) from None
 
 
 def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
@@ -204,13 +211,13 @@ def _from_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> HeightField:
     """Return the field of the surface from above: each triangle raises the cells whose middle it covers."""
     field = block(np.array(mesh.bounds), cell_mm)
     height = np.full(field.height_mm.shape, -np.inf)
-    _raise_to(np.ascontiguousarray(mesh.triangles, dtype=np.float64), field.origin_mm, field.cell_mm, height)
+    raise_to(np.ascontiguousarray(mesh.triangles, dtype=np.float64), field.origin_mm, field.cell_mm, height)
     return HeightField(
         height.astype(np.float32), field.origin_mm, field.cell_mm, float(mesh.bounds[0, 2]), False
     )
 
 
-def _raise_to(triangles: Floats, origin_mm: Floats, cell_mm: Floats, height: Floats) -> None:
+def raise_to(triangles: Floats, origin_mm: Floats, cell_mm: Floats, height: Floats) -> None:
     """Raise cells (in place) to the triangles (t, 3, 3) over their middles."""
     for a, b, c in triangles:
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -16,6 +16,7 @@ from gcode2krl.gap.tell.html.pictures import largest_size, picture_bytes, run_fi
 from gcode2krl.gap.tell.report import left_lines, where_words, worst
 from gcode2krl.gap.tell.result import CauseResult, Gap
 from gcode2krl.gap.tell.words import alike, describe, kind, named, next_run, number
+from gcode2krl.report.page.one_file import base_css
 from gcode2krl.version import __version__
 
 _VERDICTS = {
@@ -63,6 +64,7 @@ def page(gap: Gap) -> str:
             left=list(left_lines(gap)),
             next_run=[] if gap.next_run is None else next_run(gap.next_run),
             version=__version__,
+            base_css=base_css(),
         )
     )
 

@@ -1,0 +1,337 @@
+"""What the page shows, from the tables of a prediction or from what is known of a refused program."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.cell import Cell
+from gcode2krl.errors import Issue, Told, told
+from gcode2krl.prediction import Prediction
+from gcode2krl.report.page.columns import packed, packed_text
+from gcode2krl.report.page.losses import (
+    Place,
+    Window,
+    is_worth_saying,
+    lost_time,
+    time_shares,
+    worst_places,
+    worst_windows,
+)
+from gcode2krl.report.page.passes import passes_of
+from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
+from gcode2krl.report.page.sketch import robot_sketch
+from gcode2krl.tables import Toolpath
+from gcode2krl.units import MM_PER_M, S_PER_MIN
+
+NOT_CHECKED = (
+    "Collisions of arm, spindle, holder and cables with anything: look along the path with the slider.",
+    "Chatter, run-out of the cutter, and vibration of robot and part.",
+    "Clamps and fixtures, unless the cell states them.",
+)
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst places of a quantity."""
+
+    label: str
+    unit: str
+    places: list[Place]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A gouge, or a place with rest."""
+
+    kind: str
+    volume_mm3: float
+    depth_mm: float
+    place_mm: list[float]
+    row: int
+    line: int
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The finished part against the nominal one."""
+
+    found: list[Deviation]
+    left_out: int
+    """Smaller ones."""
+    volume_mm3: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Content:
+    """One page."""
+
+    title: str
+    verdict: str
+    """``written``, ``predicted``, ``refused`` or ``not understood``."""
+    sentence: str
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    shares: list[tuple[str, float]] = field(default_factory=list)
+    lost_s: float = 0.0
+    windows: list[Window] = field(default_factory=list)
+    worst: list[Worst] = field(default_factory=list)
+    told: Told = field(default_factory=lambda: told(()))
+    not_checked: list[str] = field(default_factory=list)
+    head: dict[str, Any] = field(default_factory=dict)
+    """What `page.js` reads; ``rows`` is 0 where no path is known."""
+    data: str = ""
+    text: str = ""
+    compared: Compared | None = None
+    solids: str = ""
+
+
+def content_of(
+    prediction: Prediction,
+    *,
+    verdict: str = "predicted",
+    issues: Iterable[Issue] | None = None,
+    text: str | None = None,
+    stock_mm: Floats | None = None,
+    nominal: dict[str, Any] | None = None,
+) -> Content:
+    """Return the page of a prediction.
+
+    Parameters
+    ----------
+    verdict : what became of the program.
+    issues : its findings; default: those of the prediction.
+    text : the G-code; None where it is not at hand.
+    stock_mm : (2, 3) low and high corner of the raw part in ``$BASE``, None where it is not known.
+    nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
+        ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
+        ``triangles_mm`` (t, 3, 3). None where nobody compared.
+    """
+    found = tuple(prediction.issues if issues is None else issues)
+    whole = samples_of(prediction)
+    if whole is None or len(whole) == 0:
+        return content_of_refused(
+            found, title=_name(prediction.toolpath), verdict=verdict, toolpath=prediction.toolpath, text=text
+        )
+    made = _content(
+        _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
+    )
+    return made if nominal is None else _with_nominal(made, nominal, whole)
+
+
+def content_of_refused(
+    issues: Iterable[Issue],
+    *,
+    title: str,
+    verdict: str = "refused",
+    toolpath: Toolpath | None = None,
+    cell: Cell | None = None,
+    text: str | None = None,
+    stock_mm: Floats | None = None,
+) -> Content:
+    """Return the page of a program of which no motion is known: findings, text, and the programmed path."""
+    found = tuple(issues)
+    rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M if cell is not None else None
+    whole = samples_of_path(toolpath, rapid_mm_s) if toolpath is not None else None
+    if whole is not None and len(whole) > 1:
+        return _content(title, verdict, whole, found, cell, text, stock_mm, [])
+    shown = told(found)
+    return Content(
+        title=title,
+        verdict=verdict,
+        sentence=_refusal(shown, verdict),
+        told=shown,
+        not_checked=["Everything after the reading of the program: path, time, forces, deflection."],
+        head=_head_without_path(found, text),
+        text=packed_text(text or ""),
+    )
+
+
+def _content(
+    title: str,
+    verdict: str,
+    whole: Samples,
+    issues: tuple[Issue, ...],
+    cell: Cell | None,
+    text: str | None,
+    stock_mm: Floats | None,
+    facts: list[tuple[str, str]],
+) -> Content:
+    """Return the page of samples; the figures come from all of them, also where fewer are drawn."""
+    rows = thinned(whole)
+    shown = whole.at(rows)
+    number, passes = passes_of(shown.position_mm[:, 2], shown.rapid, shown.tool, shown.line)
+    tools = sorted({int(tool) for tool in np.unique(shown.tool)})
+    data, columns = packed(_columns(shown, number))
+    lost_s = lost_time(whole.time_s, whole.speed_mm_s, whole.feed_mm_s)
+    is_timed = whole.is_timed
+    windows = worst_windows(whole.time_s, lost_s, whole.line) if is_timed else []
+    head = _head_without_path(issues, text) | {
+        "rows": len(shown),
+        "all": len(whole),
+        "timed": is_timed,
+        "columns": columns,
+        "quantities": [quantity.described(shown.rapid) for quantity in shown.quantities],
+        "passes": [{"name": one.name, "tool": one.tool} for one in passes],
+        "tools": tools,
+        "robot": robot_sketch(cell, tools) if shown.q_rad is not None else None,
+        "stock": None if stock_mm is None else stock_mm.tolist(),
+        "palette": _palette(),
+    }
+    findings = told(issues)
+    lost_whole_s = float(lost_s.sum()) if is_timed else 0.0
+    return Content(
+        title=title,
+        verdict=verdict,
+        sentence=_sentence(whole, lost_whole_s, findings, verdict),
+        facts=facts,
+        shares=time_shares(whole.time_s, whole.speed_mm_s, whole.rapid, whole.cutting) if is_timed else [],
+        lost_s=lost_whole_s,
+        windows=[_on_page(window, rows) for window in windows],
+        worst=[_worst(quantity, whole, rows) for quantity in whole.quantities if quantity.name != "speed"],
+        told=findings,
+        not_checked=[*_not_known(whole, cell), *NOT_CHECKED],
+        head=head,
+        data=data,
+        text=packed_text(text or ""),
+    )
+
+
+def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> Content:
+    """Return a page with the differences to the nominal part, as a table and as solids."""
+    rows = thinned(whole)
+    found = [
+        Deviation(
+            **{key: one[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
+            row=_nearest(rows, one["row"]),
+            line=int(whole.line[one["row"]]),
+        )
+        for one in nominal["differences"]
+    ]
+    corners = [one["triangles_mm"].reshape(-1, 3) for one in nominal["differences"]]
+    counts = [len(part) for part in corners]
+    points = np.concatenate(corners) if corners else np.empty((0, 3))
+    solids, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
+    head = content.head | {
+        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in found]},
+    }
+    compared = Compared(found, sum(nominal["left_out"].values()), nominal["volume_mm3"])
+    return replace(content, head=head, solids=solids, compared=compared)
+
+
+def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:
+    """Return the columns that the page carries, with the steps to which they are rounded."""
+    columns: dict[str, tuple[Any, float]] = {"time": (shown.time_s, 1e-4)}
+    columns |= {axis: (shown.position_mm[:, k], 1e-3) for k, axis in enumerate("xyz")}
+    columns |= {q.name: (q.values, q.step) for q in shown.quantities}
+    columns |= {"line": (shown.line, 1.0), "pass": (number, 1.0), "tool": (shown.tool, 1.0)}
+    if shown.q_rad is not None:
+        columns |= {f"q{k + 1}": (shown.q_rad[:, k], 1e-5) for k in range(6)}
+    return columns
+
+
+def _head_without_path(issues: Sequence[Issue], text: str | None) -> dict[str, Any]:
+    marked: dict[int, str] = {}
+    for issue in issues:
+        if issue.line > 0 and marked.get(issue.line) != "error":
+            marked[issue.line] = issue.severity
+    return {"rows": 0, "has_text": text is not None, "marked": [[k, v] for k, v in sorted(marked.items())]}
+
+
+def _on_page(window: Window, rows: Ints) -> Window:
+    """Return a window whose row is one of those on the page."""
+    return replace(window, row=_nearest(rows, window.row))
+
+
+def _worst(quantity: Quantity, whole: Samples, rows: Ints) -> Worst:
+    sign = -1.0 if quantity.is_low_bad else 1.0
+    considered = np.where(whole.rapid & (quantity.name != "margin"), np.nan, sign * quantity.values)
+    if quantity.name != "margin":
+        considered = np.where(considered > 0.0, considered, np.nan)
+    places = worst_places(considered, whole.time_s, whole.line)
+    own = [Place(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
+    return Worst(quantity.label, quantity.unit, own)
+
+
+def _nearest(rows: Ints, row: int) -> int:
+    at = int(np.searchsorted(rows, row))
+    before = max(at - 1, 0)
+    at = min(at, len(rows) - 1)
+    return at if abs(int(rows[at]) - row) <= abs(int(rows[before]) - row) else before
+
+
+def _facts(prediction: Prediction) -> list[tuple[str, str]]:
+    """Return figures with their bands."""
+    cell, toolpath = prediction.cell, prediction.toolpath
+    facts = [("robot", cell.robot.model or "not named"), ("G-code moves", f"{len(toolpath) - 1:,}")]
+    if prediction.forces is not None:
+        size = np.linalg.norm(prediction.forces.force_base_N, axis=1)
+        band = f"± {prediction.forces.relative_band:.0%} (90 %)"
+        facts.append(("force up to", f"{np.fmax.reduce(size, initial=0.0):.0f} N {band}"))
+    if prediction.deflection is not None:
+        size = np.linalg.norm(prediction.deflection.deflection_base_mm, axis=1)
+        band = f"± {prediction.deflection.relative_band:.0%} (90 %)"
+        facts.append(("deflection up to", f"{np.fmax.reduce(size, initial=0.0):.2f} mm {band}"))
+    return facts
+
+
+def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
+    known = {quantity.name for quantity in whole.quantities}
+    missing = []
+    if not whole.is_timed:
+        missing.append("Time and speed: what is drawn is the programmed path at the programmed feed.")
+    if "force" not in known:
+        missing.append("Cutting forces and the deflection that they cause.")
+    elif "deflection" not in known:
+        missing.append("Deflection: the cell states no compliance, or the forces are not known.")
+    if "margin" not in known:
+        missing.append("Joint limits along the path.")
+    if cell is not None and not cell.is_confirmed:
+        missing.append("The cell's own numbers: nobody has confirmed all of them.")
+    return missing
+
+
+def _sentence(whole: Samples, lost_s: float, findings: Told, verdict: str) -> str:
+    if verdict in ("refused", "not understood"):
+        return _refusal(findings, verdict)
+    length_m = float(np.linalg.norm(np.diff(whole.position_mm, axis=0), axis=1).sum()) / MM_PER_M
+    if not whole.is_timed:
+        return f"{length_m:.2f} m of programmed path"
+    time_s = float(whole.time_s[-1] - whole.time_s[0])
+    lost = (
+        f"{duration(lost_s)} ({lost_s / time_s:.0%}) are lost where it is slower than programmed"
+        if is_worth_saying(lost_s, time_s)
+        else "nearly all of it as fast as programmed"
+    )
+    return f"{duration(time_s)} for {length_m:.2f} m; {lost}"
+
+
+def _refusal(findings: Told, verdict: str) -> str:
+    first = findings.findings[0] if findings.findings else None
+    why = f": {first.first.message}" if first is not None else ""
+    place = f" (line {first.first.line})" if first is not None and first.first.line > 0 else ""
+    start = "No program was written" if verdict == "refused" else "The input is not understood"
+    return f"{start}{why}{place}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time as a person reads it."""
+    if seconds < S_PER_MIN:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), int(S_PER_MIN))
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+
+
+def _name(toolpath: Toolpath) -> str:
+    return PurePath(toolpath.source.replace("\\", "/")).name or "program"
+
+
+def _palette() -> list[str]:
+    """Return viridis from what is fine to what is worth a look, which is dark on the page's light ground."""
+    from matplotlib import colormaps
+
+    colours = colormaps["viridis"](np.linspace(0.97, 0.0, 17))[:, :3]
+    return ["#" + "".join(f"{round(255 * part):02x}" for part in colour) for colour in colours]

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from gcode2krl.report.page.losses import durations, lost_time, time_shares, worst_places, worst_windows
+
+TIME = np.arange(0.0, 100.0 + 1e-9, 0.1)
+
+
+def test_each_sample_stands_for_half_the_way_to_its_neighbours():
+    assert durations(np.array([0.0, 1.0, 4.0])).tolist() == [0.5, 2.0, 1.5]
+
+
+def test_half_the_feed_costs_half_of_the_time():
+    """100 s at 5 mm/s are 500 mm, which take 50 s at 10 mm/s."""
+    lost = lost_time(TIME, np.full(1001, 5.0), np.full(1001, 10.0))
+    assert lost.sum() == pytest.approx(50.0)
+
+
+def test_nothing_is_lost_on_rapids_or_above_the_feed():
+    feed = np.where(TIME < 50.0, np.inf, 10.0)
+    assert lost_time(TIME, np.full(1001, 11.0), feed).sum() == 0.0
+
+
+def test_shares_add_up_and_are_told_apart():
+    rapid, cutting = TIME < 20.0, TIME > 60.0
+    speed = np.where((TIME > 30.0) & (TIME < 35.0), 0.0, 10.0)
+    shares = dict(time_shares(TIME, speed, rapid, cutting))
+    assert sum(shares.values()) == pytest.approx(100.0)
+    assert shares["rapid"] == pytest.approx(20.0, abs=0.11)
+    assert shares["standing still"] == pytest.approx(5.0, abs=0.11)
+    assert shares["cutting"] == pytest.approx(40.0, abs=0.11)
+    assert "at feed" in dict(time_shares(TIME, speed, rapid, None))
+
+
+def test_the_window_with_the_slow_stretch_is_named_first():
+    speed = np.full(1001, 10.0)
+    speed[(TIME >= 40.0) & (TIME < 43.0)] = 1.0
+    line = (TIME * 10).astype(np.int32) + 1
+    lost = lost_time(TIME, speed, np.full(1001, 10.0))
+    found = worst_windows(TIME, lost, line)
+    assert 38.0 < found[0].start_s <= found[0].end_s < 44.0
+    assert 380 < found[0].first_line < found[0].last_line < 450
+    assert sum(window.lost_s for window in found) == pytest.approx(2.7, abs=0.1)
+
+
+def test_no_window_where_hardly_anything_is_lost_or_all_is_alike():
+    line = np.ones(1001, np.int32)
+    assert worst_windows(TIME, np.full(1001, 1e-6), line) == []
+    assert worst_windows(TIME, lost_time(TIME, np.full(1001, 5.0), np.full(1001, 10.0)), line) == []
+    assert worst_windows(np.zeros(1), np.zeros(1), line[:1]) == []
+
+
+def test_worst_places_lie_apart():
+    values = np.zeros(1001)
+    values[[100, 101, 400, 900]] = [9.0, 8.9, 5.0, 7.0]
+    values[500] = np.nan
+    line = (TIME / 5.0).astype(np.int32)
+    found = worst_places(values, TIME, line)
+    assert [place.row for place in found] == [100, 900, 400]
+    assert found[0].time_s == pytest.approx(10.0)
+    assert worst_places(np.full(5, np.nan), TIME[:5], line[:5]) == []
