@@ -137,7 +137,7 @@ def forecast_toolpath(
 
     The samples pass by in blocks: memory does not grow by their tables.
     """
-    begin("motion")
+    begin("motion and joints")
     planned = plan_course(targets, cell, cell.controller.cycle_s)
     give_back()
     course, figures, samples = planned.course, LargestLoads(), PilotSamples(cell)
