@@ -102,6 +102,7 @@
 #define W_ACT_TOOL "$ACT_TOOL"
 #define W_BASE_DATA "BASE_DATA"
 #define W_TOOL_DATA "TOOL_DATA"
+#define W_ROBROOT "$ROBROOT"
 #define W_OUT "$OUT"
 #define W_OWN_PREFIX "GK_"
 #define W_PILOT_SUBPROGRAM "GK_PILOT"

@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from gcode2krl.report.corner_search import Corner, smooth
 from gcode2krl.report.drawing import BLACK, BLUE, GREY, ORANGE, PALE, VERMILION, length, thin_path
-from gcode2krl.report.worst_corner import Corner, smooth
 from gcode2krl.tables import Motion, Targets
 
 

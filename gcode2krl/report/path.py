@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.report.corner_marks import corners_apart
+from gcode2krl.report.corner_search import Corner, worst_corner
 from gcode2krl.report.corner_view import draw_corner
 from gcode2krl.report.drawing import (
     BLACK,
@@ -36,7 +37,6 @@ from gcode2krl.report.maps import (
     side_title,
 )
 from gcode2krl.report.passes import Pass, passes_of
-from gcode2krl.report.worst_corner import Corner, worst_corner
 from gcode2krl.tables import Motion, Targets, Toolpath
 
 _MANY_MOVES = 2000

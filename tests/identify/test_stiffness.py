@@ -428,7 +428,7 @@ def test_wrong_readings_are_told_with_row_and_column(rows, tmp_path, change, wor
             "lasers.noise_mm: found -1, allowed: greater than or equal to 0",
         ),
         ('along = "root"', 'along = "base"', "load.along: found 'base', allowed: 'root' or 'flange'"),
-        ("[lasers]", "[lasers", "m.toml: error"),
+        ("[lasers]", "[lasers", "m.toml:3: error"),
     ],
 )
 def test_wrong_heads_are_told_with_their_key(rows, tmp_path, old, new, words):
