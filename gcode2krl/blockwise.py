@@ -14,7 +14,17 @@ from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
-from gcode2krl.tables import Deflection, Forces, Motion, PilotForce, Targets, Toolpath, joined, rows_of
+from gcode2krl.tables import (
+    Deflection,
+    Forces,
+    Gathered,
+    Motion,
+    PilotForce,
+    Targets,
+    Toolpath,
+    joined,
+    rows_of,
+)
 
 _SLOWING_ROUNDS = 3
 _LEAST_SHARE = 1.0 + 1e-3
@@ -88,7 +98,9 @@ def _seen_along(
     judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
     follower = follower_of(course, cell) if judges_joints else None
     share = np.zeros(len(line)) if judges_joints else None
-    motions, angles, waiting = [], [], np.zeros(0, dtype=np.int32)
+    gathered, waiting = Gathered[Motion](course.count), np.zeros(0, dtype=np.int32)
+    angles = np.empty((2, course.count if keeps and judges_joints else 0, 6))
+    solved = 0
     for motion, ends in course.blocks():
         acceleration.take(motion, line[motion.move])
         watch.take(motion)
@@ -98,13 +110,11 @@ def _seen_along(
             robot.raise_shares(share, qd, waiting[: len(qd)], cell)
             waiting = waiting[len(qd) :]
             if keeps:
-                angles.append((q, qd))
+                angles[:, solved : solved + len(q)] = q, qd
+                solved += len(q)
         if keeps:
-            motions.append(motion)
-    kept = None
-    if keeps:
-        found = (np.concatenate(columns) for columns in zip(*angles, strict=True)) if angles else (None, None)
-        kept = Kept(joined(*motions), *found)
+            gathered.take(motion)
+    kept = Kept(gathered.table(), *(angles if judges_joints else (None, None))) if keeps else None
     return _Seen(share[chain.move] if share is not None else None, acceleration, watch, kept)
 
 

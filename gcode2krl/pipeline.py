@@ -23,7 +23,7 @@ from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
 from gcode2krl.progress import Begin, Progress, unheard, unseen
-from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath, blocks_of, joined
+from gcode2krl.tables import Deflection, Forces, Gathered, Joints, Motion, Targets, Toolpath, blocks_of
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
 
@@ -196,20 +196,22 @@ def forces_and_deflection(
     """
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
-    done = []
+    all_forces, all_bent = Gathered[Forces](len(motion)), Gathered[Deflection](len(motion))
     for (block, ends), (at, _) in (
         zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ()
     ):
-        done.append(loads.take(block, at.q_rad, at.qd_rad_s, ends))
+        done = loads.take(block, at.q_rad, at.qd_rad_s, ends)
+        all_forces.take(done.forces)
+        if done.deflection is not None:
+            all_bent.take(done.deflection)
         tell(loads.count, len(motion))
     outcome = loads.outcome()
     forces: Forces | None = None
     deflection: Deflection | None = None
     if outcome.force_issues is not None:
-        forces = replace(joined(*(block.forces for block in done)), issues=outcome.force_issues)
+        forces = replace(all_forces.table(), issues=outcome.force_issues)
     if outcome.deflection_issues is not None:
-        bent = joined(*(block.deflection for block in done if block.deflection is not None))
-        deflection = replace(bent, issues=outcome.deflection_issues)
+        deflection = replace(all_bent.table(), issues=outcome.deflection_issues)
     return forces, deflection, outcome.skipped
 
 

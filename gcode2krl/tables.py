@@ -6,7 +6,7 @@ table; it never changes another's.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -112,6 +112,46 @@ def blocks_of(table: AnyTable, rows: int = BLOCK_ROWS) -> Iterator[tuple[AnyTabl
     """Yield a table in blocks of rows, and whether it ends with each."""
     for start in range(0, max(len(table), 1), rows):
         yield rows_of(table, start, start + rows), start + rows >= len(table)
+
+
+class Gathered(Generic[AnyTable]):
+    """A table that comes in blocks, each written where it belongs: nothing is held twice."""
+
+    def __init__(self, rows: int) -> None:
+        """Take the number of rows of the whole."""
+        self._rows, self._done = rows, 0
+        self._first: AnyTable | None = None
+        self._columns: dict[str, NDArray[Any]] = {}
+
+    def take(self, block: AnyTable) -> None:
+        """Take the rows that follow."""
+        self._first = block if self._first is None else self._first
+        for spec in fields(block):
+            if "tail" in spec.metadata:
+                self._columns[spec.name] = self._with(getattr(block, spec.name), self._columns.get(spec.name))
+        self._done += len(block)
+
+    def _with(self, new: NDArray[Any], known: NDArray[Any] | None) -> NDArray[Any]:
+        """Return a column (rows, …) with new rows; what is one row throughout stays one row in memory."""
+        shape = (self._rows, *new.shape[1:])
+        if len(new) and new.strides[0] == 0:
+            if known is None:
+                return np.broadcast_to(new[0], shape)
+            if known.strides[0] == 0 and np.array_equal(known[0], new[0]):
+                return known
+        if known is None:
+            known = np.empty(shape, new.dtype)
+        elif self._rows > 1 and known.strides[0] == 0:
+            known = known.copy()
+        known[self._done : self._done + len(new)] = new
+        return known
+
+    def table(self) -> AnyTable:
+        """Return the whole; findings and other fields are those of the first block."""
+        if self._first is None or self._done != self._rows:
+            raise ValueError(f"{self._done} of {self._rows} rows have come")
+        columns: dict[str, Any] = dict(self._columns)
+        return replace(self._first, **columns)
 
 
 def joined(first: AnyTable, *others: AnyTable) -> AnyTable:

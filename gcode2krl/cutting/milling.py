@@ -24,7 +24,7 @@ from gcode2krl.cutting.turns import shaped
 from gcode2krl.cutting.way import Points
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files.spool import let_go
-from gcode2krl.tables import BLOCK_ROWS, Forces, Motion, Toolpath, blocks_of, joined, lengths
+from gcode2krl.tables import BLOCK_ROWS, Forces, Gathered, Motion, Toolpath, blocks_of, lengths
 
 _ARC_COLUMNS = 6
 _SHANK_MM = 1.0
@@ -96,8 +96,10 @@ def remove(
     milling = Milling(
         toolpath, cell, outlook, dt_s, law, is_checked=is_checked, nodes_per_diameter=nodes_per_diameter
     )
-    forces = joined(*(milling.take(block, ends) for block, ends in blocks_of(motion, rows)))
-    return Removal(replace(forces, issues=milling.issues()), milling.part(), outlook.to_field)
+    gathered = Gathered[Forces](len(motion))
+    for block, ends in blocks_of(motion, rows):
+        gathered.take(milling.take(block, ends))
+    return Removal(replace(gathered.table(), issues=milling.issues()), milling.part(), outlook.to_field)
 
 
 class _Rows(NamedTuple):

@@ -11,7 +11,7 @@ from gcode2krl.errors import input_error
 from gcode2krl.krc4.motion import Chain, one_orientation
 from gcode2krl.krc4.profile import Profile
 from gcode2krl.krc4.sampling import Sampler, Samples, count_samples
-from gcode2krl.tables import BLOCK_ROWS, Motion, Targets, joined
+from gcode2krl.tables import BLOCK_ROWS, Gathered, Motion, Targets
 from gcode2krl.units import S_PER_H
 
 _MOST_SAMPLES = 50_000_000
@@ -56,7 +56,10 @@ class Course:
 
     def whole(self) -> Motion:
         """Return the Motion."""
-        return joined(*(motion for motion, _ in self.blocks()))
+        gathered = Gathered[Motion](self.count)
+        for motion, _ in self.blocks():
+            gathered.take(motion)
+        return gathered.table()
 
     def _sampled(self, rows: Ints, first_move: int) -> tuple[Motion, int]:
         """Return rows of the Motion, and the move in which the last of them lies."""
