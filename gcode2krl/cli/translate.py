@@ -152,6 +152,9 @@ def command(
         require_figure(compensate_plot)
         require_report(report, inputs)
         require_outputs(_outputs(place, name, part, cell, online, compensate_plot, report), *inputs)
+        from gcode2krl.compiled.long_columns import long_columns_on_disk
+
+        click.get_current_context().with_resource(long_columns_on_disk())
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.cell.confirmation import future_confirmation

@@ -1,0 +1,90 @@
+"""Long columns in temporary files instead of memory, wherever in the package they are made.
+
+numpy asks the core for the memory of its arrays (NEP 49); a long one is given pages of a file without a name,
+which vanishes with the array, whatever ends the process. The system takes such pages where it needs memory;
+on Linux they are given back before they add up, so that a program of ten million lines costs little more than
+one of a million. On Windows, and where the disk is full, the columns stay in memory.
+"""
+
+import contextlib
+import ctypes
+import mmap
+import tempfile
+import threading
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gcode2krl.compiled.core import INT, core_function
+
+LONG_BYTES = 4 << 20
+"""A column of half a million numbers: shorter ones cost less in memory than they would in a file."""
+MOST_RESIDENT_BYTES = 224 << 20
+"""Pages of files beyond this are given back; it holds the field and what a stage works on."""
+_LOOKS_EVERY_S = 0.02
+_SET_HANDLER = 304
+"""Place of PyDataMem_SetHandler in numpy's table of functions, part of its binary interface."""
+_HANDLER_NAME = b"mem_handler"
+
+_handler = core_function("long_columns_handler", ctypes.c_char_p, INT, returns=ctypes.c_void_p)
+_let_go = core_function("long_columns_let_go")
+_count = core_function("long_columns_count", returns=INT)
+
+
+@contextlib.contextmanager
+def long_columns_on_disk(least_bytes: int = LONG_BYTES) -> Iterator[bool]:
+    """Let columns of at least so many bytes that this thread makes lie in files; yields whether they do."""
+    at = _handler(tempfile.gettempdir().encode(), least_bytes)
+    if not at or _set_handler() is None:
+        yield False
+        return
+    done = threading.Event()
+    watch = threading.Thread(target=_give_back_pages, args=(done,), daemon=True)
+    before = _set_handler()(_capsule(at))
+    watch.start()
+    try:
+        yield True
+    finally:
+        _set_handler()(before)
+        done.set()
+        watch.join()
+
+
+def columns_on_disk() -> int:
+    """Return how many columns lie in files now."""
+    return int(_count())
+
+
+def _give_back_pages(done: threading.Event) -> None:
+    """Look at the resident pages of files until all is done, and let go of them where they are many."""
+    resident = Path("/proc/self/statm")
+    if not resident.exists():
+        return  # there the system does it
+    while not done.wait(_LOOKS_EVERY_S):
+        if int(resident.read_text().split()[2]) * mmap.PAGESIZE > MOST_RESIDENT_BYTES:
+            _let_go()
+
+
+@cache
+def _set_handler() -> Any:
+    """Return numpy's function that exchanges the handler of this thread, None where it is not found."""
+    core = getattr(np, "_core", None) or np.core
+    table_of = ctypes.pythonapi.PyCapsule_GetPointer
+    table_of.restype, table_of.argtypes = ctypes.c_void_p, (ctypes.py_object, ctypes.c_char_p)
+    try:
+        table = ctypes.cast(table_of(core._multiarray_umath._ARRAY_API, None), ctypes.POINTER(ctypes.c_void_p))
+    except (AttributeError, ValueError):
+        return None
+    return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object)(table[_SET_HANDLER])
+
+
+@cache
+def _capsule(handler: int) -> Any:
+    """Return the handler as numpy takes it."""
+    made = ctypes.pythonapi.PyCapsule_New
+    made.restype = ctypes.py_object
+    made.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
+    return made(handler, _HANDLER_NAME, None)
