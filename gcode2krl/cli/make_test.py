@@ -204,7 +204,8 @@ def _write_krl(
     from gcode2krl.krl import write_krl
 
     written = write_krl(test.targets(), file, cell, options=test.option, inputs=inputs)
-    return list(written.files), sum(text.count(b"\n") for text in written.texts.values()), written.issues
+    lines = sum(piece.count(b"\n") for text in written.contents.values() for piece in text.pieces())
+    return list(written.files), lines, written.issues
 
 
 def _write_gcode(test: _Test, file: Path) -> tuple[list[Path], int, tuple[Issue, ...]]:

@@ -16,7 +16,7 @@ def summary_lines(
 ) -> Iterator[str]:
     """Yield the lines of the summary, from joints at the targets and the largest corner error."""
     toolpath, targets, cell = forecast.toolpath, forecast.targets, forecast.cell
-    size_mb = sum(len(text) for text in written.texts.values()) / BYTES_PER_MB
+    size_mb = written.size_bytes / BYTES_PER_MB
     report = written.report
     lin = ~targets.ptp
     steps_m = np.zeros(len(targets))

@@ -234,7 +234,8 @@ def command(
         console.json(_result((), error.issues))
         return error.exit_code
     if output == STANDARD:
-        write_bytes(written.texts[f"{written.name}.src"])
+        for piece in written.contents[f"{written.name}.src"].pieces():
+            write_bytes(piece)
         console.findings(written.issues, part)
         return 0
     if as_json:

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 
@@ -25,6 +26,7 @@ LONG_BYTES = 4 << 20
 MOST_RESIDENT_BYTES = 224 << 20
 """Pages of files beyond this are given back; it holds the field and what a stage works on."""
 _LOOKS_EVERY_S = 0.02
+_NOTED: "WeakSet[mmap.mmap]" = WeakSet()
 _SET_HANDLER = 304
 """Place of PyDataMem_SetHandler in numpy's table of functions, part of its binary interface."""
 _HANDLER_NAME = b"mem_handler"
@@ -58,6 +60,11 @@ def columns_on_disk() -> int:
     return int(_count())
 
 
+def note_mapped(mapped: mmap.mmap) -> None:
+    """Let the pages of a file that is mapped be given back like those of columns."""
+    _NOTED.add(mapped)
+
+
 def _give_back_pages(done: threading.Event) -> None:
     """Look at the resident pages of files until all is done, and let go of them where they are many."""
     resident = Path("/proc/self/statm")
@@ -66,6 +73,8 @@ def _give_back_pages(done: threading.Event) -> None:
     while not done.wait(_LOOKS_EVERY_S):
         if int(resident.read_text().split()[2]) * mmap.PAGESIZE > MOST_RESIDENT_BYTES:
             _let_go()
+            for mapped in list(_NOTED):
+                mapped.madvise(mmap.MADV_DONTNEED)
 
 
 @cache
@@ -75,9 +84,10 @@ def _set_handler() -> Any:
     table_of = ctypes.pythonapi.PyCapsule_GetPointer
     table_of.restype, table_of.argtypes = ctypes.c_void_p, (ctypes.py_object, ctypes.c_char_p)
     try:
-        table = ctypes.cast(table_of(core._multiarray_umath._ARRAY_API, None), ctypes.POINTER(ctypes.c_void_p))
+        functions = table_of(core._multiarray_umath._ARRAY_API, None)
     except (AttributeError, ValueError):
         return None
+    table = ctypes.cast(functions, ctypes.POINTER(ctypes.c_void_p))
     return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object)(table[_SET_HANDLER])
 
 

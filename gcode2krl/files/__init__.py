@@ -3,6 +3,7 @@
 from gcode2krl.files.output import (
     SURELY_LEFT_S,
     Content,
+    Staging,
     leftovers,
     make_folder,
     refuse_inputs,
@@ -13,6 +14,7 @@ from gcode2krl.files.output import (
 __all__ = [
     "SURELY_LEFT_S",
     "Content",
+    "Staging",
     "leftovers",
     "make_folder",
     "refuse_inputs",

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from gcode2krl.errors import NotUnderstoodError, input_error
 
-Content = bytes | Callable[[Path], object]
-"""The content of a file, or a function that writes it to a path."""
+Content = bytes | Iterable[bytes] | Callable[[Path], object]
+"""The content of a file, its pieces, or a function that writes it to a path."""
 SURELY_LEFT_S = 86400.0
 """No run takes a day to write a file: an older temporary file is a leftover of whatever process."""
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"
@@ -34,27 +34,58 @@ def write_together(files: Mapping[Path, Content], inputs: Iterable[str | Path] =
     refuses; nothing half-written stays.
     """
     refuse_inputs(files, inputs)
-    temporary: dict[Path, Path] = {}
-    kept: dict[Path, Path] = {}
-    place = next(iter(files))
-    try:
+    with Staging() as staging:
         for place, content in files.items():
-            _remove(leftovers(place))
-            temporary[place] = _write_beside(place, content)
-        for place, written in temporary.items():
-            if place.exists():
-                kept[place] = _keep(place, written.with_suffix(".old"))
-        for place, written in temporary.items():
-            written.replace(place)
-    except BaseException as error:
-        _restore(temporary, kept)
-        if isinstance(error, OSError):
+            staging.write(place, content)
+        staging.take_places()
+
+
+class Staging:
+    """Files that are written beside their places, and take them together; left without that, they go."""
+
+    def __init__(self) -> None:
+        """Begin without a file."""
+        self._temporary: dict[Path, Path] = {}
+
+    def __enter__(self) -> "Staging":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.discard()
+
+    def write(self, place: Path, content: Content) -> Path:
+        """Write what will stand at a place, and return where it stands until then.
+
+        Raises `NotUnderstoodError` where folder or disk refuse.
+        """
+        _remove(leftovers(place))
+        try:
+            self._temporary[place] = _write_beside(place, content)
+        except OSError as error:
             raise unwritable(place, error.strerror or str(error)) from None
-        raise
-    else:
+        return self._temporary[place]
+
+    def take_places(self) -> None:
+        """Put all files in their places, or none: raises `NotUnderstoodError` where the disk refuses."""
+        kept: dict[Path, Path] = {}
+        place = next(iter(self._temporary))
+        try:
+            for place, written in self._temporary.items():
+                if place.exists():
+                    kept[place] = _keep(place, written.with_suffix(".old"))
+            for place, written in self._temporary.items():
+                written.replace(place)
+        except BaseException as error:
+            _restore(self._temporary, kept)
+            if isinstance(error, OSError):
+                raise unwritable(place, error.strerror or str(error)) from None
+            raise
         _remove(kept.values())
-    finally:
-        _remove(temporary.values())
+
+    def discard(self) -> None:
+        """Remove the files that have not taken their places."""
+        _remove(self._temporary.values())
+        self._temporary.clear()
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[str | Path]) -> None:
@@ -208,11 +239,11 @@ def _write_beside(target: Path, content: Content) -> Path:
     written = Path(name)
     try:
         with os.fdopen(descriptor, "wb") as stream:
-            if isinstance(content, bytes):
-                stream.write(content)
+            if not callable(content):
+                stream.writelines([content] if isinstance(content, bytes) else content)
                 stream.flush()
                 os.fsync(stream.fileno())
-        if not isinstance(content, bytes):
+        if callable(content):
             content(written)
         mode = target.stat().st_mode if target.exists() else 0o666 & ~_umask()
         written.chmod(mode & 0o777)

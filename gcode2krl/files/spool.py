@@ -8,6 +8,8 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from gcode2krl.compiled.long_columns import note_mapped
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -50,7 +52,9 @@ class Spool:
             return np.concatenate([np.empty((0, *self._tail), self._dtype), *self._pieces])
         self._spill()
         self._file.flush()
-        return np.memmap(self._file, self._dtype, "r", shape=(self._rows, *self._tail))
+        mapped = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        note_mapped(mapped)
+        return np.frombuffer(mapped, self._dtype).reshape(self._rows, *self._tail)
 
 
 def on_disk(table: "Record") -> "Record":
@@ -79,5 +83,6 @@ def let_go(*tables: "DataclassInstance | NDArray[Any]") -> None:
         for column in columns:
             while isinstance(column, np.ndarray):
                 column = column.base
+            column = column.obj if isinstance(column, memoryview) else column
             if isinstance(column, mmap.mmap):
                 column.madvise(mmap.MADV_DONTNEED)

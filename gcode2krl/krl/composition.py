@@ -1,11 +1,12 @@
 """Targets to the text of a KRL program: head, guard, motions, events, subprograms."""
 
+import itertools
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
@@ -43,16 +44,17 @@ _LOOK_BACK = 0.2
 
 _NOTHING_IN_FORCE = (-1.0, -1.0, 0.0)
 """The state of `motion_lines` at the beginning of a program or a part."""
-_MESSAGE, _PILOT_CALL = b"GK_MSG", f" {w.PILOT_SUBPROGRAM}(".encode("ascii")
+_MESSAGE = b"GK_MSG"
+PIECE_ROWS = 262_144
+"""Motions whose text is made at a time, some 25 MB of it: enough for all cores."""
 
 
 class _Part(NamedTuple):
-    """A subprogram: its name, its motions in pieces of text, and what these need declared or beside them."""
+    """A subprogram: its name and its motions, from a row of Targets to the one behind its last."""
 
     name: str
-    motions: list[bytes]
-    has_message: bool
-    has_pilot: bool
+    start: int
+    end: int
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ def compose(
     name: str,
     layout: Layout,
     pilot: PilotText | None = None,
-) -> dict[str, bytes]:
-    """Return file name → bytes of the program ``name``.
+) -> dict[str, Iterable[bytes]]:
+    """Return file name → text of the program ``name``, in pieces that are made as they are asked for.
 
     ``.src``, ``.dat``, split ``name_001.src`` …, ``.pilot.csv`` where there is a pilot force, and the RSI
     files where the program is corrected online.
@@ -111,43 +113,80 @@ class _Composer:
         self.pilot = pilot
         self.checksum = 0
         if pilot is not None:
-            self.triggers, self.trigger_start = pilot.before(len(targets))
             self.checksum = self._checksum(pilot)
         self.rsi = self._rsi(layout.online) if layout.online else None
+        rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
+        self.event_rows = np.array(sorted(rows), dtype=np.int64)
 
     def _rsi(self, name: str) -> RsiText:
         on, off = rsi_rows(self.targets)
         form = self.pilot.header.form if self.pilot is not None else "none"
         return RsiText(name, self.cell, form, on, off, int(self.targets.tool[off]))
 
-    def files(self) -> dict[str, bytes]:
-        """Compose the main program and its subprograms."""
+    def files(self) -> dict[str, Iterable[bytes]]:
+        """Return the main program, its subprograms and what stands beside them."""
         most = self.cell.program.max_lines
         count = len(self.targets)
-        if count <= most and self.layout.split == "defs":
-            return self._assemble([self._head([]), *self._motions(0, count, self.state)[0], self._foot()], [])
-        chunks = self._chunks(most)
-        texts = iter(in_threads(self._part, [(start, end) for start, end, whole in chunks if whole]))
-        body: list[bytes] = []
-        subprograms: list[_Part] = []
-        for start, end, whole in chunks:
-            if not whole:
-                body += self._motions(start, end, self.state)[0]
+        is_one = count <= most and self.layout.split == "defs"
+        chunks = [(0, count, False)] if is_one else self._chunks(most)
+        whole = [(start, end) for start, end, is_part in chunks if is_part]
+        parts = [_Part(part_name(self.name, k), *rows) for k, rows in enumerate(whole, start=1)]
+        files: dict[str, Iterable[bytes]] = {f"{self.name}{w.SOURCE_SUFFIX}": self._main(chunks, parts)}
+        if self.layout.split == "files":
+            files |= {f"{part.name}{w.SOURCE_SUFFIX}": self._part_file(part) for part in parts}
+        return files | self._side_files()
+
+    def _main(self, chunks: list[tuple[int, int, bool]], parts: list[_Part]) -> Iterator[bytes]:
+        """Yield the main program; where the parts are not files, they stand behind it."""
+        yield self._head(parts)
+        names = iter(parts)
+        for start, end, is_part in chunks:
+            if is_part:
+                yield _text(f"{next(names).name}( )")
+                self.state[:] = _NOTHING_IN_FORCE
+            else:
+                yield from self._motions(start, end, self.state)
+        yield self._foot()
+        if self.layout.split == "defs":
+            yield from self._subprograms(parts)
+        yield from self._called()
+        if self.rsi is not None:
+            yield from (NEWLINE, _text(self.rsi.lost))
+
+    def _subprograms(self, parts: list[_Part]) -> Iterator[bytes]:
+        """Yield the parts, some at a time on all cores."""
+        for together in _groups(parts):
+            if len(together) == 1:  # it may be long
+                yield from self._subprogram(together[0])
                 continue
-            name = part_name(self.name, len(subprograms) + 1)
-            body.append(_text(f"{name}( )"))
-            subprograms.append(_Part(name, *next(texts)))
-            self.state[:] = _NOTHING_IN_FORCE
-        return self._assemble([self._head(subprograms), *body, self._foot()], subprograms)
+            yield from in_threads(lambda part: b"".join(self._subprogram(part)), together)
 
-    def _part(self, rows: tuple[int, int]) -> tuple[list[bytes], bool, bool]:
-        """Return the motions of a part, which states its speed and CDIS, and what they need of it."""
-        pieces, has_message = self._motions(*rows, np.array(_NOTHING_IN_FORCE))
-        return pieces, has_message, self._calls_pilot(pieces)
+    def _subprogram(self, part: _Part) -> Iterator[bytes]:
+        """Yield a part, which states its speed and CDIS."""
+        needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if self._has_message(part) else ""
+        yield from (NEWLINE, _text(f"{w.DEF} {part.name}( )\n{needed}"))
+        yield from self._motions(part.start, part.end, np.array(_NOTHING_IN_FORCE))
+        yield _text(w.END)
 
-    def _calls_pilot(self, pieces: list[bytes]) -> bool:
-        has_subprogram = self.pilot is not None and bool(self.pilot.subprogram)
-        return has_subprogram and any(_PILOT_CALL in piece for piece in pieces)
+    def _part_file(self, part: _Part) -> Iterator[bytes]:
+        """Yield a part as a file of its own."""
+        yield _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
+        yield from itertools.islice(self._subprogram(part), 1, None)  # without the line before it
+        if self.pilot is not None and self.pilot.calls_in(part.start, part.end):
+            yield from self._called()  # a local subprogram is known in its file only
+
+    def _called(self) -> Iterator[bytes]:
+        """Yield the subprogram that triggers call."""
+        if self.pilot and self.pilot.subprogram:
+            yield from (NEWLINE, _text(self.pilot.subprogram))
+
+    def _has_message(self, part: _Part) -> bool:
+        return any(_MESSAGE in self._around(row) for row in self._with_events(part.start, part.end).tolist())
+
+    def _with_events(self, start: int, end: int) -> Ints:
+        """Return the rows of start..end at which something stands beside a motion and its dwell."""
+        first, behind = np.searchsorted(self.event_rows, (start, end))
+        return self.event_rows[first:behind]
 
     def _chunks(self, most: int) -> list[tuple[int, int, bool]]:
         """Cut the LIN motions into parts of at most ``most``; PTP motions stay in the main program.
@@ -156,16 +195,16 @@ class _Composer:
         """
         chunks: list[tuple[int, int, bool]] = []
         start, count = 0, len(self.targets)
-        apart = self.targets.ptp.copy()
+        apart = np.array(self.targets.ptp)
         if self.rsi is not None:
             apart[self.rsi.off] = True
+        borders = np.append(np.flatnonzero(apart), count)
         while start < count:
             if apart[start]:
                 chunks.append((start, start + 1, False))
                 start += 1
                 continue
-            following = np.flatnonzero(apart[start:])
-            end = start + int(following[0]) if len(following) else count
+            end = int(borders[np.searchsorted(borders, start)])
             if end - start > most:
                 end = start + most
                 standing = np.flatnonzero(self.targets.cdis_mm[end - int(most * _LOOK_BACK) : end] == 0)
@@ -175,27 +214,19 @@ class _Composer:
             start = end
         return chunks
 
-    def _motions(self, start: int, end: int, state: Floats) -> tuple[list[bytes], bool]:
-        """Return the pieces of text of rows start..end, with their waits and events, and whether these have a
-        message; ``state`` is updated."""
-        ptp, wait = self.targets.ptp, self.targets.wait_s
-        special = np.zeros(end - start, dtype=bool)
-        special |= ptp[start:end] | (wait[start:end] > 0)
-        rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
-        special[[row - start for row in rows if start <= row < end]] = True
-        pieces: list[bytes] = []
-        at, has_message = start, False
-        for row in [*(np.flatnonzero(special) + start), end]:
-            stop = min(row + 1, end) if row < end and not ptp[row] else row
-            if stop > at:
-                pieces += self._lines(at, stop, state)
+    def _motions(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
+        """Yield the text of rows start..end, with their waits and events; ``state`` is updated."""
+        ptp = self.targets.ptp
+        special = ptp[start:end] | (self.targets.wait_s[start:end] > 0)
+        special[self._with_events(start, end) - start] = True
+        at = start
+        for row in [*(np.flatnonzero(special) + start).tolist(), end]:
+            stop = row + 1 if row < end and not ptp[row] else row
+            for first in range(at, stop, PIECE_ROWS):
+                yield from self._lines(first, min(first + PIECE_ROWS, stop), state)
             if row < end:
-                pieces.append(self._around(row))
-                has_message |= _MESSAGE in pieces[-1]
-                at = row + 1
-            else:
-                at = end
-        return pieces, has_message
+                yield self._around(row)
+            at = row + 1
 
     def _lines(self, start: int, end: int, state: Floats) -> list[bytes]:
         rows = slice(start, end)
@@ -207,24 +238,24 @@ class _Composer:
             self.targets.source_line[rows],
             state,
             self.cell.program.comment_every,
-            self._triggers_before(start, end),
+            self.pilot.before(start, end) if self.pilot is not None else NOTHING_BEFORE,
         )
-
-    def _triggers_before(self, start: int, end: int) -> tuple[NDArray[np.uint8], Ints]:
-        """Return the text of the triggers of rows start..end, and where that of each row begins."""
-        if self.pilot is None:
-            return NOTHING_BEFORE
-        first = self.trigger_start[start : end + 1]
-        return self.triggers[first[0] : first[-1]], first - first[0]
 
     def _checksum(self, pilot: PilotText) -> int:
         if pilot.stated is not None:
             return pilot.stated
-        targets, home = self.targets, self.targets.home
-        q_deg = np.zeros(self.joints.q_rad.shape)  # pages that no HOME is in cost nothing
-        q_deg[home] = self.joints.q_rad[home] * DEG_PER_RAD
-        columns = (targets.ptp, targets.speed_mm_s, targets.cdis_mm)
-        return checksum(self.position, self.abc_deg, q_deg, *columns, pilot.rows, home)
+        targets, rows = self.targets, np.flatnonzero(self.targets.home)
+        return checksum(
+            self.position,
+            self.abc_deg,
+            rows,
+            self.joints.q_rad[rows] * DEG_PER_RAD,
+            targets.ptp,
+            targets.speed_mm_s,
+            targets.cdis_mm,
+            pilot.rows,
+            targets.home,
+        )
 
     def _around(self, row: int) -> bytes:
         """Return the PTP, dwell and events of a row; where the row switches RSI, it is off during them."""
@@ -259,12 +290,12 @@ class _Composer:
         turn = turn_bits(self.joints.q_rad[row])
         return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}}}"
 
-    def _head(self, subprograms: list[_Part]) -> bytes:
+    def _head(self, parts: list[_Part]) -> bytes:
         tools = [int(number) for number in distinct(self.targets.tool)]
         checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
         declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
-            declarations += [f"{w.EXT} {part.name}( )" for part in subprograms]
+            declarations += [f"{w.EXT} {part.name}( )" for part in parts]
         declarations.append(DECLARATIONS)
         if checks:
             declarations.append(FRAME_DECLARATIONS)
@@ -299,28 +330,29 @@ class _Composer:
     def _foot(self) -> bytes:
         return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)
 
-    def _assemble(self, main: list[bytes], subprograms: list[_Part]) -> dict[str, bytes]:
-        parts: dict[str, bytes] = {}
-        called = [NEWLINE, _text(self.pilot.subprogram)] if self.pilot and self.pilot.subprogram else []
-        for name, motions, has_message, has_pilot in subprograms:
-            needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if has_message else ""
-            text = [_text(f"{w.DEF} {name}( )\n{needed}"), *motions, _text(w.END)]
-            if self.layout.split == "files":
-                head = _text(f"&ACCESS RVP\n&REL 1\n&COMMENT part of {self.name} by gcode2krl")
-                own = called if has_pilot else []  # a local subprogram is known in its file only
-                parts[f"{name}{w.SOURCE_SUFFIX}"] = b"".join([head, *text, *own])
-            else:
-                main += [NEWLINE, *text]
-        lost = [NEWLINE, _text(self.rsi.lost)] if self.rsi is not None else []
-        files = {f"{self.name}{w.SOURCE_SUFFIX}": b"".join([*main, *called, *lost]), **parts}
+    def _side_files(self) -> dict[str, Iterable[bytes]]:
+        """Return the data list, the sidecar and the files of RSI."""
+        files: dict[str, Iterable[bytes]] = {}
         if not self.layout.single_file:
             data = st.environment().get_template("data.dat.j2")
-            files[f"{self.name}{w.DATA_SUFFIX}"] = _text(data.render(source=self.source, name=self.name))
+            files[f"{self.name}{w.DATA_SUFFIX}"] = [_text(data.render(source=self.source, name=self.name))]
         if self.pilot is not None and self.pilot.sidecar:
-            files[f"{self.name}{w.SIDECAR_SUFFIX}"] = self.pilot.file(self.checksum)
+            files[f"{self.name}{w.SIDECAR_SUFFIX}"] = [self.pilot.file(self.checksum)]
         if self.rsi is not None:
-            files |= {name: _text(text) for name, text in self.rsi.files.items()}
+            files |= {name: [_text(text)] for name, text in self.rsi.files.items()}
         return files
+
+
+def _groups(parts: list[_Part]) -> Iterator[list[_Part]]:
+    """Yield parts that are written at the same time: as many as a piece of text has motions, at least one."""
+    group: list[_Part] = []
+    for part in parts:
+        if group and part.end - group[0].start > PIECE_ROWS:
+            yield group
+            group = []
+        group.append(part)
+    if group:
+        yield group
 
 
 def turn_bits(q_rad: Floats) -> int:

@@ -94,7 +94,8 @@ def checksum_of(program: KrlProgram, rows: bytes) -> int:
     return checksum(
         program.position_mm,
         program.abc_deg,
-        program.q_deg,
+        program.joint_rows,
+        program.joint_deg,
         program.ptp,
         program.speed_mm_s,
         program.cdis_mm,

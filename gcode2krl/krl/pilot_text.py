@@ -1,15 +1,18 @@
 """The pilot force in a program's text: triggers, subprogram, checksum."""
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.krl.number_text import in_decimals
+from gcode2krl.compiled.chunks import chunk_borders
+from gcode2krl.krl.number_text import NOTHING_BEFORE, in_decimals
 from gcode2krl.krl.triggers import Triggers
 from gcode2krl.pilot import Knots, PilotHeader, knot_rows, sidecar_head
 from gcode2krl.pilot.knots import FORCE_DECIMALS, LEAD_DECIMALS
@@ -40,25 +43,40 @@ class PilotText:
     """G-code line from which on the program has no pilot force any more; None = it has one throughout.
     The triggers are one more than the knots then: the last says that there is no knot."""
 
-    def before(self, motions: int) -> tuple[NDArray[np.uint8], Ints]:
-        """Return the text of all triggers, and where in it that of each motion (p + 1,) begins."""
-        triggers = self.triggers
-        if triggers is None:
-            return np.zeros(0, dtype=np.uint8), np.zeros(motions + 1, dtype=np.int64)
+    def before(self, start: int, end: int) -> tuple[NDArray[np.uint8], Ints]:
+        """Return the text of the triggers before motions start..end, and where in it that of each begins."""
+        first, behind = self._triggers_of(start, end)
+        if first == behind or self.triggers is None:
+            return NOTHING_BEFORE
+        own = slice(first, behind)
         lines = [
             f"{w.TRIGGER} {w.WHEN} {w.DISTANCE}=0 {w.DELAY}={delay} {w.DO} {action}\r\n"
-            for delay, action in zip(triggers.delay_ms.tolist(), self._actions(), strict=True)
+            for delay, action in zip(self.triggers.delay_ms[own].tolist(), self._actions(own), strict=True)
         ]
         size = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
-        start = size[np.searchsorted(triggers.row, np.arange(motions + 1))]
-        return np.frombuffer("".join(lines).encode("ascii"), dtype=np.uint8), start
+        begins = size[np.searchsorted(self.triggers.row[own], np.arange(start, end + 1))]
+        return np.frombuffer("".join(lines).encode("ascii"), dtype=np.uint8), begins
 
-    def _actions(self) -> list[str]:
-        """Return what each trigger does; ``PRIO=-1`` lets the controller choose the priority."""
-        end = [self._no_knot()] if self.end_line is not None else []
+    def calls_in(self, start: int, end: int) -> bool:
+        """Tell whether triggers before motions start..end call the subprogram."""
+        first, behind = self._triggers_of(start, end)
+        return self.header.form == "values" and behind > first
+
+    def _triggers_of(self, start: int, end: int) -> tuple[int, int]:
+        """Return the first trigger of motions start..end, and the one behind the last."""
+        if self.triggers is None:
+            return 0, 0
+        first, behind = np.searchsorted(self.triggers.row, (start, end)).tolist()
+        return first, behind
+
+    def _actions(self, rows: slice) -> list[str]:
+        """Return what triggers do; ``PRIO=-1`` lets the controller choose the priority."""
+        count = len(self.knots)
+        end = [self._no_knot()] if rows.stop > count else []
         if self.header.form == "index":
-            return [*(f"{self.header.variable}={knot}" for knot in range(len(self.knots))), *end]
-        columns = [*self.knots.force_N.T.tolist(), self.knots.lead_s.tolist()]
+            known = range(rows.start, min(rows.stop, count))
+            return [*(f"{self.header.variable}={knot}" for knot in known), *end]
+        columns = [*self.knots.force_N[rows].T.tolist(), self.knots.lead_s[rows].tolist()]
         n, s = FORCE_DECIMALS, LEAD_DECIMALS
         told = [
             f"{w.PILOT_SUBPROGRAM}({x:.{n}f},{y:.{n}f},{z:.{n}f},{lead_s:.{s}f}) {_PRIO}"
@@ -105,7 +123,8 @@ class PilotText:
 def checksum(
     position_mm: Floats,
     abc_deg: Floats,
-    q_deg: Floats,
+    joint_rows: Ints,
+    joint_deg: Floats,
     ptp: Bools,
     speed_mm_s: Floats,
     cdis_mm: Floats,
@@ -114,27 +133,35 @@ def checksum(
 ) -> int:
     """Return 31 bits over the targets and knots as written; what is not stated of a motion is NaN.
 
-    Targets count as the decimals they are written in, so the text's layout does not matter; ``rows`` are
-    those of the sidecar. With ``home`` (p,), whatever the columns say, positions count where it is not, and
-    joints where it is.
+    Targets count as the decimals they are written in, so the text's layout does not matter; ``joint_deg``
+    (j, 6) are the joint targets of the motions ``joint_rows`` (j,), ``rows`` those of the sidecar. With
+    ``home`` (p,), whatever the columns say, positions count only where it is not.
     """
-    away = None if home is None else ~home
-    columns = (
-        *((column, 3, away) for column in position_mm.T),
-        *((column, 4, away) for column in abc_deg.T),
-        *((column, 4, home) for column in q_deg.T),
-    )
+    count = len(ptp)
+
+    def cartesian(column: Floats, decimals: int, part: slice) -> Ints:
+        whole = in_decimals(column[part], decimals)
+        if home is not None:
+            whole[home[part]] = 0  # as what is not stated
+        return whole
+
+    def joint(angles: Ints, part: slice) -> Ints:
+        whole = np.zeros(part.stop - part.start, dtype=np.int64)
+        first, behind = np.searchsorted(joint_rows, (part.start, part.stop))
+        whole[joint_rows[first:behind] - part.start] = angles[first:behind]
+        return whole
+
+    columns: list[Callable[[slice], Ints]] = [
+        *(partial(cartesian, column, 3) for column in position_mm.T),
+        *(partial(cartesian, column, 4) for column in abc_deg.T),
+        *(partial(joint, in_decimals(column, 4)) for column in joint_deg.T),
+        lambda part: ptp[part].astype(np.int64),
+        lambda part: in_decimals(speed_mm_s[part] / MM_PER_M, 7),
+        lambda part: in_decimals(cdis_mm[part], 3),
+    ]
     value = 0
-    for column, decimals, counts in columns:
-        whole = in_decimals(column, decimals)
-        if counts is not None:
-            whole[~counts] = 0  # as what is not stated
-        value = _crc(whole, value)
-    value = _crc(ptp.astype(np.int64), value)
-    value = _crc(in_decimals(speed_mm_s / MM_PER_M, 7), value)
-    value = _crc(in_decimals(cdis_mm, 3), value)
+    for column in columns:
+        for start, end in pairwise(chunk_borders(count)):
+            whole = column(slice(start, end))
+            value = zlib.crc32(np.ascontiguousarray(whole, dtype="<i8").data, value)
     return zlib.crc32(rows, value) & _CHECKSUM_BITS
-
-
-def _crc(column: Ints, value: int) -> int:
-    return zlib.crc32(np.ascontiguousarray(column, dtype="<i8").data, value)

@@ -1,18 +1,22 @@
 """KRL in: reads the subset that is written, in the order in which the controller would execute it."""
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
+from gcode2krl.files.stored import Stored, Texts, whole_lines
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
@@ -84,6 +88,7 @@ class KrlProgram:
     def_line: int = 0
     """Line of the main DEF."""
     texts: Mapping[str, bytes] = field(default_factory=dict)
+    """File name → bytes, those of long files read where they are asked for."""
 
     @property
     def position_mm(self) -> Floats:
@@ -114,43 +119,49 @@ def read_krl(path: str | Path) -> KrlProgram:
     Raises `NotUnderstoodError` where a file cannot be read.
     """
     main = Path(path)
-    texts = {main.name: _read_bytes(main)}
+    texts = {main.name: _text_in(main)}
     beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
-    for name in _externals(texts[main.name]):
+    for name in _externals(texts[main.name].pieces()):
         file = beside.get(name.upper())
         if file is not None and file.name not in texts:
-            texts[file.name] = _read_bytes(file)
+            texts[file.name] = _text_in(file)
     return read_texts(texts, main.name)
 
 
-def _read_bytes(file: Path) -> bytes:
+def _text_in(file: Path) -> Stored:
     try:
-        return file.read_bytes()
+        with file.open("rb"):
+            text = Stored(file)
+        return Stored(text.read()) if text.is_short else text
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
 
 
-def _externals(text: bytes) -> Iterator[str]:
+def _externals(pieces: Iterable[bytes]) -> Iterator[str]:
     """Yield the names that a program declares by EXT, at the beginning of a line."""
-    upper = text.upper()
-    at = upper.find(_EXT)
-    while at >= 0:
-        found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
-        if found:
-            yield found[1].decode("ascii")
-        line_end = upper.find(b"\n", at)
-        at = upper.find(_EXT, line_end) if line_end >= 0 else -1
+    for text in whole_lines(pieces):
+        upper = text.upper()
+        at = upper.find(_EXT)
+        while at >= 0:
+            found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
+            if found:
+                yield found[1].decode("ascii")
+            line_end = upper.find(b"\n", at)
+            at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
 
-def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
-    """Read a program from file name → bytes; ``main`` names the main file."""
+def read_texts(texts: Mapping[str, bytes | Stored], main: str) -> KrlProgram:
+    """Read a program from file name → text; ``main`` names the main file."""
     sources = [name for name in texts if name.lower().endswith(w.SOURCE_SUFFIX)]
     sources.sort(key=lambda name: name != main)
-    return _Reader({name: texts[name] for name in sources}, main).read()
+    contents = {name: text if isinstance(text := texts[name], Stored) else Stored(text) for name in sources}
+    with ExitStack() as stack:
+        opened = {name: stack.enter_context(text.opened()) for name, text in contents.items()}
+        return replace(_Reader(opened, main).read(), texts=Texts(contents))
 
 
 class _Reader:
-    def __init__(self, texts: Mapping[str, bytes], main: str) -> None:
+    def __init__(self, texts: Mapping[str, NDArray[np.uint8]], main: str) -> None:
         self.texts, self.main = texts, main
         self.names = tuple(texts)
         self.scanned = [sc.scan_krl(text) for text in texts.values()]
@@ -180,7 +191,7 @@ class _Reader:
         joint_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_PTP_AXES))
         pose, joint_deg = executed.pose, executed.pose[joint_rows, :6]
         pose[joint_rows] = np.nan
-        guard = w.NO_GUARD.encode("ascii") not in b"".join(text[:6000] for text in self.texts.values())
+        heads = b"".join(text[:6000].tobytes() for text in self.texts.values())
         return KrlProgram(
             name=main[1],
             pose=pose,
@@ -202,9 +213,8 @@ class _Reader:
             },
             declarations=tuple(self.declarations),
             issues=tuple(self.issues),
-            guard=guard,
+            guard=w.NO_GUARD.encode("ascii") not in heads,
             def_line=self.def_lines[main[1]],
-            texts=self.texts,
         )
 
     def _statements(self, executed: Executed) -> tuple[Statement, ...]:
@@ -243,7 +253,7 @@ class _Reader:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
         found: set[str] = set()
         for file in distinct(file_of).tolist():
-            data = np.frombuffer(self.texts[self.names[file]], dtype=np.uint8)
+            data = self.texts[self.names[file]]
             own = place[file_of == file]
             for size in distinct(own[:, 1]).tolist():
                 first = own[own[:, 1] == size, 0]
@@ -263,14 +273,14 @@ class _Reader:
             start, end = scanned.span[k]
         else:  # a motion, whose text is asked for where it cannot be read
             start, end = self._lines(file)[scanned.line[row] - 1 : scanned.line[row] + 1]
-        text = self.texts[self.names[file]][start:end].decode("ascii", "replace")
+        text = self.texts[self.names[file]][start:end].tobytes().decode("ascii", "replace")
         return (_COMMENT.sub(r"\1", text) if ";" in text else text).strip()
 
     def _lines(self, file: int) -> Ints:
         """Return where each line of a file begins, and the end; found once it is asked for."""
         if file not in self.line_starts:
             text = self.texts[self.names[file]]
-            newline = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n"))
+            newline = np.flatnonzero(text == NEWLINE)
             self.line_starts[file] = np.concatenate([[0], newline + 1, [len(text)]])
         return self.line_starts[file]
 

@@ -1,7 +1,7 @@
 """Rules of a program that is corrected online, as it was read: what switches RSI, once, and where."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,7 @@ def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
     yield from _ready_issues(program, cell, create, on, off)
 
 
-def rsi_file_issues(path: Path, name: str, expected: dict[str, bytes]) -> Iterator[Issue]:
+def rsi_file_issues(path: Path, name: str, expected: Mapping[str, bytes]) -> Iterator[Issue]:
     """Yield where the RSI files beside a program are not those that program and cell ask for."""
     beside = _beside(path.parent)
     for file_name in file_names(name):

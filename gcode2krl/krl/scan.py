@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.chunks import in_chunks
 from gcode2krl.compiled.core import BYTES, INT, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, core_function
 
 CHUNK_BYTES = 1 << 20
 """Bytes that a thread scans at a time, and whole lines more."""
+_SEARCHED_BYTES = 4096
 
 _count = core_function("krl_count", BYTES, INT, INT, OUT_INTS)
 _scan = core_function(
@@ -47,9 +49,9 @@ class Scanned(NamedTuple):
     """``;FOLD`` less ``;ENDFOLD``."""
 
 
-def scan_krl(text: bytes, chunk_bytes: int = CHUNK_BYTES) -> Scanned:
-    """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
-    data, borders = np.frombuffer(text, dtype=np.uint8), _borders(text, chunk_bytes)
+def scan_krl(data: NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) -> Scanned:
+    """Scan the bytes (n,) of a KRL file; comments, blank lines and ``&`` lines are left out."""
+    borders = _borders(data, chunk_bytes)
 
     def counted(start: int, end: int) -> Ints:
         lines_statements_motions = np.empty(3, dtype=np.int64)
@@ -81,15 +83,24 @@ def scan_krl(text: bytes, chunk_bytes: int = CHUNK_BYTES) -> Scanned:
     return Scanned(kind, blend, line, pose, span, value, _first(too_long), _first(not_ascii), sum(folds))
 
 
-def _borders(text: bytes, chunk_bytes: int) -> list[int]:
+def _borders(data: NDArray[np.uint8], chunk_bytes: int) -> list[int]:
     """Return where chunks of whole lines begin, and the end."""
     borders = [0]
-    while len(text) - borders[-1] > chunk_bytes:
-        behind = text.find(b"\n", borders[-1] + chunk_bytes - 1) + 1
-        if behind in (0, len(text)):
+    while len(data) - borders[-1] > chunk_bytes:
+        behind = _behind_line(data, borders[-1] + chunk_bytes - 1)
+        if behind == len(data):
             break
         borders.append(behind)
-    return [*borders, len(text)]
+    return [*borders, len(data)]
+
+
+def _behind_line(data: NDArray[np.uint8], at: int) -> int:
+    """Return where the line that a byte belongs to has ended."""
+    for start in range(at, len(data), _SEARCHED_BYTES):
+        ends = np.flatnonzero(data[start : start + _SEARCHED_BYTES] == NEWLINE)
+        if len(ends):
+            return start + int(ends[0]) + 1
+    return len(data)
 
 
 def _first(lines: list[int]) -> int:

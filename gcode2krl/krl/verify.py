@@ -12,6 +12,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.files.stored import Texts, stored
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
@@ -107,11 +108,12 @@ def verify_krl(
     alone = declares_itself(program)
     online = rsi_name(program, Path(path).parent)
     layout = Layout(guard=program.guard, online=online, single_file=alone)
-    expected = compose(targets, joints, cell, program.name, layout, pilot)
+    composed = compose(targets, joints, cell, program.name, layout, pilot)
+    expected = {name: stored(pieces) for name, pieces in composed.items()}
     if not alone:
-        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"])
+        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"].read())
     if online:
-        issues += rsi_file_issues(Path(path), online, expected)
+        issues += rsi_file_issues(Path(path), online, Texts(expected))
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
     return compare(program, targets, joints, cell, intended, issues, case)
 

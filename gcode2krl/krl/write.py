@@ -1,7 +1,7 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,7 +12,8 @@ from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.files import write_together
+from gcode2krl.files import Staging, refuse_inputs
+from gcode2krl.files.stored import Stored, Texts, stored
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.names import name_problem, suggested_name
@@ -40,12 +41,22 @@ class WrittenProgram:
 
     name: str
     files: tuple[Path, ...]
-    texts: dict[str, bytes]
-    """File name → bytes."""
+    contents: Mapping[str, Stored]
+    """File name → what it says: `Stored.pieces` yields it without holding the whole."""
     report: VerifyReport
     issues: tuple[Issue, ...]
     targets: Targets
     """As written: with the pieces that the pilot force needs."""
+
+    @property
+    def texts(self) -> Mapping[str, bytes]:
+        """File name → bytes, read from the files where they are asked for."""
+        return Texts(self.contents)
+
+    @property
+    def size_bytes(self) -> int:
+        """Bytes of all files."""
+        return sum(text.size_bytes for text in self.contents.values())
 
     @property
     def pilot(self) -> PilotFigures | None:
@@ -125,21 +136,57 @@ def write_krl(
     )
     bare = _Content(targets, joints)
     content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
-    texts, report = _composed(content, cell, program_name, layout)
-    failure = _pilot_failure(report) if pilot is None else None
-    if failure is not None:
-        plan, content = left_out(failure), bare
-        texts, report = _composed(content, cell, program_name, layout)
-    issues += released(_issues_of(plan), (), strict)
-    targets = content.targets
-    issues += released(_size_issues(texts, targets, cell), (), strict)
-    if not report.ok:
-        raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
-    written: dict[Path, bytes] = {}
-    if file is not None:
-        written = {_place(file, part, program_name): text for part, text in texts.items()}
-        write_together(written, [*_inputs(targets, cell), *inputs])
-    return WrittenProgram(program_name, tuple(written), texts, report, tuple(issues), targets)
+    with _Files(file, program_name, [*_inputs(targets, cell), *inputs]) as files:
+        report = _composed(content, cell, files, layout)
+        failure = _pilot_failure(report) if pilot is None else None
+        if failure is not None:
+            plan, content = left_out(failure), bare
+            report = _composed(content, cell, files, layout)
+        issues += released(_issues_of(plan), (), strict)
+        issues += released(_size_issues(files.contents, content.targets, cell), (), strict)
+        if not report.ok:
+            raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
+        written = files.take_places()
+    return WrittenProgram(
+        program_name, tuple(written), files.contents, report, tuple(issues), content.targets
+    )
+
+
+class _Files:
+    """The files of a program: beside their places until it is verified, or without any."""
+
+    def __init__(self, file: Path | None, name: str, inputs: Sequence[str | Path]) -> None:
+        self.file, self.name, self.inputs = file, name, inputs
+        self.staging = Staging()
+        self.contents: dict[str, Stored] = {}
+
+    def __enter__(self) -> "_Files":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.staging.discard()
+
+    def write(self, texts: Mapping[str, Iterable[bytes]]) -> None:
+        """Write the program piece by piece, in the place of what has been written before."""
+        self.staging.discard()
+        self.contents.clear()
+        if self.file is not None:
+            refuse_inputs([_place(self.file, part, self.name) for part in texts], self.inputs)
+        for part, pieces in texts.items():
+            if self.file is None:
+                self.contents[part] = stored(pieces)
+            else:
+                place = _place(self.file, part, self.name)
+                self.contents[part] = Stored(self.staging.write(place, pieces))
+
+    def take_places(self) -> list[Path]:
+        """Put the files in their places and return these; none where there is no file."""
+        if self.file is None:
+            return []
+        self.staging.take_places()
+        places = {part: _place(self.file, part, self.name) for part in self.contents}
+        self.contents = {part: Stored(place) for part, place in places.items()}
+        return list(places.values())
 
 
 @dataclass(frozen=True)
@@ -156,16 +203,13 @@ class _Content:
         return cls(plan.targets, plan.joints, plan.text, plan.case)
 
 
-def _composed(
-    content: _Content, cell: Cell, name: str, layout: Layout
-) -> tuple[dict[str, bytes], VerifyReport]:
-    """Return the files of a program, and what reading them back finds."""
+def _composed(content: _Content, cell: Cell, files: _Files, layout: Layout) -> VerifyReport:
+    """Write the files of a program; return what reading them back finds."""
     targets, joints = content.targets, content.joints
-    texts = compose(targets, joints, cell, name, layout, content.text)
+    files.write(compose(targets, joints, cell, files.name, layout, content.text))
     give_back()
-    return texts, compare(
-        read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
-    )
+    program = read_texts(files.contents, f"{files.name}{w.SOURCE_SUFFIX}")
+    return compare(program, targets, joints, cell, pilot=content.case)
 
 
 def _pilot_plan(
@@ -306,9 +350,9 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
     return [name for name in named if name]
 
 
-def _size_issues(texts: dict[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
-    program = (text for name, text in texts.items() if not name.endswith((w.SIDECAR_SUFFIX, ".xml")))
-    size_mb = sum(map(len, program)) / BYTES_PER_MB
+def _size_issues(contents: Mapping[str, Stored], targets: Targets, cell: Cell) -> list[Issue]:
+    program = (text for name, text in contents.items() if not name.endswith((w.SIDECAR_SUFFIX, ".xml")))
+    size_mb = sum(text.size_bytes for text in program) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []
