@@ -49,8 +49,9 @@ class Scanned(NamedTuple):
     """``;FOLD`` less ``;ENDFOLD``."""
 
 
-def scan_krl(data: NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) -> Scanned:
-    """Scan the bytes (n,) of a KRL file; comments, blank lines and ``&`` lines are left out."""
+def scan_krl(text: bytes | NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) -> Scanned:
+    """Scan a KRL file; comments, blank lines and ``&`` lines are left out."""
+    data = np.frombuffer(text, dtype=np.uint8)
     borders = _borders(data, chunk_bytes)
 
     def counted(start: int, end: int) -> Ints:

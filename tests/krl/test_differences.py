@@ -20,7 +20,10 @@ def case():
     cell = load_cell()
     targets = set_targets(read_gcode("examples/raster_finish.nc", cell), cell)
     joints = solve_ptp_joints(targets, cell)
-    return read_texts(compose(targets, joints, cell, "PART", Layout()), "PART.src"), targets, joints, cell
+    texts = {
+        name: b"".join(pieces) for name, pieces in compose(targets, joints, cell, "PART", Layout()).items()
+    }
+    return read_texts(texts, "PART.src"), targets, joints, cell
 
 
 def damaged(program, seed):
