@@ -45,8 +45,10 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        from gcode2krl.compiled.long_columns import long_columns_on_disk
         from gcode2krl.krl import verify_krl
 
+        click.get_current_context().with_resource(long_columns_on_disk())
         refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
         toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)

@@ -21,8 +21,8 @@ import numpy as np
 
 from gcode2krl.compiled.core import INT, core_function
 
-LONG_BYTES = 4 << 20
-"""A column of half a million numbers: shorter ones cost less in memory than they would in a file."""
+LONG_BYTES = 8 << 20
+"""A column of a million numbers: shorter ones cost less in memory than they would in a file."""
 MOST_RESIDENT_BYTES = 224 << 20
 """Pages of files beyond this are given back; it holds the field and what a stage works on."""
 _LOOKS_EVERY_S = 0.02
@@ -37,9 +37,9 @@ _count = core_function("long_columns_count", returns=INT)
 
 
 @contextlib.contextmanager
-def long_columns_on_disk(least_bytes: int = LONG_BYTES) -> Iterator[bool]:
-    """Let columns of at least so many bytes that this thread makes lie in files; yields whether they do."""
-    at = _handler(tempfile.gettempdir().encode(), least_bytes)
+def long_columns_on_disk(least_bytes: int | None = None) -> Iterator[bool]:
+    """Let long columns that this thread makes lie in files; yields whether they do."""
+    at = _handler(tempfile.gettempdir().encode(), LONG_BYTES if least_bytes is None else least_bytes)
     if not at or _set_handler() is None:
         yield False
         return

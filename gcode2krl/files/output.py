@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from gcode2krl.errors import NotUnderstoodError, input_error
@@ -150,6 +150,15 @@ def unwritable(target: Path, why: str) -> NotUnderstoodError:
     return input_error(
         "output-unwritable", f"cannot write: {why}", "check folder, rights and space", source=str(target)
     )
+
+
+@contextlib.contextmanager
+def naming_temporary_folder() -> Iterator[None]:
+    """Raise `NotUnderstoodError` that names the temporary folder where the disk refuses a file in it."""
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(Path(tempfile.gettempdir()), error.strerror or str(error)) from None
 
 
 # --- leftovers of killed runs -----------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gcode2krl.compiled.long_columns import note_mapped
+from gcode2krl.files.output import naming_temporary_folder
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -40,10 +41,12 @@ class Spool:
             self._spill()
 
     def _spill(self) -> None:
-        if self._file is None:
-            self._file = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the column
-        for piece in self._pieces:
-            self._file.write(piece.data)
+        with naming_temporary_folder():
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the column
+            for piece in self._pieces:
+                self._file.write(piece.data)
+            self._file.flush()
         self._pieces, self._bytes = [], 0
 
     def column(self) -> NDArray[Any]:
@@ -51,7 +54,6 @@ class Spool:
         if self._file is None:
             return np.concatenate([np.empty((0, *self._tail), self._dtype), *self._pieces])
         self._spill()
-        self._file.flush()
         mapped = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
         note_mapped(mapped)
         return np.frombuffer(mapped, self._dtype).reshape(self._rows, *self._tail)

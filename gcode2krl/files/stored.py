@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.compiled.long_columns import note_mapped
+from gcode2krl.files.output import naming_temporary_folder
 
 SHORT_BYTES = 4 << 20
 """A text up to this is read into memory: a file that is mapped cannot be replaced meanwhile on Windows."""
@@ -92,14 +93,18 @@ def stored(pieces: Iterable[bytes]) -> Stored:
         size += len(piece)
         held.append(piece)
         if size > SHORT_BYTES:
-            file = file if file is not None else tempfile.TemporaryFile()  # noqa: SIM115 - lives as the text
-            file.writelines(held)
+            file = _written(held, file)
             size, held = 0, []
-    if file is None:
-        return Stored(b"".join(held))
-    file.writelines(held)
-    file.flush()
-    return Stored(file)
+    return Stored(b"".join(held)) if file is None else Stored(_written(held, file))
+
+
+def _written(pieces: list[bytes], file: IO[bytes] | None) -> IO[bytes]:
+    """Add pieces to a temporary file, a new one where there is none."""
+    with naming_temporary_folder():
+        file = file if file is not None else tempfile.TemporaryFile()  # noqa: SIM115 - lives as the text
+        file.writelines(pieces)
+        file.flush()
+    return file
 
 
 class Texts(Mapping[str, bytes]):

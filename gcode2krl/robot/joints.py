@@ -135,7 +135,7 @@ class Follower:
             guess = self._branch.guess(self._row - shared + first) if before is None else before
             angles = self._branch.joints(path(slice(first, end)), self._cell, guess)
             q[start:end] = angles[start - first :]
-            row_before: Floats = angles[0]
+            row_before: Floats = angles[0].copy()  # a view would keep all rows
             return row_before
 
         borders = [shared + border for border in chunk_borders(len(motion))]
@@ -189,7 +189,7 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
         np.bitwise_or.at(wrong, target[hits], bits[hits])
         ends = line.is_target[shared:]
         q[target[ends]] = found_own[ends]
-        return found[0] if shared else np.full(6, np.nan)
+        return found[0].copy() if shared else np.full(6, np.nan)  # a view would keep all rows
 
     _solve_parts(solve, q, chunk_borders(len(targets)), cell.home_q_rad())
     q[targets.home] = cell.home_q_rad()
