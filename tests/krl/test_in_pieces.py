@@ -27,7 +27,9 @@ PART = (
 )
 OTHER = {
     "message": PART.replace("M8", "M8 (MSG, half)").replace("G21 G90", "G21 G90 G61"),  # no blended corners
-    "offline": PART.replace("Z-1", "Z-0.2"),
+    "offline": "G21 G90\nT1 M6\nS12000 M3\nG0 G43 H1 Z50\nG0 X0 Y0\nG0 Z2\nG1 Z-1 F600\n"
+    + "".join(f"G1 X{k / 10} F1500\n" for k in range(600))
+    + "G0 Z50\nM5\nM30\n",
 }
 CELL = 'based_on = "demonstration"\n[program]\nmax_lines = 250\n[online]\nmost_mm = 1.5\n[online.link]\n'
 CELL += 'address = "192.168.7.3"\nport = 50001\n'
@@ -79,7 +81,8 @@ def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request
         again = run("verify", "part.src", "part.nc", "--cell", "cell.toml", "--json")
         assert again.code == 0, again.out
     assert list((tmp_path / "temporary").iterdir()) == []
-    assert columns_on_disk() == 0
+    if way != "offline":  # what is known of its motion stays for the next question
+        assert columns_on_disk() == 0
 
 
 @pytest.fixture
