@@ -158,9 +158,18 @@ class Loads:
     """Forces and deflection along a motion that comes block after block, and what is found of them."""
 
     def __init__(
-        self, toolpath: Toolpath, cell: Cell, outlook: Callable[[], cutting.Outlook], dt_s: float
+        self,
+        toolpath: Toolpath,
+        cell: Cell,
+        outlook: Callable[[], cutting.Outlook],
+        dt_s: float,
+        *,
+        has_peaks: bool = True,
     ) -> None:
-        """Set up the stock; raises `NotUnderstoodError` where it cannot be read."""
+        """Set up the stock; raises `NotUnderstoodError` where it cannot be read.
+
+        Without peaks, ``peak_N`` of the forces is their mean: no figure of a program depends on it.
+        """
         self._toolpath, self._cell = toolpath, cell
         self._milling: cutting.Milling | None = None
         self._skipped: tuple[Issue, ...] = ()
@@ -175,7 +184,7 @@ class Loads:
             self._skipped = (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
             return
         try:
-            self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s)
+            self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s, has_peaks=has_peaks)
             give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)

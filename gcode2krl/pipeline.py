@@ -144,7 +144,7 @@ def forecast_toolpath(
     outcome = Outcome(None, None, ())
     if forces:
         tell = begin("material, forces, deflection")
-        loads = Loads(toolpath, cell, planned.outlook, course.dt_s)
+        loads = Loads(toolpath, cell, planned.outlook, course.dt_s, has_peaks=False)
         for motion, q_rad, qd_rad_s, ends in blocks_with_joints(course, cell) if loads.possible else ():
             block = loads.take(motion, q_rad, qd_rad_s, ends)
             figures.take(block.forces, block.deflection)

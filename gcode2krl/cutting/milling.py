@@ -137,10 +137,14 @@ class Milling:
         law: Floats | None = None,
         *,
         is_checked: bool = True,
+        has_peaks: bool = True,
         nodes_per_diameter: float = NODES_PER_DIAMETER,
         threads: int | None = None,
     ) -> None:
-        """Take what is known of the motion, and the time between its samples; the others as in `remove`."""
+        """Take what is known of the motion, and the time between its samples; the others as in `remove`.
+
+        Without peaks, which take long, ``peak_N`` of the forces is their mean.
+        """
         material = cell.material
         if material is None:
             raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
@@ -168,7 +172,7 @@ class Milling:
             )
         self._last: _Rows | None = None
         self._waiting: _Rows | None = None
-        self._peaks = _Peaks(self._tools, self._law)
+        self._peaks = _Peaks(self._tools, self._law) if is_checked and has_peaks else None
 
     def take(self, motion: Motion, ends: bool) -> Forces:
         """Cut the next samples; return the forces at those that follow the ones returned before.
@@ -248,7 +252,7 @@ class Milling:
         forces = Forces(
             force_base_N=turned(force_N, self._to_field.T),
             moment_base_Nmm=turned(moment_Nmm, self._to_field.T),
-            peak_N=self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N) if checks is not None else mean_N,
+            peak_N=mean_N if self._peaks is None else self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N),
             torque_Nmm=np.where(rows.rapid, 0.0, found.torque_Nmm),
             a_p_mm=found.a_p_mm,
             a_e_mm=found.a_e_mm,
