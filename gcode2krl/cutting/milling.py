@@ -125,6 +125,23 @@ class _Rows(NamedTuple):
     descent_mm: Floats
 
 
+class Approach(NamedTuple):
+    """Samples that are about to be cut."""
+
+    rows: _Rows
+    points: Points
+    """The way along them."""
+    ends: bool
+    """True where the motion ends with them."""
+
+
+class Contact(NamedTuple):
+    """The same samples, and what is read at those that are done by then."""
+
+    rows: _Rows
+    engaged: Engaged
+
+
 class Milling:
     """Removes the stock along a motion that comes some samples at a time; see `cut`."""
 
@@ -179,9 +196,24 @@ class Milling:
 
         The motion ``ends`` with these samples: then there is a row for every one.
         """
+        return self.loaded(self.touched(self.approached(motion, ends)))
+
+    # The steps of `take`. A step takes block after block; each may be at work on another block.
+
+    def approached(self, motion: Motion, ends: bool) -> Approach:
+        """Return what is known of the next samples before they are cut."""
         rows = self._rows(motion)
-        engaged = self._engagement.take(self._points(rows), ends)
+        points = self._points(rows)
         self._last = copied(rows, slice(-1, None))
+        return Approach(rows, points, ends)
+
+    def touched(self, approach: Approach) -> Contact:
+        """Cut along the next samples."""
+        return Contact(approach.rows, self._engagement.take(approach.points, approach.ends))
+
+    def loaded(self, contact: Contact) -> Forces:
+        """Return the forces at the samples that are done, and take what is found of them."""
+        rows, engaged = contact
         if self._waiting is not None:
             rows = followed(self._waiting, rows)
         count = len(engaged.result.a_p_mm)
