@@ -7,7 +7,7 @@ side. Vector columns are split: ``position_x_mm`` …, ``rotation_x`` …, ``q1_
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,7 +19,18 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.files import Content, make_folder, refuse_inputs, write_together
 from gcode2krl.prediction.record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction.tables import PARQUET_TYPES, check_numbers, check_references, read_table
-from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Restart, Table, Targets, Toolpath
+from gcode2krl.tables import (
+    Deflection,
+    Event,
+    Forces,
+    Joints,
+    Motion,
+    Restart,
+    Simplified,
+    Table,
+    Targets,
+    Toolpath,
+)
 
 RECORD = "prediction.toml"
 _UNFINISHED = f'schema = "{SCHEMA}"\nunfinished = true\n'.encode("ascii")
@@ -119,6 +130,10 @@ class Prediction:
         }
         if self.toolpath.restart is not None:
             record["restart"] = _restart_record(self.toolpath.restart)
+        if self.targets.simplified is not None:
+            record["simplified"] = asdict(self.targets.simplified)
+        if self.targets.correction_mm:
+            record["correction_mm"] = self.targets.correction_mm
         for name, table in (("forces", self.forces), ("deflection", self.deflection)):
             if table is not None:
                 record[f"{name}_relative_band"] = table.relative_band
@@ -171,6 +186,8 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
         issues=record.findings(),
         events=events_of(record.targets_events, poses, "targets"),
         restart=restart,
+        simplified=None if record.simplified is None else Simplified(**record.simplified.model_dump()),
+        correction_mm=record.correction_mm,
     )
     parts: dict[str, Any] = {"toolpath": toolpath, "targets": targets}
     if motion_frame is not None:
