@@ -9,10 +9,11 @@ reversal. A run of moves from corner a to corner b becomes one if, with u the un
 
 **The bound.** Take for each corner p of the run the nearest point n(p) of the new move S. By 1 the
 projections on the line of S rise from corner to corner, and so do the nearest points, which are these
-projections clipped to S. Between two corners p and q, p + t·(q - p) is no further from the point
-n(p) + t·(n(q) - n(p)) of S than the farther of |p - n(p)| and |q - n(q)|, as the distance is convex in t.
-So walking along the run and along S at once, never backwards, the two stay within the tolerance of each other: the whole original path is within it of the new one, the whole new path within it of the original, and
-in the same order (the Fréchet distance). S begins and ends where the program's text says it, at its last
+projections clipped to S. Between two corners p and q, p + t·(q - p) is no further from the point n(p) +
+t·(n(q) - n(p)) of S than the farther of |p - n(p)| and |q - n(q)|, as the distance is convex in t. So
+walking along the run and along S at once, never backwards, the two stay within the tolerance of each other:
+the whole original path is within it of the new one, the whole new path within it of the original, and in
+the same order (the Fréchet distance). S begins and ends where the program's text says it, at its last
 decimal, so rounding is within the bound; the tolerance has to be larger than it, `LEAST_MM`. A move back,
 however short, is not merged, by 1.
 
