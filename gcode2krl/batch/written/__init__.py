@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from gcode2krl.batch.written.difference import Change, Difference, difference, with_against
+from gcode2krl.batch.written.changes import Change, Difference, difference, with_against
 from gcode2krl.batch.written.index import index_html
 from gcode2krl.batch.written.junit import junit_xml
 from gcode2krl.batch.written.part import Record

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcode2krl.batch.written.difference import Change, Difference, difference
+from gcode2krl.batch.written.changes import Change, Difference, difference
 from gcode2krl.batch.written.part import VERDICTS, Part, Record, parts_of, told_of
 from gcode2krl.batch.written.places import quoted
 from gcode2krl.batch.written.text import one_line, printable

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from gcode2krl.batch.written.difference import Change, Difference
+from gcode2krl.batch.written.changes import Change, Difference
 from gcode2krl.batch.written.part import VERDICTS, Part
 from gcode2krl.batch.written.text import printable
 from gcode2krl.report.page.content import duration
