@@ -143,7 +143,7 @@ def choice(program, minutes, *odds, weight=1.0):
         noise=0.02,
     )
     pair = OpenPair(Answer("a", 0.5), Answer("b", 0.5), weight, None, None)
-    return Choice(program, minutes, tuple(Parting(pair, each, nothing) for each in odds))
+    return Choice(program, minutes, tuple(Parting(pair, each, math.log(each), nothing) for each in odds))
 
 
 def test_the_best_odds_win_and_among_near_equals_the_shortest():

@@ -74,6 +74,9 @@ class Parting:
 
     pair: OpenPair
     odds: float
+    """As told."""
+    nats: float
+    """What they are chosen by: the logarithm of the odds, with a wider limit."""
     apart: Apart
 
 
@@ -149,7 +152,7 @@ def best(choices: Sequence[Choice]) -> Choice | None:
 
 
 def _worth(choice: Choice) -> float:
-    return sum(parting.pair.weight * math.log(parting.odds) for parting in choice.partings)
+    return sum(parting.pair.weight * parting.nats for parting in choice.partings)
 
 
 # What is left open
@@ -276,5 +279,6 @@ def _parting(pair: OpenPair, bench: Bench, of_first: _Shown, of_second: _Shown) 
     """
     ways = [bench.apart(one, pair.second.applied, of_second.information) for one in of_first.every]
     back = [bench.apart(other, pair.first.applied, of_first.information) for other in of_second.every]
-    logs = [min(0.5 * apart.distance2, _LIMITS.most_log_odds) for apart in (*ways, *back)]
-    return Parting(pair, float(np.exp(np.mean(logs))), ways[0])
+    nats = 0.5 * np.array([apart.distance2 for apart in (*ways, *back)])
+    odds = np.exp(np.minimum(nats, _LIMITS.most_log_odds).mean())
+    return Parting(pair, float(odds), float(np.minimum(nats, _LIMITS.enough_nats).mean()), ways[0])

@@ -133,7 +133,10 @@ class ChooseThresholds:
         2, "directions in which an answer's numbers are known least, that a program is judged along too"
     )
     most_log_odds: float = convention(
-        6.9, "log 1000: beyond it no program is better than another, as noise is not exactly as learnt"
+        6.9, "log 1000: higher odds are not told, as noise is not exactly as learnt"
+    )
+    enough_nats: float = convention(
+        35.0, "log odds beyond which no program is better than another: several times what parts two answers"
     )
     nearly_best: float = convention(0.1, "programs within this share of the best mean log odds: the shortest")
     told_change: float = convention(
