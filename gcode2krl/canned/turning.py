@@ -21,8 +21,8 @@ TILTS: tuple[tuple[tuple[float, float, float], tuple[float, ...]], ...] = (
 )
 """Directions as A, B, C about the tool's axes, and by how many degrees the tool turns: the first angle that
 keeps clear of limits and of the wrist's singularity, else the last. Every angle parts a tool's error from a
-frame's; a wide one also what looks nearly the same within a few degrees, as an angle of A6 and an eccentric A6
-do."""
+frame's; a wide one also what looks nearly the same within a few degrees, as an angle of A6 and an eccentric
+A6 do."""
 _CLEAR_RAD = 10.0 * RAD_PER_DEG
 """From limits, and of A5 from zero."""
 _WAY = np.linspace(0.0, 1.0, 7)[1:]
