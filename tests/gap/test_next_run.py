@@ -156,7 +156,7 @@ def test_the_best_odds_win_and_among_near_equals_the_shortest():
 def test_tool_and_base_are_parted_by_turning_the_tool(offset):
     open_case = judgement(offset, cause(offset, 0.98, alike(FRAME, 0.98)))
     found = choose_next_run(context(), [open_case])
-    assert found.program in ("orientation", "single-joint")  # both turn it
+    assert found.program == "orientation"
     assert found.partings[0].odds > 100.0
     assert found.minutes == pytest.approx(TRIALS["orientation"].minutes)
     again = choose_next_run(context(), [open_case])

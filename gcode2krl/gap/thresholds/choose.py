@@ -136,7 +136,7 @@ class ChooseThresholds:
         6.9, "log 1000: higher odds are not told, as noise is not exactly as learnt"
     )
     enough_nats: float = convention(
-        35.0, "log odds beyond which no program is better than another: several times what parts two answers"
+        100.0, "log odds beyond which no program is better than another: real runs part less than is expected"
     )
     nearly_best: float = convention(0.1, "programs within this share of the best mean log odds: the shortest")
     told_change: float = convention(
