@@ -47,6 +47,22 @@ class Restart:
     """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
 
 
+@dataclass(frozen=True)
+class Simplified:
+    """What Targets leave out of the G-code's corners (`program.merging`)."""
+
+    tolerance_mm: float
+    """How far a corner that is left out may be from the new move."""
+    moves: int = 0
+    """Feed moves of the G-code."""
+    left_out: int = 0
+    """Corners between them."""
+    largest_mm: float = 0.0
+    """How far one is off at most."""
+    worst_line: int = 0
+    """G-code line of the move that is off most."""
+
+
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
@@ -66,8 +82,8 @@ def rows_at(table: AnyTable, rows: NDArray[np.int64]) -> AnyTable:
     return replace(table, **columns)
 
 
-BLOCK_ROWS = 65_536
-"""Rows of a table that go through the stages together: four chunks, some 30 MB in all stages."""
+BLOCK_ROWS = 32_768
+"""Rows of a table that go through the stages together: two chunks, some 15 MB in all stages."""
 
 
 def blocks_of(table: AnyTable, rows: int = BLOCK_ROWS) -> Iterator[tuple[AnyTable, bool]]:
@@ -212,6 +228,10 @@ class Targets(Table):
     source: str = ""
     restart: Restart | None = None
     """That of the Toolpath."""
+    simplified: Simplified | None = None
+    """None: every corner of the G-code is a target."""
+    correction_mm: float = 0.0
+    """How far targets are moved at most, by offline compensation."""
 
     def facts(self) -> str:
         """Return how many motions there are, and the program's name."""
