@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gcode2krl.cli.heading import Heading, heading
+from gcode2krl.cli.record_head import Heading, heading
 from gcode2krl.cli.standard_files import closed, tell
 from gcode2krl.errors import Gcode2KrlError, Issue, told
 from gcode2krl.progress import Begin, Progress, unseen

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.heading import heading
+from gcode2krl.cli.record_head import heading
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.translation import inputs as reading
 from gcode2krl.translation.inputs import (

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console
-from gcode2krl.cli.heading import Heading
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
+from gcode2krl.cli.record_head import Heading
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
