@@ -72,8 +72,8 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    tolerance: float | None,
-    chord_tolerance: float,
+    tolerance_mm: float | None,
+    chord_tolerance_mm: float,
     block_delete: bool,
     job_path: str | None,
     dt_s: float | None,
@@ -102,17 +102,17 @@ def command(
         )
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
-        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.stages() as begin:
-            settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
+            settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
             prediction = predict_toolpath(
                 toolpath,
                 cell,
                 dt_s=dt_s,
-                tolerance_mm=tolerance,
+                tolerance_mm=tolerance_mm,
                 settings=settings,
                 forces=not no_forces,
                 begin=begin,
