@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, simplify_option
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
@@ -50,6 +50,7 @@ def command(
     try:
         from gcode2krl.krl import verify_krl
 
+        console.heading.reads(program, part)
         refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
         with console.stages() as begin:
@@ -69,11 +70,10 @@ def command(
     except Gcode2KrlError as error:
         if not as_json:
             raise
-        console.json({"verify": {"max_deviation_mm": None}, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.record({"verify": {"max_deviation_mm": None}}, error.issues, exit_code=error.exit_code)
     if as_json:
-        result = {"verify": report.as_dict(), "issues": issue_dicts(report.issues)}
-        console.json(result | restart_record(toolpath))
+        figures = {"verify": report.as_dict(), **restart_record(toolpath)}
+        console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:
         console.findings(report.issues, program)
         state = "agrees with" if report.ok else "DIFFERS from"
