@@ -47,6 +47,7 @@ __all__ = [
     "require_other",
     "require_outputs",
     "require_part",
+    "simplify_option",
 ]
 
 
@@ -99,6 +100,18 @@ def gcode_options(function: Any) -> Any:
     ):
         function = option(function)
     return function
+
+
+def simplify_option(function: Any) -> Any:
+    """Add --simplify to a command that sets targets."""
+    option = click.option(
+        "--simplify",
+        "simplify_mm",
+        type=float,
+        metavar="MM",
+        help="Merge feed moves into straight ones within this; 0.01 is usual.",
+    )
+    return option(function)
 
 
 def job_option(function: Any) -> Any:

@@ -22,6 +22,7 @@ from gcode2krl.cli.inputs import (
     require_folder,
     require_other,
     require_part,
+    simplify_option,
 )
 from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, solids, with_comparison
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -46,6 +47,7 @@ _CORNERS = "corners.csv"
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
 @common_options
 @gcode_options
+@simplify_option
 @job_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
@@ -75,6 +77,7 @@ def command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     block_delete: bool,
+    simplify_mm: float | None,
     job_path: str | None,
     dt_s: float | None,
     csv: bool,
@@ -114,6 +117,7 @@ def command(
                 cell,
                 dt_s=dt_s,
                 tolerance_mm=tolerance_mm,
+                simplify_mm=simplify_mm,
                 settings=settings,
                 forces=not no_forces,
                 begin=begin,
