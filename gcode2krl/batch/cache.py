@@ -94,18 +94,10 @@ class Cache:
         """Keep an entry; raises `NotUnderstoodError` where the folder cannot be written."""
         place = self._place(key)
         try:
-            place.parent.mkdir(parents=True, exist_ok=True)
-            descriptor, begun = tempfile.mkstemp(prefix=".entry-", suffix=".part", dir=place.parent)
             try:
-                with os.fdopen(descriptor, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
-                    _add(archive, _RECORD, json.dumps(record, allow_nan=False).encode())
-                    for name, content in files.items():
-                        _add(archive, _FILES + name, content)
-                Path(begun).replace(place)
-            except BaseException:
-                with contextlib.suppress(OSError):
-                    Path(begun).unlink()
-                raise
+                self._write(place, record, files)
+            except FileNotFoundError:  # another process cleared the cache and took the folder away
+                self._write(place, record, files)
         except PermissionError:
             if not place.exists():  # Windows: another process reads the entry, which is the same
                 raise unwritable(self.folder, "no rights to write there") from None
@@ -136,6 +128,20 @@ class Cache:
             with contextlib.suppress(OSError):  # something else is in it
                 folder.rmdir()
         return gone
+
+    def _write(self, place: Path, record: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, begun = tempfile.mkstemp(prefix=".entry-", suffix=".part", dir=place.parent)
+        try:
+            with os.fdopen(descriptor, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
+                _add(archive, _RECORD, json.dumps(record, allow_nan=False).encode())
+                for name, content in files.items():
+                    _add(archive, _FILES + name, content)
+            Path(begun).replace(place)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(begun).unlink()
+            raise
 
     def _place(self, key: str) -> Path:
         return self.folder / key[:2] / f"{key}.zip"

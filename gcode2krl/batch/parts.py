@@ -36,9 +36,9 @@ def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None 
     """Return the parts that words name, sorted by their keys.
 
     A word is a folder (all files in it with one of `ENDINGS`, however deep), a pattern such as
-    ``a/**/*.nc``, a file, ``@parts.txt`` with a word a line, or a TOML file with a cell for each folder. ``cell`` and ``job``
-    serve those that have none of their own. Raises `NotUnderstoodError` where a word names nothing, or two
-    parts have one key.
+    ``a/**/*.nc``, a file, ``@parts.txt`` with a word a line, or a TOML file with a cell for each folder.
+    ``cell`` and ``job`` serve those that have none of their own. Raises `NotUnderstoodError` where a word
+    names nothing, or two parts have one key.
     """
     named = list(words)
     several = len(named) > 1

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "init": "Write the cell file of your robot from your answers and the controller's archive.",
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
+    "batch": "Translate many parts: folders, patterns, files, @lists, or a TOML file with a cell a folder.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
     "verify": "Read a KRL program back and compare it with its G-code.",
     "report": "Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.",
@@ -33,6 +34,7 @@ _COMMANDS = {
     "runkit": "Write what a program is accepted with: a variant in air, its prediction, a trace set-up, "
     "a check list.",
     "make-test": "Write a test program of air moves.",
+    "cache": "What a batch has computed before: show, clear.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
     "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "completion": "Print the script that completes commands, options and files in a shell.",
