@@ -54,6 +54,21 @@ def predict(
     note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
     ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
     the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
+
+    The worst second of every tool:
+
+    >>> from gcode2krl import load_cell, predict
+    >>> samples = predict("part.nc", load_cell("cell.toml")).samples().to_pandas()
+    >>> samples["second"] = samples["time_s"].astype(int)
+    >>> worst = samples.groupby(["tool", "second"])["force_N"].max().groupby("tool").idxmax()
+    >>> list(worst.index)
+    [1]
+
+    With an effect that the nominal model leaves out, its columns stand beside the nominal ones:
+
+    >>> loose = predict("part.nc", effects=["backlash:target=A2,gap_deg=0.02"])
+    >>> sorted(loose.added)[:2]
+    ['force_meas_x_N', 'force_meas_y_N']
     """
     cell = cell if cell is not None else load_cell()
     toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
@@ -228,6 +243,13 @@ def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = Non
         Where the program has no motion, or the tolerance is not positive.
     RefusedError
         Where the cell does not state robot, ``$BASE``, HOME or a tool's tip.
+
+    Examples
+    --------
+    >>> from gcode2krl import load_cell, read_gcode, set_targets
+    >>> cell = load_cell()
+    >>> set_targets(read_gcode("part.nc", cell), cell, tolerance_mm=0.05)
+    Targets(... motions, part.nc)
     """
     return targets_and_joints(toolpath, cell, tolerance_mm)[0]
 
@@ -277,6 +299,14 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     ------
     NotUnderstoodError
         Where the program has no motion, or ``dt_s`` is not positive.
+
+    Examples
+    --------
+    >>> from gcode2krl import load_cell, plan_motion, read_gcode
+    >>> cell = load_cell()
+    >>> motion = plan_motion(read_gcode("part.nc", cell), cell, dt_s=0.004)
+    >>> round(float(motion.time_s[1]), 3)
+    0.004
     """
     targets = set_targets(source, cell) if isinstance(source, Toolpath) else source
     planned = plan_course(targets, cell, dt_s, keeps=True)
@@ -337,6 +367,11 @@ def solve_joints(source: Targets | Motion, cell: Cell) -> Joints:
     """Return the joints at each target, or at each sample of a Motion: one branch, KUKA's signs, S and T.
 
     For Targets ``qd_rad_s`` is NaN, and the findings on reach, limits and singularities are in ``issues``.
+
+    >>> from gcode2krl import Prediction, solve_joints
+    >>> prediction = Prediction.load("prediction")
+    >>> solve_joints(prediction.motion, prediction.cell).q_rad.shape == (len(prediction.motion), 6)
+    True
     """
     if isinstance(source, Motion):
         return robot.joints_from_angles(source, *_motion_angles(source, cell), cell)

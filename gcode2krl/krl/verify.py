@@ -12,6 +12,8 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.exchange.findings import Findings, counted, findings_block
+from gcode2krl.exchange.html import block, text_table
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
@@ -29,7 +31,7 @@ from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VerifyReport:
     """Outcome of a verification.
 
@@ -50,6 +52,27 @@ class VerifyReport:
     def ok(self) -> bool:
         """True where no finding is an error."""
         return not any(issue.severity == "error" for issue in self.issues)
+
+    @property
+    def findings(self) -> Findings:
+        """The ``issues`` as a table: severity, code, line, message, remedy."""
+        return Findings(self.issues)
+
+    def __repr__(self) -> str:
+        return f"VerifyReport({self.words()})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the worst differences and the findings."""
+        head = ("file", "line", "G-code line", "off by (mm)")
+        rows = [(each["file"], each["line"], each["gcode_line"], each["deviation_mm"]) for each in self.worst]
+        table = text_table(head, rows) if rows else ""
+        return block(repr(self), table, findings_block(self.issues))
+
+    def words(self) -> str:
+        """Return the outcome in words: ``457 motions, off by 0.0007 mm``."""
+        off = f"off by {self.max_deviation_mm:.4f} mm, {self.max_rotation_deg:.4f} deg"
+        found = counted(self.issues)
+        return ", ".join([f"{self.motions} motions", off, *([found] if found else [])])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints; what is not a number is null."""
@@ -80,6 +103,12 @@ def verify_krl(
     ``prediction`` its targets (which may be compensated) are what is intended, and the knots are compared
     with its forces. The RSI files beside a program that is corrected online must be as the cell asks for.
     Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
+
+    >>> from gcode2krl import load_cell, predict, verify_krl, write_krl
+    >>> prediction = predict("part.nc")
+    >>> program = write_krl(prediction, "PART.src")
+    >>> verify_krl("PART.src", prediction.toolpath, prediction.cell).ok
+    True
     """
     program = read_krl(path)
     targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)

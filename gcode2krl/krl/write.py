@@ -12,6 +12,8 @@ from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.exchange.findings import Findings, counted, findings_block
+from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout, compose
@@ -34,7 +36,7 @@ _ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WrittenProgram:
     """What `write_krl` wrote."""
 
@@ -51,6 +53,26 @@ class WrittenProgram:
     def pilot(self) -> PilotFigures | None:
         """Figures of the pilot force, None where the program has none."""
         return self.report.pilot
+
+    @property
+    def findings(self) -> Findings:
+        """The ``issues`` as a table: severity, code, line, message, remedy."""
+        return Findings(self.issues)
+
+    def __repr__(self) -> str:
+        found = counted(self.issues)
+        facts = [f"{len(self.files)} files", self.report.words(), *([found] if found else [])]
+        return f"WrittenProgram({self.name}: {', '.join(facts)})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the files, the read-back, the findings and the path from above."""
+        rows = [("file", f"{name}, {len(text) / BYTES_PER_MB:.3f} MB") for name, text in self.texts.items()]
+        rows.append(("read back", self.report.words()))
+        if self.pilot is not None:
+            rows.append(("pilot", f"{self.pilot.knots} knots"))
+        moves = ~self.targets.ptp
+        picture = path_picture(self.targets.position_mm[moves])
+        return block(repr(self), beside(text_table((), rows), picture), findings_block(self.issues))
 
 
 def write_krl(
@@ -98,6 +120,15 @@ def write_krl(
         Where a finding forbids the program, or its own verification does.
     NotUnderstoodError
         Where the output cannot be written or is an input, or a name or release is wrong.
+
+    Examples
+    --------
+    >>> from gcode2krl import predict, write_krl
+    >>> program = write_krl(predict("part.nc"), "WRITTEN.src")
+    >>> program
+    WrittenProgram(WRITTEN: 3 files, ... motions, off by 0.000... mm, 0.0000 deg, ...)
+    >>> [file.name for file in program.files]
+    ['WRITTEN.src', 'WRITTEN.dat', 'WRITTEN.pilot.csv']
     """
     # the steps of writing in their order, kept together: most branches are the function's options
     targets, cell = (source, cell) if isinstance(source, Targets) else (source.targets, source.cell)
