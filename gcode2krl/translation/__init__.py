@@ -4,7 +4,7 @@ Commands, worker processes and Python programs translate alike; only the command
 """
 
 from gcode2krl.translation.attempt import Attempt
-from gcode2krl.translation.carry_out import carry_out
 from gcode2krl.translation.order import Order
+from gcode2krl.translation.stages import carry_out
 
 __all__ = ["Attempt", "Order", "carry_out"]
