@@ -1,6 +1,7 @@
 """Predictions of many parts from Python: `predict` in several processes, in the order of the parts."""
 
 from collections.abc import Iterable, Iterator
+from inspect import signature
 from pathlib import Path
 from typing import Any, Literal, overload
 
@@ -55,16 +56,16 @@ def predict_many(
     be predicted raises its `Gcode2KrlError` when it is its turn; with ``errors="keep"`` the error takes the
     place of the prediction, and the parts after it follow. Only few predictions wait in memory.
 
-    >>> from gcode2krl import predict_many
-    >>> for prediction in predict_many(["examples/test_piece.nc", "examples/cam_style.nc"], processes=2):
-    ...     print(prediction.toolpath.source, f"{prediction.motion.time_s[-1]:.0f} s")
-    examples/test_piece.nc 78 s
-    examples/cam_style.nc 239 s
+    >>> from gcode2krl import load_cell, predict_many
+    >>> for prediction in predict_many("*.nc", load_cell("cell.toml"), processes=2):
+    ...     print(prediction.toolpath.source, f"{prediction.forces.peak_N.max():.0f} N")
+    part.nc ... N
     """
     if isinstance(parts, str | Path):
         files = [part.file for part in find_parts([str(parts)])]
     else:
         files = [Path(part) for part in parts]
+    signature(predict).bind("", cell, **options)  # a wrong option is an error here, not in every worker
     shared = cell if cell is not None else load_cell()
     return _predictions([(file, shared, options) for file in files], processes, errors == "keep")
 

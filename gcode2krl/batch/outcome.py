@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.batch.plan import Planned
+from gcode2krl.batch.planning import Planned
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.files import unwritable, write_together
 from gcode2krl.result import input_of, issue_dicts, record_of

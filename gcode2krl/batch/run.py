@@ -12,7 +12,7 @@ from gcode2krl.batch.cache import Cache
 from gcode2krl.batch.crew import Answer, Crew
 from gcode2krl.batch.free_memory import budget_mb, expected_mb, fitting_processes
 from gcode2krl.batch.outcome import Record, failed, line_of, why_failed, write_outputs
-from gcode2krl.batch.plan import Planned
+from gcode2krl.batch.planning import Planned
 from gcode2krl.batch.work import Made, make
 from gcode2krl.compiled.threads import usable_cores
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError

@@ -13,7 +13,7 @@ MOST_POINTS = 200
 _DIGITS = 2
 
 
-def thumbnail(toolpath: "Toolpath") -> list[list[float]] | None:
+def thumbnail_of(toolpath: "Toolpath") -> list[list[float]] | None:
     """Return the feed moves seen from above, mm: at most `MOST_POINTS` points of their course, None if none.
 
     The points are those where the polyline turns most: the farthest from the chord between its neighbours is

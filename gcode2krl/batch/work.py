@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.batch.thumbnail import thumbnail
+from gcode2krl.batch.thumbnail import thumbnail_of
 from gcode2krl.translation import Attempt, Order, carry_out
 
 Record = dict[str, Any]
@@ -57,5 +57,5 @@ def _record_of(attempt: Attempt, files: dict[str, bytes], place: Path) -> Record
     record["issues"] = [
         issue | {"message": issue["message"].replace(f"{place}{os.sep}", "")} for issue in record["issues"]
     ]
-    record["thumbnail"] = thumbnail(attempt.toolpath) if attempt.toolpath is not None else None
+    record["thumbnail"] = thumbnail_of(attempt.toolpath) if attempt.toolpath is not None else None
     return record

@@ -101,7 +101,7 @@ def command(
     """
     began_s = time.perf_counter()
     from gcode2krl.batch.parts import find_parts
-    from gcode2krl.batch.plan import plan
+    from gcode2krl.batch.planning import plan
     from gcode2krl.batch.results import earlier_files, read_results, remove_outdated, write_results
     from gcode2krl.batch.run import cluster_at, crew_for, run_batch
     from gcode2krl.files import make_folder
@@ -128,7 +128,7 @@ def command(
     code = INTERRUPTED if stopped else batch.exit_code
     if as_json:
         stated = Order("", **options).options() | ({"report": True} if report else {})
-        console.json(as_record(batch, files, seconds, stated, code))
+        console.json(as_record(batch, files, seconds, stated))
     for text in table_lines(batch, out, seconds, stopped):
         console.say(text)
     return code

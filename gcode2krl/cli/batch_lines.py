@@ -105,7 +105,7 @@ def table_lines(batch: Told, out: Path, seconds: float, stopped: bool) -> Iterat
     yield f"{out} -> results.jsonl"
 
 
-def as_record(batch: Told, files: list[Path], seconds: float, options: Record, exit_code: int) -> Record:
+def as_record(batch: Told, files: list[Path], seconds: float, options: Record) -> Record:
     """Return the object that ``--json`` prints."""
     from gcode2krl.result import hashes_of, record_of
 
@@ -113,10 +113,11 @@ def as_record(batch: Told, files: list[Path], seconds: float, options: Record, e
     figures = {
         "parts": batch.parts,
         **{verdict: counts[verdict] for verdict in (*VERDICTS, "cached")},
+        "left": batch.parts - len(batch.records),
         "seconds": round(seconds, 3),
     }
     found = record_of(
-        "batch", figures, exit_code=exit_code, options=options, files=hashes_of(map(str, files))
+        "batch", figures, exit_code=batch.exit_code, options=options, files=hashes_of(map(str, files))
     )
     kinds = ("errors", "warnings", "notes")
     return found | {

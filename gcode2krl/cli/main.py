@@ -145,7 +145,7 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return input_error("option-value", *_missing_subcommand(error))
     if isinstance(error, click.ClickException):
-        return input_error("option-value", error.format_message(), "`gcode2krl --help` lists the options")
+        return input_error("option-value", error.format_message(), _remedy(error))
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else "standard input or output: "
         sentence = f"{place}{error.strerror or error}"
@@ -155,6 +155,15 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     # a defect of the program: one line for the user, the rest on request
     sentence = f"internal error, please report it: {type(error).__name__}: {error}"
     return input_error("internal-error", sentence, "-v shows the details")
+
+
+def _remedy(error: click.ClickException) -> str:
+    """Return what to do about wrong words; several parts are what people try first."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    one_part = context is not None and context.info_name == "translate"
+    if one_part and "unexpected extra argument" in error.format_message():
+        return "`gcode2krl batch PARTS -o out/` translates several"
+    return "`gcode2krl --help` lists the options"
 
 
 def _command_in(words: list[str]) -> str:

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 
 from gcode2krl.batch.cache import FOLDER_VARIABLE
+from gcode2krl.result.model import Record
 from tests.conftest import ROOT
 
 HEAD = "G21 G90 G17\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG43 H1 Z20\n"
@@ -231,6 +232,9 @@ def test_json_and_quiet(parts, run):
     (parts / "no.nc").write_text(NOT_UNDERSTOOD)
     done = run("batch", parts, "-o", "out", "--json", "-q", "--strict")
     found = json.loads(done.out)
+    Record.model_validate(found)
+    for record in records("out").values():
+        Record.model_validate(record)
     assert (found["schema"], found["command"]) == ("gcode2krl/result/1", "batch")
     assert found["parts"] == 4
     assert found["written"] + found["refused"] + found["failed"] == 4
@@ -257,6 +261,13 @@ def test_the_cache_is_shown_and_cleared(parts, run, tmp_path):
     run("batch", parts, "-o", "out", "--cache-size", "0")
     assert cached("out") == set()
     assert json.loads(run("cache", "show", "--json").out)["entries"] == 0  # more than nothing may not stay
+
+
+def test_several_parts_for_translate_name_the_batch(parts, run):
+    done = run(parts / "a.nc", parts / "b.NGC")
+    assert done.code == 2
+    assert "gcode2krl batch PARTS -o out/" in done.err
+    assert "batch" not in run(parts / "a.nc", "--nonsense").err
 
 
 # --- a worker that is killed, and a batch that is stopped ---------------------------------------------------
