@@ -16,7 +16,7 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
-from gcode2krl.files.stored import Stored, Texts, whole_lines
+from gcode2krl.files.stored import Stored, Texts, stored, whole_lines
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
@@ -87,8 +87,13 @@ class KrlProgram:
     guard: bool = True
     def_line: int = 0
     """Line of the main DEF."""
-    texts: Mapping[str, bytes] = field(default_factory=dict)
-    """File name → bytes, those of long files read where they are asked for."""
+    contents: Mapping[str, Stored] = field(default_factory=dict)
+    """File name → what it says."""
+
+    @property
+    def texts(self) -> Mapping[str, bytes]:
+        """File name → bytes, those of long files read where they are asked for."""
+        return Texts(self.contents)
 
     @property
     def position_mm(self) -> Floats:
@@ -150,14 +155,20 @@ def _externals(pieces: Iterable[bytes]) -> Iterator[str]:
             at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
 
-def read_texts(texts: Mapping[str, bytes | Stored], main: str) -> KrlProgram:
-    """Read a program from file name → text; ``main`` names the main file."""
+def read_texts(texts: Mapping[str, bytes | Stored | Iterable[bytes]], main: str) -> KrlProgram:
+    """Read a program from file name → text, or pieces of it; ``main`` names the main file."""
     sources = [name for name in texts if name.lower().endswith(w.SOURCE_SUFFIX)]
     sources.sort(key=lambda name: name != main)
-    contents = {name: text if isinstance(text := texts[name], Stored) else Stored(text) for name in sources}
+    contents = {name: _as_stored(texts[name]) for name in sources}
     with ExitStack() as stack:
         opened = {name: stack.enter_context(text.opened()) for name, text in contents.items()}
-        return replace(_Reader(opened, main).read(), texts=Texts(contents))
+        return replace(_Reader(opened, main).read(), contents=contents)
+
+
+def _as_stored(text: bytes | Stored | Iterable[bytes]) -> Stored:
+    if isinstance(text, Stored):
+        return text
+    return Stored(text) if isinstance(text, bytes) else stored(text)
 
 
 class _Reader:

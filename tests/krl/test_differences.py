@@ -20,10 +20,7 @@ def case():
     cell = load_cell()
     targets = set_targets(read_gcode("examples/raster_finish.nc", cell), cell)
     joints = solve_ptp_joints(targets, cell)
-    texts = {
-        name: b"".join(pieces) for name, pieces in compose(targets, joints, cell, "PART", Layout()).items()
-    }
-    return read_texts(texts, "PART.src"), targets, joints, cell
+    return read_texts(compose(targets, joints, cell, "PART", Layout()), "PART.src"), targets, joints, cell
 
 
 def damaged(program, seed):
@@ -39,7 +36,7 @@ def damaged(program, seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("rows", [1, 7, 1000])
+@pytest.mark.parametrize("rows", [pytest.param(1, marks=pytest.mark.slow), 7, 1000])
 def test_the_chunks_do_not_matter(case, seed, rows, monkeypatch):
     program, targets, joints, cell = case
     program = damaged(program, seed)
