@@ -9,7 +9,7 @@ import numpy as np
 from gap_blind_cases import CELL_TOML
 
 from gcode2krl import Prediction, load_cell, load_run, predict
-from tests.plant import cases, instruments, writing
+from tests.plant import faults, instruments, mismatch, writing
 from tests.plant.robot import simulate
 from tests.plant.scene import World
 from tests.plant.waypoints import Writer
@@ -63,14 +63,14 @@ def _runs(folder: Path) -> float:
         controller_s=0.012,
         scan=False,
     )
-    fault = cases._fault(EFFECT, "same", 1)
-    robot = cases._robot_mismatch(rng)
+    fault = faults.build(EFFECT, "same", 1)
+    robot = mismatch.of_robot(rng)
     for number in range(3):
         run = simulate(
             long_program().waypoints(),
             World(),
             [fault.hooks(SIZE)],
-            cases._day_mismatch(robot, rng),
+            mismatch.of_day(robot, rng),
             0.0,
             number,
         )

@@ -172,6 +172,7 @@ def test_a_saved_restart_stays_one(tmp_path):
     assert b"RESTART AT G-CODE LINE 9." in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_random_lines_of_the_examples(example, tmp_path):
     done = trials.drawn([example], 4, 7, tmp_path / "cell.toml")

@@ -207,6 +207,8 @@ class Planner:
     ) -> tuple[Triggers, Floats]:
         """Return the trigger of each knot, and (k,) the time in s by which it is earlier than needed.
 
+        Dwells do not count: no trigger can act while the program waits, and their length is known.
+
         A receiver of values ramps towards the knot it has been told, so it must hear of it before the knot
         before; one that has the sidecar need not. ``ends`` adds one that acts the lead ahead of the last
         knot, so that no receiver runs beyond it.
@@ -221,7 +223,9 @@ class Planner:
             end_s = knots.time_s[-1] - self.cell.pilot.lead_s - _SAFE_S
             deadline_s, earliest_s = np.append(deadline_s, end_s), np.append(earliest_s, earliest_s[-1])
         triggers = place_triggers(deadline_s, earliest_s, windows, self.cell, spread=spread)
-        return triggers, np.nan_to_num(deadline_s - triggers.fire_s)
+        sooner_s = deadline_s - triggers.fire_s
+        dwelt_s = windows.dwelt_s(deadline_s) - windows.dwelt_s(triggers.fire_s)
+        return triggers, np.nan_to_num(sooner_s - dwelt_s)
 
     def _waiting(self, triggers: Triggers) -> Rows:
         """Return how many triggers (k,) wait from each on."""

@@ -46,6 +46,19 @@ class Windows:
     section_s: Floats
     """(c,) instants at which the robot starts anew after a standstill whose length nobody knows (M-codes,
     tool changes, PTP), the program's start being the first."""
+    dwell_from_s: Floats
+    """(d,) instants at which the robot comes to rest for a dwell of stated length."""
+    dwell_s: Floats
+    """(d,) how long each lasts."""
+
+    def dwelt_s(self, time_s: Floats) -> Floats:
+        """Return for how long the robot has dwelt up to instants (k,)."""
+        if len(self.dwell_s) == 0:
+            return np.zeros(len(time_s))
+        begins_and_ends_s = np.column_stack([self.dwell_from_s, self.dwell_from_s + self.dwell_s])
+        whole_s = np.concatenate([[0.0], np.cumsum(self.dwell_s)])
+        dwelt_s = np.column_stack([whole_s[:-1], whole_s[1:]])
+        return np.asarray(np.interp(time_s, begins_and_ends_s.ravel(), dwelt_s.ravel()))
 
     def earliest_s(self, time_s: Floats) -> Floats:
         """Return the start of the section to which instants (k,) belong."""
@@ -82,6 +95,8 @@ def windows_of(targets: Targets, chain: Chain, motion: Motion | PilotForce, cell
     begin_s = clock.departure(leave_mm if COUNTS_FROM_END_OF_ARC else _arc_starts(arrive_mm), stops[:-1])
     rows = chain.first + 1 + np.arange(len(straight_mm))
     carries = ~targets.ptp[rows] & (straight_mm + head_mm + tail_mm > _AT_REST_MM)
+    dwells = targets.wait_s[rows] > 0
+    dwell_from_s, dwell_s = _one_after_another(end_s[dwells], targets.wait_s[rows][dwells])
     begin_s, end_s = begin_s[carries], end_s[carries]
     begin_s = np.maximum.accumulate(begin_s)
     return Windows(
@@ -94,7 +109,15 @@ def windows_of(targets: Targets, chain: Chain, motion: Motion | PilotForce, cell
         head_mm=head_mm[carries],
         tail_mm=tail_mm[carries],
         section_s=_sections(targets, chain, clock, leave_mm),
+        dwell_from_s=dwell_from_s,
+        dwell_s=dwell_s,
     )
+
+
+def _one_after_another(from_s: Floats, lasting_s: Floats) -> tuple[Floats, Floats]:
+    """Return begin and length (d,) of dwells; those at one place follow each other."""
+    before_s = np.cumsum(lasting_s) - lasting_s
+    return np.maximum.accumulate(from_s - before_s) + before_s, lasting_s
 
 
 def _arc_starts(arrive_mm: Floats) -> Floats:

@@ -103,6 +103,7 @@ def of_library(inputs, effects, grid):
     return {"tcp": tip, "force": force, "servo": act - cmd, "gear": load - act, "part": part}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", cases.simulated())
 def test_the_same_effect_does_the_same(name, nominal):
     """Sign, size and axes of the plant's form are those of the library with the label's numbers."""

@@ -36,7 +36,7 @@ def damaged(program, seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("rows", [1, 7, 1000])
+@pytest.mark.parametrize("rows", [pytest.param(1, marks=pytest.mark.slow), 7, 1000])
 def test_the_chunks_do_not_matter(case, seed, rows, monkeypatch):
     program, targets, joints, cell = case
     program = damaged(program, seed)

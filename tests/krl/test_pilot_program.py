@@ -256,6 +256,22 @@ def test_a_dwell_is_known_time(make):
     assert made.codes == set()
 
 
+def test_the_force_behind_a_long_dwell_is_announced_before_it(make):
+    prediction = predicted("G1 Z-1 F600\nG1 X60\nG4 P2\nG4 P1.5\nG1 X90\n")
+    motion = prediction.motion
+    stands = np.flatnonzero(motion.speed_mm_s == 0)
+    stands = stands[np.abs(motion.position_mm[stands, 0] - 60.0) < 0.1]
+    rests_s, again_s = (float(motion.time_s[stands[k]]) for k in (0, -1))
+    assert again_s - rests_s > 3.4
+    dense = [(rests_s - 1.0 + 0.02 * k, 200.0 * (k % 2)) for k in range(30)]
+    points = [*dense, (rests_s - 0.012, 200), (rests_s, 0), (again_s, 0), (again_s + 0.012, 300)]
+    made = make(prediction, force_by_time(prediction, [*points, (again_s + 0.6, 0)]))
+    check(made)
+    assert made.lead_s.min() >= LEAD_S
+    assert made.lead_s.max() == pytest.approx(again_s - rests_s, abs=0.1)
+    assert made.codes <= {"pilot-tolerance"}
+
+
 # --- many knots in few motions --------------------------------------------------------------------------
 
 

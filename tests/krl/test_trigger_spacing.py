@@ -16,7 +16,19 @@ def windows_of_short_motions(chance, count):
     begin = np.concatenate([[0.0], np.cumsum(length + corner)[:-1]])
     row = np.arange(1, count + 1)
     zero = np.zeros(count)
-    return Windows(row, row, begin, begin + length, begin, begin + length, zero, zero, np.zeros(1))
+    return Windows(
+        row,
+        row,
+        begin,
+        begin + length,
+        begin,
+        begin + length,
+        zero,
+        zero,
+        np.zeros(1),
+        np.zeros(0),
+        np.zeros(0),
+    )
 
 
 def test_triggers_of_two_motions_never_act_in_one_cycle():

@@ -1,0 +1,13 @@
+"""The plant's own tests are slow ones: the README's command leaves them out, ``.ci/run`` runs them."""
+
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.slow)
