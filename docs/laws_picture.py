@@ -20,7 +20,7 @@ ANGLE_DEG, LINE_MM, SPEED_MM_S = 75.0, 230.0, 400.0
 CDIS_MM = (20.0, 60.0, 100.0, 200.0)
 K_S = 0.168
 STEPS = ((25.0, 2000.0), (400.0, 2000.0))
-"""Speed in mm/s and acceleration in mm/s²: milling, where k rules, and a study of the paper, where v/a does."""
+"""Speed in mm/s and acceleration in mm/s²: milling, where k rules, and the paper, where v/a does."""
 
 
 def draw(target: Path) -> None:

@@ -25,7 +25,15 @@ def main() -> int:
     parser.add_argument("--into", type=Path, default=ROOT / "site", metavar="FOLDER")
     folder = parser.parse_args().into.resolve()
     started = time.perf_counter()
-    words = ["build", "--strict", "--quiet", "--config-file", str(ROOT / "mkdocs.yml"), "--site-dir", str(folder)]
+    words = [
+        "build",
+        "--strict",
+        "--quiet",
+        "--config-file",
+        str(ROOT / "mkdocs.yml"),
+        "--site-dir",
+        str(folder),
+    ]
     done = subprocess.run([sys.executable, "-m", "mkdocs", *words], env={**os.environ, **QUIET})
     if done.returncode != 0:
         return 1

@@ -1,7 +1,7 @@
-"""Read the parameters of a docstring as this project writes them: ``name : what it is``, shape and unit first.
+"""Read the parameters of a docstring as this project writes them: ``name : what it is``.
 
 The numpy style has the type behind the colon. Here types stand in the signature, so what stands there is the
-beginning of the description.
+beginning of the description. Names that share an entry become one each.
 """
 
 import re
@@ -10,7 +10,7 @@ from typing import Any
 import griffe
 
 _SECTION = re.compile(r"^(Parameters|Returns|Attributes)\n-+\n", re.M)
-_ENTRY = re.compile(r"^(\w[\w, *]*) : (.+)$", re.M)
+_ENTRY = re.compile(r"^(\w[\w, *]*) : ([^\n]+(?:\n +[^\n]+)*)", re.M)
 _NEXT = re.compile(r"^\w[^\n]*\n-{3,}\n", re.M)
 
 
@@ -21,7 +21,11 @@ def described(text: str) -> str:
         following = _NEXT.search(text, section.end())
         stop = following.start() if following else len(text)
         colon = " :" if section[1] == "Returns" else ""
-        entries = _ENTRY.sub(rf"\1{colon}\n    \2", text[section.end() : stop])
+
+        def entry(match: re.Match[str], colon: str = colon) -> str:
+            return "\n".join(f"{name}{colon}\n    {match[2]}" for name in match[1].split(", "))
+
+        entries = _ENTRY.sub(entry, text[section.end() : stop])
         pieces += [text[end : section.end()], entries]
         end = stop
     return "".join(pieces) + text[end:]

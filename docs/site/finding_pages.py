@@ -39,8 +39,12 @@ def pages() -> dict[str, str]:
 
 
 def linked(table: str) -> str:
-    """Return the table of all findings with each code a link to its page."""
-    return re.sub(r"^\| `([a-z0-9-]+)` \|", r"| [`\1`](findings/\1.md) |", table, flags=re.M)
+    """Return the page of all findings with each code a link to its page, which has example and remedy."""
+    head = re.compile(r"^\| code \|.*\n\|.*\n", re.M)
+    rows = re.compile(r"^\| `([a-z0-9-]+)` \| ([^|]*) \| ((?:\\\||[^|])*) \|.*$", re.M)
+    shorter = head.sub("| code | severity | why |\n| --- | --- | --- |\n", table)
+    shorter = shorter.replace("the last column says when", "its page says when")
+    return rows.sub(r"| [`\1`](findings/\1.md) | \2 | \3 |", shorter)
 
 
 def _page(code: Code, codes: dict[str, Code]) -> str:
@@ -60,7 +64,12 @@ def _page(code: Code, codes: dict[str, Code]) -> str:
 def _relatives(code: Code, codes: dict[str, Code]) -> str:
     """Return the findings that this one follows from, and those that follow from it."""
     after = [each.name for each in codes.values() if code.name in each.follows]
-    kinds = (("Counted behind its cause where it follows from", code.follows), ("What may follow from it", after))
+    kinds = (
+        ("Counted behind its cause where it follows from", code.follows),
+        ("What may follow from it", after),
+    )
     return "".join(
-        f"{words}: {', '.join(f'[`{name}`]({name}.md)' for name in names)}.\n\n" for words, names in kinds if names
+        f"{words}: {', '.join(f'[`{name}`]({name}.md)' for name in names)}.\n\n"
+        for words, names in kinds
+        if names
     )

@@ -1,17 +1,16 @@
-"""What mkdocs calls while it builds the site: equations, generated pages, pictures that the tool draws now."""
+"""What mkdocs calls while it builds the site: equations, generated pages, pictures that the tool draws."""
 
 import re
 import tempfile
 from pathlib import Path
 
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
-from mkdocs.structure.pages import Page
-
 import finding_pages
 import pictures
 import reference
 from mathml import Equations
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = Path(__file__).with_name("assets")

@@ -51,9 +51,7 @@ def _read(path: Path) -> _Page:
     return page
 
 
-def _troubles(
-    path: Path, page: _Page, pages: dict[Path, _Page], site: Path
-) -> Iterator[tuple[str, str]]:
+def _troubles(path: Path, page: _Page, pages: dict[Path, _Page], site: Path) -> Iterator[tuple[str, str]]:
     for address, fetched in page.links:
         parts = urlsplit(address)
         if parts.scheme == "data":

@@ -37,7 +37,9 @@ def inline(latex: str) -> str:
 def _mathml(latex: str, display: str) -> str:
     """Return LaTeX as MathML; a command that is not known is an error, not a word of the equation."""
     text = convert(_WORD.sub(r"\\text{\1}", latex.strip()), display=display)
-    unknown = [each.text for each in ElementTree.fromstring(text).iter() if (each.text or "").startswith("\\")]
+    unknown = [
+        each.text for each in ElementTree.fromstring(text).iter() if (each.text or "").startswith("\\")
+    ]
     if unknown:
         raise ValueError(f"{' '.join(map(str, unknown))} in the equation {latex.strip()!r} is not known")
     return text

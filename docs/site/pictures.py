@@ -1,12 +1,16 @@
 """The pictures of the site, drawn by the tool while the site is built, so that none shows an earlier state.
 
-What takes longer than a build may is kept in ``docs/images``: ``gap_backlash.png`` (a diagnosis, made by
-``docs/diagnose_example.py``), ``report.png`` (needs a browser, ``docs/report_picture.py``) and ``before_*.png``
-(an earlier version, for comparison).
+What takes longer than a build may is kept in ``docs/images``: ``gap_backlash.png`` (a diagnosis,
+``docs/diagnose_example.py``), ``report.png`` (needs a browser, ``docs/report_picture.py``) and
+``before_*.png`` (an earlier version, for comparison).
+
+python docs/site/pictures.py     puts the others there, too, for reading the documents in the repository
 """
 
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +28,7 @@ OF_THE_PIECE = (
     "deflection_path",
     "deflection_joints",
 )
-MAPS = ("workspace", "spin", "joints")
+MAPS = ("workspace", "spin")
 REPORT = "report_of_the_test_piece.html"
 LIVE_REPORT = ("(images/report.png)\n", f"(images/report.png)\n\n[Open this page]({REPORT})\n")
 
@@ -70,3 +74,15 @@ def _run(*words: str) -> None:
     done = subprocess.run([sys.executable, *words], cwd=ROOT, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"python {' '.join(words)}\n{done.stderr}")
+
+
+def main() -> None:
+    """Draw the pictures into ``docs/images``."""
+    with tempfile.TemporaryDirectory() as scratch:
+        for name, path in draw(Path(scratch)).items():
+            if name.startswith("images/"):
+                shutil.copy(path, ROOT / "docs" / name)
+
+
+if __name__ == "__main__":
+    main()
