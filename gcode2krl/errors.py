@@ -19,16 +19,25 @@ _MOST_ALIKE = 5
 """If a code has more different messages, those that differ only in their figures are one line."""
 _LINES_NAMED = 3
 _RANK: dict[Severity, int] = {"error": 0, "warning": 1, "note": 2}
+_MOST_OF_A_REPR = 160
+"""Letters of a finding where it is shown on one line among others."""
 _FIGURE = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Issue:
     """One finding.
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
     kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``. ``excerpt`` quotes the
     input, with a caret before the culprit. ``key`` is the dotted key of the cell file that is meant, if any.
+
+    >>> from gcode2krl import predict
+    >>> issue = predict("part.nc").issues[0]
+    >>> issue
+    Issue(note cell-not-verified: the cell has not been confirmed by a person; the program begins with a HALT)
+    >>> issue.line
+    0
     """
 
     severity: Severity
@@ -39,8 +48,17 @@ class Issue:
     excerpt: str = ""
     key: str = ""
 
+    def __repr__(self) -> str:
+        place = f", line {self.line}" if self.line > 0 else ""
+        return _shortened(f"Issue({self.severity} {self.code}{place}: {self.message}", _MOST_OF_A_REPR) + ")"
+
     def advice(self) -> str:
-        """Return the remedy of the finding, or else that of its code in the table."""
+        """Return the remedy of the finding, or else that of its code in the table.
+
+        >>> from gcode2krl import Issue
+        >>> Issue("error", "spindle-off", 6, "feed move with the spindle off").advice()
+        'program S and M3 before the cut; M6 stops the spindle'
+        """
         entry = None if self.remedy else all_codes().get(self.code)
         if entry is None:
             return self.remedy
@@ -51,6 +69,10 @@ class Issue:
         """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.
 
         ``also`` follows the message: where else the same was found.
+
+        >>> from gcode2krl import Issue
+        >>> Issue("error", "feed-missing", 7, "no feed", "program F").text("part.nc")
+        'part.nc:7: error: no feed [feed-missing] -> program F'
         """
         place = f"{source}:{self.line}" if self.line > 0 and source else source
         if not source and self.line > 0:
@@ -61,6 +83,10 @@ class Issue:
         near = f", near `{self.excerpt}`" if self.excerpt else ""
         others = f" ({also})" if also else ""
         return f"{head}{self.message}{near}{others} [{self.code}]{tail}"
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +212,13 @@ class Gcode2KrlError(Exception):
     """Base of all errors a user can act on; ``issues`` holds every finding, ``source`` the file's name.
 
     Its text is what the commands print: `told` of the findings.
+
+    >>> from gcode2krl import Gcode2KrlError, read_gcode
+    >>> try:
+    ...     read_gcode("missing.nc")
+    ... except Gcode2KrlError as error:
+    ...     print(error.exit_code, error.issues[0].code)
+    2 file-unreadable
     """
 
     exit_code = 2

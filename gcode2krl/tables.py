@@ -4,16 +4,18 @@ A table is a frozen dataclass of numpy columns, rows first, read-only once built
 table; it never changes another's.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints32
-from gcode2krl.compiled.inputs import locked
-from gcode2krl.errors import Issue
+from gcode2krl.exchange.table import Table as Table
+from gcode2krl.exchange.table import column, derived_column
+from gcode2krl.units import DEG_PER_RAD
 
 
 class Event(NamedTuple):
@@ -31,46 +33,6 @@ class Event(NamedTuple):
     values: dict[str, Any]
 
 
-def _column(dtype: DTypeLike, *tail: int | None) -> Any:
-    """Declare a column of the given dtype and trailing shape; None is a width that the data decide."""
-    return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
-
-
-def _derived_column(dtype: DTypeLike, *tail: int) -> Any:
-    """Declare a column that the table derives from the others where it is not given."""
-    return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail})
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
-    """Base of all tables: checks and freezes the columns."""
-
-    issues: tuple[Issue, ...] = ()
-
-    def __post_init__(self) -> None:
-        rows = -1
-        for spec in fields(self):
-            if "tail" not in spec.metadata:
-                continue
-            values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"])
-            rows = len(values) if rows < 0 else rows
-            wanted = (rows, *spec.metadata["tail"])
-            fits = values.ndim == len(wanted) and all(
-                size in (None, found) for size, found in zip(wanted, values.shape, strict=True)
-            )
-            if not fits:
-                raise ValueError(
-                    f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}"
-                )
-            object.__setattr__(self, spec.name, locked(values))
-
-    def __len__(self) -> int:
-        for spec in fields(self):
-            if "tail" in spec.metadata:
-                return len(getattr(self, spec.name))
-        return 0
-
-
 @dataclass(frozen=True)
 class Restart:
     """Where a program begins that does not run from its start (`program.restart`)."""
@@ -83,6 +45,22 @@ class Restart:
     """Rows of the Toolpath, from row 1 on, that lead to the first position."""
     left: object = field(default=None, repr=False)
     """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """What Targets leave out of the G-code's corners (`program.merging`)."""
+
+    tolerance_mm: float
+    """How far a corner that is left out may be from the new move."""
+    moves: int = 0
+    """Feed moves of the G-code."""
+    left_out: int = 0
+    """Corners between them."""
+    largest_mm: float = 0.0
+    """How far one is off at most."""
+    worst_line: int = 0
+    """G-code line of the move that is off most."""
 
 
 AnyTable = TypeVar("AnyTable", bound=Table)
@@ -174,43 +152,47 @@ def _concatenated(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate(parts)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Toolpath(Table):
     """What the G-code says: a row per straight move, row 0 the start point."""
 
-    position_mm: Floats = _column(np.float64, 3)
+    position_mm: Floats = column(np.float64, 3)
     """(n, 3) tool tip in the frame in which work offsets are stated (``$BASE``)."""
-    axis: Floats = _column(np.float64, 3)
+    axis: Floats = column(np.float64, 3)
     """(n, 3) unit vector from tip to holder."""
-    rapid: Bools = _column(np.bool_)
-    feed_mm_s: Floats = _column(np.float64)
+    rapid: Bools = column(np.bool_)
+    feed_mm_s: Floats = column(np.float64)
     """(n,) programmed speed, inf on rapids."""
-    spindle_rad_s: Floats = _column(np.float64)
+    spindle_rad_s: Floats = column(np.float64)
     """(n,) positive for M3."""
-    tool: Ints32 = _column(np.int32)
+    tool: Ints32 = column(np.int32)
     """(n,) tool in the spindle during the row; 0 = none named so far."""
-    exact_stop: Bools = _column(np.bool_)
-    tolerance_mm: Floats = _column(np.float64)
+    exact_stop: Bools = column(np.bool_)
+    tolerance_mm: Floats = column(np.float64)
     """(n,) blend tolerance of ``G64 P``, NaN = none."""
-    dwell_s: Floats = _column(np.float64)
-    source_line: Ints32 = _column(np.int32)
+    dwell_s: Floats = column(np.float64)
+    source_line: Ints32 = column(np.int32)
     """(n,) 1-based line of the file."""
-    arc: Ints32 = _column(np.int32)
+    arc: Ints32 = column(np.int32)
     """(n,) number of the arc this row is a chord of, or -1."""
-    machine: Bools = _column(np.bool_)
+    machine: Bools = column(np.bool_)
     """(n,) rows from G28, G30 and G53."""
-    known: Bools = _column(np.bool_, 3)
+    known: Bools = column(np.bool_, 3)
     """(n, 3) True where the axis has been programmed in the part frame since the start, the last machine
     move of that axis or (Z) the last change of tool length offset. Only rows that are all True are
     positions a robot may be sent to."""
-    length_offset_mm: Floats = _column(np.float64)
+    length_offset_mm: Floats = column(np.float64)
     """(n,) tool length offset in force (G43), NaN = none (G49)."""
-    length_offset_tool: Ints32 = _column(np.int32)
+    length_offset_tool: Ints32 = column(np.int32)
     """(n,) the tool whose length that is (H), -1 = none."""
     events: tuple[Event, ...] = ()
     source: str = ""
     restart: Restart | None = None
     """None: the program runs from its start."""
+
+    def facts(self) -> str:
+        """Return how many moves there are, and the program's name."""
+        return f"{max(len(self) - 1, 0)} moves{_of(self.source)}"
 
     def is_position(self) -> Bools:
         """Return (n,) True where X, Y and Z are all known: a point a robot may be sent to."""
@@ -219,59 +201,67 @@ class Toolpath(Table):
         return result
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Targets(Table):
     """What the KRL program says: a row per motion; planned, written and read back as this one table."""
 
-    position_mm: Floats = _column(np.float64, 3)
+    position_mm: Floats = column(np.float64, 3)
     """(p, 3) tool tip in ``$BASE``."""
-    rotation: Floats = _column(np.float64, 4)
+    rotation: Floats = column(np.float64, 4)
     """(p, 4) quaternion x, y, z, w of the tool frame in ``$BASE``; z points from tip to holder."""
-    ptp: Bools = _column(np.bool_)
-    home: Bools = _column(np.bool_)
+    ptp: Bools = column(np.bool_)
+    home: Bools = column(np.bool_)
     """(p,) True for PTP HOME, which is written as joint angles."""
-    speed_mm_s: Floats = _column(np.float64)
+    speed_mm_s: Floats = column(np.float64)
     """(p,) path speed, NaN on PTP."""
-    cdis_mm: Floats = _column(np.float64)
+    cdis_mm: Floats = column(np.float64)
     """(p,) approximation distance at the end of this motion, 0 = exact stop."""
-    wait_s: Floats = _column(np.float64)
+    wait_s: Floats = column(np.float64)
     """(p,) dwell at the target."""
-    move: Ints32 = _column(np.int32)
+    move: Ints32 = column(np.int32)
     """(p,) row of Toolpath, -1 = added (HOME, approach, final retract)."""
-    source_line: Ints32 = _column(np.int32)
+    source_line: Ints32 = column(np.int32)
     """(p,) line of the G-code, 0 = added."""
-    tool: Ints32 = _column(np.int32)
+    tool: Ints32 = column(np.int32)
     """(p,) tool number whose frame moves."""
     events: tuple[Event, ...] = ()
     source: str = ""
     restart: Restart | None = None
     """That of the Toolpath."""
+    simplified: Simplified | None = None
+    """None: every corner of the G-code is a target."""
+    correction_mm: float = 0.0
+    """How far targets are moved at most, by offline compensation."""
+
+    def facts(self) -> str:
+        """Return how many motions there are, and the program's name."""
+        return f"{len(self)} motions{_of(self.source)}"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Motion(Table):
     """What the controller will command: a row per time sample, from the first programmed position at rest
     to the end of the last programmed move."""
 
-    time_s: Floats = _column(np.float64)
-    position_mm: Floats = _column(np.float64, 3)
+    time_s: Floats = column(np.float64)
+    position_mm: Floats = column(np.float64, 3)
     """(m, 3) tool tip in ``$BASE``."""
-    rotation: Floats = _column(np.float64, 4)
+    rotation: Floats = column(np.float64, 4)
     """(m, 4) quaternion x, y, z, w of the tool frame in ``$BASE``."""
-    speed_mm_s: Floats = _column(np.float64)
-    acceleration_mm_s2: Floats = _column(np.float64)
+    speed_mm_s: Floats = column(np.float64)
+    acceleration_mm_s2: Floats = column(np.float64)
     """(m,) magnitude of the acceleration vector of the tip."""
-    jerk_mm_s3: Floats = _column(np.float64)
+    jerk_mm_s3: Floats = column(np.float64)
     """(m,) magnitude of the jerk vector of the tip."""
-    path_mm: Floats = _column(np.float64)
+    path_mm: Floats = column(np.float64)
     """(m,) arc length along the blended path."""
-    move: Ints32 = _column(np.int32)
+    move: Ints32 = column(np.int32)
     """(m,) row of Toolpath."""
-    corner: Bools = _column(np.bool_)
+    corner: Bools = column(np.bool_)
     """(m,) True inside an approximated corner."""
-    tool: Ints32 = _column(np.int32)
+    tool: Ints32 = column(np.int32)
     """(m,) tool number whose frame moves."""
-    direction: Floats = _derived_column(np.float64, 3)
+    direction: Floats = derived_column(np.float64, 3)
     """(m, 3) unit tangent of the path at the sample, zero in a turn on the spot; where it is not given, that
     of the chords beside the sample."""
 
@@ -279,6 +269,10 @@ class Motion(Table):
         if self.direction is None:
             object.__setattr__(self, "direction", chord_directions(np.asarray(self.position_mm, np.float64)))
         super().__post_init__()
+
+    def facts(self) -> str:
+        """Return how many samples there are, and the time they take."""
+        return f"{len(self)} samples" + (f", {self.time_s[-1]:.1f} s" if len(self) else "")
 
 
 def lengths(vectors: Floats) -> Floats:
@@ -308,71 +302,99 @@ def chord_directions(position_mm: Floats) -> Floats:
     return np.where(length_mm > _NO_CHORD_MM, tangent / np.maximum(length_mm, _NO_CHORD_MM), 0.0)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Joints(Table):
     """Joint angles along a Motion or at Targets."""
 
-    q_rad: Floats = _column(np.float64, 6)
+    q_rad: Floats = column(np.float64, 6)
     """(m, 6) KUKA signs and zero; NaN where out of reach."""
-    qd_rad_s: Floats = _column(np.float64, 6)
+    qd_rad_s: Floats = column(np.float64, 6)
     """(m, 6) joint speeds; NaN for Targets."""
-    limit_margin_rad: Floats = _column(np.float64)
+    limit_margin_rad: Floats = column(np.float64)
     """(m,) distance to the nearest joint limit, negative beyond it."""
-    sigma_min: Floats = _column(np.float64)
+    sigma_min: Floats = column(np.float64)
     """(m,) smallest singular value of the Jacobian, its translations over the length of the stretched arm."""
-    status: Ints32 = _column(np.int32)
+    status: Ints32 = column(np.int32)
     """(m,) KUKA's S bits."""
-    turn: Ints32 = _column(np.int32)
+    turn: Ints32 = column(np.int32)
     """(m,) KUKA's T bits."""
 
+    def facts(self) -> str:
+        """Return how many rows there are, and how near a limit comes."""
+        return f"{len(self)} rows, nearest limit {_most(-self.limit_margin_rad, -DEG_PER_RAD, '.1f')} deg"
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Forces(Table):
     """Cutting forces along a Motion: means over one spindle revolution, on the tool."""
 
-    force_base_N: Floats = _column(np.float64, 3)
+    force_base_N: Floats = column(np.float64, 3)
     """(m, 3) along the axes of ``$BASE``; exactly zero in air."""
-    moment_base_Nmm: Floats = _column(np.float64, 3)
+    moment_base_Nmm: Floats = column(np.float64, 3)
     """(m, 3) about the tool tip, along the axes of ``$BASE``."""
-    peak_N: Floats = _column(np.float64)
+    peak_N: Floats = column(np.float64)
     """(m,) largest force of a revolution; for warnings."""
-    torque_Nmm: Floats = _column(np.float64)
+    torque_Nmm: Floats = column(np.float64)
     """(m,) about the tool axis; the spindle must supply it."""
-    a_p_mm: Floats = _column(np.float64)
+    a_p_mm: Floats = column(np.float64)
     """(m,) axial depth of cut."""
-    a_e_mm: Floats = _column(np.float64)
+    a_e_mm: Floats = column(np.float64)
     """(m,) width of cut normal to the feed."""
-    phi_rad: Floats = _column(np.float64, None)
+    phi_rad: Floats = column(np.float64, None)
     """(m, 2k) entry and exit angles of the engagement arcs from the feed normal, NaN padded."""
-    tool: Ints32 = _column(np.int32)
+    tool: Ints32 = column(np.int32)
     """(m,) tool number that cuts."""
     relative_band: float = 0.0
     """Half-width of the 90 % band of the forces, relative."""
 
+    def facts(self) -> str:
+        """Return how many samples there are, and the largest force."""
+        return f"{len(self)} samples, up to {_most(lengths(self.force_base_N), 1.0, '.0f')} N"
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PilotForce(Table):
     """What the pilot force of a program is made from: of a Motion and its forces a row per time sample."""
 
-    time_s: Floats = _column(np.float64)
-    path_mm: Floats = _column(np.float64)
-    speed_mm_s: Floats = _column(np.float64)
-    acceleration_mm_s2: Floats = _column(np.float64)
-    line: Ints32 = _column(np.int32)
+    time_s: Floats = column(np.float64)
+    path_mm: Floats = column(np.float64)
+    speed_mm_s: Floats = column(np.float64)
+    acceleration_mm_s2: Floats = column(np.float64)
+    line: Ints32 = column(np.int32)
     """(m,) line of the G-code."""
-    force_N: Floats = _column(np.float64, 3)
+    force_N: Floats = column(np.float64, 3)
     """(m, 3) in the pilot frame."""
-    deflection_mm: Floats = _column(np.float64, 3)
+    deflection_mm: Floats = column(np.float64, 3)
     """(m, 3) in the pilot frame; NaN where it is not predicted."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Deflection(Table):
     """How far the tool tip bends away under the forces along a Motion."""
 
-    deflection_base_mm: Floats = _column(np.float64, 3)
+    deflection_base_mm: Floats = column(np.float64, 3)
     """(m, 3) along the axes of ``$BASE``."""
-    correction_base_mm: Floats = _column(np.float64, 3)
+    correction_base_mm: Floats = column(np.float64, 3)
     """(m, 3) minus the deflection, projected normal to the feed (eq. 10 of Haehn & Weigold 2020)."""
     relative_band: float = 0.0
     """Half-width of the 90 % band of the deflection, relative: forces and stiffness."""
+
+    def facts(self) -> str:
+        """Return how many samples there are, and the largest deflection."""
+        return f"{len(self)} samples, up to {_most(lengths(self.deflection_base_mm), 1.0, '.3g')} mm"
+
+
+_MOST_LETTERS = 60
+"""Of the name of a program where a table is shown on one line."""
+
+
+def _of(source: str) -> str:
+    """Return the name of a program behind a comma; of a long one its end."""
+    name = re.split(r"[\\/]", source)[-1]
+    return f", {name[-_MOST_LETTERS:]}" if name else ""
+
+
+def _most(values: Floats, factor: float, form: str) -> str:
+    """Return the largest of values that may be missing, in another unit."""
+    largest = np.fmax.reduce(values, initial=-np.inf)
+    return format(largest * factor, form) if np.isfinite(largest) else "-"

@@ -27,6 +27,7 @@ NOT_CODES = {
     "on-tool",
     "pounds-force",
     "steps-post",
+    "system-out",
     "stiffness-map",
     "utf-8",
     "utf-8-sig",

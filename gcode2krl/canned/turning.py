@@ -11,15 +11,21 @@ from gcode2krl.canned.place import Place
 from gcode2krl.cell import Cell
 from gcode2krl.units import RAD_PER_DEG
 
-TILTS_DEG = (
-    (0.0, 0.0, 15.0),
-    (0.0, 0.0, -15.0),
-    (0.0, 15.0, 0.0),
-    (0.0, -15.0, 0.0),
-    (30.0, 0.0, 0.0),
-    (-30.0, 0.0, 0.0),
+TILTS: tuple[tuple[tuple[float, float, float], tuple[float, ...]], ...] = (
+    ((0.0, 0.0, 1.0), (30.0, 15.0)),
+    ((0.0, 0.0, -1.0), (30.0, 15.0)),
+    ((0.0, 1.0, 0.0), (30.0, 15.0)),
+    ((0.0, -1.0, 0.0), (30.0, 15.0)),
+    ((1.0, 0.0, 0.0), (90.0, 60.0, 30.0)),
+    ((-1.0, 0.0, 0.0), (90.0, 60.0, 30.0)),
 )
-"""A, B, C about the tool's axes: enough to part a tool's error from a frame's, and near for the wrist."""
+"""Directions as A, B, C about the tool's axes, and by how many degrees the tool turns: the first angle that
+keeps clear of limits and of the wrist's singularity, else the last. Every angle parts a tool's error from a
+frame's; a wide one also what looks nearly the same within a few degrees, as an angle of A6 and an eccentric
+A6 do."""
+_CLEAR_RAD = 10.0 * RAD_PER_DEG
+"""From limits, and of A5 from zero."""
+_WAY = np.linspace(0.0, 1.0, 7)[1:]
 TILT_DWELL_S = 3.0
 _TILT_SPEED_MM_S = 25.0
 _LIFT_MM = 20.0
@@ -73,7 +79,8 @@ def tilts(pose: Pose, place: Place, cell: Cell) -> Turn:
     """
     position_mm, rotation = [], []
     above_mm = pose.position_mm + np.array([0.0, 0.0, _LIFT_MM])
-    for tilt in np.array(TILTS_DEG) * RAD_PER_DEG:
+    for direction, angles_deg in TILTS:
+        tilt = _widest(np.array(direction), np.array(angles_deg) * RAD_PER_DEG, pose, place, cell)
         half, whole = (pose.rotation @ turn for turn in fr.rotation_from_abc(np.stack([0.5 * tilt, tilt])))
         position_mm += [above_mm, pose.position_mm] * 2
         rotation += [half, whole, half, pose.rotation]
@@ -85,6 +92,32 @@ def tilts(pose: Pose, place: Place, cell: Cell) -> Turn:
         cdis_mm=np.zeros(count),
         wait_s=np.where(np.arange(count) % 2 == 1, TILT_DWELL_S, 0.0),
     )
+
+
+def _widest(direction: Floats, angles_rad: Floats, pose: Pose, place: Place, cell: Cell) -> Floats:
+    """Return the first tilt A, B, C (3,) in rad whose way is clear, or the last one."""
+    for angle_rad in angles_rad[:-1]:
+        if _is_clear(angle_rad * direction, pose, place, cell):
+            return np.asarray(angle_rad * direction)
+    return np.asarray(angles_rad[-1] * direction)
+
+
+def _is_clear(tilt_rad: Floats, pose: Pose, place: Place, cell: Cell) -> bool:
+    """Tell whether a tilt about the tip stays in the pose's branch, off its limits and its singularity."""
+    rotation = pose.rotation @ fr.rotation_from_abc(_WAY[:, None] * tilt_rad)
+    quaternion = fr.quaternion_from_rotation(np.concatenate([pose.rotation[None], rotation]))
+    position_mm = np.repeat(pose.position_mm[None], len(quaternion), axis=0)
+    branches = robot.inverse(position_mm, quaternion, cell, place.tool)
+    off = branches[0] - pose.q_rad
+    own = int(np.nanargmin(np.abs(np.sin(off / 2.0)).sum(axis=1)))
+    q_rad = np.unwrap(np.concatenate([pose.q_rad[None], branches[1:, own]]), axis=0)
+    if not np.isfinite(q_rad).all() or (np.abs(q_rad[:, 4]) < _CLEAR_RAD).any():
+        return False
+    limits_deg = cell.robot.limits.q_deg
+    if limits_deg is None:
+        return True
+    low, high = (np.array(limits_deg) * RAD_PER_DEG).T
+    return bool((q_rad > low + _CLEAR_RAD).all() and (q_rad < high - _CLEAR_RAD).all())
 
 
 def joint_reversals(joint: int, pose: Pose, place: Place, cell: Cell) -> Turn:

@@ -22,6 +22,7 @@ from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base,
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE, described_schema
 from gcode2krl.cell.key_lines import with_lines
 from gcode2krl.cell.keys import meant_key
+from gcode2krl.cell.looks import cell_html, cell_words
 from gcode2krl.cell.sections import (
     Axis,
     Clearance,
@@ -68,7 +69,15 @@ CODES_WITHOUT_SIGNALS = {
 
 
 class Cell(Section):
-    """A resolved cell; what its file and its base do not state is None, empty or a documented default."""
+    """A resolved cell; what its file and its base do not state is None, empty or a documented default.
+
+    >>> from gcode2krl import load_cell
+    >>> cell = load_cell()
+    >>> cell
+    Cell(KR 300 R2500 ultra, demonstration: KR 300 R2500 ultra, 20 tools, not verified)
+    >>> cell.controller.cycle_s, cell.tool[1].diameter_mm
+    (0.012, 16.0)
+    """
 
     name: OneLine = ""
     based_on: OneLine = ""
@@ -108,23 +117,43 @@ class Cell(Section):
 
     @property
     def is_confirmed(self) -> bool:
-        """True if a person confirmed every value; ``verified`` never covers values that were taken over."""
+        """True if a person confirmed every value; ``verified`` never covers values that were taken over.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().is_confirmed
+        False
+        """
         return self.verified is not None and not self.taken_over
 
     @property
     def clearance_z_mm(self) -> float | None:
-        """Height of the clearance plane in ``$BASE``, None where the cell has none."""
+        """Height of the clearance plane in ``$BASE``, None where the cell has none.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().clearance_z_mm
+        100.0
+        """
         z_mm = self.clearance.z_mm
         return None if z_mm is None or z_mm == "none" else float(z_mm)
 
     def home_q_rad(self) -> Floats:
-        """Return HOME (6,) in radians; raises `RefusedError` where it is not stated."""
+        """Return HOME (6,) in radians; raises `RefusedError` where it is not stated.
+
+        >>> from gcode2krl import load_cell
+        >>> float(load_cell().home_q_rad()[1]).__round__(4)
+        -1.5708
+        """
         if self.home.q_deg is None:
             raise missing("home.q_deg")
         return np.array(self.home.q_deg) * RAD_PER_DEG
 
     def base_matrix(self) -> Floats:
-        """Return ``$BASE`` in the robot root (4, 4); raises `RefusedError` where it is not stated."""
+        """Return ``$BASE`` in the robot root (4, 4); raises `RefusedError` where it is not stated.
+
+        >>> from gcode2krl import load_cell
+        >>> float(load_cell().base_matrix()[0, 3])
+        1500.0
+        """
         base = self.base_in_world()
         robroot = self.frames.robroot
         return base if robroot is None else fr.invert(robroot.matrix()) @ base
@@ -133,6 +162,10 @@ class Cell(Section):
         """Return ``$BASE`` in ``$WORLD`` (4, 4), as KRL states it; raises `RefusedError` where it is missing.
 
         The z of ``$WORLD`` points upwards, however the robot is mounted.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().base_in_world().shape
+        (4, 4)
         """
         if self.frames.base is None:
             raise missing("frames.base")
@@ -143,6 +176,10 @@ class Cell(Section):
 
         A tool of another length than ``frames.tool_length_mm`` has its tip shifted along that axis. Raises
         `RefusedError` where the cell does not state the tool, the frame or a length.
+
+        >>> from gcode2krl import load_cell
+        >>> [float(value) for value in load_cell().tool_matrix(1)[:3, 3]]
+        [250.0, 0.0, 250.0]
         """
         lacking = self.missing_of_tool(number)
         tool, frame = self.tool.get(number), self.frames.tool
@@ -155,7 +192,12 @@ class Cell(Section):
         return frame.matrix() @ shift
 
     def missing_of_tool(self, number: int) -> tuple[str, ...]:
-        """Return the missing keys that the position of a tool's tip depends on; empty if none is missing."""
+        """Return the missing keys that the position of a tool's tip depends on; empty if none is missing.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().missing_of_tool(99)
+        ('tool.99',)
+        """
         tool = self.tool.get(number)
         if tool is None:
             return (f"tool.{number}",)
@@ -169,7 +211,12 @@ class Cell(Section):
         return tuple(key for key, value in stated.items() if value is None)
 
     def templates(self) -> dict[str, str]:
-        """Return key → template of all KRL that the cell brings along."""
+        """Return key → template of all KRL that the cell brings along.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().templates()["m_code.M0"]
+        'HALT'
+        """
         codes = {f"m_code.{code}": text for code, text in self.m_code.items()}
         others = {
             "tool_change": self.tool_change,
@@ -177,6 +224,28 @@ class Cell(Section):
             "program.epilogue": self.program.epilogue,
         }
         return codes | {key: text for key, text in others.items() if text}
+
+    def __repr__(self) -> str:
+        return f"Cell({cell_words(self.name, self.robot.model, len(self.tool), self.is_confirmed)})"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        facts = {
+            "robot": self.robot.model,
+            "controller": self.controller.model,
+            "material": None if self.material is None else self.material.name,
+            "stock": None if self.stock is None else "stated",
+            "$BASE": None if self.frames.base is None else "stated",
+            "spin": self.frames.spin,
+            "confirmed": "yes" if self.is_confirmed else f"no, {len(self.taken_over)} values are taken over",
+        }
+        tools = {
+            number: (tool.model, tool.diameter_mm, tool.teeth, tool.length_mm)
+            for number, tool in self.tool.items()
+        }
+        return cell_html(repr(self), facts, tools)
 
 
 def controller_axes(axis: Axis) -> Floats:
@@ -199,6 +268,11 @@ def load_cell(path: str | Path | None = None) -> Cell:
     """Read a cell file and the cell it is ``based_on``, if any; without a path, the demonstration cell.
 
     Raises `NotUnderstoodError` that names file, key, what was found and what is allowed.
+
+    >>> from gcode2krl import load_cell
+    >>> cell = load_cell("cell.toml")
+    >>> cell.stock.box_mm[1][2]
+    0.0
     """
     if path is None:
         return _default_cell()

@@ -9,17 +9,19 @@ from typing import Any
 import click
 
 from gcode2krl.cli.standard_files import closed, tell
-from gcode2krl.errors import Issue, told
+from gcode2krl.errors import Gcode2KrlError, Issue, told
 from gcode2krl.progress import Begin, Progress, unseen
+from gcode2krl.result import issue_dicts, record_of
 
+__all__ = ["Console", "issue_dicts"]
 _COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
 
 
 class Console:
     """Findings and progress go to standard error, results to standard output."""
 
-    def __init__(self, quiet: bool = False, as_json: bool = False) -> None:
-        self.quiet, self.as_json = quiet, as_json
+    def __init__(self, quiet: bool = False, as_json: bool = False, command: str = "") -> None:
+        self.quiet, self.as_json, self.command = quiet, as_json, command
 
     def findings(self, issues: Iterable[Issue], source: str, notes: bool = True) -> None:
         """Print a line a finding, at most 20, then the counts; errors first, equal findings as one."""
@@ -41,6 +43,12 @@ class Console:
         """Print one error line and return the exit code."""
         tell(f"{click.style('error:', fg='red')} {message}")
         return code
+
+    def refused(self, error: Gcode2KrlError) -> int:
+        """Print the record of a command that an error ended, under ``--json``; return the exit code."""
+        if self.as_json:
+            self.json(record_of(self.command, {}, error.issues, exit_code=error.exit_code))
+        return error.exit_code
 
     def say(self, text: str) -> None:
         """Print a line of the result for a person."""
@@ -77,11 +85,3 @@ class Console:
         """Show the bar of a single stage; yields the function that tells how far it is."""
         with self.stages() as begin:
             yield begin(name)
-
-
-def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
-    """Return findings as the objects of the JSON contract."""
-    return [
-        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.advice()}
-        for i in issues
-    ]

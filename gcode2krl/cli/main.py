@@ -109,46 +109,69 @@ def main(args: list[str] | None = None) -> None:
     sys.exit(code if flushed() else 2)
 
 
-# each branch is a way to end, with its exit code
 def _run(args: list[str] | None) -> int:
     words = sys.argv[1:] if args is None else args
-    console = Console(quiet="-q" in words or "--quiet" in words)
+    console = Console(
+        quiet="-q" in words or "--quiet" in words, as_json="--json" in words, command=_command_in(words)
+    )
     try:
         result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False)
         return int(result) if isinstance(result, int) else 0
     except Gcode2KrlError as error:
         console.findings(error.issues, error.source)
         console.explain_hint(error.issues)
-        return error.exit_code
+        return console.refused(error)
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
-    except click.exceptions.NoArgsIsHelpError as error:
-        return console.failed(_missing_subcommand(error), 2)
-    except click.ClickException as error:
-        return console.failed(f"{error.format_message()} -> `gcode2krl --help` lists the options", 2)
     except BrokenPipeError:
         return 2
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else "standard input or output: "
-        return console.failed(f"{place}{error.strerror or error} -> check path, rights and space", 2)
-    except (MemoryError, RecursionError) as error:
-        return console.failed(f"not enough memory for this input ({type(error).__name__})", 2)
-    except Exception as error:  # a defect of the program: one line for the user, the rest on request
-        if "-v" in words or "--verbose" in words:
+    except Exception as error:
+        if not _is_foreseen(error) and ("-v" in words or "--verbose" in words):
             raise
-        return console.failed(
-            f"internal error, please report it: {type(error).__name__}: {error} -> -v shows the details",
-            2,
-        )
+        ours = _as_ours(error)
+        issue = ours.issues[0]
+        console.failed(f"{issue.message} -> {issue.remedy}" if issue.remedy else issue.message, 2)
+        return console.refused(ours)
 
 
-def _missing_subcommand(error: click.exceptions.NoArgsIsHelpError) -> str:
-    """Return the error line for a command without its subcommand."""
+def _is_foreseen(error: Exception) -> bool:
+    return isinstance(error, (click.ClickException, OSError, MemoryError, RecursionError))
+
+
+def _as_ours(error: Exception) -> Gcode2KrlError:
+    """Return the one line that a user gets of an error that is none of ours."""
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        return input_error("option-value", *_missing_subcommand(error))
+    if isinstance(error, click.ClickException):
+        return input_error("option-value", error.format_message(), "`gcode2krl --help` lists the options")
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else "standard input or output: "
+        sentence = f"{place}{error.strerror or error}"
+        return input_error("output-unwritable", sentence, "check path, rights and space")
+    if isinstance(error, (MemoryError, RecursionError)):
+        return input_error("no-memory", f"not enough memory for this input ({type(error).__name__})")
+    # a defect of the program: one line for the user, the rest on request
+    sentence = f"internal error, please report it: {type(error).__name__}: {error}"
+    return input_error("internal-error", sentence, "-v shows the details")
+
+
+def _command_in(words: list[str]) -> str:
+    """Return the command that words name, ``translate`` where the first is none."""
+    named = [word for word in words[:2] if not word.startswith("-")]
+    if not named or named[0] not in _COMMANDS:
+        return "translate"
+    group = commands.get_command(click.Context(commands), named[0]) if len(named) > 1 else None
+    is_sub = isinstance(group, click.Group) and named[1] in group.commands
+    return " ".join(named[: 2 if is_sub else 1])
+
+
+def _missing_subcommand(error: click.exceptions.NoArgsIsHelpError) -> tuple[str, str]:
+    """Return message and remedy for a command without its subcommand."""
     context = error.ctx
     path = context.command_path if context is not None else "gcode2krl"
     command = context.command if context is not None else commands
     words = command.list_commands(context) if context and isinstance(command, click.Group) else []
-    return f"{path}: name one of {', '.join(words)} -> `{path} --help` tells more"
+    return f"{path}: name one of {', '.join(words)}", f"`{path} --help` tells more"
 
 
 if __name__ == "__main__":

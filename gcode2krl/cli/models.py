@@ -53,12 +53,17 @@ def show(name: str) -> None:
     raise input_error("model-unknown", f"no model {name!r}", "`gcode2krl models list` lists them")
 
 
-@command.command("schema", epilog=examples("gcode2krl models schema > cell.schema.json"))
-def schema() -> None:
-    """Print the JSON schema of a cell file, for editors."""
+@command.command(
+    "schema",
+    epilog=examples("gcode2krl models schema > cell.schema.json", "gcode2krl models schema result"),
+)
+@click.argument("what", type=click.Choice(["cell", "result"]), default="cell")
+def schema(what: str) -> None:
+    """Print the JSON schema of a cell file, for editors, or that of what --json prints."""
     from gcode2krl.cell import cell_schema
+    from gcode2krl.result.model import result_schema
 
-    click.echo(json.dumps(cell_schema(), indent=2))
+    click.echo(json.dumps(cell_schema() if what == "cell" else result_schema(), indent=2))
 
 
 @command.command(

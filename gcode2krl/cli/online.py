@@ -72,8 +72,8 @@ def simulate_command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    tolerance: float | None,
-    chord_tolerance: float,
+    tolerance_mm: float | None,
+    chord_tolerance_mm: float,
     block_delete: bool,
     plot: str | None,
     **options: Any,
@@ -89,7 +89,7 @@ def simulate_command(
     cell = read_cell(cell_path)
     settings = _changed(cell.online, options)
     world_values = _world_values(options)
-    prediction = _predicted(part, cell, settings, console, tolerance, chord_tolerance, block_delete)
+    prediction = _predicted(part, cell, settings, console, tolerance_mm, chord_tolerance_mm, block_delete)
     from gcode2krl.online.judge import judged as judge
     from gcode2krl.online.outcome import as_json as outcome_json
     from gcode2krl.online.outcome import findings, simulate_all
@@ -209,8 +209,8 @@ def _predicted(
     cell: "Cell",
     settings: "Online",
     console: Console,
-    tolerance: float | None,
-    chord_tolerance: float,
+    tolerance_mm: float | None,
+    chord_tolerance_mm: float,
     block_delete: bool,
 ) -> "Prediction":
     """Predict a part at the cycle of the settings; a prediction's folder is loaded unchanged."""
@@ -227,10 +227,10 @@ def _predicted(
     from gcode2krl.pipeline import predict_toolpath
 
     try:
-        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
         with console.stages() as begin:
             return predict_toolpath(
-                toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance, begin=begin
+                toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance_mm, begin=begin
             )
     except Gcode2KrlError as error:
         error.source = error.source or part

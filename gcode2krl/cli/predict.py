@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.help_examples import examples
@@ -28,24 +27,11 @@ from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, so
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from gcode2krl.arrays import Floats
     from gcode2krl.cutting.nominal import Comparison
     from gcode2krl.prediction import Prediction
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
-_FIGURES = (
-    "path",
-    "kinematics",
-    "joints",
-    "force",
-    "force_path",
-    "deflection",
-    "deflection_path",
-    "deflection_joints",
-)
 
 
 @click.command(
@@ -86,8 +72,8 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    tolerance: float | None,
-    chord_tolerance: float,
+    tolerance_mm: float | None,
+    chord_tolerance_mm: float,
     block_delete: bool,
     job_path: str | None,
     dt_s: float | None,
@@ -116,17 +102,17 @@ def command(
         )
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
-        toolpath = read_part(part, cell, console, chord_tolerance, block_delete)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.stages() as begin:
-            settings = {"chord_tolerance_mm": chord_tolerance, "block_delete": block_delete}
+            settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
             prediction = predict_toolpath(
                 toolpath,
                 cell,
                 dt_s=dt_s,
-                tolerance_mm=tolerance,
+                tolerance_mm=tolerance_mm,
                 settings=settings,
                 forces=not no_forces,
                 begin=begin,
@@ -191,10 +177,11 @@ def command(
 def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) -> None:
     """Raise where an output is an input, has no folder, or its folder has foreign files."""
     from gcode2krl.prediction import RECORD, refuse_foreign
+    from gcode2krl.prediction.plots import FIGURES
 
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
-    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in _FIGURES)]
+    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in FIGURES)]
     require_folder(folder, names, inputs)
     if part_mesh is None:
         return
@@ -245,24 +232,11 @@ def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> 
 
 
 def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Path]:
-    """Draw path, speed and joints; returns the files."""
+    """Draw every stage that ran; returns the files."""
+    from gcode2krl.figures import figures_of
     from gcode2krl.report.figures import save_figures
-    from gcode2krl.report.joints import joints_figure
-    from gcode2krl.report.kinematics import kinematics_figure
-    from gcode2krl.report.path import path_figure
 
-    motion, joints, robot = prediction.motion, prediction.joints, prediction.cell.robot
-    if motion is None or joints is None:
-        return []
-    limits = np.array(robot.limits.q_deg) if robot.limits.q_deg is not None else None
-    speeds = np.array(robot.speeds.qd_deg_s) if robot.speeds.qd_deg_s is not None else None
-    drawn = {
-        "path": path_figure(prediction.toolpath, prediction.targets, motion),
-        "kinematics": kinematics_figure(prediction.toolpath, motion),
-        "joints": joints_figure(motion, joints, limits, speeds, prediction.toolpath),
-        **_load_figures(prediction),
-    }
-    return save_figures(drawn, folder, inputs)
+    return save_figures(figures_of(prediction), folder, inputs)
 
 
 def _folder(part: str, output: str | None) -> Path:
@@ -274,55 +248,3 @@ def _folder(part: str, output: str | None) -> Path:
     if folder.exists() and not folder.is_dir():
         raise input_error("output-unwritable", "this is a file", "name a folder", source=str(folder))
     return folder
-
-
-def _load_figures(prediction: "Prediction") -> "dict[str, Figure]":
-    """Return the figures of forces and deflection, where they are known."""
-    from gcode2krl.report.coloured_path import coloured_path_figure
-    from gcode2krl.report.deflections import deflection_figure, share_figure
-    from gcode2krl.report.forces import force_figure
-
-    toolpath, motion, forces = prediction.toolpath, prediction.motion, prediction.forces
-    deflection, joints = prediction.deflection, prediction.joints
-    if motion is None or forces is None:
-        return {}
-    size_N = np.linalg.norm(forces.force_base_N, axis=1)
-    drawn = {
-        "force": force_figure(toolpath, motion, forces),
-        "force_path": coloured_path_figure(
-            toolpath, motion, size_N, "force (N)", "Cutting force on the path"
-        ),
-    }
-    if deflection is None or joints is None:
-        return drawn
-    bent_mm = np.linalg.norm(deflection.deflection_base_mm, axis=1)
-    names, share_mm = _shares(prediction)
-    return {
-        **drawn,
-        "deflection": deflection_figure(toolpath, motion, deflection),
-        "deflection_path": coloured_path_figure(
-            toolpath, motion, bent_mm, "deflection (mm)", "Deflection on the path"
-        ),
-        "deflection_joints": share_figure(toolpath, motion, names, share_mm),
-    }
-
-
-def _shares(prediction: "Prediction") -> "tuple[tuple[str, ...], Floats]":
-    """Return the virtual joints and how much each adds along the deflection (m, 10)."""
-    from gcode2krl.cell.sections import VIRTUAL_JOINTS
-    from gcode2krl.compliance import joint_shares
-
-    joints, forces, deflection = prediction.joints, prediction.forces, prediction.deflection
-    if joints is None or forces is None or deflection is None:
-        raise AssertionError("shares are asked for only where there is a deflection")
-    base = prediction.cell.base_matrix()[:3, :3]
-    shares = joint_shares(
-        joints.q_rad,
-        forces.force_base_N @ base.T,
-        forces.moment_base_Nmm @ base.T,
-        prediction.cell,
-        forces.tool,
-    )
-    total = deflection.deflection_base_mm @ base.T
-    size = np.linalg.norm(total, axis=1, keepdims=True)
-    return VIRTUAL_JOINTS, np.einsum("mjk,mk->mj", shares, total / np.where(size > 0.0, size, 1.0))

@@ -8,8 +8,9 @@ import click
 from gcode2krl.cli.console import Console, issue_dicts
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, gcode_options, read_cell
-from gcode2krl.cli.restart import from_line_option, read_restarted, refuse_other_start, restart_record
+from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.translation.from_line import read_from_line, restart_record
 
 
 @click.command(
@@ -33,8 +34,8 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    tolerance: float | None,
-    chord_tolerance: float,
+    tolerance_mm: float | None,
+    chord_tolerance_mm: float,
     block_delete: bool,
     compensate: Literal["offline"] | None,
     from_line: int | None,
@@ -49,14 +50,17 @@ def command(
 
         refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
-        toolpath = read_restarted(part, cell, console, chord_tolerance, block_delete, tolerance, from_line)
+        with console.stages() as begin:
+            toolpath = read_from_line(
+                part, cell, chord_tolerance_mm, block_delete, tolerance_mm, from_line, begin
+            )
         prediction = None
         if compensate == "offline":
-            from gcode2krl.cli.compensation import compensated
             from gcode2krl.pipeline import predict_toolpath
+            from gcode2krl.translation.compensation import compensated
 
-            prediction = compensated(predict_toolpath(toolpath, cell, tolerance_mm=tolerance), None)
-        report = verify_krl(program, toolpath, cell, tolerance, prediction=prediction)
+            prediction = compensated(predict_toolpath(toolpath, cell, tolerance_mm=tolerance_mm), None)
+        report = verify_krl(program, toolpath, cell, tolerance_mm, prediction=prediction)
     except Gcode2KrlError as error:
         if not as_json:
             raise

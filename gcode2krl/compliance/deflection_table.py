@@ -25,6 +25,13 @@ def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
         Where the cell does not state the stiffness of every virtual joint.
     ValueError
         Where the tables differ in length.
+
+    Examples
+    --------
+    >>> from gcode2krl import Prediction, deflect
+    >>> prediction = Prediction.load("prediction")
+    >>> deflect(prediction.joints, prediction.forces, prediction.cell)
+    Deflection(... samples, up to ... mm)
     """
     if len(joints) != len(forces):
         raise ValueError(f"joints have {len(joints)} rows, forces {len(forces)}")

@@ -56,6 +56,17 @@ def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
         Where the stock cannot be read, or the material has no force law.
     RefusedError
         Where the tool axis changes within the program: one height field holds one direction.
+
+    Examples
+    --------
+    >>> from gcode2krl import cut, load_cell, plan_motion, read_gcode
+    >>> cell = load_cell("cell.toml")
+    >>> toolpath = read_gcode("part.nc", cell)
+    >>> forces = cut(toolpath, plan_motion(toolpath, cell), cell)
+    >>> forces
+    Forces(... samples, up to ... N)
+    >>> round(float(forces.a_p_mm.max()), 3)
+    4.0
     """
     return remove(toolpath, motion, cell).forces
 

@@ -53,6 +53,14 @@ def diagnose(
     ------
     NotUnderstoodError
         No run, a run of another program than its prediction's, or a prediction without motion.
+
+    Examples
+    --------
+    >>> from gcode2krl import Prediction, diagnose, load_run
+    >>> gap = diagnose(Prediction.load("prediction"), [load_run("run-1"), load_run("run-2")])
+    >>> [(cause.effect, cause.target) for cause in gap.named_causes]
+    [('backlash', 'A2')]
+    >>> gap.plot("run-1").savefig("gap.png")
     """
     if not runs:
         raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")

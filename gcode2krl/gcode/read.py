@@ -86,6 +86,15 @@ def read_gcode(
     -----
     Positions are the tool tip in the frame in which work offsets are stated, in mm. Source of meaning:
     LinuxCNC's RS274/NGC.
+
+    Examples
+    --------
+    >>> from gcode2krl import read_gcode
+    >>> toolpath = read_gcode("part.nc")
+    >>> toolpath
+    Toolpath(... moves, part.nc)
+    >>> int(toolpath.source_line[-1]), float(toolpath.position_mm[-1, 2])
+    (14, 20.0)
     """
     name = str(path)
     try:

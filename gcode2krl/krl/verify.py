@@ -12,9 +12,12 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.exchange.findings import Findings, counted, findings_block
+from gcode2krl.exchange.html import block, text_table
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
+from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import PilotText
@@ -29,7 +32,7 @@ from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VerifyReport:
     """Outcome of a verification.
 
@@ -45,11 +48,34 @@ class VerifyReport:
     issues: tuple[Issue, ...] = field(default=())
     pilot: PilotFigures | None = None
     """None without a pilot force."""
+    original: OriginalFigures | None = None
+    """How a program that leaves out corners keeps to its G-code, None where it leaves out none."""
 
     @property
     def ok(self) -> bool:
         """True where no finding is an error."""
         return not any(issue.severity == "error" for issue in self.issues)
+
+    @property
+    def findings(self) -> Findings:
+        """The ``issues`` as a table: severity, code, line, message, remedy."""
+        return Findings(self.issues)
+
+    def __repr__(self) -> str:
+        return f"VerifyReport({self.words()})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the worst differences and the findings."""
+        head = ("file", "line", "G-code line", "off by (mm)")
+        rows = [(each["file"], each["line"], each["gcode_line"], each["deviation_mm"]) for each in self.worst]
+        table = text_table(head, rows) if rows else ""
+        return block(repr(self), table, findings_block(self.issues))
+
+    def words(self) -> str:
+        """Return the outcome in words: ``457 motions, off by 0.0007 mm``."""
+        off = f"off by {self.max_deviation_mm:.4f} mm, {self.max_rotation_deg:.4f} deg"
+        found = counted(self.issues)
+        return ", ".join([f"{self.motions} motions", off, *([found] if found else [])])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints; what is not a number is null."""
@@ -62,6 +88,7 @@ class VerifyReport:
             "ok": self.ok,
             "worst": list(self.worst),
             **({"pilot": self.pilot.as_dict()} if self.pilot is not None else {}),
+            **({"original": self.original.as_dict()} if self.original is not None else {}),
         }
 
 
@@ -71,18 +98,34 @@ def verify_krl(
     cell: Cell,
     tolerance_mm: float | None = None,
     *,
+    simplify_mm: float | None = None,
     prediction: Prediction | None = None,
 ) -> VerifyReport:
     """Read a program back and compare it with what the G-code and the cell ask for.
 
-    ``tolerance_mm`` must be the one the program was made with. A pilot force is compared with the sidecar
-    beside the program and carried out along the Motion of ``prediction``, or along one planned here; with
-    ``prediction`` its targets (which may be compensated) are what is intended, and the knots are compared
-    with its forces. The RSI files beside a program that is corrected online must be as the cell asks for.
-    Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
+    ``tolerance_mm`` and ``simplify_mm`` must be those the program was made with; a program that leaves out
+    corners is compared with every move of ``toolpath`` too (`krl.original_path`). A pilot force is compared
+    with the sidecar beside the program and carried out along the Motion of ``prediction``, or along one
+    planned here; with ``prediction`` its targets (which may be compensated) are what is intended, and the
+    knots are compared with its forces. The RSI files beside a program that is corrected online must be as the
+    cell asks for. Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
+
+    >>> from gcode2krl import load_cell, predict, verify_krl, write_krl
+    >>> prediction = predict("part.nc")
+    >>> program = write_krl(prediction, "PART.src")
+    >>> verify_krl("PART.src", prediction.toolpath, prediction.cell).ok
+    True
     """
     program = read_krl(path)
-    targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)
+    if prediction is not None:
+        simplified = prediction.targets.simplified
+        simplify_mm = simplified.tolerance_mm if simplified is not None else None
+    require_stated(program, simplify_mm)
+    targets = (
+        prediction.targets
+        if prediction is not None
+        else set_targets(toolpath, cell, tolerance_mm, simplify_mm)
+    )
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
@@ -113,7 +156,7 @@ def verify_krl(
     if online:
         issues += rsi_file_issues(Path(path), online, expected)
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
-    return compare(program, targets, joints, cell, intended, issues, case)
+    return compare(program, targets, joints, cell, intended, issues, case, toolpath)
 
 
 def _not_whole(program: KrlProgram, targets: Targets, issues: Sequence[Issue]) -> VerifyReport:
@@ -160,10 +203,12 @@ def compare(
     intended: KrlProgram | None = None,
     more_issues: Sequence[Issue] = (),
     pilot: PilotCase | None = None,
+    original: Toolpath | None = None,
 ) -> VerifyReport:
     """Compare a program as read with the intended targets.
 
-    With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force.
+    With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force; with
+    ``original``, where corners are left out, also with every move of the G-code.
     """
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
@@ -189,6 +234,10 @@ def compare(
     if pilot is not None and paired:
         figures, found = check_pilot(program, pilot, targets, cell)
         issues += found
+    kept: OriginalFigures | None = None
+    if targets.simplified is not None and original is not None and paired:
+        kept, found = compare_with_original(program, targets, original, cell)
+        issues += found
     worst = tuple(
         {
             "file": program.file[program.file_of[row]],
@@ -208,6 +257,7 @@ def compare(
         worst=worst,
         issues=tuple(issues),
         pilot=figures,
+        original=kept,
     )
 
 

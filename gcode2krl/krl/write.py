@@ -12,6 +12,8 @@ from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.exchange.findings import Findings, counted, findings_block
+from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files import write_together
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout, compose
@@ -27,14 +29,14 @@ from gcode2krl.krl.verify import VerifyReport, compare
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
-from gcode2krl.tables import Joints, Targets
+from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
 _ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WrittenProgram:
     """What `write_krl` wrote."""
 
@@ -52,6 +54,26 @@ class WrittenProgram:
         """Figures of the pilot force, None where the program has none."""
         return self.report.pilot
 
+    @property
+    def findings(self) -> Findings:
+        """The ``issues`` as a table: severity, code, line, message, remedy."""
+        return Findings(self.issues)
+
+    def __repr__(self) -> str:
+        found = counted(self.issues)
+        facts = [f"{len(self.files)} files", self.report.words(), *([found] if found else [])]
+        return f"WrittenProgram({self.name}: {', '.join(facts)})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the files, the read-back, the findings and the path from above."""
+        rows = [("file", f"{name}, {len(text) / BYTES_PER_MB:.3f} MB") for name, text in self.texts.items()]
+        rows.append(("read back", self.report.words()))
+        if self.pilot is not None:
+            rows.append(("pilot", f"{self.pilot.knots} knots"))
+        moves = ~self.targets.ptp
+        picture = path_picture(self.targets.position_mm[moves])
+        return block(repr(self), beside(text_table((), rows), picture), findings_block(self.issues))
+
 
 def write_krl(
     source: Targets | Prediction | Forecast,
@@ -68,6 +90,7 @@ def write_krl(
     pilot: PilotForm | None = None,
     online: str | None = None,
     inputs: Sequence[str | Path] = (),
+    toolpath: Toolpath | None = None,
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
@@ -91,6 +114,7 @@ def write_krl(
     online : name of the RSI files of a program that is corrected online by the cell's ``[online]``; they
         are written beside it. RSI is on from above the first cut to above the last.
     inputs : files and folders that must not be overwritten, beside those that the tables name.
+    toolpath : needed with Targets that leave out corners of it; the others have their own.
 
     Raises
     ------
@@ -98,11 +122,24 @@ def write_krl(
         Where a finding forbids the program, or its own verification does.
     NotUnderstoodError
         Where the output cannot be written or is an input, or a name or release is wrong.
+
+    Examples
+    --------
+    >>> from gcode2krl import predict, write_krl
+    >>> program = write_krl(predict("part.nc"), "WRITTEN.src")
+    >>> program
+    WrittenProgram(WRITTEN: 3 files, ... motions, off by 0.000... mm, 0.0000 deg, ...)
+    >>> [file.name for file in program.files]
+    ['WRITTEN.src', 'WRITTEN.dat', 'WRITTEN.pilot.csv']
     """
     # the steps of writing in their order, kept together: most branches are the function's options
     targets, cell = (source, cell) if isinstance(source, Targets) else (source.targets, source.cell)
     if cell is None:
         raise input_error("option-value", "write_krl needs a cell with Targets")
+    original = toolpath if isinstance(source, Targets) else source.toolpath
+    if targets.simplified is not None and original is None:
+        sentence = "the targets leave out corners, which only their Toolpath tells"
+        raise input_error("option-value", sentence, "give write_krl the toolpath too")
     file, issues = _named(path, name, targets.source, cell)
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
     if online is not None:
@@ -125,11 +162,11 @@ def write_krl(
     )
     bare = _Content(targets, joints)
     content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
-    texts, report = _composed(content, cell, program_name, layout)
+    texts, report = _composed(content, cell, program_name, layout, original)
     failure = _pilot_failure(report) if pilot is None else None
     if failure is not None:
         plan, content = left_out(failure), bare
-        texts, report = _composed(content, cell, program_name, layout)
+        texts, report = _composed(content, cell, program_name, layout, original)
     issues += released(_issues_of(plan), (), strict)
     targets = content.targets
     issues += released(_size_issues(texts, targets, cell), (), strict)
@@ -157,15 +194,14 @@ class _Content:
 
 
 def _composed(
-    content: _Content, cell: Cell, name: str, layout: Layout
+    content: _Content, cell: Cell, name: str, layout: Layout, original: Toolpath | None
 ) -> tuple[dict[str, bytes], VerifyReport]:
     """Return the files of a program, and what reading them back finds."""
     targets, joints = content.targets, content.joints
     texts = compose(targets, joints, cell, name, layout, content.text)
     give_back()
-    return texts, compare(
-        read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
-    )
+    read = read_texts(texts, f"{name}{w.SOURCE_SUFFIX}")
+    return texts, compare(read, targets, joints, cell, pilot=content.case, original=original)
 
 
 def _pilot_plan(

@@ -16,7 +16,7 @@ from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import FLOAT, FLOATS, INTS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.errors import Issue
-from gcode2krl.tables import Table, _column
+from gcode2krl.exchange import Table, column
 
 LEAST_TOLERANCE_N = 10.0
 TOLERANCE_SHARE = 0.03
@@ -32,20 +32,20 @@ _thin = core_function("pilot_thin", FLOATS, FLOATS, FLOATS, INTS, FLOAT, FLOAT, 
 _errors = core_function("pilot_errors", FLOATS, FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS, OUT_FLOATS)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Knots(Table):
     """Knots of the pilot force, counted from 0, rounded to the decimals in which they are written."""
 
-    line: Ints32 = _column(np.int32)
+    line: Ints32 = column(np.int32)
     """(k,) line of the G-code."""
-    path_mm: Floats = _column(np.float64)
+    path_mm: Floats = column(np.float64)
     """(k,) arc length along the predicted path."""
-    time_s: Floats = _column(np.float64)
-    lead_s: Floats = _column(np.float64)
+    time_s: Floats = column(np.float64)
+    lead_s: Floats = column(np.float64)
     """(k,) time by which a knot is announced ahead; NaN until the announcements are placed."""
-    force_N: Floats = _column(np.float64, 3)
+    force_N: Floats = column(np.float64, 3)
     """(k, 3) on the tool, in the pilot frame."""
-    deflection_mm: Floats = _column(np.float64, 3)
+    deflection_mm: Floats = column(np.float64, 3)
     """(k, 3) that the force causes, in the pilot frame; NaN where it is not known."""
     tolerance_N: float = math.nan
     max_error_N: float = math.nan

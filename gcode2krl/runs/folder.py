@@ -7,11 +7,13 @@ from typing import Literal, TypeVar, get_args
 
 from gcode2krl.cell import load_cell
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.exchange.findings import counted, findings_block
+from gcode2krl.exchange.html import block, text_table
 from gcode2krl.runs.checks import check_columns, check_table, check_together, quantised
 from gcode2krl.runs.diadem import is_data_set
 from gcode2krl.runs.head import RunHead, read_head
 from gcode2krl.runs.krc_trace import read_krc_trace, recording_of
-from gcode2krl.runs.measured import Controller, Force, Measured, Poses, Tracker, build, columns_of
+from gcode2krl.runs.measured import Controller, Force, Measured, Poses, Tracker, build, columns_of, signals_of
 from gcode2krl.runs.poses import read_poses
 from gcode2krl.runs.rsi_log import is_rsi_log, read_rsi_log
 from gcode2krl.runs.scan import Scan, read_scan
@@ -23,9 +25,17 @@ _ENDINGS = {"scan": (".csv", ".parquet", ".ply")}
 _RSI_NAMES = ("rsi.log", "rsi.xml", "rsi.txt", "rsi.csv")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """What one run recorded; None where there is no file."""
+    """What one run recorded; None where there is no file.
+
+    >>> from gcode2krl import load_run
+    >>> run = load_run("run-1")
+    >>> run
+    Run(run-1: controller ... rows, tracker ... rows...)
+    >>> run.tracker.position_mm.shape[1]
+    3
+    """
 
     name: str
     folder: Path
@@ -38,9 +48,42 @@ class Run:
     poses: Poses | None = None
 
     def path(self, key: Literal["cell", "program", "prediction"]) -> Path | None:
-        """Return a path that ``run.toml`` names, relative to the run's folder; None where it names none."""
+        """Return a path that ``run.toml`` names, relative to the run's folder; None where it names none.
+
+        >>> from gcode2krl import load_run
+        >>> load_run("run-1").path("prediction")
+        """
         value: str | None = getattr(self.head, key)
         return None if value is None else self.folder / value
+
+    def _tables(self) -> dict[str, Measured]:
+        named = {
+            "controller": self.controller,
+            "tracker": self.tracker,
+            "force": self.force,
+            "poses": self.poses,
+        }
+        return {name: table for name, table in named.items() if table is not None}
+
+    def __repr__(self) -> str:
+        parts = [f"{name} {len(table)} rows" for name, table in self._tables().items()]
+        parts += ["scan"] if self.scan is not None else []
+        found = counted(self.issues)
+        return f"Run({self.name[-60:]}: {', '.join([*(parts or ['no table']), *([found] if found else [])])})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the tables with their signals, and the findings."""
+        rows = [
+            (
+                name,
+                len(table),
+                f"{table.time_s[0]:.2f} to {table.time_s[-1]:.2f}",
+                ", ".join(signals_of(table)),
+            )
+            for name, table in self._tables().items()
+        ]
+        head = ("table", "rows", "time (s)", "signals")
+        return block(repr(self), text_table(head, rows), findings_block(self.issues))
 
 
 def load_run(folder: str | Path, *, partial: bool = False) -> Run:
@@ -55,6 +98,12 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
     NotUnderstoodError
         Names file, row and column: a file that cannot be read, a missing column, time that does not rise,
         wrong units, swapped columns, tables that do not overlap.
+
+    Examples
+    --------
+    >>> from gcode2krl import load_run
+    >>> load_run("run-1").controller.q_act_rad.shape[1]
+    6
     """
     place = Path(folder)
     if not place.is_dir():

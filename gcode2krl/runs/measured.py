@@ -44,7 +44,7 @@ def _six(pattern: str) -> tuple[str, ...]:
     return tuple(pattern.format(number) for number in range(1, 7))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Measured:
     """One measured table: rows in order of time, without missing values."""
 
@@ -79,8 +79,11 @@ class Measured:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} rows: {', '.join(signals_of(self))})"
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Controller(Measured):
     """``controller.csv``; a signal is None where its columns are missing, a joint's column NaN."""
 
@@ -124,7 +127,7 @@ class Controller(Measured):
         return _present(self.q_load_rad)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Tracker(Measured):
     """``tracker.csv``: the TCP by a separate instrument, in the frame that ``run.toml`` names."""
 
@@ -134,7 +137,7 @@ class Tracker(Measured):
     """(n, 3)"""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Force(Measured):
     """``force.csv``, in the frame that ``run.toml`` names."""
 
@@ -144,7 +147,7 @@ class Force(Measured):
     """(n, 3)"""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Poses(Measured):
     """``poses.csv``: the TCP at poses in which the robot stands still, each one a row."""
 
@@ -200,6 +203,19 @@ _ALWAYS = ("position_mm", "force_N", "q_rad")
 _USUAL = ("position_cmd_mm", "abc_cmd_rad", "q_cmd_rad", "q_act_rad")
 """Signals of the format that are not marked optional: their absence is reported."""
 AnyMeasured = TypeVar("AnyMeasured", bound=Measured)
+
+
+def signals_of(table: Measured) -> list[str]:
+    """Return the names of the signals that a table has."""
+    names = (spec.name for spec in fields(table))
+    return [name for name in names if name not in _NO_SIGNALS and _is_array(getattr(table, name))]
+
+
+_NO_SIGNALS = ("time_s", "row", "segments")
+
+
+def _is_array(value: object) -> bool:
+    return isinstance(value, np.ndarray)
 
 
 def columns_of(kind: type[Measured]) -> tuple[str, ...]:

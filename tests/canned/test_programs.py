@@ -127,6 +127,21 @@ def test_orientation_changes_about_the_same_points():
         assert len(np.unique(np.round(axis[at], 4), axis=0)) >= 5
 
 
+def test_the_tool_turns_as_far_as_limits_and_wrist_allow():
+    def turned_deg(cell):
+        targets = targets_of(draft_of("orientation", place_of(cell)), cell)
+        assert not [issue for issue in targets.issues if issue.severity == "error"]
+        half = np.arccos(np.clip(np.abs(targets.rotation @ targets.rotation[-1]), 0.0, 1.0))
+        return np.degrees(2.0 * half[targets.wait_s >= 3.0]).max()
+
+    assert turned_deg(CELL) == pytest.approx(90.0, abs=0.01)
+    limits = list(CELL.robot.limits.q_deg)
+    limits[4] = (-90.0, 90.0)
+    narrow = CELL.robot.limits.model_copy(update={"q_deg": tuple(limits)})
+    robot = CELL.robot.model_copy(update={"limits": narrow})
+    assert turned_deg(CELL.model_copy(update={"robot": robot})) == pytest.approx(60.0, abs=0.01)
+
+
 def _third_axis(quaternion):
     x, y, z, w = quaternion
     return 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)

@@ -38,6 +38,15 @@ def test_every_example_is_translated_verified_and_verifies_again(run, tmp_path, 
 def test_json_has_every_key_of_the_contract(run, part):
     result = json.loads(run(part, "-o", "part.src", "--json").out)
     assert set(result) == {
+        "schema",
+        "command",
+        "version",
+        "input",
+        "cell",
+        "options",
+        "exit_code",
+        "counts",
+        "sha256",
         "files",
         "moves",
         "time_s",

@@ -8,7 +8,6 @@ import pytest
 from gcode2krl.canned.trial import trials_of
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import Cause
 from gcode2krl.gap.choose.next_run import (
     Answer,
@@ -19,7 +18,6 @@ from gcode2krl.gap.choose.next_run import (
     answer_of,
     best,
     choose_next_run,
-    draws_of,
     open_pairs,
 )
 from gcode2krl.gap.choose.rivals import Rival
@@ -129,13 +127,6 @@ def test_a_family_is_simulated_by_an_effect_that_depends_on_it(offset):
     assert unknown.label == "tip, no such input"
 
 
-def test_numbers_are_drawn_at_the_ends_of_their_intervals_within_their_range(offset):
-    thermal = at("thermal", mm_per_h=0.1, time_constant_h=1.0)
-    own = Cause(thermal, "mechanics", 0.5, {"mm_per_h": Interval(0.1, -0.05, 0.2)}, None, None)
-    assert [each["mm_per_h"] for each in draws_of(own)] == [0.0, 0.2]
-    assert Answer("x", 0.5, thermal, tuple(draws_of(own))).every[0] is thermal
-
-
 # --- the choice -------------------------------------------------------------------------------------------
 
 
@@ -152,7 +143,7 @@ def choice(program, minutes, *odds, weight=1.0):
         noise=0.02,
     )
     pair = OpenPair(Answer("a", 0.5), Answer("b", 0.5), weight, None, None)
-    return Choice(program, minutes, tuple(Parting(pair, each, nothing) for each in odds))
+    return Choice(program, minutes, tuple(Parting(pair, each, math.log(each), nothing) for each in odds))
 
 
 def test_the_best_odds_win_and_among_near_equals_the_shortest():

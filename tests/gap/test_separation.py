@@ -9,10 +9,12 @@ import pytest
 from gcode2krl.canned.trial import trials_of
 from gcode2krl.effects import Applied, library, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.separation import Bench, information_of
+from gcode2krl.gap.choose.separation import Bench, allowed_by, information_of
 from gcode2krl.gap.fit.design import Question
+from gcode2krl.gap.fit.numbers import free_of
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.signatures import blocks_of
+from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import cell, examined, noise, trace
 
 KNOWN = library()
@@ -110,3 +112,24 @@ def test_what_the_runs_say_binds_the_rival():
     free = bench.apart(found.applied[0], rival).distance2
     bound = bench.apart(found.applied[0], rival, information_of(found, 0, rival)).distance2
     assert bound >= free - 1e-6
+
+
+def test_an_answer_is_moved_where_the_runs_have_shown_it_least():
+    found = measured("tool_frame", None, (("x_mm", 0.3), ("y_mm", 0.2)))
+    own = found.applied[0]
+    information = information_of(found, 0, own)
+    known = np.diag(information)
+    drawn = allowed_by(information, own, found.traces[0])
+    assert len(drawn) == 2 * THRESHOLDS.choose.widest_ways
+    names = free_of(own, found.traces[0]).names
+    moved = [max(abs(each[name] - own[name]) for each in drawn) for name in names]
+    most, least = names[int(np.argmin(known))], names[int(np.argmax(known))]
+    assert moved[names.index(most)] > 10.0 * moved[names.index(least)]
+    for each in drawn:
+        for parameter in own.effect.parameters:
+            assert parameter.low <= each[parameter.name] <= parameter.high
+
+
+def test_nothing_is_moved_where_the_runs_cannot_show_it():
+    found = measured("tool_frame", None, (("x_mm", 0.3), ("y_mm", 0.2)))
+    assert allowed_by(None, found.applied[0], found.traces[0]) == ()

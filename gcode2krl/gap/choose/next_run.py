@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gcode2krl.arrays import Floats
 from gcode2krl.canned import NAMES, REPEAT, around_minutes
 from gcode2krl.canned.trial import Trial, trials_of
 from gcode2krl.effects import Applied, Effect
@@ -19,9 +20,8 @@ from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.choose.examination import Examination
-from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import Cause, Judgement
-from gcode2krl.gap.choose.separation import Apart, Bench, information_of
+from gcode2krl.gap.choose.separation import Apart, Bench, allowed_by, information_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_MIN
 
@@ -37,13 +37,6 @@ class Answer:
     probability: float
     applied: Applied | None = None
     """What it does, at its best values; None for what nobody can simulate."""
-    draws: tuple[Applied, ...] = ()
-    """Other values that the data allow."""
-
-    @property
-    def every(self) -> tuple[Applied | None, ...]:
-        """Return what it may be: its best values and the others."""
-        return (self.applied, *self.draws)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +74,9 @@ class Parting:
 
     pair: OpenPair
     odds: float
+    """As told."""
+    nats: float
+    """What they are chosen by: the logarithm of the odds, with a wider limit."""
     apart: Apart
 
 
@@ -156,7 +152,7 @@ def best(choices: Sequence[Choice]) -> Choice | None:
 
 
 def _worth(choice: Choice) -> float:
-    return sum(parting.pair.weight * math.log(parting.odds) for parting in choice.partings)
+    return sum(parting.pair.weight * parting.nats for parting in choice.partings)
 
 
 # What is left open
@@ -185,7 +181,7 @@ def _pairs_of(cause: Cause, judgement: Judgement, families: Sequence[Answer]) ->
     """Yield the pairs of a cause: with each rival, with what the rest depends on, with the unknown."""
     found = judgement.examination
     number = next((n for n in found.cause_numbers if found.applied[n] == cause.applied), None)
-    own = Answer(cause.applied.label, cause.probability, cause.applied, tuple(draws_of(cause)))
+    own = Answer(cause.applied.label, cause.probability, cause.applied)
     compared = cause.rivals or ()
     for rival, probability in compared:
         if rival.alike or (probability >= _LIMITS.least_open and cause.probability < _LIMITS.settled):
@@ -209,18 +205,6 @@ def _between(families: Sequence[Answer], judgement: Judgement) -> Iterator[OpenP
     if len(families) == 1 and families[0].probability < _LIMITS.settled:
         none = Answer("something else", 1.0 - families[0].probability)
         yield OpenPair(families[0], none, none.probability, found, None)
-
-
-def draws_of(cause: Cause) -> Iterator[Applied]:
-    """Yield a cause with all its numbers at the low and at the high ends of their intervals."""
-    for end in ("low", "high"):
-        values = dict(cause.applied.values)
-        for parameter in cause.applied.effect.sizes:
-            interval: Interval | None = cause.parameters.get(parameter.name)
-            if interval is not None:
-                ends = float(np.clip(getattr(interval, end), parameter.low, parameter.high))
-                values[parameter.name] = max(ends, parameter.minimum)
-        yield replace(cause.applied, values=values)
 
 
 def answer_of(family: Family, known: Mapping[str, Effect], judgement: Judgement) -> Answer:
@@ -255,37 +239,46 @@ def _is_at(effect: Effect, target: str | None, family: Family) -> bool:
 
 def _choices(pairs: Sequence[OpenPair], trials: Sequence[Trial], mismatch: Mismatch) -> Iterator[Choice]:
     """Yield each program with the odds of every pair that it can show."""
-    known = [_informations(pair) for pair in pairs]
+    shown = [(_shown(pair, pair.first), _shown(pair, pair.second)) for pair in pairs]
     for trial in sorted(trials, key=lambda trial: trial.minutes):
         benches: dict[int, Bench] = {}
         partings = []
-        for pair, information in zip(pairs, known, strict=True):
+        for pair, (of_first, of_second) in zip(pairs, shown, strict=True):
             key = id(pair.found)
             try:
                 if key not in benches:
                     benches[key] = Bench(pair.found, trial.inputs, mismatch)
-                partings.append(_parting(pair, benches[key], information))
+                partings.append(_parting(pair, benches[key], of_first, of_second))
             except Gcode2KrlError:  # an effect that this program cannot show
                 continue
         if partings:
             yield Choice(trial.name, trial.minutes, tuple(partings))
 
 
-def _informations(pair: OpenPair) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return what the measured runs say of the numbers of both answers."""
-    first, second = pair.first.applied, pair.second.applied
-    return (
-        None if first is None else information_of(pair.found, pair.number, first),
-        None if second is None else information_of(pair.found, pair.number, second),
-    )
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What the measured runs say of an answer."""
+
+    information: Floats | None
+    every: tuple[Applied | None, ...]
+    """What it may be: its best numbers, and others that the runs allow."""
 
 
-def _parting(
-    pair: OpenPair, bench: Bench, information: tuple[np.ndarray | None, np.ndarray | None]
-) -> Parting:
-    """Return the odds that a program is expected to give: whichever of the two is right, over its draws."""
-    of_first, of_second = information
-    ways = [bench.apart(one, pair.second.applied, of_second) for one in pair.first.every]
-    back = [bench.apart(other, pair.first.applied, of_first) for other in pair.second.every]
-    logs = [min(0.5 * apart.distance2, _LIMITS.most_log_odds) for apart in (*ways, *back)]
-    return Parting(pair, float(np.exp(np.mean(logs))), ways[0])
+def _shown(pair: OpenPair, answer: Answer) -> _Shown:
+    if answer.applied is None:
+        return _Shown(None, (None,))
+    information = information_of(pair.found, pair.number, answer.applied)
+    others = allowed_by(information, answer.applied, pair.found.traces[0])
+    return _Shown(information, (answer.applied, *others))
+
+
+def _parting(pair: OpenPair, bench: Bench, of_first: _Shown, of_second: _Shown) -> Parting:
+    """Return the odds expected of a program, whichever of the two is right and whatever its numbers.
+
+    The one that is wrong is refitted, as far as the measured runs let it.
+    """
+    ways = [bench.apart(one, pair.second.applied, of_second.information) for one in of_first.every]
+    back = [bench.apart(other, pair.first.applied, of_first.information) for other in of_second.every]
+    nats = 0.5 * np.array([apart.distance2 for apart in (*ways, *back)])
+    odds = np.exp(np.minimum(nats, _LIMITS.most_log_odds).mean())
+    return Parting(pair, float(odds), float(np.minimum(nats, _LIMITS.enough_nats).mean()), ways[0])

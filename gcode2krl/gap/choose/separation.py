@@ -23,6 +23,7 @@ from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.likelihood import STEP_SHARE, Likelihood
 from gcode2krl.gap.fit.noise import Noise, white
 from gcode2krl.gap.fit.nuisance import nuisance_of
+from gcode2krl.gap.fit.numbers import NORMAL_90
 from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -124,6 +125,26 @@ class Bench:
             signal=self.trace.signal,
             noise=factor * float(sigma[column]),
         )
+
+
+def allowed_by(information: Floats | None, applied: Applied, trace: Trace) -> tuple[Applied, ...]:
+    """Return an answer with other numbers that the measured runs allow, where they allow most.
+
+    ``information`` (p, p) as `information_of` returns it. Its numbers are known to their typical size before
+    any run; along the directions that the runs have shown least they are moved to both ends of a 90 %
+    interval, and stay in their range.
+    """
+    numbers = Numbers.of((applied,), trace)
+    x = numbers.start((applied,))
+    if information is None or not len(x):
+        return ()
+    limits = numbers.box.low, numbers.box.high
+    precision, directions = np.linalg.eigh(information + np.eye(len(x)))
+    ends = []
+    for which in range(min(_LIMITS.widest_ways, len(x))):  # the least known first
+        step = NORMAL_90 / np.sqrt(precision[which]) * directions[:, which] * numbers.box.scale
+        ends += [np.clip(x + step, *limits), np.clip(x - step, *limits)]
+    return tuple(numbers.applied(end)[0] for end in ends)
 
 
 _FREE = 1e-9

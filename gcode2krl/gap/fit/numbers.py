@@ -16,7 +16,7 @@ _LIMITS = THRESHOLDS.fit
 _AT_BOUND = 1e-3
 _MOMENT_S = 2.0
 """Typical size of a moment: differences of a fiftieth of it are those of a short slip."""
-_NORMAL_90 = 1.645
+NORMAL_90 = 1.645
 """Half-width of a 90 % interval in standard deviations."""
 
 
@@ -84,7 +84,7 @@ class Free:
 
     def shapes_spanned(self, deviation: Mapping[str, float]) -> frozenset[str]:
         """Return the shapes whose 90 % interval, from their standard deviations, spans nearly their range."""
-        width = np.array([2.0 * _NORMAL_90 * deviation[name] for name in self.names])
+        width = np.array([2.0 * NORMAL_90 * deviation[name] for name in self.names])
         wide = width > _LIMITS.shape_span * (self.high - self.low)
         return frozenset(np.array(self.names, dtype=object)[wide & self._shapes])
 

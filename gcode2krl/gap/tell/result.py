@@ -2,15 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Issue
+from gcode2krl.exchange.findings import Findings
+from gcode2krl.exchange.views import view
 from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import NAMED
 from gcode2krl.gap.tell.as_json import gap_object
 from gcode2krl.gap.tell.evidence import Evidence
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,7 +271,7 @@ class Detectable:
     """False where normal mismatch could do nearly all that the effect does."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Gap:
     """Where reality differs from the prediction, why, and how much is gone with the causes in the model."""
 
@@ -300,3 +305,24 @@ class Gap:
     def as_dict(self) -> dict[str, Any]:
         """Return the object of the JSON contract, plain numbers only."""
         return gap_object(self)
+
+    @property
+    def findings(self) -> Findings:
+        """The ``issues`` as a table: severity, code, line, message, remedy."""
+        return Findings(self.issues)
+
+    def plot(self, run: str | None = None) -> "Figure":
+        """Return the figure of a run, the first by default: over time, on the path, by what it depends on.
+
+        Raises `NotUnderstoodError` where nothing was compared, or there is no such run.
+        """
+        figure: Figure = view("gap figure")(self, run)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"Gap({view('gap words')(self)})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page: str = view("gap page")(self)
+        return page

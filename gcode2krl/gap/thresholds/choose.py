@@ -129,8 +129,14 @@ class ChooseThresholds:
     settled: float = convention(0.8, "probability from which on a cause without a rival alike is not open")
     least_open: float = convention(0.05, "probability below which an answer is not worth a run")
     most_open_pairs: int = convention(4, "pairs that programs are compared for, the most open first")
+    widest_ways: int = convention(
+        2, "directions in which an answer's numbers are known least, that a program is judged along too"
+    )
     most_log_odds: float = convention(
-        6.9, "log 1000: beyond it no program is better than another, as noise is not exactly as learnt"
+        6.9, "log 1000: higher odds are not told, as noise is not exactly as learnt"
+    )
+    enough_nats: float = convention(
+        100.0, "log odds beyond which no program is better than another: real runs part less than is expected"
     )
     nearly_best: float = convention(0.1, "programs within this share of the best mean log odds: the shortest")
     told_change: float = convention(

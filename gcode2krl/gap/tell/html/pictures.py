@@ -15,6 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gcode2krl.arrays import Floats
+from gcode2krl.errors import input_error
 from gcode2krl.files import make_folder, write_together
 from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
 from gcode2krl.gap.tell.residuals import smoothed
@@ -48,6 +49,15 @@ def write_pictures(gap: Gap, folder: Path, inputs: Iterable[str | Path] = ()) ->
     figures = {folder / f"gap_{_file_name(run.run)}.png": run_figure(gap, run) for run in evidence.runs}
     write_together({file: partial(_save, figure) for file, figure in figures.items()}, inputs)
     return list(figures)
+
+
+def figure_of_run(gap: Gap, run: str | None) -> Figure:
+    """Draw a run by its name, None = the first; raises `NotUnderstoodError` where there is none to draw."""
+    runs = {} if gap.evidence is None else {each.run: each for each in gap.evidence.runs}
+    if not runs or (run is not None and run not in runs):
+        sentence = f"there is no run {run!r} to draw" if runs else "nothing was compared: nothing to draw"
+        raise input_error("no-runs", sentence, f"the runs are {', '.join(runs)}" if runs else "")
+    return run_figure(gap, runs[run] if run is not None else next(iter(runs.values())))
 
 
 def run_figure(gap: Gap, run: RunEvidence) -> Figure:

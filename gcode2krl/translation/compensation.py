@@ -6,16 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gcode2krl.cli.inputs import require_other
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Motion
+from gcode2krl.translation.outputs import require_other
 
 if TYPE_CHECKING:
     from gcode2krl.compensation.iteration import Compensated
 
 
-def compensated(prediction: Prediction, plot: str | None, inputs: Sequence[str | Path] = ()) -> Prediction:
+def compensated(
+    prediction: Prediction, plot: str | Path | None, inputs: Sequence[str | Path] = ()
+) -> Prediction:
     """Return the prediction of the compensated program; ``plot`` draws the path before and after.
 
     ``inputs`` are files that the drawing must not overwrite.

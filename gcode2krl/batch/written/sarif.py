@@ -1,0 +1,102 @@
+"""``findings.sarif``, SARIF 2.1.0: each finding at its line, with the help of its code.
+
+GitHub shows the results at the lines of a pull request. It refuses a file of more than 25,000 results.
+"""
+
+import json
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from gcode2krl.batch.written.part import Part, Record, parts_of
+from gcode2krl.batch.written.places import Places, is_absolute, uri
+from gcode2krl.batch.written.text import printable
+from gcode2krl.codes import Code, all_codes
+from gcode2krl.errors import Issue
+from gcode2krl.version import __version__
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+MOST_RESULTS = 20_000
+_BASE = "%SRCROOT%"
+_RANK = ("error", "warning", "note")
+
+_Result = tuple[int, str, int, str, str]
+"""Rank of the severity, path, line, code, sentence: what makes a finding the same as another."""
+
+
+def findings_sarif(records: Iterable[Record], places: Places | None = None) -> bytes:
+    """Return the file; ``places`` says where the parts are, default: in the folder in which the run began."""
+    found = sorted(set(_results(parts_of(records), places or Places())))
+    kept = found[:MOST_RESULTS]
+    codes = sorted({code for _, _, _, code, _ in kept})
+    run = {
+        "tool": {"driver": _driver(codes)},
+        "invocations": [{"executionSuccessful": True} | _left_out(len(found) - len(kept))],
+        "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(one, codes.index(one[3])) for one in kept],
+    }
+    log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+    return (json.dumps(log, indent=1) + "\n").encode("ascii")
+
+
+def _results(parts: Iterable[Part], places: Places) -> Iterator[_Result]:
+    """Yield all findings; one on a cell comes once, whatever number of parts has it."""
+    for part in parts:
+        path = places.of_part(part.name)
+        for finding in part.findings:
+            issue = finding.issue
+            place = places.below_root(finding.file) if finding.file else path
+            yield _RANK.index(issue.severity), place, issue.line, printable(issue.code), _sentence(issue)
+
+
+def _sentence(issue: Issue) -> str:
+    advice = issue.advice()
+    return printable(f"{issue.message} -> {advice}" if advice else issue.message) or issue.code
+
+
+def _result(found: _Result, rule: int) -> dict[str, Any]:
+    rank, path, line, code, sentence = found
+    place = {"uri": uri(path)} if is_absolute(path) else {"uri": uri(path), "uriBaseId": _BASE}
+    region = {"startLine": max(line, 1)}  # GitHub refuses a result without a line
+    return {
+        "ruleId": code,
+        "ruleIndex": rule,
+        "level": _RANK[rank],
+        "message": {"text": sentence},
+        "locations": [{"physicalLocation": {"artifactLocation": place, "region": region}}],
+    }
+
+
+def _driver(codes: Iterable[str]) -> dict[str, Any]:
+    known = all_codes()
+    return {
+        "name": "gcode2krl",
+        "version": __version__,
+        "semanticVersion": __version__,
+        "rules": [_rule(known[code]) if code in known else {"id": code} for code in codes],
+    }
+
+
+def _rule(code: Code) -> dict[str, Any]:
+    """Return a finding code as a rule."""
+    first = code.why.partition(". ")[0].rstrip(".")
+    more = {"Example": code.example, "What to do": code.remedy, "May be released by --allow": code.allow}
+    return {
+        "id": code.name,
+        "name": "".join(word.capitalize() for word in code.name.split("-")),
+        "shortDescription": {"text": f"{first}."},
+        "fullDescription": {"text": code.why},
+        "help": {
+            "text": "\n".join([code.why, *(f"{name}: {text}" for name, text in more.items())]),
+            "markdown": "\n\n".join([code.why, *(f"**{name}:** {text}" for name, text in more.items())]),
+        },
+        "defaultConfiguration": {"level": code.severity.partition(",")[0]},
+    }
+
+
+def _left_out(count: int) -> dict[str, Any]:
+    """Return what says that not all findings are in the file."""
+    if count == 0:
+        return {}
+    text = f"{count:,} more findings are in results.jsonl and not here, the least severe ones."
+    return {"toolExecutionNotifications": [{"level": "note", "message": {"text": text}}]}

@@ -1,0 +1,143 @@
+"""Figures, totals and differences in words, the same in the summary and on the index page."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from gcode2krl.batch.written.changes import Change, Difference
+from gcode2krl.batch.written.part import VERDICTS, Part
+from gcode2krl.batch.written.text import printable
+from gcode2krl.report.page.content import duration
+
+UNKNOWN = "–"
+_HARDLY = 0.0005
+"""A share below this is printed as none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A figure of the whole run, and the part that it comes from where it is one part's."""
+
+    name: str
+    value: str
+    part: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DifferenceRow:
+    """One part that changed, as texts."""
+
+    part: str
+    what: str
+    time: str = ""
+    force: str = ""
+    deflection: str = ""
+
+
+def time(seconds: float | None) -> str:
+    """Return a time as a person reads it, a dash where it is not known."""
+    return UNKNOWN if seconds is None else duration(seconds)
+
+
+def force(value_N: float | None) -> str:
+    """Return a force with its unit."""
+    return UNKNOWN if value_N is None else f"{value_N:,.0f} N"
+
+
+def deflection(value_mm: float | None) -> str:
+    """Return a deflection with its unit."""
+    return UNKNOWN if value_mm is None else f"{value_mm:.3f} mm"
+
+
+def headline(parts: Sequence[Part]) -> str:
+    """Return how many parts were written, refused and not understood."""
+    verdicts = [part.verdict for part in parts]
+    written, *others = [(verdicts.count(verdict), verdict) for verdict in VERDICTS]
+    if not parts:
+        return "No parts"
+    if written[0] == len(parts):
+        return "The only part was written" if len(parts) == 1 else f"All {len(parts):,} parts were written"
+    named = ", ".join(f"{count:,} {verdict}" for count, verdict in others if count)
+    return f"{written[0]:,} of {_counted(len(parts), 'part')} written, {named}"
+
+
+def facts(parts: Sequence[Part]) -> list[Fact]:
+    """Return the figures of a whole run."""
+    written = [part for part in parts if part.is_written]
+    cached = sum(part.cached for part in parts)
+    warnings = sum(part.count("warning") for part in parts)
+    found = [Fact("machining time", duration(sum(part.time_s or 0.0 for part in written)))] if written else []
+    found += _largest("largest force", written, lambda part: part.force_N, force)
+    found += _largest("largest deflection", written, lambda part: part.deflection_mm, deflection)
+    found.append(Fact("computed in", duration(sum(part.seconds or 0.0 for part in parts))))
+    found += [Fact("from the cache", _counted(cached, "part"))] if cached else []
+    found += [Fact("warnings", f"{warnings:,}")] if warnings else []
+    return found
+
+
+def _largest(
+    name: str,
+    parts: Iterable[Part],
+    figure: Callable[[Part], float | None],
+    words: Callable[[float | None], str],
+) -> list[Fact]:
+    known = [(value, part.name) for part in parts if (value := figure(part)) is not None]
+    return [Fact(name, words(max(known)[0]), printable(max(known)[1]))] if known else []
+
+
+def difference_sentence(found: Difference) -> str:
+    """Return what changed since the last run in one sentence."""
+    if found.is_none:
+        return "Nothing changed since the last run."
+    counts = [
+        (len(found.refused), "not written any more"),
+        (len(found.mended), "written now"),
+        (len(found.gone), "gone"),
+        (len(found.new), "new"),
+        (len(found.changed), "with other figures"),
+        (found.same, "the same"),
+    ]
+    named = ", ".join(f"{count:,} {what}" for count, what in counts if count)
+    times = ""
+    if found.changed:
+        whole = _from_to(found.time_before_s, found.time_after_s, time)
+        times = f" The parts that were written both times take {whole}."
+    return f"Since the last run: {named}.{times}"
+
+
+def difference_rows(found: Difference) -> Iterator[DifferenceRow]:
+    """Yield the parts that changed, those that are not written any more first."""
+    for one in found.refused:
+        yield DifferenceRow(printable(one.name), f"{one.after.verdict}, was written")
+    for one in found.mended:
+        yield DifferenceRow(printable(one.name), f"written, was {one.before.verdict}")
+    yield from (DifferenceRow(printable(part.name), "gone") for part in found.gone)
+    yield from (DifferenceRow(printable(part.name), "new") for part in found.new)
+    yield from map(_changed, found.changed)
+
+
+def _changed(one: Change) -> DifferenceRow:
+    before, after = one.before, one.after
+    return DifferenceRow(
+        printable(one.name),
+        "other figures",
+        _from_to(before.time_s, after.time_s, time),
+        _from_to(before.force_N, after.force_N, force),
+        _from_to(before.deflection_mm, after.deflection_mm, deflection),
+    )
+
+
+def share(before: float | None, after: float | None) -> str:
+    """Return a change in percent, empty where there is none worth a word."""
+    change = (after - before) / before if before and after is not None else 0.0
+    return f"{change:+.1%}".replace("%", "\u00a0%") if abs(change) >= _HARDLY else ""
+
+
+def _from_to(before: float | None, after: float | None, words: Callable[[float | None], str]) -> str:
+    """Return two figures and the change in percent, one figure where they read the same."""
+    percent = share(before, after)
+    told = words(after) if words(before) == words(after) else f"{words(before)} → {words(after)}"
+    return f"{told} ({percent})" if percent else told
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count:,} {noun if count == 1 else f'{noun}s'}"

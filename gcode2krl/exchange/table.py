@@ -1,0 +1,61 @@
+"""The base of all tables: columns with a declared type and shape, checked once, read-only from then on."""
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from gcode2krl.compiled.inputs import locked
+from gcode2krl.errors import Issue
+from gcode2krl.exchange.disk_names import split_columns
+from gcode2krl.exchange.frame import Frame
+
+
+def column(dtype: DTypeLike, *tail: int | None) -> Any:
+    """Declare a column of the given dtype and trailing shape; None is a width that the data decide."""
+    return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
+
+
+def derived_column(dtype: DTypeLike, *tail: int) -> Any:
+    """Declare a column that the table derives from the others where it is not given."""
+    return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Table(Frame):
+    """A frozen dataclass of numpy columns, rows first, which other libraries take as a frame."""
+
+    issues: tuple[Issue, ...] = ()
+
+    def __post_init__(self) -> None:
+        rows = -1
+        for spec in fields(self):
+            if "tail" not in spec.metadata:
+                continue
+            values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"])
+            rows = len(values) if rows < 0 else rows
+            wanted = (rows, *spec.metadata["tail"])
+            fits = values.ndim == len(wanted) and all(
+                size in (None, found) for size, found in zip(wanted, values.shape, strict=True)
+            )
+            if not fits:
+                raise ValueError(
+                    f"{type(self).__name__}.{spec.name}: shape {values.shape}, expected {wanted}"
+                )
+            object.__setattr__(self, spec.name, locked(values))
+
+    def __len__(self) -> int:
+        for spec in fields(self):
+            if "tail" in spec.metadata:
+                return len(getattr(self, spec.name))
+        return 0
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns by name, vectors split as in the files: ``position_x_mm`` ….
+
+        >>> from gcode2krl import read_gcode
+        >>> list(read_gcode("part.nc").columns())[:4]
+        ['position_x_mm', 'position_y_mm', 'position_z_mm', 'axis_x']
+        """
+        return split_columns(self)

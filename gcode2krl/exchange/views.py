@@ -1,0 +1,21 @@
+"""What shows a result and stands above it: looked up by its name when it is asked for.
+
+A result may be drawn only by what knows it. Imports go from the drawing to the result and never back, so
+the way back is a name; a test resolves all of them.
+"""
+
+from pkgutil import resolve_name
+from typing import Any
+
+VIEWS = {
+    "prediction figure": "gcode2krl.figures:figure_of",
+    "gap words": "gcode2krl.gap.tell.looks:gap_words",
+    "gap page": "gcode2krl.gap.tell.looks:gap_html",
+    "gap figure": "gcode2krl.gap.tell.html.pictures:figure_of_run",
+}
+"""What is shown to module and function."""
+
+
+def view(name: str) -> Any:
+    """Return the function that shows something."""
+    return resolve_name(VIEWS[name])

@@ -1,0 +1,68 @@
+"""What is wrong with an order before its part is read, and the files that it writes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gcode2krl.errors import input_error
+from gcode2krl.translation.inputs import STANDARD
+from gcode2krl.translation.order import Order
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
+    from gcode2krl.tables import Targets
+
+
+def place_of(order: Order) -> Path | None:
+    """Return the file or the folder to write into, None for standard output."""
+    from_standard = str(order.part) == STANDARD
+    if order.output is not None and str(order.output) == STANDARD:
+        return None
+    if order.output == "":
+        raise input_error("option-value", "-o: the name is empty", "give -o part.src")
+    if from_standard and order.output is None:
+        raise input_error("option-value", "standard input needs an output", "give -o part.src, or -o -")
+    place = Path(order.output) if order.output is not None else Path(order.part).parent
+    if from_standard and order.name is None and place.is_dir():
+        raise input_error("option-value", "standard input has no name", "give -o part.src, or --name PART")
+    return place
+
+
+def refuse_online(order: Order, place: Path | None) -> None:
+    """Raise where ``--online`` is not possible or not allowed with another option."""
+    if order.both and (order.online is None or order.compensate is None):
+        sentence = "--both: there are no two compensations"
+        raise input_error("option-value", sentence, "give --online NAME and --compensate offline too")
+    if order.online is None:
+        return
+    from gcode2krl.krl.rsi_files import file_names
+
+    file_names(order.online)
+    if place is None:
+        sentence = "--online writes RSI files, which standard output cannot carry"
+        raise input_error("option-value", sentence, "give -o part.src")
+    if order.compensate == "offline":
+        from gcode2krl.compensation.iteration import refuse_twice
+
+        refuse_twice(online=True, both=order.both)
+
+
+def outputs_of(order: Order, place: Path | None, name: str | None, cell: "Cell") -> list[Path]:
+    """Return the files to write, without the parts of a long program; raises where a name is bad."""
+    from gcode2krl.krl import output_files, program_file
+
+    outputs = [Path(file) for file in (order.compensate_plot, order.report) if file is not None]
+    if place is not None:
+        file, _ = program_file(place, name, str(order.part), cell.program.externals)
+        outputs += output_files(file, order.online)
+    return outputs
+
+
+def refuse_early(targets: "Targets", cell: "Cell", order: Order) -> None:
+    """Refuse targets that cannot move, or not be corrected online, before their motion is planned."""
+    from gcode2krl.krl.release import matching, released
+    from gcode2krl.krl.rsi_refusals import online_issues
+
+    online = order.online is not None
+    issues = [*targets.issues, *(online_issues(targets, cell) if online else ())]
+    if any(issue.severity == "error" for issue in issues):
+        released(issues, matching(issues, order.allow))

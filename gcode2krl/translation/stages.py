@@ -1,0 +1,247 @@
+"""``carry_out``: from an order to a written program, stage by stage."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gcode2krl.errors import Gcode2KrlError, Issue
+from gcode2krl.progress import Begin, unseen
+from gcode2krl.translation.attempt import Attempt
+from gcode2krl.translation.checks import outputs_of, place_of, refuse_early, refuse_online
+from gcode2krl.translation.from_line import read_from_line, refuse_without_forces, restart_name
+from gcode2krl.translation.inputs import (
+    STANDARD,
+    StandardInput,
+    cell_files,
+    existing,
+    files_of_job,
+    read_cell_under_job,
+    require_part,
+)
+from gcode2krl.translation.order import Order
+from gcode2krl.translation.outputs import require_figure, require_outputs
+from gcode2krl.translation.page import (
+    can_be_written,
+    require_report,
+    write_page_of_refused,
+    write_page_of_written,
+)
+
+if TYPE_CHECKING:
+    from gcode2krl.cell import Cell
+    from gcode2krl.krl import WrittenProgram
+    from gcode2krl.prediction import Prediction
+    from gcode2krl.prediction.forecast import Forecast
+    from gcode2krl.tables import Joints, Targets, Toolpath
+
+
+_Stage = TypeVar("_Stage")
+
+
+@dataclass
+class _Known:
+    """What an attempt knows so far, as far as it got."""
+
+    cell: "Cell | None" = None
+    toolpath: "Toolpath | None" = None
+    targets: "Targets | None" = None
+    joints: "Joints | None" = None
+    corner_mm: float | None = None
+    forecast: "Forecast | None" = None
+    written: "WrittenProgram | None" = None
+    page: Path | None = None
+    standard: StandardInput | None = None
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """An order whose options, cell and names are in order."""
+
+    cell: "Cell"
+    """With the options that change it."""
+    place: Path | None
+    name: str | None
+    inputs: list[Path]
+    """Files that must not be overwritten."""
+    of_job: tuple[Issue, ...]
+
+
+def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
+    """Translate a part: read, plan, predict, write, read back.
+
+    ``begin`` is told the name of each stage as it begins. No `Gcode2KrlError` leaves: it is the attempt's
+    ``error``, beside what was known when it came. Nothing is printed.
+    """
+    known, error = _Known(), None
+    try:
+        _translate(order, known, begin)
+    except Gcode2KrlError as refused:
+        error = _with_page(order, refused, known)
+    return Attempt(order, error, **vars(known))
+
+
+def _translate(order: Order, known: _Known, begin: Begin) -> None:
+    """Run the stages in their order; each leaves in ``known`` what it has found."""
+    ready = _ready(order, known)
+    _read(order, ready, known, begin)
+    begin("planning")
+    _plan(order, ready.cell, known)
+    prediction = _predict(order, ready, known, begin)
+    begin("writing and reading back")
+    written = _write(order, ready, known)
+    known.written = written
+    if prediction is not None and order.report is not None:
+        page = Path(order.report)
+        write_page_of_written(page, str(order.part), prediction, written.issues, ready.inputs)
+        known.page = page
+
+
+def _ready(order: Order, known: _Known) -> _Ready:
+    """Return the order with its cell and names; raises where it cannot be carried out."""
+    part, output = str(order.part), None if order.output is None else str(order.output)
+    require_part(part)
+    place = place_of(order)
+    refuse_online(order, place)
+    refuse_without_forces(order.from_line, order.no_forces)
+    known.cell, of_job = read_cell_under_job(order.cell_path, order.job_path)
+    cell = _with_options(known.cell, order)
+    name = restart_name(part, order.name, output, order.from_line, cell)
+    inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path))
+    require_figure(order.compensate_plot)
+    require_report(order.report, inputs)
+    require_outputs(outputs_of(order, place, name, cell), *inputs)
+    return _Ready(cell, place, name, inputs, of_job)
+
+
+def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
+    """Read the G-code, from a line on where one is named."""
+    known.standard = StandardInput() if str(order.part) == STANDARD else None
+    toolpath = read_from_line(
+        str(order.part),
+        ready.cell,
+        order.chord_tolerance_mm,
+        order.block_delete,
+        order.tolerance_mm,
+        order.from_line,
+        begin,
+        known.standard,
+    )
+    known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job))
+
+
+def _plan(order: Order, cell: "Cell", known: _Known) -> None:
+    """Set the targets, and refuse those that a robot cannot run; tables that wait are kept on disk."""
+    from gcode2krl.cell.confirmation import future_confirmation
+    from gcode2krl.compiled.memory import give_back
+    from gcode2krl.files.spool import on_disk
+    from gcode2krl.pipeline import corner_errors, targets_and_joints
+
+    toolpath = _done(known.toolpath)
+    targets, joints = targets_and_joints(toolpath, cell, order.tolerance_mm)
+    errors_mm, corner_issues = corner_errors(toolpath, targets, cell, order.tolerance_mm)
+    known.corner_mm = float(errors_mm.max(initial=0.0))
+    del errors_mm
+    known.targets = replace(targets, issues=(*targets.issues, *corner_issues, *future_confirmation(cell)))
+    refuse_early(known.targets, cell, order)
+    known.toolpath, known.joints = on_disk(toolpath), on_disk(joints)
+    del toolpath, joints
+    give_back()
+
+
+def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Prediction | None":
+    """Foresee motion, forces and deflection; returns whole tables where something needs them."""
+    from gcode2krl.compiled.memory import give_back
+    from gcode2krl.pipeline import forecast_of, forecast_toolpath, predict_toolpath, solve_joints
+
+    toolpath, targets, forces = _done(known.toolpath), _done(known.targets), not order.no_forces
+    prediction: Prediction | None = None
+    if order.compensate == "offline" or order.report is not None:
+        prediction = predict_toolpath(toolpath, ready.cell, targets=targets, forces=forces, begin=begin)
+    if order.compensate == "offline" and prediction is not None:
+        from gcode2krl.translation.compensation import compensated
+
+        begin("compensation")
+        prediction = compensated(prediction, order.compensate_plot, ready.inputs)
+        known.joints = solve_joints(prediction.targets, ready.cell)
+    if prediction is not None:
+        known.forecast = forecast_of(prediction)
+    else:
+        known.forecast = forecast_toolpath(toolpath, ready.cell, targets, forces=forces, begin=begin)
+    give_back()
+    return prediction
+
+
+def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
+    """Write the program and read it back."""
+    from gcode2krl.krl import suggested_name, write_krl
+
+    name = ready.name
+    if ready.place is None and name is None and str(order.part) != STANDARD:
+        name = suggested_name(Path(order.part).stem, ready.cell.program.externals)
+    return write_krl(
+        _done(known.forecast),
+        ready.place,
+        joints=known.joints,
+        name=name,
+        allow=order.allow,
+        guard=not order.no_guard,
+        split=order.split,
+        options=_header_words(order, ready.cell),
+        strict=order.strict,
+        pilot=order.pilot,
+        online=order.online,
+        inputs=ready.inputs,
+    )
+
+
+def _with_page(order: Order, error: Gcode2KrlError, known: _Known) -> Gcode2KrlError:
+    """Write the page of a refused program where one is asked for; returns what refuses it."""
+    inputs = existing(str(order.part), *cell_files(order.cell_path))
+    if order.report is None or not can_be_written(order.report, inputs):
+        return error
+    page = Path(order.report)
+    try:
+        prediction = write_page_of_refused(page, str(order.part), error, known.toolpath, known.cell, inputs)
+    except Gcode2KrlError as unwritable:
+        return unwritable
+    known.page = page
+    if prediction is not None and known.forecast is None:
+        from gcode2krl.pipeline import forecast_of
+
+        known.forecast = forecast_of(prediction)
+    return error
+
+
+def _with_options(cell: "Cell", order: Order) -> "Cell":
+    given = {"max_lines": order.max_lines, "comment_every": order.comment_every}
+    program = cell.program.model_copy(
+        update={key: value for key, value in given.items() if value is not None}
+    )
+    return cell.model_copy(update={"program": program})
+
+
+def _header_words(order: Order, cell: "Cell") -> str:
+    """Return the options that the header of the program names."""
+    named: dict[str, Any] = {
+        "tolerance": order.tolerance_mm,
+        "chord_tolerance": order.chord_tolerance_mm,
+        "block_delete": order.block_delete,
+        "job": Path(order.job_path).name if order.job_path is not None else None,
+        "spin": cell.frames.spin,
+        "compensate": order.compensate,
+        "online": order.online,
+        "both": order.both,
+        "from_line": order.from_line,
+    }
+    return " ".join(
+        f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}"
+        for key, value in named.items()
+        if value not in (None, False)
+    )
+
+
+def _done(table: "_Stage | None") -> "_Stage":
+    """Return what an earlier stage has left."""
+    if table is None:
+        raise AssertionError("the stages run in their order")
+    return table
