@@ -80,6 +80,19 @@ def test_a_page_says_when_its_finding_may_be_released(part):
     assert "--allow" not in made["findings/arc-no-centre.md"]
 
 
+def test_documents_and_findings_that_are_named_become_links(part):
+    def linked(text, page="a.md"):
+        return part("crosslinks").linked(text, page, {"runs"}, {"spindle-off", "allow"})
+
+    assert linked("see docs/runs.md, `docs/runs.md`") == "see [runs](runs.md), [runs](runs.md)"
+    assert linked("`spindle-off`") == "[`spindle-off`](findings/spindle-off.md)"
+    assert linked("docs/runs.md", "findings/x.md") == "[runs](../runs.md)"
+    for same in ("`allow`", "docs/none.md", "[x](docs/runs.md)", "`a docs/runs.md`", "[`spindle-off`](y.md)"):
+        assert linked(same) == same
+    block = "```text\ndocs/runs.md\n```\n"
+    assert linked(block) == block
+
+
 def test_equations_become_mathml(part):
     pytest.importorskip("markdown", reason="needs the extra docs")
     equations = part("mathml", "latex2mathml").Equations()

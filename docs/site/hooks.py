@@ -1,9 +1,9 @@
 """What mkdocs calls while it builds the site: equations, generated pages, pictures that the tool draws."""
 
-import re
 import tempfile
 from pathlib import Path
 
+import crosslinks
 import finding_pages
 import pictures
 import reference
@@ -12,8 +12,11 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+from gcode2krl.codes import all_codes
+
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = Path(__file__).with_name("assets")
+DOCUMENTS = {path.stem for path in (ROOT / "docs").glob("*.md")}
 _scratch = tempfile.TemporaryDirectory(prefix="gcode2krl-site-")
 
 
@@ -49,9 +52,10 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         markdown = markdown.replace("](docs/", "](")
     if name == "findings.md":
         markdown = finding_pages.linked(markdown)
-    if name == "report.md":
-        markdown = markdown.replace(*pictures.LIVE_REPORT)
-    return re.sub(r"\]\((?:\.\./)?(CONTRIBUTING|CHANGELOG)\.md", lambda m: f"]({m[1].lower()}.md", markdown)
+    markdown = markdown.replace(*pictures.LIVE_REPORT).replace(
+        "`CONTRIBUTING.md`", "[contributing](contributing.md)"
+    )
+    return crosslinks.linked(markdown, name, DOCUMENTS, all_codes())
 
 
 def on_post_build(config: MkDocsConfig) -> None:
