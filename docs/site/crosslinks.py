@@ -11,8 +11,8 @@ _DOCUMENT = re.compile(r"(?<!\]\()(?<![\w/.`])docs/(\w+)\.md")
 def linked(markdown: str, page: str, documents: Collection[str], findings: Collection[str]) -> str:
     """Return a page with links in place of ``docs/name.md`` and of the codes of findings.
 
-    ``page`` is its own path below ``docs``; ``documents`` are the names that exist, without ``.md``. A code of one
-    word, such as ``allow``, may mean something else and is left as it is.
+    ``page`` is its own path below ``docs``; ``documents`` are the names that exist, without ``.md``. A code
+    of one word, such as ``allow``, may mean something else and is left as it is.
     """
     up = "../" * page.count("/")
 
