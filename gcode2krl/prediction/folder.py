@@ -63,12 +63,14 @@ def record_bytes(
     targets: Targets,
     cell: Cell,
     bands: Mapping[str, float],
+    head: Mapping[str, Any],
 ) -> bytes:
-    """Return ``prediction.toml``; ``bands`` are the relative bands of the tables that have one."""
+    """Return ``prediction.toml``: ``bands`` of the tables that have one, ``head`` as of `head_of`."""
     import tomli_w
 
     record: dict[str, Any] = {
         "schema": SCHEMA,
+        "result": head,
         "inputs": inputs,
         "issues": [_issue_record(issue) for issue in issues],
         "toolpath_events": [_event_record(event) for event in toolpath.events],
