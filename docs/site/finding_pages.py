@@ -56,7 +56,7 @@ def _page(code: Code, codes: dict[str, Code]) -> str:
         example=code.example,
         remedy=code.remedy,
         allow=code.allow[:1].upper() + code.allow[1:] + ("" if code.allow.endswith(".") else "."),
-        release=f" Then: `--allow {code.name}:LINE`." if releasable else "",
+        release=f" Then:\n\n```text\n--allow {code.name}:LINE\n```" if releasable else "",
         relatives=_relatives(code, codes),
     )
 
