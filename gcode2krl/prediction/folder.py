@@ -16,7 +16,6 @@ import numpy as np
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.exchange.arrow_stream import write_parquet
 from gcode2krl.exchange.disk_names import counted_pattern, names_of_parts
 from gcode2krl.exchange.frame import Columns
 from gcode2krl.files import Content
@@ -47,6 +46,8 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 def table_files(place: Path, tables: Mapping[str, Columns], csv: bool) -> dict[Path, Content]:
     """Return the files of tables by name and what writes them; with ``csv`` as CSV too."""
+    from gcode2krl.exchange.arrow_stream import write_parquet
+
     files: dict[Path, Content] = {}
     for name, columns in tables.items():
         frame = columns.to_polars()
