@@ -41,6 +41,7 @@ def predict(
     *,
     dt_s: float | None = None,
     tolerance_mm: float | None = None,
+    simplify_mm: float | None = None,
     chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
     block_delete: bool = False,
     forces: bool = True,
@@ -49,11 +50,12 @@ def predict(
 ) -> Prediction:
     """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
 
-    ``dt_s`` is the sample time, by default the controller's cycle; ``forces`` False leaves out material
-    removal and what depends on it. A stage that cannot run (no material, unknown stiffness) leaves None and a
-    note. ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
-    ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
-    the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
+    ``dt_s`` is the sample time, by default the controller's cycle; ``simplify_mm`` merges feed moves, see
+    `set_targets`; ``forces`` False leaves out material removal and what depends on it. A stage that cannot
+    run (no material, unknown stiffness) leaves None and a note. ``effects`` such as
+    ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; ``effect_folders`` are folders with
+    the user's own effects. Raises `NotUnderstoodError` where the G-code, the cell or an option is wrong; what
+    a program must not do is in the prediction's ``issues``.
 
     The worst second of every tool:
 
@@ -74,7 +76,13 @@ def predict(
     toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
     settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
     prediction = predict_toolpath(
-        toolpath, cell, dt_s=dt_s, tolerance_mm=tolerance_mm, settings=settings, forces=forces
+        toolpath,
+        cell,
+        dt_s=dt_s,
+        tolerance_mm=tolerance_mm,
+        simplify_mm=simplify_mm,
+        settings=settings,
+        forces=forces,
     )
     return add_effects(prediction, effects, effect_folders)
 
@@ -110,6 +118,7 @@ def predict_toolpath(
     *,
     dt_s: float | None = None,
     tolerance_mm: float | None = None,
+    simplify_mm: float | None = None,
     settings: dict[str, Any] | None = None,
     targets: Targets | None = None,
     forces: bool = True,
@@ -122,7 +131,7 @@ def predict_toolpath(
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     if targets is None:
         begin("planning")
-        targets = set_targets(toolpath, cell, tolerance_mm)
+        targets = set_targets(toolpath, cell, tolerance_mm, simplify_mm)
     begin("motion")
     motion = plan_motion(targets, cell, dt_s)
     begin("joints")
@@ -139,6 +148,8 @@ def predict_toolpath(
     }
     if tolerance_mm is not None:
         inputs["tolerance_mm"] = tolerance_mm
+    if targets.simplified is not None:
+        inputs["simplify_mm"] = targets.simplified.tolerance_mm
     source = Path(toolpath.source)
     if source.is_file():
         inputs["program_sha256"] = hashlib.sha256(source.read_bytes()).hexdigest()
@@ -230,17 +241,21 @@ def forces_and_deflection(
     return forces, deflection, outcome.skipped
 
 
-def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) -> Targets:
+def set_targets(
+    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None, simplify_mm: float | None = None
+) -> Targets:
     """Return what the KRL program will say: poses, spin about the tool axis, CDIS, speeds, stops.
 
-    ``tolerance_mm`` is the blend tolerance at corners: below ``G64 P``, above the cell's own. The findings
+    ``tolerance_mm`` is the blend tolerance at corners: below ``G64 P``, above the cell's own.
+    ``simplify_mm`` merges feed moves that follow each other into straight ones which no corner of the G-code
+    is further from (`program.merging`); a note says what that gains. The findings
     of the G-code, of the cell and of the robot (reach, limits, singularities) travel with the table; the
     writer refuses what is an error.
 
     Raises
     ------
     NotUnderstoodError
-        Where the program has no motion, or the tolerance is not positive.
+        Where the program has no motion, or a tolerance is not positive or too large.
     RefusedError
         Where the cell does not state robot, ``$BASE``, HOME or a tool's tip.
 
@@ -251,19 +266,33 @@ def set_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = Non
     >>> set_targets(read_gcode("part.nc", cell), cell, tolerance_mm=0.05)
     Targets(... motions, part.nc)
     """
-    return targets_and_joints(toolpath, cell, tolerance_mm)[0]
+    return targets_and_joints(toolpath, cell, tolerance_mm, simplify_mm)[0]
 
 
 def targets_and_joints(
-    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None
+    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None, simplify_mm: float | None = None
 ) -> tuple[Targets, Joints]:
     """Return what `set_targets` returns, and the joints it was checked with (``sigma_min`` left NaN)."""
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     program.require_geometry(toolpath, cell)
     planned = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
+    if simplify_mm is not None:
+        planned = _simplified(planned, toolpath, cell, simplify_mm, tolerance_mm)
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
     return checked(replace(planned, issues=(*planned.issues, *warnings)), cell)
+
+
+def _simplified(
+    whole: Targets, toolpath: Toolpath, cell: Cell, simplify_mm: float, tolerance_mm: float | None
+) -> Targets:
+    """Return targets with feed moves merged, and a note on what that gains."""
+    fewer = program.merged(whole, toolpath, cell, simplify_mm, tolerance_mm)
+    if fewer.simplified is None:
+        raise AssertionError("merged targets say what was merged")
+    before_s, after_s = (krc4.plan(krc4.build_chain(each, cell), cell).total_s for each in (whole, fewer))
+    note = program.merging_note(fewer.simplified, before_s, after_s, cell.controller.law)
+    return replace(fewer, issues=(*fewer.issues, note))
 
 
 def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
@@ -329,11 +358,8 @@ def corner_errors(
     """
     chain = krc4.build_chain(targets, cell)
     error_mm = chain.corner_error_mm()
-    of_cell = cell.controller.tolerance_mm
-    below = tolerance_mm if tolerance_mm is not None else (of_cell if of_cell is not None else np.nan)
     move = targets.move[chain.first + 1 : chain.first + 1 + len(error_mm)]
-    programmed = np.where(move >= 0, toolpath.tolerance_mm[move], np.nan)
-    allowed = np.where(np.isnan(programmed), below, programmed)
+    allowed = program.asked_tolerance(toolpath, move, cell, tolerance_mm)
     beyond = np.flatnonzero(error_mm > allowed * (1.0 + 1e-9))
     findings = tuple(
         Issue(

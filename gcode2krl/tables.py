@@ -47,6 +47,22 @@ class Restart:
     """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
 
 
+@dataclass(frozen=True)
+class Simplified:
+    """What Targets leave out of the G-code's corners (`program.merging`)."""
+
+    tolerance_mm: float
+    """How far a corner that is left out may be from the new move."""
+    moves: int = 0
+    """Feed moves of the G-code."""
+    left_out: int = 0
+    """Corners between them."""
+    largest_mm: float = 0.0
+    """How far one is off at most."""
+    worst_line: int = 0
+    """G-code line of the move that is off most."""
+
+
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
@@ -212,6 +228,10 @@ class Targets(Table):
     source: str = ""
     restart: Restart | None = None
     """That of the Toolpath."""
+    simplified: Simplified | None = None
+    """None: every corner of the G-code is a target."""
+    correction_mm: float = 0.0
+    """How far targets are moved at most, by offline compensation."""
 
     def facts(self) -> str:
         """Return how many motions there are, and the program's name."""

@@ -110,7 +110,7 @@ def compensate(
         "after_rms_mm": now.rms_mm,
         "after_steady_max_mm": now.steady_max_mm,
     }
-    moved = replace(moved, issues=(*targets.issues, *issues))
+    moved = replace(moved, issues=(*targets.issues, *issues), correction_mm=shift.largest_mm())
     return Compensated(moved, plain, was, now, evaluated, figures, issues)
 
 

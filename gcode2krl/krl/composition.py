@@ -283,6 +283,7 @@ class _Composer:
             forces=self.layout.forces,
             provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
             restart=self.targets.restart,
+            simplified=self.targets.simplified,
             pilot=self.pilot,
             rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",

@@ -17,6 +17,7 @@ from gcode2krl.exchange.html import block, text_table
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
+from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import PilotText
@@ -47,6 +48,8 @@ class VerifyReport:
     issues: tuple[Issue, ...] = field(default=())
     pilot: PilotFigures | None = None
     """None without a pilot force."""
+    original: OriginalFigures | None = None
+    """How a program that leaves out corners keeps to its G-code, None where it leaves out none."""
 
     @property
     def ok(self) -> bool:
@@ -85,6 +88,7 @@ class VerifyReport:
             "ok": self.ok,
             "worst": list(self.worst),
             **({"pilot": self.pilot.as_dict()} if self.pilot is not None else {}),
+            **({"original": self.original.as_dict()} if self.original is not None else {}),
         }
 
 
@@ -94,15 +98,17 @@ def verify_krl(
     cell: Cell,
     tolerance_mm: float | None = None,
     *,
+    simplify_mm: float | None = None,
     prediction: Prediction | None = None,
 ) -> VerifyReport:
     """Read a program back and compare it with what the G-code and the cell ask for.
 
-    ``tolerance_mm`` must be the one the program was made with. A pilot force is compared with the sidecar
-    beside the program and carried out along the Motion of ``prediction``, or along one planned here; with
-    ``prediction`` its targets (which may be compensated) are what is intended, and the knots are compared
-    with its forces. The RSI files beside a program that is corrected online must be as the cell asks for.
-    Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
+    ``tolerance_mm`` and ``simplify_mm`` must be those the program was made with; a program that leaves out
+    corners is compared with every move of ``toolpath`` too (`krl.original_path`). A pilot force is compared
+    with the sidecar beside the program and carried out along the Motion of ``prediction``, or along one
+    planned here; with ``prediction`` its targets (which may be compensated) are what is intended, and the
+    knots are compared with its forces. The RSI files beside a program that is corrected online must be as the
+    cell asks for. Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
 
     >>> from gcode2krl import load_cell, predict, verify_krl, write_krl
     >>> prediction = predict("part.nc")
@@ -111,7 +117,15 @@ def verify_krl(
     True
     """
     program = read_krl(path)
-    targets = prediction.targets if prediction is not None else set_targets(toolpath, cell, tolerance_mm)
+    if prediction is not None:
+        simplified = prediction.targets.simplified
+        simplify_mm = simplified.tolerance_mm if simplified is not None else None
+    require_stated(program, simplify_mm)
+    targets = (
+        prediction.targets
+        if prediction is not None
+        else set_targets(toolpath, cell, tolerance_mm, simplify_mm)
+    )
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
@@ -142,7 +156,7 @@ def verify_krl(
     if online:
         issues += rsi_file_issues(Path(path), online, expected)
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
-    return compare(program, targets, joints, cell, intended, issues, case)
+    return compare(program, targets, joints, cell, intended, issues, case, toolpath)
 
 
 def _not_whole(program: KrlProgram, targets: Targets, issues: Sequence[Issue]) -> VerifyReport:
@@ -189,10 +203,12 @@ def compare(
     intended: KrlProgram | None = None,
     more_issues: Sequence[Issue] = (),
     pilot: PilotCase | None = None,
+    original: Toolpath | None = None,
 ) -> VerifyReport:
     """Compare a program as read with the intended targets.
 
-    With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force.
+    With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force; with
+    ``original``, where corners are left out, also with every move of the G-code.
     """
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
@@ -218,6 +234,10 @@ def compare(
     if pilot is not None and paired:
         figures, found = check_pilot(program, pilot, targets, cell)
         issues += found
+    kept: OriginalFigures | None = None
+    if targets.simplified is not None and original is not None and paired:
+        kept, found = compare_with_original(program, targets, original, cell)
+        issues += found
     worst = tuple(
         {
             "file": program.file[program.file_of[row]],
@@ -237,6 +257,7 @@ def compare(
         worst=worst,
         issues=tuple(issues),
         pilot=figures,
+        original=kept,
     )
 
 

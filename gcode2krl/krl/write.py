@@ -29,7 +29,7 @@ from gcode2krl.krl.verify import VerifyReport, compare
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
-from gcode2krl.tables import Joints, Targets
+from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
 _ALIKE = "; a controller needs file and DEF alike"
@@ -90,6 +90,7 @@ def write_krl(
     pilot: PilotForm | None = None,
     online: str | None = None,
     inputs: Sequence[str | Path] = (),
+    toolpath: Toolpath | None = None,
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
@@ -113,6 +114,7 @@ def write_krl(
     online : name of the RSI files of a program that is corrected online by the cell's ``[online]``; they
         are written beside it. RSI is on from above the first cut to above the last.
     inputs : files and folders that must not be overwritten, beside those that the tables name.
+    toolpath : needed with Targets that leave out corners of it; the others have their own.
 
     Raises
     ------
@@ -134,6 +136,10 @@ def write_krl(
     targets, cell = (source, cell) if isinstance(source, Targets) else (source.targets, source.cell)
     if cell is None:
         raise input_error("option-value", "write_krl needs a cell with Targets")
+    original = toolpath if isinstance(source, Targets) else source.toolpath
+    if targets.simplified is not None and original is None:
+        sentence = "the targets leave out corners, which only their Toolpath tells"
+        raise input_error("option-value", sentence, "give write_krl the toolpath too")
     file, issues = _named(path, name, targets.source, cell)
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
     if online is not None:
@@ -156,11 +162,11 @@ def write_krl(
     )
     bare = _Content(targets, joints)
     content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
-    texts, report = _composed(content, cell, program_name, layout)
+    texts, report = _composed(content, cell, program_name, layout, original)
     failure = _pilot_failure(report) if pilot is None else None
     if failure is not None:
         plan, content = left_out(failure), bare
-        texts, report = _composed(content, cell, program_name, layout)
+        texts, report = _composed(content, cell, program_name, layout, original)
     issues += released(_issues_of(plan), (), strict)
     targets = content.targets
     issues += released(_size_issues(texts, targets, cell), (), strict)
@@ -188,15 +194,14 @@ class _Content:
 
 
 def _composed(
-    content: _Content, cell: Cell, name: str, layout: Layout
+    content: _Content, cell: Cell, name: str, layout: Layout, original: Toolpath | None
 ) -> tuple[dict[str, bytes], VerifyReport]:
     """Return the files of a program, and what reading them back finds."""
     targets, joints = content.targets, content.joints
     texts = compose(targets, joints, cell, name, layout, content.text)
     give_back()
-    return texts, compare(
-        read_texts(texts, f"{name}{w.SOURCE_SUFFIX}"), targets, joints, cell, pilot=content.case
-    )
+    read = read_texts(texts, f"{name}{w.SOURCE_SUFFIX}")
+    return texts, compare(read, targets, joints, cell, pilot=content.case, original=original)
 
 
 def _pilot_plan(

@@ -7,7 +7,7 @@ Deflection side by side. The Arrow schema of a file states the unit of each colu
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,7 +22,18 @@ from gcode2krl.exchange.frame import Columns
 from gcode2krl.files import Content
 from gcode2krl.prediction.record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction.tables import PARQUET_TYPES, check_numbers, check_references, read_table
-from gcode2krl.tables import Deflection, Event, Forces, Joints, Motion, Restart, Table, Targets, Toolpath
+from gcode2krl.tables import (
+    Deflection,
+    Event,
+    Forces,
+    Joints,
+    Motion,
+    Restart,
+    Simplified,
+    Table,
+    Targets,
+    Toolpath,
+)
 
 RECORD = "prediction.toml"
 UNFINISHED = f'schema = "{SCHEMA}"\nunfinished = true\n'.encode("ascii")
@@ -66,6 +77,10 @@ def record_bytes(
     }
     if toolpath.restart is not None:
         record["restart"] = _restart_record(toolpath.restart)
+    if targets.simplified is not None:
+        record["simplified"] = asdict(targets.simplified)
+    if targets.correction_mm:
+        record["correction_mm"] = targets.correction_mm
     record |= {f"{name}_relative_band": band for name, band in bands.items()}
     return tomli_w.dumps(record).encode("utf-8", "replace")
 
@@ -114,6 +129,8 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
         issues=record.findings(),
         events=events_of(record.targets_events, poses, "targets"),
         restart=restart,
+        simplified=None if record.simplified is None else Simplified(**record.simplified.model_dump()),
+        correction_mm=record.correction_mm,
     )
     parts: dict[str, Any] = {"toolpath": toolpath, "targets": targets}
     if motion_frame is not None:

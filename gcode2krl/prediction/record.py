@@ -85,6 +85,16 @@ class _RestartRecord(_Part):
     way_rows: Annotated[int, Field(strict=True, ge=0, le=3)]
 
 
+class _SimplifiedRecord(_Part):
+    """`tables.Simplified`."""
+
+    tolerance_mm: Annotated[FiniteFloat, Field(gt=0)]
+    moves: _Row
+    left_out: _Row
+    largest_mm: _NotNegative
+    worst_line: _Line
+
+
 class _Inputs(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, _Plain | list[_Plain]]
@@ -104,6 +114,8 @@ class PredictionRecord(BaseModel):
     targets_events: tuple[_EventRecord, ...]
     cell: dict[str, Any]
     restart: _RestartRecord | None = None
+    simplified: _SimplifiedRecord | None = None
+    correction_mm: _NotNegative = 0.0
     forces_relative_band: _Band = 0.0
     deflection_relative_band: _Band = 0.0
 

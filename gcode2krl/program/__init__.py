@@ -1,7 +1,9 @@
 """Toolpath to Targets: what the KRL program will say."""
 
+from gcode2krl.program.blending import asked_tolerance
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
+from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.restart import (
     approached_row,
@@ -16,12 +18,15 @@ from gcode2krl.program.targets import plan_targets
 
 __all__ = [
     "approached_row",
+    "asked_tolerance",
     "begun_at",
     "begun_row",
     "below_table",
     "check_toolpath",
     "doubtful",
     "feeds_per_tooth",
+    "merged",
+    "merging_note",
     "plan_targets",
     "require_geometry",
     "row_before",

@@ -9,9 +9,11 @@ import math
 
 import numpy as np
 
-from gcode2krl.arrays import Bools, Floats
+from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, INT, OUT_FLOATS, core_function
+from gcode2krl.tables import Toolpath
 
 LEVELS_MM = np.array([m * 10.0**e for e in range(-3, 3) for m in (1, 2, 5)])
 """The values ``$APO.CDIS`` may take, so that a program changes it rarely."""
@@ -21,6 +23,18 @@ _REVERSAL_COS = math.cos(math.radians(1.0))
 _corner_cdis = core_function(
     "program_corner_cdis", FLOATS, FLOATS, FLOAT, BOOLS, FLOATS, FLOAT, INT, INT, OUT_FLOATS
 )
+
+
+def asked_tolerance(toolpath: Toolpath, move: Ints32, cell: Cell, tolerance_mm: float | None) -> Floats:
+    """Return the blend tolerance (p,) that is asked for at the end of motions, NaN where none is.
+
+    Order of precedence: ``G64 P``, then the option, then the cell's. ``move`` (p,) is the row of the
+    Toolpath; to added motions, -1, ``G64 P`` does not apply.
+    """
+    of_cell = cell.controller.tolerance_mm
+    below = tolerance_mm if tolerance_mm is not None else (of_cell if of_cell is not None else np.nan)
+    programmed = np.where(move >= 0, toolpath.tolerance_mm[move], np.nan)
+    return np.where(np.isnan(programmed), below, programmed)
 
 
 def corner_cdis(
