@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from gcode2krl.batch.written import contents
 from gcode2krl.errors import input_error
 from gcode2krl.files import write_together
 
@@ -15,10 +16,9 @@ RESULTS = "results.jsonl"
 
 
 def write_results(out: Path, records: Iterable[Record], before: Sequence[Record] | None) -> list[Path]:
-    """Write what there is to say about all parts, sorted by their names; return the files."""
-    ordered = sorted(records, key=lambda record: str(record["part"]))
-    contents = {RESULTS: "".join(json.dumps(each, allow_nan=False) + "\n" for each in ordered).encode()}
-    files = {out / name: content for name, content in contents.items()}
+    """Write what there is to say about all parts, and what changed since ``before``; return the files."""
+    made = contents(records, before, str(Path.cwd()))
+    files = {out / name: content for name, content in made.items()}
     write_together(files)
     return list(files)
 

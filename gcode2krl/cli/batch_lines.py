@@ -102,7 +102,7 @@ def table_lines(batch: Told, out: Path, seconds: float, stopped: bool) -> Iterat
         yield f"{'left':<10}{batch.parts - len(batch.records):>7,}   the same command goes on from here"
     yield f"{'cached':<10}{counts['cached']:>7,}"
     yield f"{'time':<10}{seconds:>7.1f} s, {computed_s:.1f} s of workers"
-    yield f"{out} -> results.jsonl"
+    yield f"{out} -> index.html, summary.md, junit.xml, findings.sarif, results.jsonl"
 
 
 def as_record(batch: Told, files: list[Path], seconds: float, options: Record) -> Record:
