@@ -242,16 +242,17 @@ def test_the_steps_of_the_containerfile(tmp_path, repository):
     image = tmp_path / "image"
     ignored = shutil.ignore_patterns(".git", "__pycache__", "built", ".hypothesis", "*_cache")
     shutil.copytree(ROOT, image / "src", ignore=ignored)
-    own = {"PIP_NO_DEPS": "1", "PIP_TARGET": str(image / "site"), "PYTHONPATH": ""}
+    site = image / "site"
     commands = [words for name, words in instructions() if name == "RUN"]
     assert len(commands) == 2
     for command in commands:
         here = command.replace("/src", str(image / "src")).replace("/wheels", str(image / "wheels"))
-        wheel = {"PIP_TARGET": ""} if " wheel " in command else {}
-        done = repository.run(here.replace("python ", f'"{sys.executable}" '), **{**own, **wheel})
+        own = {"PIP_NO_DEPS": "1", "PIP_TARGET": str(site)} if " install " in command else {}
+        script = here.replace("python ", f'"{sys.executable}" ')
+        done = repository.run(script, PYTHONPATH="", **own)
         assert done.returncode == 0, done.stderr
     assert ("ENTRYPOINT", '["gcode2krl"]') in instructions()
     program = f'"{sys.executable}" -m gcode2krl batch parts/ -o out/ --no-cache'
-    done = repository.run(program, PYTHONPATH=str(image / "site"))
+    done = repository.run(program, PYTHONPATH=str(site))
     assert done.returncode == 1, done.stderr
     assert set(lines_of(repository)) == {"good.nc", "sub/bad.nc"}
