@@ -1,6 +1,6 @@
 """The stages on a Motion, block after block, so that no stage keeps all samples."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ from gcode2krl import compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.memory import give_back
+from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
@@ -18,10 +19,12 @@ from gcode2krl.tables import (
     Deflection,
     Forces,
     Gathered,
+    Joints,
     Motion,
     PilotForce,
     Targets,
     Toolpath,
+    blocks_of,
     joined,
     rows_of,
 )
@@ -132,6 +135,11 @@ def _line_of_move(targets: Targets, chain: krc4.Chain) -> Ints32:
     return line
 
 
+Samples = tuple[Motion, Floats, Floats, bool]
+"""The next samples (m) of a motion, angles and speeds of those of them and before them that are known, and
+whether the motion ends with them; see `Loads.take`."""
+
+
 class Block(NamedTuple):
     """Samples that have passed all stages."""
 
@@ -158,9 +166,18 @@ class Loads:
     """Forces and deflection along a motion that comes block after block, and what is found of them."""
 
     def __init__(
-        self, toolpath: Toolpath, cell: Cell, outlook: Callable[[], cutting.Outlook], dt_s: float
+        self,
+        toolpath: Toolpath,
+        cell: Cell,
+        outlook: Callable[[], cutting.Outlook],
+        dt_s: float,
+        *,
+        has_peaks: bool = True,
     ) -> None:
-        """Set up the stock; raises `NotUnderstoodError` where it cannot be read."""
+        """Set up the stock; raises `NotUnderstoodError` where it cannot be read.
+
+        Without peaks, ``peak_N`` of the forces is their mean: no figure of a program depends on it.
+        """
         self._toolpath, self._cell = toolpath, cell
         self._milling: cutting.Milling | None = None
         self._skipped: tuple[Issue, ...] = ()
@@ -175,7 +192,7 @@ class Loads:
             self._skipped = (Issue("note", "no-forces", 0, "no forces: the cell names no material", remedy),)
             return
         try:
-            self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s)
+            self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s, has_peaks=has_peaks)
             give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
@@ -193,7 +210,27 @@ class Loads:
         """
         if self._milling is None:
             raise ValueError("there are no forces")
-        forces = self._milling.take(motion, ends)
+        return self._done((motion, q_rad, qd_rad_s, ends), self._milling.take(motion, ends))
+
+    def along(self, samples: Iterator[Samples]) -> Iterator[Block]:
+        """Yield the blocks of `take`: while one is judged the next is cut, and the one behind it prepared."""
+        milling = self._milling
+        if milling is None:
+            return
+
+        def approached() -> Generator[tuple[Samples, cutting.Approach], None, None]:
+            for block in samples:
+                yield block, milling.approached(block[0], block[3])
+
+        def touched() -> Generator[tuple[Samples, cutting.Contact], None, None]:
+            for block, approach in ahead(approached()):
+                yield block, milling.touched(approach)
+
+        for block, contact in ahead(touched()):
+            yield self._done(block, milling.loaded(contact))
+
+    def _done(self, samples: Samples, forces: Forces) -> Block:
+        motion, q_rad, qd_rad_s, _ = samples
         if self._waiting is not None:
             old, q_old, qd_old = self._waiting
             motion = joined(old, motion)
@@ -268,8 +305,14 @@ class PilotSamples:
         return PilotForce(**columns, deflection_mm=self._bent.column() if with_deflection else unknown)
 
 
-def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[tuple[Motion, Floats, Floats, bool]]:
+def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[Samples]:
     """Yield the blocks of a motion with the joints and speeds that are known so far, see `Loads.take`."""
     follower = follower_of(course, cell)
     for motion, ends in course.blocks():
         yield motion, *follower.take(motion, ends), ends
+
+
+def blocks_with(joints: Joints, motion: Motion) -> Iterator[Samples]:
+    """Yield the blocks of a motion with its joints."""
+    for (block, ends), (at, _) in zip(blocks_of(motion), blocks_of(joints), strict=True):
+        yield block, at.q_rad, at.qd_rad_s, ends

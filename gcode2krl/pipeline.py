@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
-from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with_joints, plan_course
+from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
@@ -170,9 +170,8 @@ def forecast_toolpath(
     outcome = Outcome(None, None, ())
     if forces:
         tell = begin("material, forces, deflection")
-        loads = Loads(toolpath, cell, planned.outlook, course.dt_s)
-        for motion, q_rad, qd_rad_s, ends in blocks_with_joints(course, cell) if loads.possible else ():
-            block = loads.take(motion, q_rad, qd_rad_s, ends)
+        loads = Loads(toolpath, cell, planned.outlook, course.dt_s, has_peaks=False)
+        for block in loads.along(blocks_with_joints(course, cell)):
             figures.take(block.forces, block.deflection)
             samples.take(block.motion, block.line, block.forces, block.deflection)
             tell(loads.count, course.count)
@@ -223,10 +222,7 @@ def forces_and_deflection(
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
     all_forces, all_bent = Gathered[Forces](len(motion)), Gathered[Deflection](len(motion))
-    for (block, ends), (at, _) in (
-        zip(blocks_of(motion), blocks_of(joints), strict=True) if loads.possible else ()
-    ):
-        done = loads.take(block, at.q_rad, at.qd_rad_s, ends)
+    for done in loads.along(blocks_with(joints, motion)):
         all_forces.take(done.forces)
         if done.deflection is not None:
             all_bent.take(done.deflection)

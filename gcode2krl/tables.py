@@ -82,8 +82,8 @@ def rows_at(table: AnyTable, rows: NDArray[np.int64]) -> AnyTable:
     return replace(table, **columns)
 
 
-BLOCK_ROWS = 65_536
-"""Rows of a table that go through the stages together: four chunks, some 30 MB in all stages."""
+BLOCK_ROWS = 32_768
+"""Rows of a table that go through the stages together: two chunks, some 15 MB in all stages."""
 
 
 def blocks_of(table: AnyTable, rows: int = BLOCK_ROWS) -> Iterator[tuple[AnyTable, bool]]:

@@ -11,6 +11,8 @@ import pytest
 from gcode2krl import load_cell, read_gcode, set_targets
 from gcode2krl.blockwise import Loads, follower_of, plan_course
 from gcode2krl.cli.main import main
+from gcode2krl.compiled.threads import THREADS_VARIABLE
+from gcode2krl.krc4.course import Course
 from gcode2krl.pipeline import forecast_of, forecast_toolpath, plan_motion, predict_toolpath, solve_joints
 from gcode2krl.tables import joined, lengths, rows_of
 
@@ -73,6 +75,19 @@ def test_a_forecast_says_what_the_prediction_says(part):
     assert passed.loads == whole.loads
     assert (passed.time_s, passed.path_mm) == (whole.time_s, whole.path_mm)
     same(passed.pilot, whole.pilot)
+
+
+def test_any_number_of_threads_gives_the_same_forecast(part, monkeypatch):
+    toolpath, targets, cell = part
+    whole = Course.blocks
+    monkeypatch.setattr(Course, "blocks", lambda course: whole(course, 50))
+    passed = []
+    for threads in "125":
+        monkeypatch.setenv(THREADS_VARIABLE, threads)
+        passed.append(forecast_toolpath(toolpath, cell, targets))
+    for other in passed[1:]:
+        assert (other.issues, other.loads) == (passed[0].issues, passed[0].loads)
+        same(other.pilot, passed[0].pilot)
 
 
 def test_rows_of_a_table_joined_are_the_table(part):

@@ -2,12 +2,11 @@
 
 import contextlib
 import hashlib
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from gcode2krl.batch.written import contents
+from gcode2krl.batch.written import contents, records_of
 from gcode2krl.errors import input_error
 from gcode2krl.files import write_together
 
@@ -16,8 +15,8 @@ RESULTS = "results.jsonl"
 
 
 def write_results(out: Path, records: Iterable[Record], before: Sequence[Record] | None) -> list[Path]:
-    """Write what there is to say about all parts, and what changed since ``before``; return the files."""
-    made = contents(records, before, str(Path.cwd()))
+    """Write what there is to say about all parts, beside those of ``before``; return the files."""
+    made = contents(records, before, Path.cwd().as_posix())
     files = {out / name: content for name, content in made.items()}
     write_together(files)
     return list(files)
@@ -28,16 +27,13 @@ def read_results(folder: Path) -> list[Record]:
     file = folder / RESULTS
     remedy = "name the output folder of an earlier batch"
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-        records = [json.loads(line) for line in lines if line.strip()]
+        records = records_of(file.read_bytes())
     except OSError as error:
         why = f"cannot read: {error.strerror}"
         raise input_error("file-unreadable", why, remedy, source=str(file)) from None
-    except ValueError:
-        raise input_error("file-unreadable", "not a line of JSON a part", remedy, source=str(file)) from None
-    if not all(isinstance(record, dict) and "part" in record for record in records):
-        raise input_error("file-unreadable", "not the records of a batch", remedy, source=str(file))
-    return records
+    if not records:
+        raise input_error("file-unreadable", "no record of a part", remedy, source=str(file))
+    return [dict(record) for record in records]
 
 
 def earlier_files(out: Path) -> dict[str, dict[str, str]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gcode2krl.batch.written.part import VERDICTS
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.standard_files import tell
 from gcode2krl.errors import Issue, told
@@ -17,9 +18,7 @@ if TYPE_CHECKING:
 
 Record = dict[str, Any]
 Show = Callable[["Line"], None]
-VERDICTS = ("written", "refused", "failed")
-"""By exit code."""
-_COLOURS = {"written": "green", "refused": "red", "failed": "red"}
+_COLOURS = dict(zip(VERDICTS, ("green", "red", "red"), strict=True))
 _MOST_FINDINGS = 3
 """Of a part that was not written; the rest is counted, and stands in ``results.jsonl``."""
 
@@ -34,7 +33,7 @@ class Told:
 
     @property
     def counts(self) -> Counter[str]:
-        """How many were written, refused and failed, and how many of them came from the cache."""
+        """How many there are of each verdict, and how many of them came from the cache."""
         verdicts = Counter(VERDICTS[record["exit_code"]] for record in self.records)
         verdicts["cached"] = sum(record["cached"] for record in self.records)
         return verdicts
@@ -71,7 +70,7 @@ def part_line(record: Record) -> str:
         if record.get(key) is not None
     ]
     took = "cached" if record["cached"] else f"{record['seconds']:.1f} s"
-    head = click.style(f"{verdict:<8}", fg=_COLOURS[verdict])
+    head = click.style(f"{verdict:<14}", fg=_COLOURS[verdict])
     return f"{head} {record['part']}  {', '.join(figures)}{'  ' if figures else ''}[{took}]"
 
 
@@ -95,14 +94,14 @@ def table_lines(batch: Told, out: Path, seconds: float, stopped: bool) -> Iterat
     """Yield the table at the end."""
     counts = batch.counts
     computed_s = sum(record["seconds"] for record in batch.records if not record["cached"])
-    yield f"{'parts':<10}{batch.parts:>7,}"
+    yield f"{'parts':<14}{batch.parts:>7,}"
     for verdict in VERDICTS:
-        yield f"{verdict:<10}{counts[verdict]:>7,}"
+        yield f"{verdict:<14}{counts[verdict]:>7,}"
     if stopped:
-        yield f"{'left':<10}{batch.parts - len(batch.records):>7,}   the same command goes on from here"
-    yield f"{'cached':<10}{counts['cached']:>7,}"
-    yield f"{'time':<10}{seconds:>7.1f} s, {computed_s:.1f} s of workers"
-    yield f"{out} -> index.html, summary.md, junit.xml, findings.sarif, results.jsonl"
+        yield f"{'left':<14}{batch.parts - len(batch.records):>7,}   the same command goes on from here"
+    yield f"{'cached':<14}{counts['cached']:>7,}"
+    yield f"{'time':<14}{seconds:>7.1f} s, {computed_s:.1f} s of workers"
+    yield f"{out / 'index.html'} shows all of them"
 
 
 def as_record(batch: Told, files: list[Path], seconds: float, options: Record) -> Record:
@@ -112,7 +111,7 @@ def as_record(batch: Told, files: list[Path], seconds: float, options: Record) -
     counts = batch.counts
     figures = {
         "parts": batch.parts,
-        **{verdict: counts[verdict] for verdict in (*VERDICTS, "cached")},
+        **{name.replace(" ", "_"): counts[name] for name in (*VERDICTS, "cached")},
         "left": batch.parts - len(batch.records),
         "seconds": round(seconds, 3),
     }

@@ -2,12 +2,14 @@
 
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import closing
+from typing import Any, TypeVar
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+_END: Any = object()
 
 
 THREADS_VARIABLE = "GCODE2KRL_THREADS"
@@ -37,3 +39,19 @@ def in_threads(
         return [work(task) for task in tasks]
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(work, tasks))
+
+
+def ahead(items: Generator[Result, None, None], threads: int | None = None) -> Generator[Result, None, None]:
+    """Yield items, the next one of which is made in a thread while one is worked on.
+
+    What making one raises is raised here. The thread ends with the last item, or with this generator: one
+    that is being made then is waited for.
+    """
+    if (threads or cores()) < 2:
+        yield from items
+        return
+    with closing(items), ThreadPoolExecutor(1) as maker:
+        coming = maker.submit(next, items, _END)
+        while (item := coming.result()) is not _END:
+            coming = maker.submit(next, items, _END)
+            yield item

@@ -3,6 +3,8 @@
 from gcode2krl.cutting.entry import depth_in_material, highest_below
 from gcode2krl.cutting.force import Load, cutting_load, mean_force
 from gcode2krl.cutting.milling import (
+    Approach,
+    Contact,
     Milling,
     Removal,
     cut,
@@ -15,6 +17,8 @@ from gcode2krl.cutting.milling import (
 from gcode2krl.cutting.outlook import Outlook, Watch, outlook_of
 
 __all__ = [
+    "Approach",
+    "Contact",
     "Load",
     "Milling",
     "Outlook",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
-from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.chunks import chunked
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
 from gcode2krl.cutting.stretches import CONTACT_MM as _CONTACT_MM
 from gcode2krl.cutting.stretches import RapidContacts, Stretch, Stretches
@@ -269,20 +269,18 @@ class _Chips:
         """Of thin chips, of thick ones: how many, and the line of the first."""
 
     def take(self, cut: Cut, forces: Forces) -> None:
-        cutting = np.flatnonzero(cut.engaged & (cut.f_z_mm > 0.0))
-        self._in_cut += len(cutting)
+        cutting = cut.engaged & (cut.f_z_mm > 0.0)
+        self._in_cut += int(np.count_nonzero(cutting))
 
-        def chips(start: int, end: int) -> Floats:
-            rows = cutting[start:end]
+        def chips(rows: slice) -> Floats:
             return largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
 
-        if not len(cutting):
-            return
-        chip_mm = np.concatenate(in_chunks(chips, chunk_borders(len(cutting))))
+        chip_mm = chunked(chips, len(cutting))
         for kind, wrong in enumerate((chip_mm < THIN_CHIP_MM, chip_mm > THICK_CHIP_MM)):
+            wrong &= cutting
             count = int(np.count_nonzero(wrong))
             if count and not self._count[kind]:
-                self._line[kind] = int(cut.source_line[cutting[np.argmax(wrong)]])
+                self._line[kind] = int(cut.source_line[np.argmax(wrong)])
             self._count[kind] += count
 
     def issues(self) -> Iterator[Issue]:

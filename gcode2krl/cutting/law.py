@@ -1,12 +1,11 @@
 """How much force a chip takes: the material's law as numbers, the chip from speed and spindle, its limits."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Material
+from gcode2krl.cutting.slices import largest_chips
 from gcode2krl.errors import input_error
 from gcode2krl.units import MM_PER_M, RAD_PER_REV
 
@@ -84,16 +83,14 @@ def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.
     ``phi_rad`` (n, 2k), NaN pairs are none; 0 without an arc. To compare with `THIN_CHIP_MM`,
     `THICK_CHIP_MM`.
     """
-    arcs = np.atleast_2d(np.asarray(phi_rad, dtype=float))
-    start, end = arcs[:, 0::2], arcs[:, 1::2]
-    with np.errstate(invalid="ignore"):
-        engaged = end > start
-        crest = start + np.mod(math.pi / 2 - start, 2.0 * math.pi)  # first angle after the start with sin = 1
-        sine = np.where(crest <= end, 1.0, np.maximum(np.sin(start), np.sin(end)))
-    sine = np.where(engaged, sine, -np.inf).max(axis=1, initial=-np.inf)
-    gamma = np.asarray(ramp_rad, dtype=float)
-    per_feed = np.maximum(np.maximum(sine, 0.0) * np.cos(gamma), np.where(sine > -np.inf, np.sin(gamma), 0.0))
-    return np.asarray(np.asarray(f_z_mm, dtype=float) * np.maximum(per_feed, 0.0))
+    arcs = np.ascontiguousarray(np.atleast_2d(np.asarray(phi_rad, dtype=float)))
+    out = np.empty(len(arcs))
+    feed, gamma = (
+        np.ascontiguousarray(np.broadcast_to(np.asarray(each, dtype=float), out.shape))
+        for each in (f_z_mm, ramp_rad)
+    )
+    largest_chips(arcs, feed, gamma, out)
+    return out
 
 
 def spindle_power(torque_Nmm: ArrayLike, spindle_rad_s: ArrayLike) -> Floats:

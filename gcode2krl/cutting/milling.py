@@ -136,6 +136,23 @@ class _Rows(NamedTuple):
     descent_mm: Floats
 
 
+class Approach(NamedTuple):
+    """Samples that are about to be cut."""
+
+    rows: _Rows
+    points: Points
+    """The way along them."""
+    ends: bool
+    """True where the motion ends with them."""
+
+
+class Contact(NamedTuple):
+    """The same samples, and what is read at those that are done by then."""
+
+    rows: _Rows
+    engaged: Engaged
+
+
 class Milling:
     """Removes the stock along a motion that comes some samples at a time; see `cut`."""
 
@@ -148,10 +165,14 @@ class Milling:
         law: Floats | None = None,
         *,
         is_checked: bool = True,
+        has_peaks: bool = True,
         nodes_per_diameter: float = NODES_PER_DIAMETER,
         threads: int | None = None,
     ) -> None:
-        """Take what is known of the motion, and the time between its samples; the others as in `remove`."""
+        """Take what is known of the motion, and the time between its samples; the others as in `remove`.
+
+        Without peaks, which take long, ``peak_N`` of the forces is their mean.
+        """
         material = cell.material
         if material is None:
             raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
@@ -179,16 +200,31 @@ class Milling:
             )
         self._last: _Rows | None = None
         self._waiting: _Rows | None = None
-        self._peaks = _Peaks(self._tools, self._law)
+        self._peaks = _Peaks(self._tools, self._law) if is_checked and has_peaks else None
 
     def take(self, motion: Motion, ends: bool) -> Forces:
         """Cut the next samples; return the forces at those that follow the ones returned before.
 
         The motion ``ends`` with these samples: then there is a row for every one.
         """
+        return self.loaded(self.touched(self.approached(motion, ends)))
+
+    # The steps of `take`. A step takes block after block; each may be at work on another block.
+
+    def approached(self, motion: Motion, ends: bool) -> Approach:
+        """Return what is known of the next samples before they are cut."""
         rows = self._rows(motion)
-        engaged = self._engagement.take(self._points(rows), ends)
+        points = self._points(rows)
         self._last = copied(rows, slice(-1, None))
+        return Approach(rows, points, ends)
+
+    def touched(self, approach: Approach) -> Contact:
+        """Cut along the next samples."""
+        return Contact(approach.rows, self._engagement.take(approach.points, approach.ends))
+
+    def loaded(self, contact: Contact) -> Forces:
+        """Return the forces at the samples that are done, and take what is found of them."""
+        rows, engaged = contact
         if self._waiting is not None:
             rows = followed(self._waiting, rows)
         count = len(engaged.result.a_p_mm)
@@ -259,7 +295,7 @@ class Milling:
         forces = Forces(
             force_base_N=turned(force_N, self._to_field.T),
             moment_base_Nmm=turned(moment_Nmm, self._to_field.T),
-            peak_N=self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N) if checks is not None else mean_N,
+            peak_N=mean_N if self._peaks is None else self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N),
             torque_Nmm=np.where(rows.rapid, 0.0, found.torque_Nmm),
             a_p_mm=found.a_p_mm,
             a_e_mm=found.a_e_mm,

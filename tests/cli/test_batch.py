@@ -102,8 +102,15 @@ def test_a_bad_part_does_not_stop_the_others(parts, run):
     }
     assert "far.nc:7: error" in done.err
     assert "no.nc:1: error" in done.err
+    sarif = json.loads((Path("out") / "findings.sarif").read_text(encoding="utf-8"))
+    places = {
+        result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+        for result in sarif["runs"][0]["results"]
+    }
+    assert "parts/far.nc" in places  # below the folder in which the run began
+    assert {"junit.xml", "summary.md", "index.html"} <= {file.name for file in Path("out").iterdir()}
     words = done.out.split()
-    assert [words[words.index(word) + 1] for word in ("parts", "written", "refused", "failed")] == [
+    assert [words[words.index(word) + 1] for word in ("parts", "written", "refused", "understood")] == [
         "5",
         "3",
         "1",
@@ -237,7 +244,7 @@ def test_json_and_quiet(parts, run):
         Record.model_validate(record)
     assert (found["schema"], found["command"]) == ("gcode2krl/result/1", "batch")
     assert found["parts"] == 4
-    assert found["written"] + found["refused"] + found["failed"] == 4
+    assert found["written"] + found["refused"] + found["not_understood"] == 4
     assert found["exit_code"] == done.code == 1
     assert found["options"] == {"strict": True}
     assert "out/results.jsonl" in [Path(file).as_posix() for file in found["files"]]
@@ -249,6 +256,9 @@ def test_against_an_earlier_run(parts, run):
     run("batch", parts, "-o", "old")
     (parts / "a.nc").write_text(GOOD.format(x=150))
     assert run("batch", parts, "-o", "new", "--against", "old").code == 0
+    before, after = records("old")["a.nc"]["time_s"], records("new")["a.nc"]
+    assert after["against"]["time_s"] == before < after["time_s"]
+    assert "a.nc" in (Path("new") / "summary.md").read_text(encoding="utf-8")
     assert run("batch", parts, "-o", "new", "--against", "nothing").code == 2
 
 

@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from gcode2krl.compiled.threads import THREADS_VARIABLE, cores, in_threads
+from gcode2krl.compiled.threads import THREADS_VARIABLE, ahead, cores, in_threads
 
 
 def test_results_come_in_the_order_of_the_tasks():
@@ -51,3 +51,55 @@ def test_a_worker_of_a_pool_takes_one(monkeypatch):
     monkeypatch.delenv(THREADS_VARIABLE, raising=False)
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert pool.submit(cores).result() == 1
+
+
+def counted(most, closed=None):
+    try:
+        yield from range(most)
+    finally:
+        if closed is not None:
+            closed.set()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_what_is_made_ahead_comes_in_order(threads):
+    assert list(ahead(counted(5), threads)) == [0, 1, 2, 3, 4]
+    assert list(ahead(counted(0), threads)) == []
+
+
+def test_the_next_item_is_made_while_one_is_worked_on():
+    together = threading.Barrier(2, timeout=10.0)  # both have to meet, or it breaks
+
+    def items():
+        yield 0
+        together.wait()
+        yield 1
+
+    for item in ahead(items(), 2):
+        if item == 0:
+            together.wait()
+
+
+def test_an_error_while_making_an_item_comes_where_it_is_due():
+    def items():
+        yield 0
+        raise KeyError(1)
+
+    made = ahead(items(), 2)
+    assert next(made) == 0
+    with pytest.raises(KeyError):
+        next(made)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_no_thread_is_left_where_the_work_on_an_item_fails(error):
+    before, closed = threading.active_count(), threading.Event()
+    with pytest.raises(error):
+        work_that_fails(ahead(ahead(counted(9, closed), 2), 2), error)
+    assert closed.is_set()
+    assert threading.active_count() == before
+
+
+def work_that_fails(items, error):
+    for _ in items:
+        raise error

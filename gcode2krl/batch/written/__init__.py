@@ -6,7 +6,7 @@ from gcode2krl.batch.written.changes import Change, Difference, difference, with
 from gcode2krl.batch.written.index import index_html
 from gcode2krl.batch.written.junit import junit_xml
 from gcode2krl.batch.written.part import Record
-from gcode2krl.batch.written.results import results_jsonl
+from gcode2krl.batch.written.results import records_of, results_jsonl
 from gcode2krl.batch.written.sarif import findings_sarif
 from gcode2krl.batch.written.summary import summary_md
 
@@ -19,6 +19,7 @@ __all__ = [
     "findings_sarif",
     "index_html",
     "junit_xml",
+    "records_of",
     "results_jsonl",
     "summary_md",
 ]

@@ -1,5 +1,6 @@
 """``results.jsonl``: a record a line, sorted by part."""
 
+import contextlib
 import json
 import math
 from collections.abc import Iterable
@@ -20,6 +21,17 @@ def results_jsonl(records: Iterable[Record]) -> bytes:
 def _line(record: Record) -> bytes:
     text = json.dumps(_finite(record), sort_keys=True, allow_nan=False)
     return text.encode("ascii") + b"\n"
+
+
+def records_of(content: bytes) -> list[Record]:
+    """Return the records of a ``results.jsonl``; a line that is no object is left out."""
+    records: list[Record] = []
+    for line in content.splitlines():
+        with contextlib.suppress(ValueError):
+            record = json.loads(line)
+            if isinstance(record, dict):
+                records.append(record)
+    return records
 
 
 def _finite(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 import json
 
-from gcode2krl.batch.written import results_jsonl
+from gcode2krl.batch.written import records_of, results_jsonl
 from tests.batch.written.records import NASTY, many, record
 
 
@@ -42,3 +42,10 @@ def read(records):
 
 def refused(word):
     raise AssertionError(word)
+
+
+def test_a_line_that_is_no_record_is_left_out():
+    whole = results_jsonl(many(3))
+    assert len(records_of(whole + b'{"part": "half.nc", "exit_c')) == 3
+    assert len(records_of(whole + b'7\n[]\n\xff\n{"part": "d.nc"}\n')) == 4
+    assert records_of(b"") == []
