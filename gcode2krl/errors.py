@@ -89,11 +89,14 @@ def _shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Finding:
     """Equal findings, or findings that differ only in their figures, printed on one line."""
 
     issues: tuple[Issue, ...]
+
+    def __repr__(self) -> str:
+        return f"Finding({len(self.issues)} times {self.first!r})"
 
     @property
     def first(self) -> Issue:

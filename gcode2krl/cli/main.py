@@ -10,6 +10,7 @@ import click
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
+from gcode2krl.cli.record_head import Heading
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -113,16 +114,15 @@ def main(args: list[str] | None = None) -> None:
 
 def _run(args: list[str] | None) -> int:
     words = sys.argv[1:] if args is None else args
-    console = Console(
-        quiet="-q" in words or "--quiet" in words, as_json="--json" in words, command=_command_in(words)
-    )
+    head = Heading()
+    console = Console("-q" in words or "--quiet" in words, "--json" in words, head)
     try:
-        result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False)
+        result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False, obj=head)
         return int(result) if isinstance(result, int) else 0
     except Gcode2KrlError as error:
         console.findings(error.issues, error.source)
         console.explain_hint(error.issues)
-        return console.refused(error)
+        return _recorded(console, error, words)
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
     except BrokenPipeError:
@@ -133,7 +133,14 @@ def _run(args: list[str] | None) -> int:
         ours = _as_ours(error)
         issue = ours.issues[0]
         console.failed(f"{issue.message} -> {issue.remedy}" if issue.remedy else issue.message, 2)
-        return console.refused(ours)
+        return _recorded(console, ours, words)
+
+
+def _recorded(console: Console, error: Gcode2KrlError, words: list[str]) -> int:
+    """Print the record of a command that an error ended, under ``--json``; return the exit code."""
+    if console.as_json and not console.heading.command:  # it ended before the command began
+        console.heading.command = _command_in(words)
+    return console.record({}, error.issues, exit_code=error.exit_code)
 
 
 def _is_foreseen(error: Exception) -> bool:
@@ -172,8 +179,8 @@ def _command_in(words: list[str]) -> str:
     if not named or named[0] not in _COMMANDS:
         return "translate"
     group = commands.get_command(click.Context(commands), named[0]) if len(named) > 1 else None
-    is_sub = isinstance(group, click.Group) and named[1] in group.commands
-    return " ".join(named[: 2 if is_sub else 1])
+    is_of_group = isinstance(group, click.Group) and named[1] in group.list_commands(click.Context(group))
+    return " ".join(named[: 2 if is_of_group else 1])
 
 
 def _missing_subcommand(error: click.exceptions.NoArgsIsHelpError) -> tuple[str, str]:
