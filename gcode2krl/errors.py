@@ -231,6 +231,10 @@ class Gcode2KrlError(Exception):
         self.source = source
         super().__init__("\n".join(told(self.issues).lines(source)))
 
+    def __reduce__(self) -> tuple[type["Gcode2KrlError"], tuple[tuple[Issue, ...], str]]:
+        """Let it pass from one process to another: an exception is made again from what it was made from."""
+        return type(self), (self.issues, self.source)
+
 
 class NotUnderstoodError(Gcode2KrlError):
     """The input cannot be understood: unreadable file, G-code, cell or option (exit code 2)."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "init": "Write the cell file of your robot from your answers and the controller's archive.",
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
+    "batch": "Translate many parts: folders, patterns, files, @lists, or a TOML file with a cell a folder.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
     "verify": "Read a KRL program back and compare it with its G-code.",
     "report": "Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.",
@@ -34,6 +35,7 @@ _COMMANDS = {
     "runkit": "Write what a program is accepted with: a variant in air, its prediction, a trace set-up, "
     "a check list.",
     "make-test": "Write a test program of air moves.",
+    "cache": "What a batch has computed before: show, clear.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
     "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "completion": "Print the script that completes commands, options and files in a shell.",
@@ -150,7 +152,7 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return input_error("option-value", *_missing_subcommand(error))
     if isinstance(error, click.ClickException):
-        return input_error("option-value", error.format_message(), "`gcode2krl --help` lists the options")
+        return input_error("option-value", error.format_message(), _remedy(error))
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else "standard input or output: "
         sentence = f"{place}{error.strerror or error}"
@@ -160,6 +162,15 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     # a defect of the program: one line for the user, the rest on request
     sentence = f"internal error, please report it: {type(error).__name__}: {error}"
     return input_error("internal-error", sentence, "-v shows the details")
+
+
+def _remedy(error: click.ClickException) -> str:
+    """Return what to do about wrong words; several parts are what people try first."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    one_part = context is not None and context.info_name == "translate"
+    if one_part and "unexpected extra argument" in error.format_message():
+        return "`gcode2krl batch PARTS -o out/` translates several"
+    return "`gcode2krl --help` lists the options"
 
 
 def _command_in(words: list[str]) -> str:

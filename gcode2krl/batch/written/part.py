@@ -36,6 +36,8 @@ class Part:
     """Its path below the folder of parts, with slashes."""
     verdict: str
     """One of `VERDICTS`."""
+    source: str = ""
+    """Its G-code file as it was named to the batch; empty if unknown."""
     seconds: float | None = None
     """How long its translation took."""
     cached: bool = False
@@ -89,6 +91,7 @@ def part_of(record: Record) -> Part:
     return Part(
         name=name_of(record),
         verdict=_verdict(record.get("exit_code")),
+        source=_source(record.get("input")),
         seconds=_number(record.get("seconds")),
         cached=record.get("cached") is True,
         time_s=_number(record.get("time_s")),
@@ -120,6 +123,10 @@ def lines_of(findings: Iterable[Finding], source: str) -> list[str]:
 
 def _verdict(exit_code: Any) -> str:
     return VERDICTS[exit_code] if exit_code in (0, 1) else VERDICTS[2]
+
+
+def _source(stated: Any) -> str:
+    return str(stated.get("file") or "") if isinstance(stated, Mapping) else ""
 
 
 def _number(value: Any) -> float | None:

@@ -15,8 +15,10 @@ class Places:
     folder: str = "."
     root: str = ""
 
-    def of_part(self, name: str) -> str:
-        """Return the path of a part, below the root where it is there."""
+    def of_part(self, name: str, source: str = "") -> str:
+        """Return the path of a part, as its record names the file or else by its name."""
+        if source and self.folder == ".":
+            return self.below_root(source)
         return self.below_root(posixpath.join(self.folder.replace("\\", "/"), name))
 
     def below_root(self, path: str) -> str:

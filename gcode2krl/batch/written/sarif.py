@@ -42,7 +42,7 @@ def findings_sarif(records: Iterable[Record], places: Places | None = None) -> b
 def _results(parts: Iterable[Part], places: Places) -> Iterator[_Result]:
     """Yield all findings; one on a cell comes once, whatever number of parts has it."""
     for part in parts:
-        path = places.of_part(part.name)
+        path = places.of_part(part.name, part.source)
         for finding in part.findings:
             issue = finding.issue
             place = places.below_root(finding.file) if finding.file else path
