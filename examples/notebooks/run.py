@@ -5,6 +5,7 @@ notebooks only these are run; ``--keep FOLDER`` leaves them there with their out
 """
 
 import argparse
+import os
 import sys
 import time
 from pathlib import Path
@@ -27,11 +28,12 @@ def run(file: Path, keep: Path | None) -> float:
     )
     started = time.perf_counter()
     print(f"{file.name}")
-    with client.setup_kernel():
+    with client.setup_kernel(env={name: value for name, value in os.environ.items() if name != "MPLBACKEND"}):
         for number, cell in enumerate(notebook.cells):
             if cell.cell_type == "code":
                 before = time.perf_counter()
                 client.execute_cell(cell, number)
+                require_pictures(cell.outputs)
                 print(
                     f"  cell {number:2d}  {time.perf_counter() - before:5.1f} s  {first_words(cell.outputs)}"
                 )
@@ -40,6 +42,14 @@ def run(file: Path, keep: Path | None) -> float:
     taken_s = time.perf_counter() - started
     print(f"  {taken_s:.1f} s")
     return taken_s
+
+
+def require_pictures(outputs: list[Any]) -> None:
+    """Raise where a figure is only told of and not shown."""
+    for output in outputs:
+        data = output.get("data", {})
+        if data.get("text/plain", "").startswith("<Figure") and "image/png" not in data:
+            raise AssertionError(f"{data['text/plain']} is not shown")
 
 
 def first_words(outputs: list[Any]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from gcode2krl.batch.written import Places, contents, records_of
+from gcode2krl.batch.written import contents, records_of
 from gcode2krl.errors import input_error
 from gcode2krl.files import write_together
 
@@ -16,8 +16,8 @@ RESULTS = "results.jsonl"
 
 def write_results(out: Path, records: Iterable[Record], before: Sequence[Record] | None) -> list[Path]:
     """Write what there is to say about all parts, beside those of ``before``; return the files."""
-    places = Places(root=Path.cwd().as_posix())
-    files = {out / name: content for name, content in contents(records, before, places).items()}
+    made = contents(records, before, Path.cwd().as_posix())
+    files = {out / name: content for name, content in made.items()}
     write_together(files)
     return list(files)
 

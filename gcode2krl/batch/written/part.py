@@ -37,7 +37,7 @@ class Part:
     verdict: str
     """One of `VERDICTS`."""
     source: str = ""
-    """Its G-code file as it was named to the batch; empty if unknown."""
+    """The file as it was named when the batch was started, its name where that is not known."""
     seconds: float | None = None
     """How long its translation took."""
     cached: bool = False
@@ -91,7 +91,7 @@ def part_of(record: Record) -> Part:
     return Part(
         name=name_of(record),
         verdict=_verdict(record.get("exit_code")),
-        source=_source(record.get("input")),
+        source=_source(record),
         seconds=_number(record.get("seconds")),
         cached=record.get("cached") is True,
         time_s=_number(record.get("time_s")),
@@ -106,6 +106,12 @@ def part_of(record: Record) -> Part:
 def name_of(record: Record) -> str:
     """Return the part's name in a record."""
     return str(record.get("part") or "(no name)").replace("\\", "/")
+
+
+def _source(record: Record) -> str:
+    read = record.get("input")
+    named = read.get("file") if isinstance(read, Mapping) else None
+    return str(named).replace("\\", "/") if named else name_of(record)
 
 
 def told_of(findings: Iterable[Finding]) -> list[tuple[str, Told]]:
@@ -123,10 +129,6 @@ def lines_of(findings: Iterable[Finding], source: str) -> list[str]:
 
 def _verdict(exit_code: Any) -> str:
     return VERDICTS[exit_code] if exit_code in (0, 1) else VERDICTS[2]
-
-
-def _source(stated: Any) -> str:
-    return str(stated.get("file") or "") if isinstance(stated, Mapping) else ""
 
 
 def _number(value: Any) -> float | None:
