@@ -16,6 +16,7 @@ _HOMES = {
     "set_targets": "gcode2krl.pipeline",
     "plan_motion": "gcode2krl.pipeline",
     "predict": "gcode2krl.pipeline",
+    "predict_many": "gcode2krl.batch.many",
     "Prediction": "gcode2krl.prediction",
     "solve_joints": "gcode2krl.pipeline",
     "write_krl": "gcode2krl.krl",
@@ -42,6 +43,7 @@ __all__ = [
     "load_run",
     "plan_motion",
     "predict",
+    "predict_many",
     "read_gcode",
     "set_targets",
     "solve_joints",
@@ -50,6 +52,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from gcode2krl.batch.many import predict_many
     from gcode2krl.cell import Cell, load_cell
     from gcode2krl.compliance.deflection_table import deflect
     from gcode2krl.cutting.milling import cut

@@ -61,7 +61,8 @@ def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = Fals
     """
     chain = krc4.build_chain(targets, cell)
     profile = krc4.plan(chain, cell)
-    issues = list(krc4.motion_issues(chain, profile, cell))
+    simplify_mm = targets.simplified.tolerance_mm if targets.simplified is not None else None
+    issues = list(krc4.motion_issues(chain, profile, cell, simplify_mm))
     slower, slowed, planned_s = chain, chain.speed_mm_s, profile.total_s
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)

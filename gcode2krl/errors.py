@@ -89,11 +89,14 @@ def _shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Finding:
     """Equal findings, or findings that differ only in their figures, printed on one line."""
 
     issues: tuple[Issue, ...]
+
+    def __repr__(self) -> str:
+        return f"Finding({len(self.issues)} times {self.first!r})"
 
     @property
     def first(self) -> Issue:
@@ -227,6 +230,10 @@ class Gcode2KrlError(Exception):
         self.issues: tuple[Issue, ...] = (issues,) if isinstance(issues, Issue) else tuple(issues)
         self.source = source
         super().__init__("\n".join(told(self.issues).lines(source)))
+
+    def __reduce__(self) -> tuple[type["Gcode2KrlError"], tuple[tuple[Issue, ...], str]]:
+        """Let it pass from one process to another: an exception is made again from what it was made from."""
+        return type(self), (self.issues, self.source)
 
 
 class NotUnderstoodError(Gcode2KrlError):

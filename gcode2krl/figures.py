@@ -31,6 +31,8 @@ _REMEDIES = {
 
 def figure_of(prediction: Prediction, name: str) -> "Figure":
     """Return a figure of `FIGURES`; raises `NotUnderstoodError` where the stage that it draws did not run."""
+    from gcode2krl.report.figures import shown_in_notebooks
+
     for stage in _missing(prediction, name):
         sentence = f"{name} cannot be drawn: the prediction has no {stage}"
         raise input_error("prediction-empty", sentence, _REMEDIES.get(stage, "predict the part again"))
@@ -44,7 +46,7 @@ def figure_of(prediction: Prediction, name: str) -> "Figure":
         "deflection_path": _deflection_path,
         "deflection_joints": _deflection_joints,
     }[name]
-    return draw(prediction)
+    return shown_in_notebooks(draw(prediction))
 
 
 def figures_of(prediction: Prediction) -> "dict[str, Figure]":

@@ -152,7 +152,9 @@ def predict_toolpath(
         inputs["simplify_mm"] = targets.simplified.tolerance_mm
     source = Path(toolpath.source)
     if source.is_file():
-        inputs["program_sha256"] = hashlib.sha256(source.read_bytes()).hexdigest()
+        content = source.read_bytes()
+        inputs["program_sha256"] = hashlib.sha256(content).hexdigest()
+        inputs["program_size_bytes"] = len(content)
     return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
 
 

@@ -39,6 +39,7 @@ class Outcome:
 def run(capfd, tmp_path, monkeypatch):
     """Run ``gcode2krl`` with arguments, in an empty folder; returns code, output and findings."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GCODE2KRL_CACHE", str(tmp_path / "cache"))
 
     def run_command(*arguments):
         capfd.readouterr()

@@ -27,6 +27,7 @@ PUBLIC = {
         "load_run",
         "plan_motion",
         "predict",
+        "predict_many",
         "read_gcode",
         "set_targets",
         "solve_joints",

@@ -342,6 +342,7 @@ def cell_schema() -> dict[str, Any]:
     schema = described_schema(Cell)
     _drop_required(schema)
     schema["title"] = "gcode2krl cell file"
+    schema["description"] = schema["description"].partition("\n\n>>>")[0]  # without the example in Python
     return schema
 
 

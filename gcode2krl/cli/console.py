@@ -2,26 +2,27 @@
 
 import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import click
 
+from gcode2krl.cli.record_head import Heading, heading
 from gcode2krl.cli.standard_files import closed, tell
 from gcode2krl.errors import Gcode2KrlError, Issue, told
 from gcode2krl.progress import Begin, Progress, unseen
-from gcode2krl.result import issue_dicts, record_of
 
-__all__ = ["Console", "issue_dicts"]
 _COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
 
 
 class Console:
     """Findings and progress go to standard error, results to standard output."""
 
-    def __init__(self, quiet: bool = False, as_json: bool = False, command: str = "") -> None:
-        self.quiet, self.as_json, self.command = quiet, as_json, command
+    def __init__(self, quiet: bool = False, as_json: bool = False, head: Heading | None = None) -> None:
+        self.quiet, self.as_json = quiet, as_json
+        self.heading = heading() if head is None else head
 
     def findings(self, issues: Iterable[Issue], source: str, notes: bool = True) -> None:
         """Print a line a finding, at most 20, then the counts; errors first, equal findings as one."""
@@ -44,12 +45,6 @@ class Console:
         tell(f"{click.style('error:', fg='red')} {message}")
         return code
 
-    def refused(self, error: Gcode2KrlError) -> int:
-        """Print the record of a command that an error ended, under ``--json``; return the exit code."""
-        if self.as_json:
-            self.json(record_of(self.command, {}, error.issues, exit_code=error.exit_code))
-        return error.exit_code
-
     def say(self, text: str) -> None:
         """Print a line of the result for a person."""
         if not self.quiet and not self.as_json:
@@ -59,6 +54,29 @@ class Console:
         """Print a hint on standard error."""
         if not self.quiet:
             tell(text)
+
+    def record(
+        self,
+        figures: Mapping[str, Any],
+        issues: Iterable[Issue] = (),
+        *,
+        exit_code: int = 0,
+        files: Iterable[str | Path] = (),
+    ) -> int:
+        """Print the record of a command under ``--json``; return the exit code."""
+        if self.as_json:
+            self.json(self.heading.record(figures, issues, exit_code=exit_code, files=files))
+        return exit_code
+
+    def refused(self, error: Gcode2KrlError, figures: Iterable[str] = (), source: str = "") -> int:
+        """Print the record of a command that an error ended, its figures null; return the exit code.
+
+        Without ``--json`` the error is raised, with the name of its source if it has none.
+        """
+        if self.as_json:
+            return self.record(dict.fromkeys(figures), error.issues, exit_code=error.exit_code)
+        error.source = error.source or source
+        raise error
 
     def json(self, result: dict[str, Any]) -> None:
         """Print the one JSON object of a command."""

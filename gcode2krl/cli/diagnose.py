@@ -1,13 +1,20 @@
 """``gcode2krl diagnose prediction/ run/ [more runs]``: where reality differs, why, and how far it shrinks."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import cell_files, common_options, effect_files, require_folder, require_outputs
+from gcode2krl.cli.inputs import (
+    cell_files,
+    common_options,
+    effect_files,
+    read_cell,
+    require_folder,
+    require_outputs,
+)
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
@@ -53,6 +60,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        console.heading.reads(*folders, *holdout)
         data: list[str | Path] = [*folders, *holdout, *effect_files(effects)]
         _require_writable(apply_to, html, plot, data, cell_path)
         gap = _diagnosis(folders, holdout, effects, from_log, cell_path, console)
@@ -60,16 +68,10 @@ def command(
         added = _apply(gap, apply_to, cell_path, sources)
         written = _written(gap, html, plot, [*data, *cell_files(cell_path)], console)
     except Gcode2KrlError as error:
-        if not as_json:
-            raise
-        from gcode2krl.cli.console import issue_dicts
-        from gcode2krl.gap.tell.as_json import SCHEMA
-
-        console.json({"schema": SCHEMA, "verdict": None, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, ["verdict"])
     if as_json:
-        console.json(gap.as_dict())
-        return 0
+        applied = [Path(apply_to)] if apply_to is not None else []
+        return console.record(_figures(gap), gap.issues, files=[*written, *applied])
     from gcode2krl.gap import text_report
 
     console.findings(gap.issues, "")
@@ -79,6 +81,12 @@ def command(
     for file in written:
         console.hint(f"{file} written")
     return 0
+
+
+def _figures(gap: "Gap") -> dict[str, Any]:
+    """Return the object of a diagnosis as figures of a record, whose own schema the record names first."""
+    figures = gap.as_dict()
+    return {"gap_schema": figures.pop("schema"), **figures}
 
 
 def _require_writable(
@@ -136,15 +144,15 @@ def _diagnosis(
         runs, held = read[: len(names)], read[len(names) :]
         if from_log:
             return diagnose_log(runs, _cell(cell_path), held, effects=effects, begin=begin)
-        return diagnose(Prediction.load(folders[0]), runs, held, effects=effects, begin=begin)
+        prediction = Prediction.load(folders[0])
+        console.heading.has_cell(prediction.cell, None)
+        return diagnose(prediction, runs, held, effects=effects, begin=begin)
 
 
 def _cell(path: str | None) -> "Cell | None":
     if path is None:
         return None
-    from gcode2krl.cell import load_cell
-
-    return load_cell(path)
+    return read_cell(path)
 
 
 def _apply(gap: "Gap", apply_to: str | None, cell_path: str | None, sources: list[str]) -> int:

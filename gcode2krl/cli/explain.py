@@ -5,7 +5,7 @@ from textwrap import TextWrapper, shorten
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.codes import Code, all_codes, closest
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -29,11 +29,10 @@ def command(code: str | None, as_json: bool) -> int:
     except Gcode2KrlError as error:
         if not as_json:
             raise
-        console.json({"codes": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.record({"codes": []}, error.issues, exit_code=error.exit_code)
     if as_json:
-        console.json({"codes": [_record(entry) for entry in entries], "issues": []})
-    elif code is None:
+        return console.record({"codes": [_record(entry) for entry in entries]})
+    if code is None:
         for entry in entries:
             console.say(_brief(entry))
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, read_part, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
@@ -37,7 +37,9 @@ _MOST_SHOWN = 20
     "--part", metavar="TEST.nc", help="The program that was run; default: that of `make-test controller`."
 )
 @common_options
-@click.option("--tolerance", type=float, metavar="MM", help="Blend tolerance it was translated with.")
+@click.option(
+    "--tolerance", "tolerance_mm", type=float, metavar="MM", help="Blend tolerance it was translated with."
+)
 @click.option("--plot", metavar="FIGURE.png", help="Draw the trace with the fit over it.")
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the values into this cell file.")
 def command(
@@ -47,7 +49,7 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    tolerance: float | None,
+    tolerance_mm: float | None,
     plot: str | None,
     apply_to: str | None,
 ) -> int:
@@ -58,22 +60,18 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        console.heading.reads(trace, part)
         require_fit_outputs(plot, apply_to, cell_path, trace, part)
-        result = _identify(trace, part, read_cell(cell_path), tolerance, console)
+        result = _identify(trace, part, read_cell(cell_path), tolerance_mm, console)
         files = []
         if plot is not None:
             files.append(_save_figure(result, Path(plot)))
         if apply_to is not None:
             files.append(_apply(result, Path(apply_to), trace, read_cell(cell_path)))
     except Gcode2KrlError as error:
-        if not as_json:
-            error.source = error.source or trace
-            raise
-        console.json({**dict.fromkeys(_KEYS), "files": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, _KEYS, trace)
     if as_json:
-        console.json(_record(result, files))
-        return 0
+        return console.record(_record(result), result.issues, files=files)
     console.findings(result.issues, part or "")
     _say(result, trace, console)
     for file in files:
@@ -187,7 +185,7 @@ _KEYS = (
 )
 
 
-def _record(result: "Identification", files: list[Path]) -> dict[str, Any]:
+def _record(result: "Identification") -> dict[str, Any]:
     values = (
         result.k_s.value,
         _interval(result.k_s),
@@ -209,8 +207,7 @@ def _record(result: "Identification", files: list[Path]) -> dict[str, Any]:
         [_section_record(section) for section in result.sections],
         [_corner_record(corner) for corner in result.corners],
     )
-    record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
-    return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+    return dict(zip(_KEYS, values, strict=True))
 
 
 def _value_and_interval(estimate: "Estimate | None") -> tuple[float | None, list[float] | None]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -49,7 +49,9 @@ def command(
     console = Console(quiet, as_json)
     try:
         require_fit_outputs(plot, apply_to, None, run_folder, prediction)
+        console.heading.reads(run_folder, prediction)
         run, predicted = _inputs(run_folder, prediction)
+        console.heading.has_cell(predicted.cell, None)
         with console.stage("fitting"):
             fit = _fit(run, predicted)
         files = [_save_figure(fit, Path(plot))] if plot is not None else []
@@ -59,13 +61,9 @@ def command(
         if apply_to is not None:
             files.append(_apply(fit, Path(apply_to), run, predicted.cell))
     except Gcode2KrlError as error:
-        if not as_json:
-            error.source = error.source or run_folder
-            raise
-        console.json({"coefficients": None, "files": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, ["coefficients"], run_folder)
     if as_json:
-        console.json(_record(fit, files))
+        return console.record(_record(fit), files=files)
     for file in files:
         console.say(f"  wrote      {file}")
     return 0
@@ -127,7 +125,7 @@ def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
     )
 
 
-def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
+def _record(fit: "ForceFit") -> dict[str, Any]:
     from gcode2krl.identify.force import NAMES
 
     coefficients = {
@@ -141,8 +139,6 @@ def _record(fit: "ForceFit", files: list[Path]) -> dict[str, Any]:
         "rms_N": fit.rms_N,
         "relative_band": fit.relative_band,
         "samples": fit.samples,
-        "files": [str(file) for file in files],
-        "issues": [],
     }
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError
@@ -70,6 +70,7 @@ def command(
         from gcode2krl.identify.sensor import identify_sensor
         from gcode2krl.identify.sensor_poses import read_poses
 
+        console.heading.reads(poses)
         if output is not None:
             calibration = read_cell(cell_path).online.calibration  # will be measured again
             others = (file for file in cell_files(cell_path) if str(file.resolve()) != calibration)
@@ -78,14 +79,9 @@ def command(
         if output is not None:
             files.append(_write(result, Path(output)))
     except Gcode2KrlError as error:
-        if not as_json:
-            error.source = error.source or poses
-            raise
-        console.json({**dict.fromkeys(_KEYS), "files": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, _KEYS, poses)
     if as_json:
-        console.json(_record(result, files))
-        return 0
+        return console.record(_record(result), result.issues, files=files)
     console.findings(result.issues, poses)
     _say(result, poses, console)
     for file in files:
@@ -150,7 +146,7 @@ _KEYS = (
 )
 
 
-def _record(result: "SensorIdentification", files: list[Path]) -> dict[str, Any]:
+def _record(result: "SensorIdentification") -> dict[str, Any]:
     triples = (result.centre_mm, result.force_offset_N, result.moment_offset_Nmm)
     values = (
         result.weight_N.value,
@@ -166,8 +162,7 @@ def _record(result: "SensorIdentification", files: list[Path]) -> dict[str, Any]
         result.moment_left_out_Nmm,
         result.calibration.model_dump(mode="json"),
     )
-    record: dict[str, Any] = dict(zip(_KEYS, values, strict=True))
-    return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+    return dict(zip(_KEYS, values, strict=True))
 
 
 def _interval(estimate: "Estimate") -> list[float]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError
@@ -47,22 +47,21 @@ def command(
     applied.
     """
     console = Console(quiet, as_json)
+    console.heading.reads(measurements)
     try:
         result, files = _run(measurements, cell_path, plot, apply_to, console)
     except Gcode2KrlError as error:
-        if not as_json:
-            error.source = error.source or measurements
-            raise
-        console.json({**dict.fromkeys(_KEYS), "files": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, _KEYS, measurements)
+    exit_code = 1 if result.errors() else 0
     if as_json:
-        console.json(_record(result, files, read_cell(cell_path)))
+        figures = _record(result, read_cell(cell_path))
+        console.record(figures, result.issues, exit_code=exit_code, files=files)
     else:
         _say(result, read_cell(cell_path), console)
         console.findings(result.issues, result.source)
         for file in files:
             console.say(f"  wrote  {file}")
-    return 1 if result.errors() else 0
+    return exit_code
 
 
 def _run(
@@ -114,14 +113,13 @@ def _line(fit: "JointFit", axis: int, estimate: "Estimate | None", cell: "Cell")
 _KEYS = ("joints", "known", "level", "stated_noise_mm")
 
 
-def _record(result: "StiffnessIdentification", files: list[Path], cell: "Cell") -> dict[str, Any]:
+def _record(result: "StiffnessIdentification", cell: "Cell") -> dict[str, Any]:
     known = {
         name: {"k_c": value.k_c, "k_b": value.k_b, "k_a": value.k_a, "source": origin}
         for name, (value, origin) in result.known.items()
     }
     joints = {fit.joint: _joint_record(fit, cell) for fit in result.joints}
-    record = dict(zip(_KEYS, (joints, known, result.level, result.stated_noise_mm), strict=True))
-    return {**record, "files": [str(file) for file in files], "issues": issue_dicts(result.issues)}
+    return dict(zip(_KEYS, (joints, known, result.level, result.stated_noise_mm), strict=True))
 
 
 def _joint_record(fit: "JointFit", cell: "Cell") -> dict[str, Any]:

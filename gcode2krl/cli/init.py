@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_error
 
@@ -67,6 +67,7 @@ def command(
         return 0
     _refuse_existing(cell_path, force)
     console = Console(as_json=as_json)
+    console.heading.reads(answers_path, archive)
     is_asked = answers_path is None
     if is_asked and not (sys.stdin.isatty() and sys.stdout.isatty()):
         sentence = "no terminal to ask questions at, and no --answers FILE"
@@ -77,14 +78,14 @@ def command(
     answers = completed(given, controller)
     text = text_of_cell(answers, controller, SCHEMA)
     cell = _resolved(text, cell_path)
+    console.heading.has_cell(cell, cell_path)
     _write(cell_path, text, [path for path in (answers_path, archive) if path is not None and path.is_file()])
 
     lacking, issues = missing_keys(cell), findings(cell)
     skipped = [question.key for question in left_out(answers)]
     if as_json:
-        result = {"files": [str(cell_path), str(cell_path.with_name(SCHEMA))], "missing": lacking}
-        console.json(result | {"not_answered": skipped, "issues": issue_dicts(issues)})
-        return 0
+        files = (cell_path, cell_path.with_name(SCHEMA))
+        return console.record({"missing": lacking, "not_answered": skipped}, issues, files=files)
     console.findings(issues, str(cell_path))
     _say_written(console, cell_path, lacking)
     return 0

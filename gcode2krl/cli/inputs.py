@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.cli.console import Console
+from gcode2krl.cli.record_head import heading
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.translation import inputs as reading
 from gcode2krl.translation.inputs import (
@@ -15,8 +16,6 @@ from gcode2krl.translation.inputs import (
     effect_files,
     existing,
     files_of_job,
-    read_cell,
-    read_cell_under_job,
     require_part,
 )
 from gcode2krl.translation.outputs import (
@@ -28,6 +27,7 @@ from gcode2krl.translation.outputs import (
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
+    from gcode2krl.errors import Issue
     from gcode2krl.tables import Toolpath
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "require_other",
     "require_outputs",
     "require_part",
+    "simplify_option",
 ]
 
 
@@ -101,6 +102,18 @@ def gcode_options(function: Any) -> Any:
     return function
 
 
+def simplify_option(function: Any) -> Any:
+    """Add --simplify to a command that sets targets."""
+    option = click.option(
+        "--simplify",
+        "simplify_mm",
+        type=float,
+        metavar="MM",
+        help="Merge feed moves into straight ones within this; 0.01 is usual.",
+    )
+    return option(function)
+
+
 def job_option(function: Any) -> Any:
     """Add --job to a command that reads a part."""
     option = click.option(
@@ -113,14 +126,32 @@ def job_option(function: Any) -> Any:
     return option(function)
 
 
+def read_cell(path: str | None) -> "Cell":
+    """Read the cell of a command; its record names it."""
+    cell = reading.read_cell(path)
+    heading().has_cell(cell, path)
+    return cell
+
+
+def read_cell_under_job(path: str | None, job_path: str | None) -> "tuple[Cell, tuple[Issue, ...]]":
+    """Read the cell of a command and lay a job over it; the findings say where the two differ."""
+    cell, issues = reading.read_cell_under_job(path, job_path)
+    heading().has_cell(cell, path)
+    return cell, issues
+
+
 def read_part(
     part: str,
     cell: "Cell",
     console: Console,
     chord_tolerance_mm: float,
     block_delete: bool,
-    standard: StandardInput | None = None,
 ) -> "Toolpath":
     """Read the G-code of a command with a bar on the terminal, see `translation.inputs.read_part`."""
+    standard = StandardInput() if part == STANDARD else None
+    console.heading.reads(part)
     with console.stages() as begin:
-        return reading.read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard)
+        toolpath = reading.read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard)
+    if standard is not None:
+        console.heading.inputs[part] = standard.as_input()
+    return toolpath

@@ -10,6 +10,7 @@ import click
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
+from gcode2krl.cli.record_head import Heading
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "init": "Write the cell file of your robot from your answers and the controller's archive.",
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
+    "batch": "Translate many parts: folders, patterns, files, @lists, or a TOML file with a cell a folder.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
     "verify": "Read a KRL program back and compare it with its G-code.",
     "report": "Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.",
@@ -33,6 +35,7 @@ _COMMANDS = {
     "runkit": "Write what a program is accepted with: a variant in air, its prediction, a trace set-up, "
     "a check list.",
     "make-test": "Write a test program of air moves.",
+    "cache": "What a batch has computed before: show, clear.",
     "models": "Robots, controllers, tools and cells: list, show, check, schema.",
     "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "completion": "Print the script that completes commands, options and files in a shell.",
@@ -111,16 +114,15 @@ def main(args: list[str] | None = None) -> None:
 
 def _run(args: list[str] | None) -> int:
     words = sys.argv[1:] if args is None else args
-    console = Console(
-        quiet="-q" in words or "--quiet" in words, as_json="--json" in words, command=_command_in(words)
-    )
+    head = Heading()
+    console = Console("-q" in words or "--quiet" in words, "--json" in words, head)
     try:
-        result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False)
+        result: Any = commands.main(args=args, prog_name="gcode2krl", standalone_mode=False, obj=head)
         return int(result) if isinstance(result, int) else 0
     except Gcode2KrlError as error:
         console.findings(error.issues, error.source)
         console.explain_hint(error.issues)
-        return console.refused(error)
+        return _recorded(console, error, words)
     except click.exceptions.Abort:
         return console.failed("stopped", 130)
     except BrokenPipeError:
@@ -131,7 +133,14 @@ def _run(args: list[str] | None) -> int:
         ours = _as_ours(error)
         issue = ours.issues[0]
         console.failed(f"{issue.message} -> {issue.remedy}" if issue.remedy else issue.message, 2)
-        return console.refused(ours)
+        return _recorded(console, ours, words)
+
+
+def _recorded(console: Console, error: Gcode2KrlError, words: list[str]) -> int:
+    """Print the record of a command that an error ended, under ``--json``; return the exit code."""
+    if console.as_json and not console.heading.command:  # it ended before the command began
+        console.heading.command = _command_in(words)
+    return console.record({}, error.issues, exit_code=error.exit_code)
 
 
 def _is_foreseen(error: Exception) -> bool:
@@ -143,7 +152,7 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return input_error("option-value", *_missing_subcommand(error))
     if isinstance(error, click.ClickException):
-        return input_error("option-value", error.format_message(), "`gcode2krl --help` lists the options")
+        return input_error("option-value", error.format_message(), _remedy(error))
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else "standard input or output: "
         sentence = f"{place}{error.strerror or error}"
@@ -155,14 +164,23 @@ def _as_ours(error: Exception) -> Gcode2KrlError:
     return input_error("internal-error", sentence, "-v shows the details")
 
 
+def _remedy(error: click.ClickException) -> str:
+    """Return what to do about wrong words; several parts are what people try first."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    one_part = context is not None and context.info_name == "translate"
+    if one_part and "unexpected extra argument" in error.format_message():
+        return "`gcode2krl batch PARTS -o out/` translates several"
+    return "`gcode2krl --help` lists the options"
+
+
 def _command_in(words: list[str]) -> str:
     """Return the command that words name, ``translate`` where the first is none."""
     named = [word for word in words[:2] if not word.startswith("-")]
     if not named or named[0] not in _COMMANDS:
         return "translate"
     group = commands.get_command(click.Context(commands), named[0]) if len(named) > 1 else None
-    is_sub = isinstance(group, click.Group) and named[1] in group.commands
-    return " ".join(named[: 2 if is_sub else 1])
+    is_of_group = isinstance(group, click.Group) and named[1] in group.list_commands(click.Context(group))
+    return " ".join(named[: 2 if is_of_group else 1])
 
 
 def _missing_subcommand(error: click.exceptions.NoArgsIsHelpError) -> tuple[str, str]:

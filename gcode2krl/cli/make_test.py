@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import STANDARD, cell_files, common_options, read_cell, require_outputs
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
@@ -65,15 +65,22 @@ class _Test:
 @common_options
 @click.option(
     "--at",
+    "at_mm",
     nargs=3,
     type=float,
     metavar="X Y Z",
     help="Where the program begins in $BASE, mm; default: 100 0 and 40 below the clearance plane.",
 )
 @click.option(
-    "--size", type=float, metavar="MM", help=f"Side of the square it stays in; default: {_SIZE_MM:g}."
+    "--size",
+    "size_mm",
+    type=float,
+    metavar="MM",
+    help=f"Side of the square it stays in; default: {_SIZE_MM:g}.",
 )
-@click.option("--speed", type=float, metavar="PERCENT", help="Of the program's feeds; default: 100.")
+@click.option(
+    "--speed", "speed_percent", type=float, metavar="PERCENT", help="Of the program's feeds; default: 100."
+)
 def command(
     what: str,
     part: str | None,
@@ -82,9 +89,9 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    at: Point | None,
-    size: float | None,
-    speed: float | None,
+    at_mm: Point | None,
+    size_mm: float | None,
+    speed_percent: float | None,
 ) -> int:
     """Write a test program of air moves.
 
@@ -97,12 +104,13 @@ def command(
     """
     console = Console(quiet or output == STANDARD, as_json)
     try:
+        console.heading.reads(part)
         if as_json and output == STANDARD:
             raise input_error("option-value", "--json and -o - both claim standard output", "choose one")
-        if at and not all(map(math.isfinite, at)):
-            raise input_error("option-value", f"--at {at}: found no numbers", "give X Y Z in mm")
+        if at_mm and not all(map(math.isfinite, at_mm)):
+            raise input_error("option-value", f"--at {at_mm}: found no numbers", "give X Y Z in mm")
         cell = read_cell(cell_path)
-        test = _test_of(what, part, cell, at, size, speed)
+        test = _test_of(what, part, cell, at_mm, size_mm, speed_percent)
         if output == STANDARD:
             click.echo(test.gcode(), nl=False)
             return 0
@@ -118,14 +126,10 @@ def command(
         files, lines, issues = _write_krl(test, file, cell, inputs) if krl else _write_gcode(test, file)
         minutes = None if test.minutes is None else round(test.minutes(), 1)
     except Gcode2KrlError as error:
-        if not as_json:
-            raise
-        console.json({"files": [], "lines": None, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, ["lines"])
     if as_json:
-        record = {"files": [str(name) for name in files], "lines": lines, "issues": issue_dicts(issues)}
-        console.json(record if minutes is None else {**record, "minutes": minutes})
-        return 0
+        lasting = {} if minutes is None else {"minutes": minutes}
+        return console.record({"lines": lines, **lasting}, issues, files=files)
     console.findings(issues, file.name)
     console.say(f"{', '.join(map(str, files))}: {lines} lines, air moves{_lasting(minutes)}")
     _say_next(console, what, file)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cell import library
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -28,7 +28,7 @@ def list_models(kind: str | None, as_json: bool) -> None:
     kinds = [kind] if kind else list(library.KINDS)
     models = {k: list(library.names(k)) for k in kinds}
     if as_json:
-        click.echo(json.dumps(models, indent=2))
+        Console(as_json=True).record(models)
         return
     for k, names in models.items():
         click.echo(f"{k}:")
@@ -79,20 +79,21 @@ def check(cell_path: str | None, as_json: bool) -> int:
     from gcode2krl.krl.provenance import default_values
 
     console = Console(as_json=as_json)
+    console.heading.reads(cell_path)
     try:
         cell = load_cell(cell_path)
     except Gcode2KrlError as error:
         if not as_json:
             raise
-        console.json({"valid": False, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.record({"valid": False}, error.issues, exit_code=error.exit_code)
+    console.heading.has_cell(cell, cell_path)
     rows = list(to_confirm(cell))
     lacking, issues = missing_keys(cell), findings(cell)
     if cell_path is not None:
         issues = list(with_lines(issues, library.read_text(Path(cell_path))))
     wrong = any(issue.severity == "error" for issue in issues)
     if as_json:
-        console.json(
+        return console.record(
             {
                 "valid": not wrong,
                 "verified": cell.is_confirmed,
@@ -100,10 +101,10 @@ def check(cell_path: str | None, as_json: bool) -> int:
                 "taken_over": [taken.model_dump() for taken in cell.taken_over],
                 "defaults": default_values(cell),
                 "missing": lacking,
-                "issues": issue_dicts(issues),
-            }
+            },
+            issues,
+            exit_code=1 if wrong else 0,
         )
-        return 1 if wrong else 0
     name = cell_path or "the demonstration cell"
     console.say(f"{name}: {'refused' if wrong else 'valid'}")
     console.findings(tuple(issues), name)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     cell_files,
@@ -106,8 +106,7 @@ def simulate_command(
     issues = [*prediction.issues, *findings(twin, runs, judged)]
     files = _draw(prediction, twin, runs, judged, outcome, Path(plot), inputs) if plot is not None else []
     if as_json:
-        console.json({**outcome, "files": [str(file) for file in files], "issues": issue_dicts(issues)})
-        return 0
+        return console.record(outcome, issues, files=files)
     console.findings(issues, part or "test piece", notes=False)
     console.say(f"{part or 'test piece'}: deviation normal to the feed of what stays on the part")
     for line in _table(outcome):
@@ -312,6 +311,7 @@ def replay_command(
     from gcode2krl.files import write_together
 
     console = Console(quiet, as_json)
+    console.heading.reads(run, sidecar)
     inputs = existing(run, sidecar, *cell_files(cell_path))
     if output is not None:
         require_other(Path(output), *inputs)
@@ -336,8 +336,7 @@ def replay_command(
 
         write_together({Path(output): pl.DataFrame(columns(result)).write_csv}, inputs)
     if as_json:
-        console.json({**record, "issues": issue_dicts(result.issues)})
-        return 0
+        return console.record(record, result.issues, files=[output] if output is not None else [])
     console.findings(result.issues, run, notes=False)
     console.say(f"{run}: {record['cycles']} cycles, {record['time_s']:.1f} s")
     most_mm, most_N = record["max_correction_mm"], record["max_force_N"]
@@ -389,6 +388,7 @@ def serve_command(
     that it takes corrections as absolute. The force comes in the telegram (element Force).
     """
     console = Console(quiet, as_json)
+    console.heading.reads(sidecar)
     inputs = existing(sidecar, *cell_files(cell_path))
     require_folder(output, _RUN_FILES, inputs)
     cell = read_cell(cell_path)
@@ -398,7 +398,7 @@ def serve_command(
     if files is not None:
         changed = cell.model_copy(update={"online": settings})
         written = _controller_files(changed, form, name, Path(files), inputs)
-        _say_files(written, settings.link.address, console, as_json)
+        _say_files(written, settings.link.address, console)
         return 0
     from gcode2krl.online.compensator import build_compensator
     from gcode2krl.online.recorder import Recorder
@@ -438,12 +438,10 @@ def serve_command(
         "log_dropped": recorder.dropped,
         "log_unwritten": recorder.unwritten,
     }
-    if as_json:
-        console.json(record)
-    else:
-        console.say("\n".join(f"  {key} {value}" for key, value in record.items()))
     is_complete = recorder.dropped == recorder.unwritten == 0
-    return 0 if session.phase is Phase.CLOSED and session.reason == "silence" and is_complete else 1
+    is_done = session.phase is Phase.CLOSED and session.reason == "silence" and is_complete
+    console.say("\n".join(f"  {key} {value}" for key, value in record.items()))
+    return console.record(record, exit_code=0 if is_done else 1)
 
 
 _RUN_HEAD = """\
@@ -492,11 +490,10 @@ def _link_changed(settings: "Online", options: dict[str, Any]) -> "Online":
     return _valid(settings, changes)
 
 
-def _say_files(files: list[Path], address: str, console: Console, as_json: bool) -> None:
+def _say_files(files: list[Path], address: str, console: Console) -> None:
     if address.startswith("127."):
         console.hint("the controller will look for the server at 127.0.0.1: name the PC with --address")
-    if as_json:
-        console.json({"files": [str(file) for file in files]})
+    console.record({}, files=files)
     for file in files:
         console.say(str(file))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
@@ -22,6 +22,7 @@ from gcode2krl.cli.inputs import (
     require_folder,
     require_other,
     require_part,
+    simplify_option,
 )
 from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, solids, with_comparison
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -46,6 +47,7 @@ _CORNERS = "corners.csv"
 @click.option("-o", "--output", metavar="FOLDER", help="Folder of the prediction; default: beside the input.")
 @common_options
 @gcode_options
+@simplify_option
 @job_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
@@ -75,6 +77,7 @@ def command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     block_delete: bool,
+    simplify_mm: float | None,
     job_path: str | None,
     dt_s: float | None,
     csv: bool,
@@ -95,6 +98,7 @@ def command(
 
     console = Console(quiet, as_json)
     try:
+        console.heading.reads(part, nominal)
         require_part(part)
         folder = _folder(part, output)
         inputs = existing(
@@ -113,6 +117,7 @@ def command(
                 cell,
                 dt_s=dt_s,
                 tolerance_mm=tolerance_mm,
+                simplify_mm=simplify_mm,
                 settings=settings,
                 forces=not no_forces,
                 begin=begin,
@@ -132,22 +137,15 @@ def command(
                 begin("figures")
                 files += _draw(prediction, folder, inputs)
     except Gcode2KrlError as error:
-        if not as_json:
-            error.source = error.source or part
-            raise
-        console.json(
-            {"files": [], "moves": None, "time_s": None, "path_mm": None, "issues": issue_dicts(error.issues)}
-        )
-        return error.exit_code
+        return console.refused(error, ["moves", "time_s", "path_mm"], part)
     motion = prediction.motion
     if motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
     forces = prediction.forces
     loads = load_figures(forces, prediction.deflection) if forces is not None else None
     if as_json:
-        console.json(
+        return console.record(
             {
-                "files": [str(file) for file in files],
                 "moves": len(toolpath) - 1,
                 "time_s": float(motion.time_s[-1]),
                 "path_mm": float(motion.path_mm[-1]),
@@ -155,10 +153,10 @@ def command(
                 "max_force_N": loads.force_N if loads is not None else None,
                 "max_deflection_mm": loads.deflection_mm if loads is not None else None,
                 **({"nominal": as_dict(comparison)} if comparison is not None else {}),
-                "issues": issue_dicts(prediction.issues),
-            }
+            },
+            prediction.issues,
+            files=files,
         )
-        return 0
     console.findings(prediction.issues, part)
     console.say(f"{part} -> {folder}: {', '.join(file.name for file in files)}")
     console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")

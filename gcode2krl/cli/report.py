@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import existing
 from gcode2krl.cli.nominal import HASH_KEY, KEY, compared, on_page
@@ -43,6 +43,7 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
+        console.heading.reads(folder, gcode, nominal)
         place = Path(folder)
         file = Path(output) if output is not None else place.with_name(f"{place.resolve().name}.html")
         files = [*place.glob("*")] if place.is_dir() else []
@@ -52,6 +53,7 @@ def command(
 
         with console.stage("drawing"):
             prediction = Prediction.load(place)
+            console.heading.has_cell(prediction.cell, None)
             text = text_of(_gcode_file(prediction, place, gcode))
             stock_mm = stock_corners_mm(prediction.toolpath, prediction.cell)
             mesh = _nominal_file(prediction, place, nominal)
@@ -59,13 +61,9 @@ def command(
             content = content_of(prediction, text=text, stock_mm=stock_mm, nominal=beside)
             write_page(content, file, files)
     except Gcode2KrlError as error:
-        if not as_json:
-            raise
-        console.json({"files": [], "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error)
     if as_json:
-        console.json({"files": [str(file)], "issues": issue_dicts(prediction.issues)})
-        return 0
+        return console.record({}, prediction.issues, files=[file])
     if mesh is None and KEY in prediction.inputs:
         console.hint(
             f"{prediction.inputs[KEY]} is not at hand: the page does not compare with it; --nominal names it"

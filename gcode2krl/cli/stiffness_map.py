@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_folder
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError, input_error
@@ -34,6 +34,7 @@ _TABLES = ("workspace", "spin", "joints")
 @common_options
 @click.option(
     "--load",
+    "load_N",
     type=float,
     nargs=3,
     metavar="FX FY FZ",
@@ -48,6 +49,7 @@ _TABLES = ("workspace", "spin", "joints")
 )
 @click.option(
     "--at",
+    "at_mm",
     type=float,
     nargs=3,
     default=(0.0, 0.0, 0.0),
@@ -56,18 +58,20 @@ _TABLES = ("workspace", "spin", "joints")
     help="Point in $BASE of the spin map and of the joints; its Z is the height of the workspace map.",
 )
 @click.option("--tool", type=int, help="Tool number; default: the mounted one, else the first.")
-@click.option("--step", type=float, metavar="MM", help="Grid of the workspace map; default: reach/25.")
+@click.option(
+    "--step", "step_mm", type=float, metavar="MM", help="Grid of the workspace map; default: reach/25."
+)
 @click.option("-o", "--output", default="stiffness-map", show_default=True, metavar="FOLDER")
 def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    load: Three | None,
+    load_N: Three | None,
     feed: Three | None,
-    at: Three,
+    at_mm: Three,
     tool: int | None,
-    step: float | None,
+    step_mm: float | None,
     output: str,
 ) -> int:
     """Draw how far the robot bends under a load: over $BASE's plane, over the spin, and joint by joint.
@@ -80,16 +84,13 @@ def command(
     try:
         require_folder(folder, [f"{name}{kind}" for name in _TABLES for kind in (".png", ".csv")], inputs)
         cell = read_cell(cell_path)
-        case = Case.of(cell, load, feed, tool)
+        case = Case.of(cell, load_N, feed, tool)
         with console.stage("mapping"):
-            plane, spins = plane_map(case, at[2], step), spin_map(case, at)
-            result, shares = pose_cost(case, at)
-            files = _save(case, at, plane, spins, shares, folder, inputs)
+            plane, spins = plane_map(case, at_mm[2], step_mm), spin_map(case, at_mm)
+            result, shares = pose_cost(case, at_mm)
+            files = _save(case, at_mm, plane, spins, shares, folder, inputs)
     except Gcode2KrlError as error:
-        if not as_json:
-            raise
-        console.json({"files": [], "deflection_mm": None, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.refused(error, ["deflection_mm"])
     usable = np.where(spins.usable, spins.deflection_mm, np.nan)
     best = int(np.nanargmin(usable)) if np.isfinite(usable).any() else None
     result |= {
@@ -97,10 +98,9 @@ def command(
         "stiffest_spin_mm": None if best is None else float(usable[best]),
     }
     if as_json:
-        console.json({"files": [str(file) for file in files], **result, "issues": []})
-        return 0
+        return console.record(result, files=files)
     console.say(f"{output}: {', '.join(file.name for file in files)}")
-    console.say(f"  {case.words}, tool T{case.tool}, at X {at[0]:g} Y {at[1]:g} Z {at[2]:g}")
+    console.say(f"  {case.words}, tool T{case.tool}, at X {at_mm[0]:g} Y {at_mm[1]:g} Z {at_mm[2]:g}")
     console.say(f"  deflection {result['deflection_mm']:.4f} mm at spin {case.spin_deg:g} deg")
     if best is not None:
         console.say(f"  stiffest at spin {spins.spin_deg[best]:g} deg: {usable[best]:.4f} mm")

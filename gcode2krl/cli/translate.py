@@ -7,7 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, job_option
+from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, job_option, simplify_option
 from gcode2krl.cli.restart import from_line_option, restart_words
 from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import input_error
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     "translate",
     epilog=examples(
         "gcode2krl part.nc -o part.src",
-        "gcode2krl part.nc --cell cell.toml -o part.src --tolerance 0.05",
+        "gcode2krl part.nc --cell cell.toml -o part.src --tolerance 0.05 --simplify 0.01",
         "cat part.nc | gcode2krl - -o - --name PART > part.src",
         "gcode2krl part.nc --cell cell.toml --compensate offline --json",
     ),
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 )
 @common_options
 @gcode_options
+@simplify_option
 @job_option
 @click.option("--name", help="Program name, where -o names no file; a controller needs both alike.")
 @click.option(

@@ -5,9 +5,9 @@ from typing import Literal
 
 import click
 
-from gcode2krl.cli.console import Console, issue_dicts
+from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import common_options, gcode_options, read_cell
+from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, simplify_option
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.translation.from_line import read_from_line, restart_record
@@ -23,6 +23,7 @@ from gcode2krl.translation.from_line import read_from_line, restart_record
 @click.argument("part", metavar="PART.nc")
 @common_options
 @gcode_options
+@simplify_option
 @click.option(
     "--compensate", type=click.Choice(["offline"]), help="The program was made with --compensate offline."
 )
@@ -37,6 +38,7 @@ def command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     block_delete: bool,
+    simplify_mm: float | None,
     compensate: Literal["offline"] | None,
     from_line: int | None,
 ) -> int:
@@ -48,6 +50,7 @@ def command(
     try:
         from gcode2krl.krl import verify_krl
 
+        console.heading.reads(program, part)
         refuse_other_start(program, from_line)
         cell = read_cell(cell_path)
         with console.stages() as begin:
@@ -59,16 +62,18 @@ def command(
             from gcode2krl.pipeline import predict_toolpath
             from gcode2krl.translation.compensation import compensated
 
-            prediction = compensated(predict_toolpath(toolpath, cell, tolerance_mm=tolerance_mm), None)
-        report = verify_krl(program, toolpath, cell, tolerance_mm, prediction=prediction)
+            whole = predict_toolpath(toolpath, cell, tolerance_mm=tolerance_mm, simplify_mm=simplify_mm)
+            prediction = compensated(whole, None)
+        report = verify_krl(
+            program, toolpath, cell, tolerance_mm, simplify_mm=simplify_mm, prediction=prediction
+        )
     except Gcode2KrlError as error:
         if not as_json:
             raise
-        console.json({"verify": {"max_deviation_mm": None}, "issues": issue_dicts(error.issues)})
-        return error.exit_code
+        return console.record({"verify": {"max_deviation_mm": None}}, error.issues, exit_code=error.exit_code)
     if as_json:
-        result = {"verify": report.as_dict(), "issues": issue_dicts(report.issues)}
-        console.json(result | restart_record(toolpath))
+        figures = {"verify": report.as_dict(), **restart_record(toolpath)}
+        console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:
         console.findings(report.issues, program)
         state = "agrees with" if report.ok else "DIFFERS from"
@@ -79,6 +84,12 @@ def command(
             console.say(
                 f"  largest deviation {report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg, "
                 f"{report.max_speed_difference_mm_min:.2f} mm/min"
+            )
+        if report.original is not None and not math.isnan(report.original.max_deviation_mm):
+            kept = report.original
+            console.say(
+                f"  simplified: of {kept.moves} moves {kept.left_out} corners left out, at most "
+                f"{kept.max_deviation_mm:.4f} mm off ({kept.limit_mm:.4f} allowed)"
             )
         if not report.ok:
             console.explain_hint(report.issues)

@@ -173,9 +173,18 @@ def _refuse_other_sources(core: ctypes.CDLL) -> None:
     """In a source tree compare what the core was built from with what is there."""
     if not (_NATIVE / "core.h").exists():
         return
-    core.core_sources.restype = ctypes.c_char_p
-    if core.core_sources().decode() != _digest():
+    if _built_from(core) != _digest():
         raise _wrong_installation("the compiled core is older than its sources")
+
+
+def core_digest() -> str:
+    """Return the digest of the sources that the core was built from."""
+    return _built_from(_library())
+
+
+def _built_from(core: ctypes.CDLL) -> str:
+    core.core_sources.restype = ctypes.c_char_p
+    return str(core.core_sources().decode())
 
 
 def _digest() -> str:

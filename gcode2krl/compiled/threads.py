@@ -20,10 +20,10 @@ def cores() -> int:
     """Return how many threads to use: what the environment says, one in a pool's worker, else one a core."""
     if named := os.environ.get(THREADS_VARIABLE):
         return int(named)
-    return 1 if multiprocessing.parent_process() else _usable_cores()
+    return 1 if multiprocessing.parent_process() else usable_cores()
 
 
-def _usable_cores() -> int:
+def usable_cores() -> int:
     """Return how many cores this process may use, where the system tells."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

@@ -9,7 +9,9 @@ from numpy.typing import DTypeLike, NDArray
 from gcode2krl.compiled.inputs import locked
 from gcode2krl.errors import Issue
 from gcode2krl.exchange.disk_names import split_columns
+from gcode2krl.exchange.findings import findings_block
 from gcode2krl.exchange.frame import Frame
+from gcode2krl.exchange.html import beside, block, path_picture
 
 
 def column(dtype: DTypeLike, *tail: int | None) -> Any:
@@ -59,3 +61,10 @@ class Table(Frame):
         ['position_x_mm', 'position_y_mm', 'position_z_mm', 'axis_x']
         """
         return split_columns(self)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the columns, the path from above where there is one, and findings."""
+        position_mm = getattr(self, "position_mm", None)
+        picture = "" if position_mm is None else path_picture(position_mm)
+        found = findings_block(self.issues) if self.issues else ""
+        return block("", beside(super()._repr_html_(), picture), found)

@@ -15,6 +15,8 @@ from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
 from gcode2krl.tables import Targets
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
+SIMPLIFY_MM = 0.01
+"""The tolerance to merge moves within that is proposed: a tenth of what a robot's milling usually keeps."""
 _WORTH_SAYING = 0.01
 """Fraction of the time above which a loss is reported."""
 _NO_LENGTH_MM = 1e-6
@@ -148,10 +150,13 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
     )
 
 
-def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
+def motion_issues(
+    chain: Chain, profile: Profile, cell: Cell, simplify_mm: float | None = None
+) -> tuple[Issue, ...]:
     """Return findings on lost time: look-ahead on short moves, stops, and the difference of the two laws.
 
-    Notes; together above ``[limits] lost_time_share`` warnings.
+    ``simplify_mm`` is the tolerance within which moves have been merged already. Notes; together above
+    ``[limits] lost_time_share`` warnings.
     """
     issues: list[Issue] = []
     lost_whole_s = 0.0
@@ -165,7 +170,8 @@ def motion_issues(chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ..
                 f"moves too short for a look-ahead of {cell.controller.advance} cost {lost_s:.1f} s of "
                 f"{profile.total_s:.1f} s, most at this line (unverified: how the controller plans ahead)"
             )
-            remedy = "merge collinear moves, raise the chord tolerance, or let the CAM write longer moves"
+            first = f"--simplify {SIMPLIFY_MM:g}" if simplify_mm is None else "a larger --simplify"
+            remedy = f"{first}, a larger chord tolerance, or longer moves from the CAM"
             issues.append(Issue("note", "short-moves", int(chain.source_line[worst]), sentence, remedy))
     stops_s = _lost_by_stops(chain, cell)
     lost_whole_s += float(stops_s.sum())

@@ -54,7 +54,7 @@ class OriginalFigures:
         known = not np.isnan(self.max_deviation_mm)
         return {
             "simplify_mm": self.simplify_mm,
-            "limit_mm": self.limit_mm,
+            "limit_mm": self.limit_mm if known else None,
             "max_deviation_mm": self.max_deviation_mm if known else None,
             "moves": self.moves,
             "left_out": self.left_out,
@@ -86,6 +86,10 @@ def compare_with_original(
     simplified = targets.simplified
     if simplified is None:
         raise ValueError("the targets leave out nothing")
+    if int(targets.move.max(initial=0)) >= len(toolpath):
+        nan, text = float("nan"), "the G-code has fewer moves than the program was made from"
+        issue = Issue("error", "verify-original", program.def_line, text, _REMEDY)
+        return OriginalFigures(simplified.tolerance_mm, nan, nan, len(toolpath), 0), [issue]
     walk = _Walk(program, targets, toolpath, cell, simplified.tolerance_mm)
     issues = list(islice(walk.issues(), MOST_PLACES))
     figures = OriginalFigures(

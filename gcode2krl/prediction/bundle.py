@@ -1,6 +1,6 @@
 """A prediction: the tables of a part and its cell, saved as a folder and loaded again."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from gcode2krl.prediction.folder import (
     refuse_foreign,
     table_files,
 )
+from gcode2krl.prediction.head import hashed, head_of
 from gcode2krl.prediction.looks import Figures, figures_html, figures_words
 from gcode2krl.prediction.plots import Plots
 from gcode2krl.prediction.samples import joined_samples
@@ -137,10 +138,9 @@ class Prediction:
         place = Path(folder)
         refuse_foreign(place)
         make_folder(place)
-        files, record = table_files(place, self._tables_on_disk(), csv), place / RECORD
-        files[record] = record_bytes(
-            self.inputs, self.issues, self.toolpath, self.targets, self.cell, self._bands()
-        )
+        hashes: dict[str, str] = {}
+        files, record = hashed(table_files(place, self._tables_on_disk(), csv), hashes), place / RECORD
+        files[record] = lambda file: file.write_bytes(self._record_bytes(hashes))  # after the tables
         refuse_inputs(files, inputs)
         before = record.read_bytes() if record.is_file() else None
         write_together({record: UNFINISHED})
@@ -176,6 +176,12 @@ class Prediction:
                 tables["motion"] |= table.columns()
             tables["motion"] |= self.added
         return {name: Columns(columns) for name, columns in tables.items()}
+
+    def _record_bytes(self, hashes: Mapping[str, str]) -> bytes:
+        head = head_of(self.inputs, self.issues, self.cell, self._figures().as_dict(), hashes)
+        return record_bytes(
+            self.inputs, self.issues, self.toolpath, self.targets, self.cell, self._bands(), head
+        )
 
     def _bands(self) -> dict[str, float]:
         named = (("forces", self.forces), ("deflection", self.deflection))

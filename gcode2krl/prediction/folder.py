@@ -16,7 +16,6 @@ import numpy as np
 
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.exchange.arrow_stream import write_parquet
 from gcode2krl.exchange.disk_names import counted_pattern, names_of_parts
 from gcode2krl.exchange.frame import Columns
 from gcode2krl.files import Content
@@ -47,6 +46,8 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 def table_files(place: Path, tables: Mapping[str, Columns], csv: bool) -> dict[Path, Content]:
     """Return the files of tables by name and what writes them; with ``csv`` as CSV too."""
+    from gcode2krl.exchange.arrow_stream import write_parquet
+
     files: dict[Path, Content] = {}
     for name, columns in tables.items():
         frame = columns.to_polars()
@@ -63,12 +64,14 @@ def record_bytes(
     targets: Targets,
     cell: Cell,
     bands: Mapping[str, float],
+    head: Mapping[str, Any],
 ) -> bytes:
-    """Return ``prediction.toml``; ``bands`` are the relative bands of the tables that have one."""
+    """Return ``prediction.toml``: ``bands`` of the tables that have one, ``head`` as of `head_of`."""
     import tomli_w
 
     record: dict[str, Any] = {
         "schema": SCHEMA,
+        "result": head,
         "inputs": inputs,
         "issues": [_issue_record(issue) for issue in issues],
         "toolpath_events": [_event_record(event) for event in toolpath.events],

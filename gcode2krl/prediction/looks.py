@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from gcode2krl.errors import Issue
 from gcode2krl.exchange.findings import counted, findings_block
@@ -25,6 +26,16 @@ class Figures:
     path_mm: float | None
     loads: LoadFigures | None
     issues: tuple[Issue, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures by the names of a record."""
+        return {
+            "moves": self.moves,
+            "time_s": self.time_s,
+            "path_mm": self.path_mm,
+            "max_force_N": self.loads.force_N if self.loads is not None else None,
+            "max_deflection_mm": self.loads.deflection_mm if self.loads is not None else None,
+        }
 
     @classmethod
     def of(

@@ -1,7 +1,8 @@
-"""Figures to files."""
+"""Figures to files and to notebooks."""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -28,3 +29,19 @@ def save_figures(
     with look():
         write_together(files, inputs)
     return list(files)
+
+
+def shown_in_notebooks(figure: Figure) -> Figure:
+    """Return a figure that a notebook shows as a picture, also where nobody has imported pyplot.
+
+    Jupyter learns to draw figures when pyplot is imported; until then it would print the figure's size.
+    """
+    vars(figure)["_repr_png_"] = partial(_as_png, figure)
+    return figure
+
+
+def _as_png(figure: Figure) -> bytes:
+    buffer = BytesIO()
+    with look():
+        figure.savefig(buffer, format="png")
+    return buffer.getvalue()

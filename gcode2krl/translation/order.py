@@ -40,6 +40,7 @@ class Order:
     """The page to write, also of a refused program."""
     comment_every: int | None = None
     from_line: int | None = None
+    simplify_mm: float | None = None
 
     def options(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as plain values of a record."""

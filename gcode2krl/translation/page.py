@@ -44,6 +44,7 @@ def write_page_of_refused(
     toolpath: "Toolpath | None",
     cell: "Cell | None",
     inputs: list[Path],
+    simplify_mm: float | None = None,
 ) -> "Prediction | None":
     """Write the page of a program that was not written, with as much of its path as is known.
 
@@ -54,7 +55,7 @@ def write_page_of_refused(
     verdict = "refused" if error.exit_code == 1 else "not understood"
     text = text_of(part)
     stock_mm = stock_corners_mm(toolpath, cell) if toolpath is not None and cell is not None else None
-    prediction = _predicted(toolpath, cell)
+    prediction = _predicted(toolpath, cell, simplify_mm)
     if prediction is not None:
         content = content_of(prediction, verdict=verdict, issues=error.issues, text=text, stock_mm=stock_mm)
     else:
@@ -80,14 +81,16 @@ def can_be_written(report: str | Path, inputs: list[Path]) -> bool:
     return True
 
 
-def _predicted(toolpath: "Toolpath | None", cell: "Cell | None") -> "Prediction | None":
+def _predicted(
+    toolpath: "Toolpath | None", cell: "Cell | None", simplify_mm: float | None
+) -> "Prediction | None":
     """Return what the robot would do with a program that is refused; None where that cannot be said."""
     if toolpath is None or cell is None:
         return None
     from gcode2krl.pipeline import predict_toolpath
 
     try:
-        return predict_toolpath(toolpath, cell)
+        return predict_toolpath(toolpath, cell, simplify_mm=simplify_mm)
     except Gcode2KrlError:
         return None
 

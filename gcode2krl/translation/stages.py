@@ -137,7 +137,7 @@ def _plan(order: Order, cell: "Cell", known: _Known) -> None:
     from gcode2krl.pipeline import corner_errors, targets_and_joints
 
     toolpath = _done(known.toolpath)
-    targets, joints = targets_and_joints(toolpath, cell, order.tolerance_mm)
+    targets, joints = targets_and_joints(toolpath, cell, order.tolerance_mm, order.simplify_mm)
     errors_mm, corner_issues = corner_errors(toolpath, targets, cell, order.tolerance_mm)
     known.corner_mm = float(errors_mm.max(initial=0.0))
     del errors_mm
@@ -201,7 +201,9 @@ def _with_page(order: Order, error: Gcode2KrlError, known: _Known) -> Gcode2KrlE
         return error
     page = Path(order.report)
     try:
-        prediction = write_page_of_refused(page, str(order.part), error, known.toolpath, known.cell, inputs)
+        prediction = write_page_of_refused(
+            page, str(order.part), error, known.toolpath, known.cell, inputs, order.simplify_mm
+        )
     except Gcode2KrlError as unwritable:
         return unwritable
     known.page = page
@@ -224,6 +226,7 @@ def _header_words(order: Order, cell: "Cell") -> str:
     """Return the options that the header of the program names."""
     named: dict[str, Any] = {
         "tolerance": order.tolerance_mm,
+        "simplify": order.simplify_mm,
         "chord_tolerance": order.chord_tolerance_mm,
         "block_delete": order.block_delete,
         "job": Path(order.job_path).name if order.job_path is not None else None,

@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,9 @@ def ready(folder, run):  # noqa: F811
             measured(folder)
         if "trace.csv" in line:
             traced(folder, run)
+        if "batch" in line:
+            (folder / "parts").mkdir()
+            shutil.copy(folder / "part.nc", folder / "parts")
         if "macros/" in line:
             (folder / "macros").mkdir()
         (folder / ".local" / "share" / "FreeCAD" / "Macro").mkdir(parents=True, exist_ok=True)

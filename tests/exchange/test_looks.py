@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import Issue, load_cell, predict, write_krl
+from gcode2krl.errors import told
 from gcode2krl.exchange.html import line_picture, path_picture
 from gcode2krl.gap.tell.result import Gap, GapSize, Unexplained, Where
 from gcode2krl.runs import Run, RunHead, Tracker
@@ -96,6 +97,14 @@ def test_html_is_small_whole_and_escaped(shown, name):
     assert "<script" not in page
     assert len(page) < MOST_OF_A_PAGE
     ET.fromstring(page)  # every element is closed, every text escaped
+
+
+def test_a_table_shows_its_path_and_its_findings(shown):
+    assert shown["motion"]._repr_html_().count("<svg") == 1
+    assert "&lt;script&gt;" in shown["motion"]._repr_html_()
+    assert "<svg" not in shown["joints"]._repr_html_()
+    assert repr(told([shown["issue"]] * 500).findings[0]).startswith("Finding(500 times Issue(warning evil")
+    assert len(repr(told([shown["issue"]] * 500).findings[0])) < MOST_OF_A_REPR
 
 
 def test_the_texts_are_there(shown):

@@ -2,11 +2,13 @@
 
 import json
 import tomllib
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from gcode2krl.cli.diagnose import command
+from gcode2krl.result.model import Record
 from tests.gap.synthetic import applied, prediction, runs, write
 
 pytestmark = pytest.mark.slow
@@ -41,4 +43,9 @@ def test_text(tmp_path):
 def test_from_log(tmp_path):
     result = CliRunner().invoke(command, ["--from-log", *_folders(tmp_path)[1:], "--json"])
     assert result.exit_code == 0
-    assert json.loads(result.stdout)["causes"][0]["effect"] == "servo_lag"
+    found = json.loads(result.stdout)
+    assert found["causes"][0]["effect"] == "servo_lag"
+    Record.model_validate(found)
+    assert (found["command"], found["gap_schema"]) == ("diagnose", "gcode2krl/gap/1")
+    assert [Path(entry["file"]).name for entry in found["inputs"]] == ["run-1", "run-2"]
+    assert found["options"] == {"from_log": True}

@@ -73,6 +73,7 @@ def test_as_a_notebook_shows_it(gap):
 def test_a_run_is_drawn_by_its_name(gap):
     assert gap.plot().get_suptitle().startswith("run-1")
     assert gap.plot("a<b").get_suptitle().startswith("a<b")
+    assert gap.plot()._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(Gcode2KrlError, match=r"no run 'run-9'.*the runs are run-1, a<b"):
         gap.plot("run-9")
     with pytest.raises(Gcode2KrlError, match="nothing was compared"):

@@ -6,11 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
+from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.read import read_texts
+from gcode2krl.krl.verify import compare
+from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.tables import Simplified, rows_at
 
 CELL = resolve_cell({"based_on": "demonstration"})
@@ -197,6 +203,40 @@ def test_targets_that_leave_out_corners_are_not_written_without_their_toolpath()
         write_krl(set_targets(TOOLPATH, CELL, None, 0.01), None, CELL, name="PART")
 
 
+_NUMBER = st.integers(0, 40).map(lambda mm: f"{mm}")
+_NEAR = st.integers(0, 60).map(lambda um: f"{um / 1000:.3f}")
+_BLOCKS = st.one_of(
+    st.tuples(_NUMBER, _NEAR).map(lambda p: f"G1 X{p[0]} Y{p[1]}"),
+    st.lists(st.tuples(st.integers(1, 300), _NEAR), min_size=2, max_size=12).map(
+        lambda steps: "\n".join(["G91 G1", *(f"X{x / 1000:.3f} Z{z}" for x, z in steps), "G90"])
+    ),
+    st.sampled_from(
+        [
+            *("G0 Z5\nG0 X3 Y3\nG1 Z-1", "F900", "F1500", "M8", "M9", "G4 P0.2", "G61", "G64", "G64 P0.02"),
+            *("S9000", "G91\nG2 X5 Y0 I2.5 J0\nG90", "G28 Z0\nG0 X1 Y1 Z5\nG1 Z-1", "G1 X5\nX6\nX7\nX8"),
+            "G0 Z20\nT2 M6\nS8000 M3\nG0 G43 H2 Z20\nG0 X2 Y2\nG1 Z-1",
+            "G0 Z20\nT1 M6\nS8000 M3\nG1 G43 H1 X2 Y2 Z-1",
+        ]
+    ),
+)
+
+
+@settings(deadline=None, max_examples=80)
+@given(st.lists(_BLOCKS, min_size=2, max_size=14), st.sampled_from([0.001, 0.01, 0.05, 0.5]))
+def test_no_simplified_program_is_refused(blocks, simplify_mm):
+    """Whatever stands between the moves, what merging leaves out passes the comparison with the G-code."""
+    body = "\n".join(blocks)
+    head = "\n".join(PART.split("\n")[:8])
+    toolpath = toolpath_of(f"{head}\nF1200\n{body}\nG0 Z20\nM5\nM30\n")
+    targets = set_targets(toolpath, CELL, None, simplify_mm)
+    joints = solve_ptp_joints(targets, CELL)
+    texts = compose(targets, joints, CELL, "PART", Layout())
+    report = compare(read_texts(texts, "PART.src"), targets, joints, CELL, original=toolpath)
+    assert not [issue for issue in report.issues if issue.code == "verify-original"]
+    assert report.original.left_out >= targets.simplified.left_out
+    assert report.original.max_deviation_mm <= simplify_mm + 0.001
+
+
 # --- on disk ---------------------------------------------------------------------------------------------
 
 
@@ -255,6 +295,16 @@ def test_other_g_code_is_refused(written):
     part, _, program = written
     part.write_text(PART.replace("X20.005 Y0.005", "X20.005 Y0.02"))
     assert not verified(part, program, simplify_mm=0.01).ok
+
+
+def test_other_g_code_than_that_of_a_prediction_is_refused(written):
+    part, prediction, program = written
+    lines = PART.split("\n")
+    part.write_text("\n".join(lines[:9] + lines[-5:]))
+    report = verified(part, program, prediction=prediction)
+    assert [issue.code for issue in report.issues if issue.severity == "error"] == ["verify-original"]
+    part.write_text(PART.replace("X30 Y0", "X31 Y0"))
+    assert not verified(part, program, prediction=prediction).ok
 
 
 @pytest.mark.parametrize("edit", ["delete", "move", "swap"])

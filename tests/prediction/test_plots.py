@@ -29,6 +29,7 @@ def test_a_figure_is_one_of_matplotlib(prediction, name):
     figure = getattr(prediction.plot, name)()
     assert isinstance(figure, Figure)
     assert figure.axes
+    assert figure._repr_png_().startswith(b"\x89PNG")  # what Jupyter asks for without pyplot
 
 
 def test_the_command_draws_the_same(prediction, run, tmp_path):

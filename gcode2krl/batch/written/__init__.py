@@ -6,22 +6,19 @@ from gcode2krl.batch.written.changes import Change, Difference, difference, with
 from gcode2krl.batch.written.index import index_html
 from gcode2krl.batch.written.junit import junit_xml
 from gcode2krl.batch.written.part import Record
-from gcode2krl.batch.written.places import Places
-from gcode2krl.batch.written.results import line_of, records_of, results_jsonl
+from gcode2krl.batch.written.results import records_of, results_jsonl
 from gcode2krl.batch.written.sarif import findings_sarif
 from gcode2krl.batch.written.summary import summary_md
 
 __all__ = [
     "Change",
     "Difference",
-    "Places",
     "Record",
     "contents",
     "difference",
     "findings_sarif",
     "index_html",
     "junit_xml",
-    "line_of",
     "records_of",
     "results_jsonl",
     "summary_md",
@@ -29,7 +26,7 @@ __all__ = [
 
 
 def contents(
-    records: Iterable[Record], before: Iterable[Record] | None = None, places: Places | None = None
+    records: Iterable[Record], before: Iterable[Record] | None = None, root: str = ""
 ) -> dict[str, bytes]:
     """Return name → content of all files of a batch.
 
@@ -37,14 +34,14 @@ def contents(
     ----------
     records : what became of each part, as in ``results.jsonl``; their ``against`` is filled in.
     before : the records of the last run, None where there was none.
-    places : where the parts are, for ``findings.sarif``.
+    root : the absolute folder in which the run began, for ``findings.sarif``.
     """
     before = list(before) if before is not None else None
     records = with_against(records, before)
     return {
         "results.jsonl": results_jsonl(records),
         "junit.xml": junit_xml(records),
-        "findings.sarif": findings_sarif(records, places),
+        "findings.sarif": findings_sarif(records, root),
         "summary.md": summary_md(records, before).encode("utf-8"),
         "index.html": index_html(records, before).encode("utf-8"),
     }

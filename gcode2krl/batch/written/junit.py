@@ -44,14 +44,14 @@ def _case(part: Part) -> ElementTree.Element:
         "testcase",
         classname=printable(part.folder),
         name=printable(part.file),
-        file=printable(part.name),
+        file=printable(part.source),
         time=_seconds(part.seconds or 0.0),
     )
     if not part.is_written:
         case.append(_refusal(part))
     others = part.of_severity("error", "warning") if part.is_written else _beside_errors(part)
     if others:
-        ElementTree.SubElement(case, "system-out").text = _text(lines_of(others, part.name))
+        ElementTree.SubElement(case, "system-out").text = _text(lines_of(others, part.source))
     return case
 
 
@@ -69,7 +69,7 @@ def _refusal(part: Part) -> ElementTree.Element:
         message=one_line(first.text(), _MOST_MESSAGE) if first is not None else part.verdict,
         type=printable(first.code) if first is not None else part.verdict,
     )
-    refusal.text = _text(lines_of(reasons, part.name))
+    refusal.text = _text(lines_of(reasons, part.source))
     return refusal
 
 

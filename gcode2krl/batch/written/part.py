@@ -36,6 +36,8 @@ class Part:
     """Its path below the folder of parts, with slashes."""
     verdict: str
     """One of `VERDICTS`."""
+    source: str = ""
+    """The file as it was named when the batch was started, its name where that is not known."""
     seconds: float | None = None
     """How long its translation took."""
     cached: bool = False
@@ -89,6 +91,7 @@ def part_of(record: Record) -> Part:
     return Part(
         name=name_of(record),
         verdict=_verdict(record.get("exit_code")),
+        source=_source(record),
         seconds=_number(record.get("seconds")),
         cached=record.get("cached") is True,
         time_s=_number(record.get("time_s")),
@@ -103,6 +106,12 @@ def part_of(record: Record) -> Part:
 def name_of(record: Record) -> str:
     """Return the part's name in a record."""
     return str(record.get("part") or "(no name)").replace("\\", "/")
+
+
+def _source(record: Record) -> str:
+    read = record.get("input")
+    named = read.get("file") if isinstance(read, Mapping) else None
+    return str(named).replace("\\", "/") if named else name_of(record)
 
 
 def told_of(findings: Iterable[Finding]) -> list[tuple[str, Told]]:

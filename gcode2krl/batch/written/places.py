@@ -2,30 +2,18 @@
 
 import posixpath
 import re
-from dataclasses import dataclass
 from urllib.parse import quote
 
 _DRIVE = re.compile(r"[A-Za-z]:/")
 
 
-@dataclass(frozen=True, slots=True)
-class Places:
-    """Folders with slashes: that of the parts as it was named, and the absolute one of the run."""
-
-    folder: str = "."
-    root: str = ""
-
-    def of_part(self, name: str) -> str:
-        """Return the path of a part, below the root where it is there."""
-        return self.below_root(posixpath.join(self.folder.replace("\\", "/"), name))
-
-    def below_root(self, path: str) -> str:
-        """Return a path relative to the root, absolute where it is not below it."""
-        plain = posixpath.normpath(path.replace("\\", "/"))
-        root = posixpath.normpath(self.root.replace("\\", "/")) if self.root else ""
-        if root and is_absolute(plain) and plain.startswith(f"{root.rstrip('/')}/"):
-            return plain[len(root.rstrip("/")) + 1 :]
-        return plain
+def below_root(path: str, root: str = "") -> str:
+    """Return a path with slashes, relative to an absolute folder where it is below it."""
+    plain = posixpath.normpath(path.replace("\\", "/"))
+    above = posixpath.normpath(root.replace("\\", "/")).rstrip("/") if root else ""
+    if root and is_absolute(plain) and plain.startswith(f"{above}/"):
+        return plain[len(above) + 1 :]
+    return plain
 
 
 def is_absolute(path: str) -> bool:

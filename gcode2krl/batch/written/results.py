@@ -1,5 +1,6 @@
 """``results.jsonl``: a record a line, sorted by part."""
 
+import contextlib
 import json
 import math
 from collections.abc import Iterable
@@ -14,28 +15,22 @@ def results_jsonl(records: Iterable[Record]) -> bytes:
     Of several records of one part the last counts.
     """
     last = {name_of(record): record for record in records}
-    return b"".join(line_of(last[name]) for name in sorted(last))
+    return b"".join(_line(last[name]) for name in sorted(last))
 
 
-def line_of(record: Record) -> bytes:
-    """Return the line of one record."""
-    text = json.dumps(_finite(record), sort_keys=True, allow_nan=False, separators=(", ", ": "))
+def _line(record: Record) -> bytes:
+    text = json.dumps(_finite(record), sort_keys=True, allow_nan=False)
     return text.encode("ascii") + b"\n"
 
 
 def records_of(content: bytes) -> list[Record]:
-    """Return the records of a ``results.jsonl``.
-
-    A line that a killed run left unfinished is left out, and so is whatever is no object.
-    """
+    """Return the records of a ``results.jsonl``; a line that is no object is left out."""
     records: list[Record] = []
     for line in content.splitlines():
-        try:
+        with contextlib.suppress(ValueError):
             record = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(record, dict):
-            records.append(record)
+            if isinstance(record, dict):
+                records.append(record)
     return records
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from gcode2krl.batch.written.part import Part, Record, parts_of
-from gcode2krl.batch.written.places import Places, is_absolute, uri
+from gcode2krl.batch.written.places import below_root, is_absolute, uri
 from gcode2krl.batch.written.text import printable
 from gcode2krl.codes import Code, all_codes
 from gcode2krl.errors import Issue
@@ -23,9 +23,9 @@ _Result = tuple[int, str, int, str, str]
 """Rank of the severity, path, line, code, sentence: what makes a finding the same as another."""
 
 
-def findings_sarif(records: Iterable[Record], places: Places | None = None) -> bytes:
-    """Return the file; ``places`` says where the parts are, default: in the folder in which the run began."""
-    found = sorted(set(_results(parts_of(records), places or Places())))
+def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
+    """Return the file; ``root`` is the absolute folder in which the run began."""
+    found = sorted(set(_results(parts_of(records), root)))
     kept = found[:MOST_RESULTS]
     codes = sorted({code for _, _, _, code, _ in kept})
     run = {
@@ -39,13 +39,13 @@ def findings_sarif(records: Iterable[Record], places: Places | None = None) -> b
     return (json.dumps(log, indent=1) + "\n").encode("ascii")
 
 
-def _results(parts: Iterable[Part], places: Places) -> Iterator[_Result]:
+def _results(parts: Iterable[Part], root: str) -> Iterator[_Result]:
     """Yield all findings; one on a cell comes once, whatever number of parts has it."""
     for part in parts:
-        path = places.of_part(part.name)
+        path = below_root(part.source, root)
         for finding in part.findings:
             issue = finding.issue
-            place = places.below_root(finding.file) if finding.file else path
+            place = below_root(finding.file, root) if finding.file else path
             yield _RANK.index(issue.severity), place, issue.line, printable(issue.code), _sentence(issue)
 
 

@@ -6,7 +6,7 @@ _NOT_PRINTED = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff"  # not in XML, or better not
     "\u200e\u200f\u202a-\u202e\u2066-\u2069]"  # turn the direction of writing
 )
-_IN_MARKDOWN = re.compile(r"[\\`*_{}\[\]<>|&~#@!$^]|(?<=:)//|[\n\r\t]+")
+_IN_MARKDOWN = re.compile(r"[\\`*{}\[\]<>|&~#@!$^]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])|(?<=:)//|[\n\r\t]+")
 _C0_PICTURES = 0x2400
 _FIRST_PRINTED = 0x20
 _REPLACEMENT = "\ufffd"

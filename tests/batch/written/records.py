@@ -52,7 +52,7 @@ def record(part, exit_code=0, issues=(), **more):
         "schema": "gcode2krl/result/1",
         "command": "translate",
         "version": "0.1.0",
-        "input": {"file": part, "sha256": "0" * 64, "size_bytes": 1000},
+        "input": {"file": f"parts/{part}", "sha256": "0" * 64, "size_bytes": 1000},
         "cell": {"name": "demonstration", "file": None, "sha256": "1" * 64},
         "options": {},
         "exit_code": exit_code,

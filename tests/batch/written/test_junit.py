@@ -88,4 +88,6 @@ def test_thousands_of_findings_are_what_the_command_line_prints():
     issues = [ERROR | {"line": line, "message": f"X {line} is too far"} for line in range(1, 5000)]
     ((_, _, (result,), _),) = cases([record("a.nc", 1, issues)])
     (line,) = result.text.strip().splitlines()
-    assert line.startswith("a.nc:1: error: X 1 is too far (also with other figures in lines 2, 3, 4 and ")
+    assert line.startswith(
+        "parts/a.nc:1: error: X 1 is too far (also with other figures in lines 2, 3, 4 and "
+    )

@@ -21,27 +21,30 @@ def test_the_order_of_records_and_keys_does_not_matter():
 
 
 def test_the_last_record_of_a_part_counts():
-    written = records_of(results_jsonl([record("a.nc", 1), record("b.nc"), record("a.nc", 0)]))
+    written = read([record("a.nc", 1), record("b.nc"), record("a.nc", 0)])
     assert [(one["part"], one["exit_code"]) for one in written] == [("a.nc", 0), ("b.nc", 0)]
 
 
 def test_what_json_cannot_hold_is_null():
-    line = results_jsonl([record("a.nc", time_s=float("inf"), thumbnail=[[float("nan"), 1.0], (2.0, 3.0)])])
-    read = json.loads(line, parse_constant=lambda word: pytest_fail(word))
-    assert read["time_s"] is None
-    assert read["thumbnail"] == [[None, 1.0], [2.0, 3.0]]
-
-
-def pytest_fail(word):
-    raise AssertionError(word)
+    (found,) = read([record("a.nc", time_s=float("inf"), thumbnail=[[float("nan"), 1.0], (2.0, 3.0)])])
+    assert found["time_s"] is None
+    assert found["thumbnail"] == [[None, 1.0], [2.0, 3.0]]
 
 
 def test_names_of_any_bytes_come_back():
-    (read,) = records_of(results_jsonl([record(NASTY)]))
-    assert read["part"] == NASTY
+    (found,) = read([record(NASTY)])
+    assert found["part"] == NASTY
 
 
-def test_a_line_that_a_killed_run_left_is_left_out():
+def read(records):
+    return [json.loads(line, parse_constant=refused) for line in results_jsonl(records).splitlines()]
+
+
+def refused(word):
+    raise AssertionError(word)
+
+
+def test_a_line_that_is_no_record_is_left_out():
     whole = results_jsonl(many(3))
     assert len(records_of(whole + b'{"part": "half.nc", "exit_c')) == 3
     assert len(records_of(whole + b'7\n[]\n\xff\n{"part": "d.nc"}\n')) == 4

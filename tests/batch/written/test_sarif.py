@@ -8,8 +8,8 @@ from urllib.parse import unquote
 import jsonschema
 import pytest
 
-from gcode2krl.batch.written import Places, findings_sarif
-from gcode2krl.batch.written.places import uri
+from gcode2krl.batch.written import findings_sarif
+from gcode2krl.batch.written.places import below_root, uri
 from gcode2krl.batch.written.sarif import MOST_RESULTS, SCHEMA
 from gcode2krl.codes import all_codes
 from tests.batch.written.records import ERROR, NASTY, NOTE, OF_CELL, WARNING, many, record
@@ -31,8 +31,8 @@ def validator():
     return kind(schema)
 
 
-def run_of(records, places=None, validator=None):
-    log = json.loads(findings_sarif(records, places))
+def run_of(records, root="", validator=None):
+    log = json.loads(findings_sarif(records, root))
     if validator is not None:
         assert [error.message for error in validator.iter_errors(log)] == []
     return log["runs"][0]
@@ -72,7 +72,7 @@ def test_the_schema_would_refuse_a_wrong_file(validator):
 
 
 def test_findings_stand_at_their_lines_below_the_repository():
-    run = run_of([record("sub dir/ä#1.nc", 1, [NOTE, WARNING, ERROR])], Places("parts"))
+    run = run_of([record("sub dir/ä#1.nc", 1, [NOTE, WARNING, ERROR])])
     path = "parts/sub%20dir/%C3%A4%231.nc"
     assert places_of(run) == [
         ("out-of-reach", "error", path, 120),
@@ -87,7 +87,7 @@ def test_findings_stand_at_their_lines_below_the_repository():
 
 
 def test_a_finding_on_a_cell_stands_once_at_its_line():
-    run = run_of([record("a.nc", 2, [OF_CELL]), record("b.nc", 2, [OF_CELL])], Places("parts"))
+    run = run_of([record("a.nc", 2, [OF_CELL]), record("b.nc", 2, [OF_CELL])])
     assert places_of(run) == [("model-unknown", "error", "cells/big.toml", 3)]
 
 
@@ -106,24 +106,24 @@ def test_a_rule_is_an_entry_of_the_table():
 
 
 @pytest.mark.parametrize(
-    ("places", "expected"),
+    ("path", "root", "expected"),
     [
-        (Places("."), "a/b.nc"),
-        (Places("parts/"), "parts/a/b.nc"),
-        (Places(".\\parts\\"), "parts/a/b.nc"),
-        (Places("/work/repo/parts", "/work/repo"), "parts/a/b.nc"),
-        (Places("/work/repo/parts", "/work/rep"), "/work/repo/parts/a/b.nc"),
-        (Places("D:\\repo\\parts", "D:\\repo\\"), "parts/a/b.nc"),
-        (Places("/parts", "/"), "parts/a/b.nc"),
-        (Places("../parts"), "../parts/a/b.nc"),
+        ("parts/a.nc", "", "parts/a.nc"),
+        (".\\parts\\a.nc", "", "parts/a.nc"),
+        ("/work/repo/parts/a.nc", "/work/repo", "parts/a.nc"),
+        ("/work/repo/parts/a.nc", "/work/rep", "/work/repo/parts/a.nc"),
+        ("D:\\repo\\parts\\a.nc", "D:\\repo\\", "parts/a.nc"),
+        ("/parts/a.nc", "/", "parts/a.nc"),
+        ("../parts/a.nc", "/work/repo", "../parts/a.nc"),
     ],
 )
-def test_paths(places, expected):
-    assert places.of_part("a/b.nc") == expected
+def test_paths(path, root, expected):
+    assert below_root(path, root) == expected
 
 
 def test_an_absolute_path_is_a_file_uri_of_its_own():
-    run = run_of([record("a b.nc", 1, [ERROR])], Places("D:\\elsewhere", "C:\\repo"))
+    made = record("a.nc", 1, [ERROR]) | {"input": {"file": "D:\\elsewhere\\a b.nc"}}
+    run = run_of([made], "C:\\repo")
     (result,) = run["results"]
     assert result["locations"][0]["physicalLocation"]["artifactLocation"] == {
         "uri": "file:///D:/elsewhere/a%20b.nc"

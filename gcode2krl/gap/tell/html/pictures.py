@@ -21,6 +21,7 @@ from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
 from gcode2krl.gap.tell.residuals import smoothed
 from gcode2krl.gap.tell.result import Gap, IntervalResult
 from gcode2krl.report.drawing import BLUE, GREY, PALE, SKY, VERMILION, line_ticks, look, thin
+from gcode2krl.report.figures import shown_in_notebooks
 
 DPI = 110
 PATH_COLOURS = "viridis"
@@ -57,7 +58,7 @@ def figure_of_run(gap: Gap, run: str | None) -> Figure:
     if not runs or (run is not None and run not in runs):
         sentence = f"there is no run {run!r} to draw" if runs else "nothing was compared: nothing to draw"
         raise input_error("no-runs", sentence, f"the runs are {', '.join(runs)}" if runs else "")
-    return run_figure(gap, runs[run] if run is not None else next(iter(runs.values())))
+    return shown_in_notebooks(run_figure(gap, runs[run] if run is not None else next(iter(runs.values()))))
 
 
 def run_figure(gap: Gap, run: RunEvidence) -> Figure:

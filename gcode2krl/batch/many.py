@@ -1,0 +1,108 @@
+"""Predictions of many parts from Python: `predict` in several processes, in the order of the parts."""
+
+from collections.abc import Iterable, Iterator
+from inspect import signature
+from pathlib import Path
+from typing import Any, Literal, overload
+
+from gcode2krl.batch.crew import Answer, Crew
+from gcode2krl.batch.free_memory import budget_mb, expected_mb, fitting_processes
+from gcode2krl.batch.parts import find_parts
+from gcode2krl.cell import Cell, load_cell
+from gcode2krl.compiled.threads import usable_cores
+from gcode2krl.errors import Gcode2KrlError, Issue, NotUnderstoodError
+from gcode2krl.pipeline import predict
+from gcode2krl.prediction import Prediction
+
+_AHEAD = 2
+"""So many predictions for each process wait at most until it is their turn."""
+_Task = tuple[Path, Cell, dict[str, Any]]
+
+
+@overload
+def predict_many(
+    parts: str | Path | Iterable[str | Path],
+    cell: Cell | None = ...,
+    *,
+    processes: int | None = ...,
+    errors: Literal["raise"] = ...,
+    **options: Any,
+) -> Iterator[Prediction]: ...
+
+
+@overload
+def predict_many(
+    parts: str | Path | Iterable[str | Path],
+    cell: Cell | None = ...,
+    *,
+    processes: int | None = ...,
+    errors: Literal["keep"],
+    **options: Any,
+) -> Iterator[Prediction | Gcode2KrlError]: ...
+
+
+def predict_many(
+    parts: str | Path | Iterable[str | Path],
+    cell: Cell | None = None,
+    *,
+    processes: int | None = None,
+    errors: Literal["raise", "keep"] = "raise",
+    **options: Any,
+) -> Iterator[Prediction] | Iterator[Prediction | Gcode2KrlError]:
+    """Yield the prediction of each part, in the order of the parts; several are computed at once.
+
+    ``parts`` are files, or one folder or pattern, whose files come sorted by name. ``processes`` is by
+    default one a core, as far as the memory suffices; ``options`` are those of `predict`. A part that cannot
+    be predicted raises its `Gcode2KrlError` when it is its turn; with ``errors="keep"`` the error takes the
+    place of the prediction, and the parts after it follow. Only few predictions wait in memory.
+
+    >>> from gcode2krl import load_cell, predict_many
+    >>> for prediction in predict_many("*.nc", load_cell("cell.toml"), processes=2):
+    ...     print(prediction.toolpath.source, f"{prediction.forces.peak_N.max():.0f} N")
+    part.nc ... N
+    """
+    if isinstance(parts, str | Path):
+        files = [part.file for part in find_parts([str(parts)])]
+    else:
+        files = [Path(part) for part in parts]
+    signature(predict).bind("", cell, **options)  # a wrong option is an error here, not in every worker
+    shared = cell if cell is not None else load_cell()
+    return _predictions([(file, shared, options) for file in files], processes, errors == "keep")
+
+
+def _predictions(tasks: list[_Task], processes: int | None, keep: bool) -> Iterator[Any]:
+    budget = budget_mb()
+    costs_mb = [expected_mb(_size_bytes(file), whole_tables=True) for file, _, _ in tasks]
+    count = fitting_processes(min(processes or usable_cores(), len(tasks)), budget)
+    with Crew(count, budget) as crew:
+        for answer in crew.answers(_predicted, tasks, costs_mb, ahead=_AHEAD * count):
+            value = _value(answer, tasks[answer.task][0])
+            if isinstance(value, Gcode2KrlError) and not keep:
+                raise value
+            yield value
+
+
+def _predicted(task: _Task) -> Prediction | Gcode2KrlError:
+    """Carry out a task in a worker."""
+    file, cell, options = task
+    try:
+        return predict(file, cell, **options)
+    except Gcode2KrlError as error:
+        return error
+
+
+def _value(answer: Answer, file: Path) -> Any:
+    return died(answer.failure, str(file)) if answer.failure else answer.value
+
+
+def died(failure: str, source: str) -> NotUnderstoodError:
+    """Return the error for a part at which two workers died."""
+    remedy = "give it more memory, or fewer --processes; if neither helps, report it with the part"
+    return NotUnderstoodError(Issue("error", "worker-died", 0, failure, remedy), source)
+
+
+def _size_bytes(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except OSError:  # reading it reports it
+        return 0
