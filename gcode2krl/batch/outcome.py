@@ -64,7 +64,7 @@ def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -
         counts = dict(found["counts"])
         counts["notes"] += 1
         found |= {"counts": counts, "issues": [*found["issues"], *issue_dicts([planned.note])]}
-    ours = {"part": part.key, "seconds": round(seconds, 3), "cached": cached}
+    ours = {"part": part.key, "seconds": round(seconds, 4), "cached": cached}
     return {**found, **ours, "thumbnail": record.get("thumbnail"), "against": None}
 
 

@@ -68,7 +68,7 @@ def lay_over_base(data: Table, beside: Path | None, source: str, seen: tuple[Pat
     from_further = {taken.key: taken for taken in base.taken}
     stated = dict(_leaves(table))
     taken = tuple(
-        from_further.get(key, Taken(key, _text(value), whose, verified))
+        from_further.get(key, Taken(key, _shown(key, value), whose, verified))
         for key, value in _leaves(merged)
         if key not in stated and key.rpartition(".")[2] not in _NO_VALUES
     )
@@ -207,6 +207,15 @@ def _leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tu
 def stated_keys(data: Table) -> frozenset[str]:
     """Return the dotted keys of all values of a cell file."""
     return frozenset(key for key, _ in _leaves(data))
+
+
+def _shown(key: str, value: Any) -> str:
+    """Return a value as text; of a file its name, as a program must not depend on where a folder lies."""
+    section, _, last = key.partition(".")
+    names_file = (section, last) in _FILES or (section == "tool" and last.endswith(".model"))
+    if names_file and isinstance(value, str) and Path(value).is_absolute():
+        return _text(Path(value).name)
+    return _text(value)
 
 
 def _text(value: Any) -> str:
