@@ -85,7 +85,7 @@ def whole_lines(pieces: Iterable[bytes]) -> Iterator[bytes]:
     yield rest
 
 
-def stored(pieces: Iterable[bytes]) -> Stored:
+def store(pieces: Iterable[bytes]) -> Stored:
     """Return a text that comes in pieces, a long one in a temporary file that vanishes with it."""
     held: list[bytes] = []
     size, file = 0, None

@@ -16,7 +16,7 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
-from gcode2krl.files.stored import Stored, Texts, stored, whole_lines
+from gcode2krl.files.stored import Stored, Texts, store, whole_lines
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
@@ -168,7 +168,7 @@ def read_texts(texts: Mapping[str, bytes | Stored | Iterable[bytes]], main: str)
 def _as_stored(text: bytes | Stored | Iterable[bytes]) -> Stored:
     if isinstance(text, Stored):
         return text
-    return Stored(text) if isinstance(text, bytes) else stored(text)
+    return Stored(text) if isinstance(text, bytes) else store(text)
 
 
 class _Reader:

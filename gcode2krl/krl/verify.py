@@ -14,7 +14,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
-from gcode2krl.files.stored import Texts, stored
+from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
@@ -152,7 +152,7 @@ def verify_krl(
     online = rsi_name(program, Path(path).parent)
     layout = Layout(guard=program.guard, online=online, single_file=alone)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
-    expected = {name: stored(pieces) for name, pieces in composed.items()}
+    expected = {name: store(pieces) for name, pieces in composed.items()}
     if not alone:
         issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"].read())
     if online:

@@ -15,7 +15,7 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files import Staging, refuse_inputs
-from gcode2krl.files.stored import Stored, Texts, stored
+from gcode2krl.files.stored import Stored, Texts, store
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.names import name_problem, suggested_name
@@ -214,7 +214,7 @@ class _Files:
             refuse_inputs([_place(self.file, part, self.name) for part in texts], self.inputs)
         for part, pieces in texts.items():
             if self.file is None:
-                self.contents[part] = stored(pieces)
+                self.contents[part] = store(pieces)
             else:
                 place = _place(self.file, part, self.name)
                 self.contents[part] = Stored(self.staging.write(place, pieces))

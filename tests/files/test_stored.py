@@ -10,7 +10,7 @@ import pytest
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.files import stored as module
 from gcode2krl.files.spool import Spool
-from gcode2krl.files.stored import Stored, Texts, stored, whole_lines
+from gcode2krl.files.stored import Stored, Texts, store, whole_lines
 
 TEXT = b"".join(b"LIN {X %d.000}\r\n" % k for k in range(500))
 
@@ -30,7 +30,7 @@ def text(request, tmp_path, monkeypatch):
     if request.param == "file":
         (tmp_path / "a.src").write_bytes(TEXT)
         return Stored(tmp_path / "a.src")
-    return stored(pieces_of(TEXT, 64))
+    return store(pieces_of(TEXT, 64))
 
 
 def test_every_form_says_the_same(text):
@@ -60,7 +60,7 @@ def test_a_file_that_was_open_can_be_replaced(tmp_path, monkeypatch):
 def test_an_empty_text(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "SHORT_BYTES", 0)
     (tmp_path / "empty").write_bytes(b"")
-    for text in (stored([]), Stored(tmp_path / "empty")):
+    for text in (store([]), Stored(tmp_path / "empty")):
         assert (text.size_bytes, text.read()) == (0, b"")
         with text.opened() as data:
             assert len(data) == 0
@@ -75,7 +75,7 @@ def test_pieces_end_with_lines_and_nothing_is_lost(size, end):
     assert made[-1] == end
 
 
-@pytest.mark.parametrize("write", [lambda: stored([TEXT]), lambda: Spool(np.uint8).append(np.zeros(2 << 20))])
+@pytest.mark.parametrize("write", [lambda: store([TEXT]), lambda: Spool(np.uint8).append(np.zeros(2 << 20))])
 def test_a_full_temporary_folder_is_named(monkeypatch, write):
     monkeypatch.setattr(module, "SHORT_BYTES", 0)
 
