@@ -1,9 +1,10 @@
-"""Run the commands named in the README's ``<!-- output: … -->`` comments and put their output below them.
+"""Run the commands named in ``<!-- output: … -->`` comments of the README and of the first program's page,
+and put their output below them.
 
     python docs/update_readme.py
 
 A comment may end in ``| lines A-B`` to keep part of the output. Commands run in the checkout; files they
-write go to a temporary folder where the command says ``{tmp}``, which the README shows without it.
+write go to a temporary folder where the command says ``{tmp}``, which the page shows without it.
 """
 
 import re
@@ -15,6 +16,7 @@ from pathlib import Path
 
 STOCK = 'based_on = "demonstration"\n' + "[stock]\nbox_mm = [[0, -100, -30], [300, 100, 0]]\n"
 ROOT = Path(__file__).resolve().parent.parent
+PAGES = (ROOT / "README.md", ROOT / "docs" / "first_program.md")
 BLOCK = re.compile(
     r"(<!-- output: (?P<command>.*?)(?: \| lines (?P<first>\d+)-(?P<last>\d+))? -->\n)```text\n.*?^```",
     re.M | re.S,
@@ -29,8 +31,14 @@ def output_of(command: str, folder: str) -> str:
 
 
 def main() -> None:
-    """Replace the output below each command."""
-    readme = ROOT / "README.md"
+    """Replace the output below each command, and draw the pictures."""
+    for path in PAGES:
+        refresh(path)
+    draw_pictures()
+
+
+def refresh(path: Path) -> None:
+    """Replace the output below each command of a page."""
     with tempfile.TemporaryDirectory() as folder:
 
         def replaced(match: re.Match[str]) -> str:
@@ -39,9 +47,8 @@ def main() -> None:
                 lines = lines[int(match["first"]) - 1 : int(match["last"])]
             return match[1] + "```text\n" + "\n".join(line.rstrip() for line in lines) + "\n```"
 
-        text = BLOCK.sub(replaced, readme.read_text(encoding="utf-8"))
-    readme.write_text(text, encoding="utf-8", newline="\n")
-    draw_pictures()
+        text = BLOCK.sub(replaced, path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def draw_pictures() -> None:

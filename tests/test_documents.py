@@ -49,9 +49,10 @@ COMMANDS = [
     for line, command in enumerate(text.splitlines())
 ]
 SHOWN = [
-    case("README.md", number, command)
+    pytest.param(path, command, id=f"{path.name}:{number}")
+    for path in (DOCUMENTS[0], ROOT / "docs" / "first_program.md")
     for number, command in enumerate(
-        re.findall(r"<!-- output: (gcode2krl .*?)(?: \| .*?)? -->", DOCUMENTS[0].read_text(encoding="utf-8"))
+        re.findall(r"<!-- output: (gcode2krl .*?)(?: \| .*?)? -->", path.read_text(encoding="utf-8"))
     )
 ]
 
@@ -136,13 +137,13 @@ def test_commands(command, folder, run, predicted):
     assert done.code == 0, done.err
 
 
-@pytest.mark.parametrize("command", SHOWN)
-def test_what_the_readme_shows_is_what_is_printed(command, folder):
+@pytest.mark.parametrize(("path", "command"), SHOWN)
+def test_what_a_page_shows_is_what_is_printed(path, command, folder):
     """Equal except for figures: the last digits of a computer may differ."""
     words = shlex.split(command.replace("{tmp}", "."))[1:]
     done = subprocess.run([sys.executable, "-m", "gcode2krl", *words], capture_output=True, text=True)
     block = re.escape(f"<!-- output: {command} -->\n```text\n") + r"(.*?)\n```"
-    shown = re.search(block, DOCUMENTS[0].read_text(encoding="utf-8"), re.S).group(1)
+    shown = re.search(block, path.read_text(encoding="utf-8"), re.S).group(1)
     lines = [line.rstrip() for line in (done.stderr + done.stdout).splitlines()]
     assert without_figures("\n".join(lines)) == without_figures(shown)
 
@@ -153,7 +154,7 @@ def without_figures(text):
 
 def test_no_example_is_forgotten():
     """A block in a language that is not known here would run nowhere."""
-    known = {"", "text", "toml", "python", "sh", "sh setup"}
+    known = {"", "text", "toml", "python", "math", "sh", "sh setup"}
     for path in DOCUMENTS:
         fences = re.findall(r"^```(.*)$", path.read_text(encoding="utf-8"), re.M)
         assert set(fences[::2]) <= known, path
