@@ -105,7 +105,7 @@ def _seen_along(
     gathered, waiting = Gathered[Motion](course.count), np.zeros(0, dtype=np.int32)
     angles = np.empty((2, course.count if keeps and judges_joints else 0, 6))
     solved = 0
-    for motion, ends in course.blocks():
+    for motion, ends in ahead(course.blocks()):
         acceleration.take(motion, line[motion.move])
         watch.take(motion)
         if follower is not None and share is not None:

@@ -1,6 +1,6 @@
 """A chain with its time law: the Motion, sampled block after block or at chosen samples."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class Course:
             self._from, self._to = chain.from_rotation, chain.to_rotation
             self._turns = not one_orientation(self._from, self._to)
 
-    def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[tuple[Motion, bool]]:
+    def blocks(self, rows: int = BLOCK_ROWS) -> Generator[tuple[Motion, bool], None, None]:
         """Yield the Motion in blocks of rows, and whether it ends with each."""
         first_move = 0
         for start in range(0, self.count, rows):

@@ -6,7 +6,7 @@ between two samples that are. Where contact begins or ends, or the force jumps, 
 #include "cutting/stretch.h"
 
 /* Length of a stretch, in radii, whose middle need not be read where both ends are alike. */
-#define SHORT 0.15
+#define SHORT 0.3
 
 enum { MOST_HALVINGS = 16 };
 
