@@ -49,6 +49,9 @@ class Finding(_Strict):
     line: NotNegative = Field(description="Of the G-code or the file, from 1; 0 where there is none.")
     message: str
     remedy: str
+    file: str | None = Field(
+        default=None, description="What the line is of where it is not the input: a cell, a job."
+    )
 
 
 class Record(BaseModel):

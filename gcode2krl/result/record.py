@@ -21,11 +21,13 @@ def record_of(
     cell: Mapping[str, Any] | None = None,
     options: Mapping[str, Any] | None = None,
     files: Mapping[str, str | None] | None = None,
+    issues_file: str | None = None,
 ) -> dict[str, Any]:
     """Return the record: what went in, the exit code, the files, the figures, the findings.
 
     ``figures`` are the command's own keys, with their units in their names; ``input`` is made by
     `hashes.input_of`, ``cell`` by `hashes.cell_of`, ``files`` (name → SHA-256) by `hashes.hashes_of`.
+    ``issues_file`` is the file that the findings are about if not the input: a cell, a job.
     """
     found = tuple(issues)
     severities = Counter[str](issue.severity for issue in found)
@@ -42,13 +44,15 @@ def record_of(
         "files": list(hashes),
         "sha256": {name: content for name, content in hashes.items() if content is not None},
         **figures,
-        "issues": issue_dicts(found),
+        "issues": issue_dicts(found, issues_file),
     }
 
 
-def issue_dicts(issues: Iterable[Issue]) -> list[dict[str, Any]]:
-    """Return findings as the objects of a record."""
+def issue_dicts(issues: Iterable[Issue], file: str | None = None) -> list[dict[str, Any]]:
+    """Return findings as the objects of a record; ``file`` is what they are about if not the input."""
+    elsewhere = {} if file is None else {"file": file}
     return [
         {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.advice()}
+        | elsewhere
         for i in issues
     ]

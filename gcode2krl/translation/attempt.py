@@ -66,7 +66,15 @@ class Attempt:
             cell=None if self.cell is None else cell_of(self.cell, self.order.cell_path),
             options=self.order.options(),
             files={} if self.written is None else hashes_of(self.written.files),
+            issues_file=self._issues_file(),
         )
+
+    def _issues_file(self) -> str | None:
+        """Return the file that the findings are about, None where it is the part."""
+        source = self.error.source if self.error is not None else ""
+        if source in ("", str(self.order.part)) or not Path(source).is_file():
+            return None
+        return source
 
     def _input(self) -> Mapping[str, Any] | None:
         if str(self.order.part) != STANDARD:

@@ -113,6 +113,16 @@ def test_a_wrong_order_is_an_attempt_with_exit_code_2(part, monkeypatch, wrong, 
     assert sorted(path.name for path in part.parent.iterdir()) == ["part.nc"]
 
 
+def test_a_finding_on_the_cell_names_the_cell_and_its_line(part, tmp_path):
+    cell = tmp_path / "cell.toml"
+    cell.write_text('based_on = "demonstration"\nclearence.z_mm = 5\n', encoding="ascii")
+    record = carry_out(Order(part, cell_path=cell)).record
+    Record.model_validate(record)
+    assert [(issue["file"], issue["line"]) for issue in record["issues"]] == [(str(cell), 2)]
+    part.write_text("G1 X\n", encoding="ascii")
+    assert all("file" not in issue for issue in carry_out(Order(part)).record["issues"])
+
+
 def test_standard_input_is_hashed_as_it_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(CLEAN.encode())))
     record = carry_out(Order("-", tmp_path / "part.src", no_forces=True)).record
