@@ -1,5 +1,6 @@
 """What a batch prints: a line a finished part, one bar, and the table at the end."""
 
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from gcode2krl.batch.written.part import VERDICTS
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.standard_files import tell
 from gcode2krl.errors import Issue, told
+from gcode2krl.progress import Progress, unheard
 
 if TYPE_CHECKING:
     from gcode2krl.batch.run import Line
@@ -47,18 +49,37 @@ class Told:
 @contextmanager
 def shown(console: Console, told_so_far: Told) -> Iterator[Show]:
     """Yield the function that shows a finished part, below which a terminal has a bar of the whole batch."""
-    with console.stages() as begin:
-        progress = begin("translating")
+    with _bar(console) as (say, progress):
+        progress(0.0, 1.0)
 
         def show(line: "Line") -> None:
             told_so_far.records.append(line.record)
             if not console.quiet:
-                tell(part_line(line.record))
+                say(part_line(line.record))
             for text in finding_lines(line.record):
-                tell(text)
+                say(text)
             progress(line.share, 1.0)
 
         yield show
+
+
+@contextmanager
+def _bar(console: Console) -> Iterator[tuple[Callable[[str], None], Progress]]:
+    """Yield how to print a line and how to move the bar; on a terminal lines appear above it."""
+    if console.quiet or not sys.stderr.isatty():
+        yield tell, unheard
+        return
+    from rich.console import Console as Terminal
+    from rich.text import Text
+
+    from gcode2krl.cli.terminal_bars import bars
+
+    terminal = Terminal(stderr=True)
+    with bars(terminal) as begin:
+        yield (
+            lambda text: terminal.print(Text.from_ansi(text), soft_wrap=True),
+            begin("translating"),
+        )
 
 
 def part_line(record: Record) -> str:

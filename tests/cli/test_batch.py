@@ -1,8 +1,10 @@
 """``gcode2krl batch``: what is written, what a second run computes, what a killed worker and Ctrl-C cost."""
 
+import contextlib
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -278,6 +280,31 @@ def test_several_parts_for_translate_name_the_batch(parts, run):
     assert done.code == 2
     assert "gcode2krl batch PARTS -o out/" in done.err
     assert "batch" not in run(parts / "a.nc", "--nonsense").err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal")
+def test_on_a_terminal_the_lines_stand_above_one_bar(parts, tmp_path):
+    import pty
+
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "gcode2krl", "batch", str(parts), "-o", "out"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
+    process = subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=theirs
+    )
+    os.close(theirs)
+    shown = b""
+    with contextlib.suppress(OSError):  # the end of a pseudo-terminal on Linux
+        while piece := os.read(ours, 65536):
+            shown += piece
+    os.close(ours)
+    assert process.wait(60) == 0
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode("utf-8"))
+    lines = [line for line in re.split(r"[\r\n]+", plain) if "written" in line]
+    assert len(lines) == 3
+    assert all(line.startswith("written ") for line in lines)
+    assert "translating" in plain
+    assert "left" in plain or "100%" in plain
 
 
 # --- a worker that is killed, and a batch that is stopped ---------------------------------------------------
