@@ -129,6 +129,7 @@ def raster(folder, lines):
     return file
 
 
+@pytest.mark.slow
 def test_the_memory_of_a_translation_grows_by_little_a_line(tmp_path):
     few, many = 30_000, 75_000
     peaks = [peak_bytes(raster(tmp_path, lines), tmp_path) for lines in (2_000, few, many)]

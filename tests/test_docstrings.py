@@ -117,12 +117,18 @@ def measure(true, folder, generator):
         pl.DataFrame({"t_s": time_s, **columns}).write_csv(folder / f"{name}.csv")
 
 
+def marked(name):
+    """Return a name as a parameter; what draws or diagnoses is slow."""
+    slow = name == "diagnose" or name.startswith(("Gap", "Plots"))
+    return pytest.param(name, marks=[pytest.mark.slow] if slow else [])
+
+
 @pytest.mark.parametrize("name", PUBLIC)
 def test_every_public_name_has_an_example(name):
     assert name in EXAMPLES, f"{name} has no example in its docstring"
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", [marked(name) for name in EXAMPLES])
 def test_the_example_is_right(name, files, tmp_path, monkeypatch):
     folder = tmp_path / "files"
     shutil.copytree(files, folder)

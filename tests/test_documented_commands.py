@@ -57,6 +57,7 @@ def test_a_command_that_is_named_exists(command, run):
     assert "Usage:" in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", sorted(LISTED["run"]))
 def test_a_command_runs(command, folder, run, ready):  # noqa: F811
     how = LISTED["run"][command]

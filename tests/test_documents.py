@@ -23,7 +23,7 @@ box_mm = [[0, -100, -30], [300, 100, 0]]
 """
 ELSEWHERE = {"docs/diagnose_check.md": "hours of cases; .ci/run makes one with the same program"}
 """Documents with commands that are not run here, and why."""
-SLOW = ("diagnose",)
+SLOW = ("diagnose", "predict .* --plot", "report .* -o", "--report", "batch .* -o")
 
 
 def blocks(language):
@@ -38,7 +38,7 @@ def blocks(language):
 
 def case(name, number, text):
     """Return a block or a command as a parameter; whole diagnoses are slow."""
-    marks = [pytest.mark.slow] if any(re.search(rf"\b{word}\b", text) for word in SLOW) else []
+    marks = [pytest.mark.slow] if any(re.search(rf"(?<!\w){word}\b", text) for word in SLOW) else []
     return pytest.param(text, id=f"{name}:{number}", marks=marks)
 
 

@@ -9,6 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "count"),
     [("gcode", 600), ("predictions", 100), ("runs", 150), ("meshes", 150), ("telegrams", 4000), ("krl", 600)],

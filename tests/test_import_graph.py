@@ -204,6 +204,7 @@ def test_no_package(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "no __init__.py" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_package_itself_has_no_cycles() -> None:
     text = graph.report(graph.map_of(graph.PACKAGE))
     assert "cycles between rooms, types included: 0" in text

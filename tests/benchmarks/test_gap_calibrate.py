@@ -43,6 +43,7 @@ def test_the_script_writes_a_table_that_the_diagnosis_takes(tmp_path, capsys):
     assert all(f"| {term} |" in said for term in TERMS)
 
 
+@pytest.mark.slow
 def test_the_same_records_make_the_same_table(tmp_path):
     tables = []
     for name in ("first", "second"):

@@ -31,6 +31,7 @@ def probe(room, name, factor):
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_the_whole_diagnosis_sees_the_changed_threshold():
     assert probe("choose", "named", 0.5) == ["0.25", "0.25", "True"]
     assert probe("choose", "most_causes", 2.0)[:2] == ["8", "0.5"]
@@ -149,6 +150,7 @@ def test_a_few_stored_cases_are_of_all_kinds(tmp_path):
     assert len(tool.stored(tmp_path, 0)) == 5
 
 
+@pytest.mark.slow
 def test_a_case_that_breaks_is_no_answer(tmp_path):
     command = [sys.executable, str(BENCHMARKS / "gap_thresholds_changed.py")]
     task = {"setting": ["choose", "named", 0.5], "cases": {"null-00001": [str(tmp_path), []]}}

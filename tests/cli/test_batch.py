@@ -74,6 +74,7 @@ def test_every_part_becomes_what_translate_makes_of_it(parts, run):
     }
 
 
+@pytest.mark.slow
 def test_a_record_has_what_a_page_needs(parts, run):
     run("batch", parts, "-o", "out", "--report")
     record = records("out")["Größe 2/c d.tap"]
@@ -120,6 +121,7 @@ def test_a_bad_part_does_not_stop_the_others(parts, run):
     ]
 
 
+@pytest.mark.slow
 def test_nothing_is_computed_twice(parts, run):
     (parts / "far.nc").write_text(REFUSED)
     (parts / "no.nc").write_text(NOT_UNDERSTOOD)
@@ -137,6 +139,7 @@ def test_nothing_is_computed_twice(parts, run):
     assert programs("out") == first
 
 
+@pytest.mark.slow
 def test_one_part_changed(parts, run):
     run("batch", parts, "-o", "out")
     (parts / "a.nc").write_text(GOOD.format(x=77))
@@ -145,6 +148,7 @@ def test_one_part_changed(parts, run):
     assert b"77" in programs("out")["a.src"]
 
 
+@pytest.mark.slow
 def test_an_option_a_cell_and_its_mesh_count(parts, run, tmp_path):
     cell, base, mesh = (tmp_path / name for name in ("cell.toml", "base.toml", "stock.stl"))
     base.write_text(CELL)
@@ -189,6 +193,7 @@ def test_a_damaged_entry_is_a_miss(parts, run, tmp_path):
     assert programs("again") == programs("out")
 
 
+@pytest.mark.slow
 def test_a_program_that_is_refused_now_does_not_stay(parts, run):
     run("batch", parts, "-o", "out")
     assert (Path("out") / "a.src").exists()
@@ -329,6 +334,7 @@ def many(parts, count):
         (parts / f"m{number}.nc").write_text(GOOD.format(x=60 + number))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
 def test_a_killed_worker_loses_nothing(parts, run, tmp_path):
     many(parts, 12)
@@ -341,6 +347,7 @@ def test_a_killed_worker_loses_nothing(parts, run, tmp_path):
     assert len(records(tmp_path / "out")) == 15
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="sends the signal of Ctrl-C")
 def test_ctrl_c_leaves_what_is_finished_and_the_next_call_goes_on(parts, run, tmp_path):
     many(parts, 12)

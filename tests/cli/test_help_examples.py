@@ -21,7 +21,7 @@ from tests.test_documents import CELL, folder, measured, traced  # noqa: F401 (f
 NEEDS_SHELL = ("|", ">", '"$(')
 LISTENS = "online serve --pilot"
 """Begins a line of an example that waits for a robot."""
-SLOW = ("diagnose", "identify force", "online simulate part.nc --cell")
+SLOW = ("diagnose", "identify force", "--plot", "online simulate part.nc --cell")
 
 
 def all_commands():

@@ -49,6 +49,7 @@ def test_the_summary_names_both(run, folder):
     assert "slot.nc:7: warning: cuts up to 1.50 mm into the nominal part" in done.err
 
 
+@pytest.mark.slow
 def test_the_report_shows_them_if_the_part_is_unchanged(run, folder):
     run(*WORDS)
     assert run("report", "prediction", "-o", "report.html").code == 0

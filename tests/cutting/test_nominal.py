@@ -64,6 +64,7 @@ def test_what_is_not_cut_is_rest(slot):
     assert 32 <= one.place_mm[1] <= 38
 
 
+@pytest.mark.slow
 def test_a_wall_beside_a_gouge_is_not_part_of_its_depth(slot):
     """Cells of 0.16 mm do not end where the slot does: half of a wall's height would be taken for a gouge."""
     for shift in (0.0, 0.04, 0.08, 0.12):

@@ -59,6 +59,7 @@ class Workflow:
         return self.repository.run(self.steps[name]["run"], **known, GITHUB_STEP_SUMMARY=str(self.summary))
 
 
+@pytest.mark.slow
 def test_the_github_workflow(repository):
     workflow = Workflow(repository)
     assert list(workflow.steps) == ["Install", "Translate", "Summary", "Keep for the next comparison"]
@@ -92,6 +93,7 @@ def test_steps_after_a_refusal_still_run():
     assert all("!cancelled()" in step["if"] for step in after)
 
 
+@pytest.mark.slow
 def test_the_workflow_uploads_what_a_batch_writes(repository):
     workflow = Workflow(repository)
     workflow.run("Translate")

@@ -96,6 +96,7 @@ def played(values, half_width):
     return follower
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoders", [0, 3])
 def test_a_play_of_a4_is_found_with_and_without_load_encoders_elsewhere(encoders):
     gap = diagnose_log([logged(number, 0.08, encoders) for number in range(2)], cell())

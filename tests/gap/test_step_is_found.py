@@ -21,6 +21,7 @@ def dated(*texts, **more):
     return [replace(run, head=head) for run, head in zip(made, heads, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "target", "at_s", "size", "value"),
     [
@@ -30,7 +31,6 @@ def dated(*texts, **more):
             1806.0,
             "size_mm",
             0.15,
-            marks=pytest.mark.slow,
         ),
         ("step:target=A2,at_s=7.5,size_deg=0.01", "A2", 7.5, "size_deg", 0.01),
     ],

@@ -69,6 +69,7 @@ def turning_trace(text, cell, controller, vel_ori, acc_ori, seed=3):
     return ControllerTrace(t, position, np.arange(len(t)) + 2, 0, "trace.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["averages", "trapezoid"])
 def test_turning_lines_give_the_limits_of_orientation(text, cell, law):
     slow = {"vel_ori_deg_s": 30.0, "acc_ori_deg_s2": 150.0, "law": law}
@@ -89,6 +90,7 @@ def test_turning_lines_that_never_reach_their_speed_leave_it_open(text, cell):
     assert any("$VEL.ORI is not determined" in issue.message for issue in found.issues)
 
 
+@pytest.mark.slow
 def test_the_krl_form_has_the_turning_lines_and_its_trace_is_read(run, text, cell, tmp_path):
     made = run("make-test", "controller", "-o", "test.src", "--json")
     assert made.code == 0, made.err

@@ -378,6 +378,7 @@ def test_reversed_program_mirrors_the_path(run_program, points, speed):
         assert np.abs(mirrored - back.position_mm[inside, axis]).max() < 1e-3
 
 
+@pytest.mark.slow
 @given(
     pieces=st.lists(st.floats(0.2, 40), min_size=2, max_size=12),
     speed=st.sampled_from([20.0, 75.0, 400.0]),

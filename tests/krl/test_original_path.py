@@ -221,6 +221,7 @@ _BLOCKS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(st.lists(_BLOCKS, min_size=2, max_size=14), st.sampled_from([0.001, 0.01, 0.05, 0.5]))
 def test_no_simplified_program_is_refused(blocks, simplify_mm):

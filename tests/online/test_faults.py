@@ -17,6 +17,7 @@ def check(report):
     assert report.answers > 0.5 * report.cycles
 
 
+@pytest.mark.slow
 def test_no_fault_in_any_state_makes_a_step():
     report = faults.drive(20_000, seed=7)
     check(report)

@@ -123,6 +123,7 @@ def test_one_peer_only_and_garbage_does_nothing(cell):
     assert np.linalg.norm(np.diff(steps, axis=0), axis=1).max() <= 0.2 + 1e-3
 
 
+@pytest.mark.slow
 def test_a_bad_network_never_moves_the_robot_faster_than_the_limit(cell):
     """Of 1,500 telegrams 2 % are lost, doubled, late or mixed with garbage."""
     force = lambda telegram: SIDE * np.sin(0.002 * telegram.ipoc)  # noqa: E731

@@ -186,6 +186,7 @@ def test_an_added_approach_is_not_held_to_the_tolerance_of_the_part(cell):
     assert error_mm.max() > 0.01  # over the plane, by the cell's own CDIS
 
 
+@pytest.mark.slow
 def test_the_command_writes_tables_and_pictures(run, tmp_path):
     done = run("predict", TEST_PIECE, "-o", "out", "--csv", "--plot", "--json", "--dt", "0.004")
     assert done.code == 0, done.err

@@ -32,6 +32,7 @@ def test_a_figure_is_one_of_matplotlib(prediction, name):
     assert figure._repr_png_().startswith(b"\x89PNG")  # what Jupyter asks for without pyplot
 
 
+@pytest.mark.slow
 def test_the_command_draws_the_same(prediction, run, tmp_path):
     done = run("predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet")
     assert done.code == 0, done.err

@@ -280,6 +280,7 @@ class TestJoints:
         shown = texts(figure)
         assert "limit 127° away" in shown
 
+    @pytest.mark.slow
     def test_near_limit_is_drawn_far_is_noted(self, dog_leg):
         motion = dog_leg[2]
         limits = LIMITS_DEG.copy()
@@ -298,6 +299,7 @@ class TestJoints:
         shown = texts(joints_figure(motion, joints_of(motion), limits))
         assert any(text.startswith("beyond its limit by 10") for text in shown)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("lost", [slice(10, 50), slice(None)])
     def test_out_of_reach_is_shaded(self, dog_leg, lost):
         motion = dog_leg[2]
@@ -309,6 +311,7 @@ class TestJoints:
         draw(figure)
         assert all(axes.collections for axes in figure.axes)
 
+    @pytest.mark.slow
     def test_long(self, long):
         figure = joints_figure(long[2], joints_of(long[2]), None, SPEEDS_DEG_S)
         draw(figure)
@@ -366,6 +369,7 @@ class TestThinning:
 
 
 class TestSaving:
+    @pytest.mark.slow
     def test_same_bytes_twice(self, tmp_path, dog_leg):
         toolpath, targets, motion = dog_leg
 

@@ -96,6 +96,7 @@ def test_shares_are_those_of_the_worst_sample_of_each_stretch(circles):
     assert "where it bends most, 1481.47 s, line 12, A1 is 75% of it" in texts(figure)
 
 
+@pytest.mark.slow
 def test_no_pass_hides_a_worse_one(circles):
     """Three depths over one another, the first with 1.7 mm, the last with next to nothing."""
     toolpath, motion, _ = circles

@@ -9,12 +9,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gcode2krl.batch.verdicts import VERDICTS
 from gcode2krl.errors import Issue, Told, told
 
 Record = Mapping[str, Any]
 """A line of ``results.jsonl``: a record of schema ``gcode2krl/result/1`` with ``part``, ``seconds`` …"""
-VERDICTS = ("written", "refused", "not understood")
-"""What became of a part, by its exit code."""
 _SEVERITIES = ("error", "warning", "note")
 _FEWEST_POINTS = 2
 _PAGE = ".html"

@@ -7,15 +7,15 @@ from gcode2krl.exchange.html import beside, block, line_picture, paragraph, text
 from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.gap.tell.words import describe, number
+from gcode2krl.gap.thresholds import THRESHOLDS
 
-_MOST_LETTERS = 240
-_MOST_CAUSES = 12
+_LIMITS = THRESHOLDS.tell
 
 
 def gap_words(gap: Gap) -> str:
     """Return the verdict and the first sentence, cut where it is long."""
     sentence = headline(gap)
-    short = sentence if len(sentence) <= _MOST_LETTERS else f"{sentence[: _MOST_LETTERS - 1]}…"
+    short = sentence if len(sentence) <= _LIMITS.most_letters else f"{sentence[: _LIMITS.most_letters - 1]}…"
     return f"{gap.verdict}: {short}"
 
 
@@ -37,7 +37,7 @@ def gap_html(gap: Gap) -> str:
     )
     causes = text_table(
         ("cause", "probability"),
-        [(describe(cause), f"{cause.probability:.0%}") for cause in gap.causes[:_MOST_CAUSES]],
+        [(describe(cause), f"{cause.probability:.0%}") for cause in gap.causes[: _LIMITS.most_shown]],
     )
     head = paragraph(headline(gap))
     pictures = "".join(_pictures(gap))

@@ -9,6 +9,8 @@ from gcode2krl.gap.thresholds.stated import convention, physics
 class TellThresholds:
     """What of an answer is said."""
 
+    most_letters: int = convention(240, "of the first sentence in the short form of an answer")
+    most_shown: int = convention(12, "causes that a notebook lists")
     most_alike: int = convention(5, "effects that a cause lists as indistinguishable from it")
     timing_share: float = convention(
         0.5, "a gap of the path with more of its power along the motion is one of timing"

@@ -1,0 +1,3 @@
+"""What became of a part, by its exit code."""
+
+VERDICTS = ("written", "refused", "not understood")
