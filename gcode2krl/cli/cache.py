@@ -57,7 +57,10 @@ def show(cache_folder: str | None, as_json: bool) -> None:
     sizes = [about.st_size for _, about in cache.entries()]
     console = Console(as_json=as_json)
     if as_json:
-        console.json({"folder": str(cache.folder), "entries": len(sizes), "size_bytes": sum(sizes)})
+        from gcode2krl.result import record_of
+
+        figures = {"folder": str(cache.folder), "entries": len(sizes), "cache_bytes": sum(sizes)}
+        console.json(record_of("cache show", figures))
     console.say(f"{cache.folder}: {len(sizes):,} entries, {sum(sizes) / 1e6:,.1f} MB")
 
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from gcode2krl.batch.written.part import VERDICTS, Part, Record, name_of, parts_of
+from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch.written.part import Part, Record, name_of, parts_of
 
 SAME = 1e-4
 """Figures are the same if they differ by less than this share: nobody acts on a hundredth of a percent."""

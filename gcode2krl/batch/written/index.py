@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gcode2krl.batch.verdicts import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference, difference
-from gcode2krl.batch.written.part import VERDICTS, Part, Record, parts_of, told_of
+from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
 from gcode2krl.batch.written.places import quoted
 from gcode2krl.batch.written.text import one_line, printable
 from gcode2krl.batch.written.thumbnail import HEIGHT, WIDTH, svg_path

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from gcode2krl.batch.verdicts import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference
-from gcode2krl.batch.written.part import VERDICTS, Part
+from gcode2krl.batch.written.part import Part
 from gcode2krl.batch.written.text import printable
 from gcode2krl.report.page.content import duration
 
