@@ -86,6 +86,9 @@ def command(as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """
     order = Order(**options)
     console = Console(quiet or order.output == STANDARD, as_json)
+    from gcode2krl.compiled.long_columns import long_columns_on_disk
+
+    click.get_current_context().with_resource(long_columns_on_disk())  # the summary looks at columns too
     attempt = _attempt(order, console)
     if attempt.page is not None:
         console.hint(f"{attempt.page} written: open it in a browser")
