@@ -97,6 +97,7 @@ class Bench:
                 env=environment(self.folder),
                 stdout=subprocess.DEVNULL,
                 stderr=words,
+                preexec_fn=heed_ctrl_c if os.name == "posix" else None,
             )
             if disturb is not None:
                 while process.poll() is None and not words.seek(0, 2):
@@ -137,6 +138,11 @@ def environment(folder: Path) -> dict[str, str]:
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
+
+
+def heed_ctrl_c() -> None:
+    """A shell in the background lets its programs ignore Ctrl+C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def kill_a_worker(process: subprocess.Popen) -> None:

@@ -1,6 +1,7 @@
 """What all tests share: the checkout's folders and a way to run the command line in-process."""
 
 import os
+import signal
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,14 @@ def pytest_configure(config):
     if getattr(config.option, "numprocesses", None):
         for library in ("OMP", "OPENBLAS", "MKL"):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def _heed_ctrl_c():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+HEEDS_CTRL_C = _heed_ctrl_c if os.name == "posix" else None
+"""``preexec_fn`` of a process that gets a SIGINT: a shell in the background lets its programs ignore it."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import trimesh
 
 from gcode2krl.batch.cache import FOLDER_VARIABLE
 from gcode2krl.result.model import Record
-from tests.conftest import ROOT
+from tests.conftest import HEEDS_CTRL_C, ROOT
 
 HEAD = "G21 G90 G17\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG43 H1 Z20\n"
 GOOD = HEAD + "G0 X10 Y10 Z5\nG1 Z-1 F500\nG1 X{x} F1000\nG1 Y40\nG0 Z20\nM30\n"
@@ -319,7 +319,13 @@ def started(parts, *options, folder):
     command = [sys.executable, "-m", "gcode2krl", "batch", str(parts), "-o", "out", *options]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(
-        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=HEEDS_CTRL_C,
     )
 
 

@@ -18,7 +18,7 @@ from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.files import stored
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl import composition, read_krl
-from tests.conftest import ROOT
+from tests.conftest import HEEDS_CTRL_C, ROOT
 
 WAVE = "".join(f"G1 X{k / 4} Y{(k * 7) % 5} F{900 + k % 3 * 300}\n" for k in range(900))
 PART = (
@@ -175,6 +175,7 @@ main(["part.nc", "-o", "part.src", "--no-forces"])
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
+        preexec_fn=HEEDS_CTRL_C,
     )
     assert process.stdout.readline() == b"writing\n"
     assert any(file.name.startswith(".part.src") for file in tmp_path.iterdir())
