@@ -115,7 +115,8 @@ def _top(feed: _Feed, rapids: Floats, highest_mm: float, radius_mm: float, deepe
     sound = np.sort(rapids[rapids > cuts.height_mm + FLAT_MM])
     if len(sound):
         tops.append(float(sound[len(sound) // 2]))
-    return min(tops)
+    top = min(tops)
+    return top if np.isfinite(top) else highest_mm  # holes alone, and no way above them
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,12 @@ def test_a_program_that_stays_at_one_height_above_zero_moves_in_the_air():
     assert not findings(forces, "rapid-in-stock")
 
 
+def test_holes_that_nothing_is_above_end_where_the_tool_comes_from():
+    """A feed that only rises, in small steps: no rapid and no entry above it."""
+    rising = "".join(f"G1 Z{0.1 * step:.1f} F20\n" for step in range(1, 31))
+    assert top(f"G0 X0 Y0 Z0.05\n{rising}") == pytest.approx(3.0)
+
+
 def test_a_rapid_in_a_pocket_that_is_cut_already_is_sound():
     body = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nX60\nG0 X0\nG1 Z-8\nX60\nG0 X10\nG0 Z30\n"
     assert not findings(run(body), "rapid-in-stock")
