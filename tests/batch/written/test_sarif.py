@@ -110,11 +110,11 @@ def test_a_rule_is_an_entry_of_the_table():
     [
         ("parts/a.nc", "", "parts/a.nc"),
         (".\\parts\\a.nc", "", "parts/a.nc"),
-        ("/work/repo/parts/a.nc", "/work/repo", "parts/a.nc"),
-        ("/work/repo/parts/a.nc", "/work/rep", "/work/repo/parts/a.nc"),
+        ("/builds/repo/parts/a.nc", "/builds/repo", "parts/a.nc"),
+        ("/builds/repo/parts/a.nc", "/builds/rep", "/builds/repo/parts/a.nc"),
         ("D:\\repo\\parts\\a.nc", "D:\\repo\\", "parts/a.nc"),
         ("/parts/a.nc", "/", "parts/a.nc"),
-        ("../parts/a.nc", "/work/repo", "../parts/a.nc"),
+        ("../parts/a.nc", "/builds/repo", "../parts/a.nc"),
     ],
 )
 def test_paths(path, root, expected):
