@@ -139,7 +139,7 @@ class _Plan:
         self.place = "home"
 
     def _above(self, position: Floats, axis: Floats) -> Floats:
-        """Return where the tool's axis through a position leaves the clearance plane, or the position above it.
+        """Return where the axis of a tool at a position meets the clearance plane, or the position above it.
 
         Along its axis a tool that is tilted leaves the work through the hole that it stands in.
         """

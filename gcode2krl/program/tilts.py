@@ -6,34 +6,40 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats
+from gcode2krl.cell import Cell
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.program.targets import LEAST_UPRIGHT
 from gcode2krl.tables import Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD
 
 _LIMIT_DEG = 0.1
-"""How far the tool axis may leave the plane of its turn within one feed motion; chords of 5° stay below it."""
+"""How far the tool axis may leave the plane of its turn within a feed motion; chords of 5° stay below it."""
 _RAPID_LIMIT_DEG = 5.0
 
 
-def tilt_issues(targets: Targets, toolpath: Toolpath) -> Iterator[Issue]:
+def tilt_issues(targets: Targets, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield feed moves with a tool that lies, and motions on which the robot would swing the tool aside."""
     if toolpath.axis.strides[0] == 0:
         return
-    yield from _lying(toolpath)
+    yield from _lying(toolpath, cell)
     yield from _swinging(targets, toolpath)
 
 
-def _lying(toolpath: Toolpath) -> Iterator[Issue]:
-    position = toolpath.is_position() & ~toolpath.machine
-    for row in _begins(position & (toolpath.axis[:, 2] < LEAST_UPRIGHT - 1e-9)):
+def _lying(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    on_path = toolpath.is_position() & ~toolpath.machine
+    on_path[:1] = False
+    follows = on_path[1:] & on_path[:-1] & (toolpath.tool[1:] == toolpath.tool[:-1])
+    met = on_path & ~(np.append(False, follows) & np.append(follows, False))
+    if cell.clearance_z_mm is not None:
+        met &= toolpath.position_mm[:, 2] < cell.clearance_z_mm
+    for row in _begins(met & (toolpath.axis[:, 2] < LEAST_UPRIGHT - 1e-9)):
         tilt_deg = float(np.arccos(np.clip(toolpath.axis[row, 2], -1.0, 1.0)) * DEG_PER_RAD)
         yield Issue(
             "error",
             "tool-lies",
             int(toolpath.source_line[row]),
-            f"the tool is tilted by {tilt_deg:.1f} degrees, and no way along it leads to the clearance plane",
-            "clamp the part so that the tool is tilted by 80 degrees at most, and post the program anew",
+            f"the tool is tilted by {tilt_deg:.1f} degrees where it has to reach the clearance plane",
+            "program a move to the clearance plane, or one that tilts the tool by 80 degrees at most",
         )
 
 
