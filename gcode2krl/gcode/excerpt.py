@@ -3,6 +3,7 @@
 import re
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN
+from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.vocabulary import TENFOLD
 
@@ -45,8 +46,14 @@ _FIXED = {
     f.BAD_M: "M",
     f.VECTOR_ZERO: "[IJK]",
     f.VECTOR_ARC: _ARC_WORD,
+    f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
     f.TURN_PER_REV: "[ABC]",
     f.TURN_TOO_FAR: "[ABC]",
+    c.R_BELOW_DEPTH: "R",
+    c.REPEATS: "L",
+    c.DWELL_NEGATIVE: "P",
+    c.PECK_NOT_POSITIVE: "Q",
+    c.CLEARANCE_NEGATIVE: "D",
 }
 
 

@@ -38,6 +38,19 @@ void use_vector(Block *b) {
         b->used[V_WORD_I] = b->used[V_WORD_J] = b->used[V_WORD_K] = true;
 }
 
+/* Tell whether a canned cycle may run, which moves along Z: no rotary words, and an upright tool where the tip
+   is programmed; report it where it may not. */
+bool may_cycle(Block *b) {
+    const State *s = b->state;
+    const int32_t named = rotary_words(b);
+    const bool tilted = is_turned(s) && turn_mode(b->machine) != V_TURN_MACHINE;
+    if (!named && !tilted && !s->rotary_unknown && !(is_by_vector(s) && s->has_vector))
+        return true;
+    report(b, F_CYCLE_TURNED, (Says){.a = s->motion * V_TENFOLD});
+    b->state->doubt |= S_DOUBT_Z;
+    return false;
+}
+
 /* Take a tool vector: a word that is left out is 0, as none of the three is where the tool stands as before. */
 static bool take_vector(Block *b) {
     State *s = b->state;

@@ -51,6 +51,7 @@ bool take_turn(Block *b, bool by_machine);
 void follow_rotary(Block *b);
 void rotary_home(Block *b, bool any_axis);
 void use_vector(Block *b);
+bool may_cycle(Block *b);
 bool take_length_code(Block *b, int32_t code);
 void check_turn_feed(Block *b, double length_mm);
 double feed_time_s(const Block *b, double length_mm, int64_t chords);

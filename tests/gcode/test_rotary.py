@@ -335,6 +335,8 @@ REFUSED = {
     "G43.5 H1\nG1 X1 F100 K1\nG1 X2 K-1": ("tool-vector", "head-head"),
     "G95 F0.1\nG1 A10": ("turn-per-rev", "head-head"),
     "G0 A400000": ("too-far", "head-head"),
+    "G81 X1 Y1 Z-5 R2 F100 A10": ("cycle-turned", "head-head"),
+    "G43.4 H1\nG0 X0 Y0 Z9 A10\nG81 X1 Y1 Z-5 R2 F100": ("cycle-turned", "head-head"),
     "G10 L2 P1 A10": ("unsupported-g", "head-head"),
     "G92 A10": ("unsupported-g", "head-head"),
     "G52 A10": ("unsupported-g", "head-head"),
