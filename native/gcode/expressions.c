@@ -202,7 +202,8 @@ static int64_t parameter_number(Evaluation *e, int64_t *i) {
         return 0;
     if (e->dry)
         return 1;
-    if (!whole_number(value, &number) || number < 1 || number >= P_MOST_PARAMETERS) {
+    const bool exists = whole_number(value, &number) && number >= 1 && number < P_MOST_PARAMETERS;
+    if (!exists || is_of_other_axis(number)) {
         wrong(e, F_PARAMETER_NUMBER, value, 0.0, place);
         return 0;
     }

@@ -69,6 +69,9 @@ bool is_read_only(int64_t number) {
            (number >= POSITION && number <= LAST_OF_STATE);
 }
 
+/* Tell whether a parameter is the position of a rotary or secondary axis, which a program cannot ask for. */
+bool is_of_other_axis(int64_t number) { return number >= POSITION + 3 && number <= LAST_OF_STATE; }
+
 double numbered_parameter(const Evaluation *e, int64_t number) {
     return is_read_only(number) ? of_state(e->machine, number) : AT(e->program->parameters, number);
 }
@@ -155,7 +158,7 @@ bool is_name_set(const Evaluation *e, int64_t name) {
 
 static double of_modes(const State *s, int64_t name) {
     switch (name) {
-    case N_MOTION_MODE: return s->motion * V_TENFOLD;
+    case N_MOTION_MODE: return s->motion == V_MOTION_CANCELLED ? V_G80 : s->motion * V_TENFOLD;
     case N_PLANE: return s->plane * V_TENFOLD;
     case N_CCOMP: return 400.0; /* G40 */
     case N_METRIC: return s->unit_mm == 1.0;
@@ -168,7 +171,8 @@ static double of_modes(const State *s, int64_t name) {
     case N_COORD_SYSTEM:
         return s->work_offset < 6 ? V_G54 + V_TENFOLD * s->work_offset : V_G59 + s->work_offset - 5;
     case N_TOOL_OFFSET: return !isnan(s->length_offset) && s->length_offset != 0.0;
-    case N_RETRACT_OLD_Z: return 1.0;
+    case N_RETRACT_R_PLANE: return s->retract == V_G99;
+    case N_RETRACT_OLD_Z: return s->retract != V_G99;
     case N_SPINDLE_RPM_MODE: return 1.0;
     case N_IJK_ABSOLUTE_MODE: return s->arc_absolute != 0;
     case N_LATHE_RADIUS_MODE: return 1.0;
