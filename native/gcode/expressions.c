@@ -18,18 +18,37 @@ typedef enum { ABS, ACOS, ASIN, ATAN, COS, EXISTS, EXP, FIX, FUP, LN, ROUND, SIN
 static const char *const FUNCTION[] = {"abs", "acos", "asin", "atan", "cos",   "exists", "exp",
                                        "fix", "fup",  "ln",   "round", "sin", "sqrt",   "tan"};
 
-/* Return degrees in radians, rounded once: FIX[10 * SIN[30]] has to be 5. */
-static double radians(double degrees) {
+/* Return degrees in radians, and what the float leaves over: FIX[10 * SIN[30]] and FIX[10 * COS[60]] are 5. */
+static double radians(double degrees, double *left_over) {
     const double product = degrees * PI;
     const double rest = fma(degrees, PI, -product) + degrees * PI_REST;
     const double quotient = product / 180.0;
-    return quotient + (fma(-quotient, 180.0, product) + rest) / 180.0;
+    *left_over = (fma(-quotient, 180.0, product) + rest) / 180.0;
+    return quotient;
 }
 
 /* Return radians in degrees, rounded once behind the product. */
 static double degrees(double radian) {
     const double product = radian * 180.0, quotient = product / PI;
     return quotient + (fma(-quotient, PI, product) - quotient * PI_REST) / PI;
+}
+
+static double sine(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over);
+    return sin(angle) + left_over * cos(angle);
+}
+
+static double cosine(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over);
+    return cos(angle) - left_over * sin(angle);
+}
+
+static double tangent(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over), t = tan(angle);
+    return t + left_over * (1.0 + t * t);
 }
 
 static double function_of(Evaluation *e, Function function, double x, int64_t place) {
@@ -39,15 +58,15 @@ static double function_of(Evaluation *e, Function function, double x, int64_t pl
         return fabs(x) > 1.0 ? wrong(e, F_EXPRESSION_VALUE, PF_ARC_COSINE, x, place) : degrees(acos(x));
     case ASIN:
         return fabs(x) > 1.0 ? wrong(e, F_EXPRESSION_VALUE, PF_ARC_SINE, x, place) : degrees(asin(x));
-    case COS: return cos(radians(x));
+    case COS: return cosine(x);
     case EXP: return exp(x);
     case FIX: return floor(x);
     case FUP: return ceil(x);
     case LN: return x <= 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_LOGARITHM, x, place) : log(x);
     case ROUND: return x < 0.0 ? ceil(x - 0.5) : floor(x + 0.5);
-    case SIN: return sin(radians(x));
+    case SIN: return sine(x);
     case SQRT: return x < 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_SQUARE_ROOT, x, place) : sqrt(x);
-    case TAN: return tan(radians(x));
+    case TAN: return tangent(x);
     default: return 0.0;
     }
 }

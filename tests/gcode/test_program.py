@@ -31,6 +31,10 @@ def test_assignments_take_effect_behind_their_line():
     assert ends("#1=5\n#1=7 #2=#1 G1 X#1\nG1 X#1\nX#2") == [5.0, 7.0, 5.0]
 
 
+def test_functions_of_round_angles_are_not_a_unit_short_behind_fix():
+    assert ends("G0 X[FIX[10*SIN[30]]]\nX[FIX[10*COS[60]]]\nX[FIX[10*TAN[45]]]") == [5.0, 5.0, 10.0]
+
+
 def test_rows_have_the_line_that_made_them():
     assert read("o1 repeat [2]\nX1\nX2\no1 endrepeat").source_line[2:].tolist() == [4, 5, 4, 5]
 
