@@ -173,6 +173,7 @@
 #define V_WORD_R 17
 #define V_WORD_S 18
 #define V_WORD_T 19
+#define V_WORD_L 11
 #define V_WORD_I 8
 #define V_WORD_J 9
 #define V_WORD_K 10
@@ -199,6 +200,9 @@
 #define V_G41 410
 #define V_G43 430
 #define V_G49 490
+#define V_G43_1 431
+#define V_G43_2 432
+#define V_G43_4 434
 #define V_G52 520
 #define V_G53 530
 #define V_G54 540
@@ -213,6 +217,9 @@
 #define V_G90_1 901
 #define V_G91_1 911
 #define V_G92 920
+#define V_G92_1 921
+#define V_G92_2 922
+#define V_G92_3 923
 #define V_G96 960
 #define V_M0 0
 #define V_M1 1
@@ -235,6 +242,11 @@
 #define V_M73 73
 #define V_M98 98
 #define V_M99 99
+#define V_L_TOOL 1
+#define V_L_OFFSET 2
+#define V_L_TOOL_FROM_POSITION 10
+#define V_L_TOOL_FROM_FIXTURE 11
+#define V_L_OFFSET_FROM_POSITION 20
 #define V_MOTION_CANCELLED (-1)
 #define V_MOTION_RAPID 0
 #define V_MOTION_LINE 1
@@ -258,7 +270,8 @@
 #define V_WORK_OFFSET 10
 #define V_PATH_CONTROL 11
 #define V_SPINDLE_MODE 12
-#define V_GROUPS 13
+#define V_SHIFT_STATE 13
+#define V_GROUPS 14
 #define V_M_STOP 4
 #define V_M_TOOL_CHANGE 6
 #define V_M_SPINDLE 7
@@ -325,6 +338,22 @@
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
+/* gcode2krl.gcode.offset_findings */
+#define FO_NO_AXES 220
+#define FO_WITHOUT_L 221
+#define FO_UNKNOWN_L 222
+#define FO_WRONG_SYSTEM 223
+#define FO_WRONG_TOOL 224
+#define FO_TOOL_UNDECLARED 225
+#define FO_NO_LENGTH 226
+#define FO_ROTATION_BY_POSITION 227
+#define FO_TOOL_ACROSS 228
+#define FO_ADDED_BY_WORDS 229
+#define FO_ADDED_WITHOUT_H 230
+#define FO_FROM_UNKNOWN 231
+#define FO_AT_START 232
+#define FO_LENGTH_DIFFERS 233
+
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
@@ -344,6 +373,9 @@
 #define S_NOTE_CENTRE 1
 #define S_NOTE_HOME 2
 #define S_NOTE_OVERRIDE 3
+#define S_NOTE_LOCAL 4
+#define S_NOTE_SHIFT 5
+#define S_NOTE_TABLE 6
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -481,6 +513,15 @@ typedef struct {
     int8_t exact_stop;
     double tolerance;
     int32_t work_offset;
+    double base_mm[3];
+    double shift_mm[3];
+    double shift_kept_mm[3];
+    int32_t shift_line;
+    double pivot_mm[2];
+    double rotation_cos;
+    double rotation_sin;
+    int8_t rotated;
+    int8_t offsets_taken;
     double home_28[3];
     double home_30[3];
     int32_t arcs;
@@ -499,9 +540,10 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[4];
-    int32_t note_line[4];
-    int32_t note_word[4];
+    int32_t note_count[7];
+    int32_t note_line[7];
+    int32_t note_word[7];
+    double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
     int32_t spirals;
@@ -532,35 +574,45 @@ typedef char State_offset_tool_stands_at_96[offsetof(State, offset_tool) == 96 ?
 typedef char State_exact_stop_stands_at_100[offsetof(State, exact_stop) == 100 ? 1 : -1];
 typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1 : -1];
 typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
-typedef char State_home_28_stands_at_120[offsetof(State, home_28) == 120 ? 1 : -1];
-typedef char State_home_30_stands_at_144[offsetof(State, home_30) == 144 ? 1 : -1];
-typedef char State_arcs_stands_at_168[offsetof(State, arcs) == 168 ? 1 : -1];
-typedef char State_mist_stands_at_172[offsetof(State, mist) == 172 ? 1 : -1];
-typedef char State_flood_stands_at_173[offsetof(State, flood) == 173 ? 1 : -1];
-typedef char State_ended_stands_at_174[offsetof(State, ended) == 174 ? 1 : -1];
-typedef char State_end_line_stands_at_176[offsetof(State, end_line) == 176 ? 1 : -1];
-typedef char State_tape_marks_stands_at_180[offsetof(State, tape_marks) == 180 ? 1 : -1];
-typedef char State_unit_named_stands_at_184[offsetof(State, unit_named) == 184 ? 1 : -1];
-typedef char State_blocks_stands_at_192[offsetof(State, blocks) == 192 ? 1 : -1];
-typedef char State_largest_mm_stands_at_200[offsetof(State, largest_mm) == 200 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_208[offsetof(State, unknown_feed_line) == 208 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_212[offsetof(State, unknown_reported) == 212 ? 1 : -1];
-typedef char State_doubt_stands_at_216[offsetof(State, doubt) == 216 ? 1 : -1];
-typedef char State_motion_line_stands_at_220[offsetof(State, motion_line) == 220 ? 1 : -1];
-typedef char State_distance_line_stands_at_224[offsetof(State, distance_line) == 224 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_228[offsetof(State, feed_mode_line) == 228 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_232[offsetof(State, rotary_refused) == 232 ? 1 : -1];
-typedef char State_note_count_stands_at_236[offsetof(State, note_count) == 236 ? 1 : -1];
-typedef char State_note_line_stands_at_252[offsetof(State, note_line) == 252 ? 1 : -1];
-typedef char State_note_word_stands_at_268[offsetof(State, note_word) == 268 ? 1 : -1];
-typedef char State_misfits_stands_at_284[offsetof(State, misfits) == 284 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_288[offsetof(State, misfits_other_centre) == 288 ? 1 : -1];
-typedef char State_spirals_stands_at_292[offsetof(State, spirals) == 292 ? 1 : -1];
-typedef char State_spiral_line_stands_at_296[offsetof(State, spiral_line) == 296 ? 1 : -1];
-typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 304 ? 1 : -1];
-typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+typedef char State_base_mm_stands_at_120[offsetof(State, base_mm) == 120 ? 1 : -1];
+typedef char State_shift_mm_stands_at_144[offsetof(State, shift_mm) == 144 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_168[offsetof(State, shift_kept_mm) == 168 ? 1 : -1];
+typedef char State_shift_line_stands_at_192[offsetof(State, shift_line) == 192 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_200[offsetof(State, pivot_mm) == 200 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_216[offsetof(State, rotation_cos) == 216 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_224[offsetof(State, rotation_sin) == 224 ? 1 : -1];
+typedef char State_rotated_stands_at_232[offsetof(State, rotated) == 232 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_233[offsetof(State, offsets_taken) == 233 ? 1 : -1];
+typedef char State_home_28_stands_at_240[offsetof(State, home_28) == 240 ? 1 : -1];
+typedef char State_home_30_stands_at_264[offsetof(State, home_30) == 264 ? 1 : -1];
+typedef char State_arcs_stands_at_288[offsetof(State, arcs) == 288 ? 1 : -1];
+typedef char State_mist_stands_at_292[offsetof(State, mist) == 292 ? 1 : -1];
+typedef char State_flood_stands_at_293[offsetof(State, flood) == 293 ? 1 : -1];
+typedef char State_ended_stands_at_294[offsetof(State, ended) == 294 ? 1 : -1];
+typedef char State_end_line_stands_at_296[offsetof(State, end_line) == 296 ? 1 : -1];
+typedef char State_tape_marks_stands_at_300[offsetof(State, tape_marks) == 300 ? 1 : -1];
+typedef char State_unit_named_stands_at_304[offsetof(State, unit_named) == 304 ? 1 : -1];
+typedef char State_blocks_stands_at_312[offsetof(State, blocks) == 312 ? 1 : -1];
+typedef char State_largest_mm_stands_at_320[offsetof(State, largest_mm) == 320 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_328[offsetof(State, unknown_feed_line) == 328 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_332[offsetof(State, unknown_reported) == 332 ? 1 : -1];
+typedef char State_doubt_stands_at_336[offsetof(State, doubt) == 336 ? 1 : -1];
+typedef char State_motion_line_stands_at_340[offsetof(State, motion_line) == 340 ? 1 : -1];
+typedef char State_distance_line_stands_at_344[offsetof(State, distance_line) == 344 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_348[offsetof(State, feed_mode_line) == 348 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_352[offsetof(State, rotary_refused) == 352 ? 1 : -1];
+typedef char State_note_count_stands_at_356[offsetof(State, note_count) == 356 ? 1 : -1];
+typedef char State_note_line_stands_at_384[offsetof(State, note_line) == 384 ? 1 : -1];
+typedef char State_note_word_stands_at_412[offsetof(State, note_word) == 412 ? 1 : -1];
+typedef char State_moved_mm_stands_at_440[offsetof(State, moved_mm) == 440 ? 1 : -1];
+typedef char State_misfits_stands_at_512[offsetof(State, misfits) == 512 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_516[offsetof(State, misfits_other_centre) == 516 ? 1 : -1];
+typedef char State_spirals_stands_at_520[offsetof(State, spirals) == 520 ? 1 : -1];
+typedef char State_spiral_line_stands_at_524[offsetof(State, spiral_line) == 524 ? 1 : -1];
+typedef char State_spiral_start_stands_at_528[offsetof(State, spiral_start) == 528 ? 1 : -1];
+typedef char State_spiral_end_stands_at_536[offsetof(State, spiral_end) == 536 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_544[offsetof(State, spiral_unit_mm) == 544 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 552 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -655,7 +707,7 @@ typedef struct {
     Rows rows;
     EventView events;
     FoundView found;
-    Floats offsets_mm;
+    Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
     Ints32 group_of_g;

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.units import MM_PER_INCH
 
@@ -291,6 +292,7 @@ FINDINGS: dict[int, Finding] = {
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
 }
+FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
@@ -301,25 +303,21 @@ _OF_CHARACTER = {
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
-_SHIFT_REMEDY = "put the offset into [work_offsets] of the cell"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
     v.G7: ("lathe diameter mode", "this is a milling translator"),
     v.G8: ("lathe radius mode", "this is a milling translator"),
-    v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     v.G38: ("probing is not a motion this program can make", "probe on the controller"),
     v.G41: (
         f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
-    v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
-    v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
+    v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     v.G70: ("lathe cycle", "this is a milling translator"),
     v.G73: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
     v.G76: ("threading cycle of a lathe", "mill the thread"),
     v.G81: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
-    v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
     v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
@@ -372,6 +370,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
         "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
+        "axes": " and ".join(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",

@@ -22,6 +22,7 @@ def index_of(letter: str) -> int:
 
 
 WORD_E, WORD_F, WORD_H, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (index_of(letter) for letter in "EFHPQRST")
+WORD_L = index_of("L")
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
 OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
@@ -40,7 +41,8 @@ G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
 G33 = 330  # spindle-synchronised motion
 G38 = 380  # probing, G38.2 to G38.5
 G41 = 410  # cutter radius compensation, G41 to G42.1
-G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
+G43, G49 = 430, 490  # tool length offset on, off
+G43_1, G43_2, G43_4 = 431, 432, 434  # given by words, added, and with rotary axes (to G43.5)
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
 G64 = 640  # blending; else exact stop
@@ -48,7 +50,8 @@ G70, G73, G76, G81 = 700, 730, 760, 810  # lathe cycles, chip-breaking drilling,
 G80 = 800  # ends the motion mode
 G90 = 900  # absolute distances; else incremental
 G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
-G92, G96 = 920, 960  # coordinate shift, constant surface speed
+G92, G92_1, G92_2, G92_3 = 920, 921, 922, 923  # coordinate shift: set, clear, suspend, restore
+G96 = 960  # constant surface speed
 
 M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change
 M3, M4, M5 = 3, 4, 5  # spindle clockwise, counter-clockwise, off
@@ -59,6 +62,9 @@ M48, M53 = 48, 53  # overrides, M48 to M53
 M61, M62, M70, M72, M73 = 61, 62, 70, 72, 73  # tool number, inputs and outputs, modal state
 M98, M99 = 98, 99  # subprograms
 
+L_TOOL, L_OFFSET, L_TOOL_FROM_POSITION, L_TOOL_FROM_FIXTURE, L_OFFSET_FROM_POSITION = 1, 2, 10, 11, 20
+"""What G10 sets, its word L."""
+
 MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3
 """Motion modes of the state: none after G80 and before the first motion code, else the G number."""
 PLANE_XY, PLANE_ZX = 17, 18
@@ -68,7 +74,8 @@ INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
 
 NON_MODAL, MOTION, PLANE, DISTANCE, CENTRE, FEED_MODE, UNIT = range(7)
 RADIUS_COMPENSATION, LENGTH_OFFSET, RETRACT, WORK_OFFSET, PATH_CONTROL, SPINDLE_MODE = range(7, 13)
-GROUPS = 13
+SHIFT_STATE = 13
+GROUPS = 14
 """Modal groups of G-codes, numbered in the order of the tables in `state`."""
 M_STOP, M_TOOL_CHANGE, M_SPINDLE, M_COOLANT, M_OVERRIDE = 4, 6, 7, 8, 9
 """Modal groups of M-codes as RS274/NGC numbers them; M-codes of no group are 0."""
