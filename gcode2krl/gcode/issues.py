@@ -11,7 +11,7 @@ from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
-from gcode2krl.gcode.offset_issues import offset_issues
+from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
@@ -108,7 +108,7 @@ def program_issues(
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
-    yield from offset_issues(state)
+    yield from zero_issues(state)
     if not state["ended"]:
         yield _no_end(cut_off=state["tape_marks"] == 1)
     if rest_line:

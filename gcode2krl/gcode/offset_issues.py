@@ -24,7 +24,7 @@ _SENTENCES: dict[int, tuple[Severity, str, str]] = {
 }
 
 
-def offset_issues(state: Record) -> Iterator[Issue]:
+def zero_issues(state: Record) -> Iterator[Issue]:
     """Yield where the program moves its zero, and that a shift is in force at its end."""
     for which, (severity, sentence, remedy) in _SENTENCES.items():
         count, line = int(state["note_count"][which]), int(state["note_line"][which])
