@@ -3,6 +3,7 @@
 import re
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN
+from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode.vocabulary import TENFOLD
@@ -62,6 +63,11 @@ _FIXED = {
     of_offsets.ADDED_WITHOUT_H: r"G\s*43",
     of_offsets.AT_START: r"G\s*(92|10)",
     of_offsets.LENGTH_DIFFERS: "[ZH]",
+    c.R_BELOW_DEPTH: "R",
+    c.REPEATS: "L",
+    c.DWELL_NEGATIVE: "P",
+    c.PECK_NOT_POSITIVE: "Q",
+    c.CLEARANCE_NEGATIVE: "D",
 }
 
 
