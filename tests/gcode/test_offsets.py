@@ -61,7 +61,7 @@ def motions(draw, arcs=True):
             blocks.append(f"G{kind - 1} " + " ".join(f"{letter}{draw(number):.4f}" for letter in letters))
         else:
             first, second, i, j = IN_PLANE[(name := draw(plane))]
-            u, v = draw(number), draw(number.filter(bool))
+            u, v = draw(number), draw(number.filter(lambda v: abs(v) > 0.01))
             turn, end = draw(st.sampled_from((2, 3))), f"{first}{2 * u:.4f} {second}{2 * v:.4f}"
             blocks.append(f"G91 {name} G{turn} {end} {i}{u:.4f} {j}{v:.4f}")
             blocks.append("G90")
