@@ -181,7 +181,9 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_WORD_A 0
 #define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
+#define V_ROTARY_AXES 3
 #define V_TENFOLD 10
 #define V_LARGEST_G 999
 #define V_LARGEST_M 9999
@@ -204,6 +206,7 @@
 #define V_G43_1 431
 #define V_G43_2 432
 #define V_G43_4 434
+#define V_G43_5 435
 #define V_G52 520
 #define V_G53 530
 #define V_G54 540
@@ -270,6 +273,9 @@
 #define V_INVERSE_TIME 93
 #define V_PER_MINUTE 94
 #define V_PER_REVOLUTION 95
+#define V_TURN_MACHINE 0
+#define V_TURN_TIP 1
+#define V_TURN_VECTOR 2
 #define V_NON_MODAL 0
 #define V_MOTION 1
 #define V_PLANE 2
@@ -348,6 +354,14 @@
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
 #define F_ARC_TOO_LONG 51
+#define F_NO_MACHINE 52
+#define F_ROTARY_UNKNOWN 53
+#define F_VECTOR_ZERO 54
+#define F_VECTOR_AND_ANGLE 55
+#define F_VECTOR_ARC 56
+#define F_TURN_PER_REV 57
+#define F_TURN_TOO_FAR 58
+#define F_CYCLE_TURNED 59
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -384,6 +398,8 @@
 #define FO_FROM_UNKNOWN 231
 #define FO_AT_START 232
 #define FO_LENGTH_DIFFERS 233
+#define FO_ROTARY 234
+#define FO_ROTATION_WITH_ROTARY 235
 
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1
@@ -556,6 +572,14 @@ typedef struct {
     int8_t offsets_taken;
     double home_28[3];
     double home_30[3];
+    double rotary_deg[3];
+    int32_t rotary_unknown;
+    double home_28_deg[3];
+    double home_30_deg[3];
+    double tool_vector[3];
+    int8_t has_vector;
+    int32_t length_code;
+    double feed_word;
     int32_t arcs;
     int8_t mist;
     int8_t flood;
@@ -631,48 +655,56 @@ typedef char State_rotated_stands_at_232[offsetof(State, rotated) == 232 ? 1 : -
 typedef char State_offsets_taken_stands_at_233[offsetof(State, offsets_taken) == 233 ? 1 : -1];
 typedef char State_home_28_stands_at_240[offsetof(State, home_28) == 240 ? 1 : -1];
 typedef char State_home_30_stands_at_264[offsetof(State, home_30) == 264 ? 1 : -1];
-typedef char State_arcs_stands_at_288[offsetof(State, arcs) == 288 ? 1 : -1];
-typedef char State_mist_stands_at_292[offsetof(State, mist) == 292 ? 1 : -1];
-typedef char State_flood_stands_at_293[offsetof(State, flood) == 293 ? 1 : -1];
-typedef char State_ended_stands_at_294[offsetof(State, ended) == 294 ? 1 : -1];
-typedef char State_end_line_stands_at_296[offsetof(State, end_line) == 296 ? 1 : -1];
-typedef char State_tape_marks_stands_at_300[offsetof(State, tape_marks) == 300 ? 1 : -1];
-typedef char State_unit_named_stands_at_304[offsetof(State, unit_named) == 304 ? 1 : -1];
-typedef char State_blocks_stands_at_312[offsetof(State, blocks) == 312 ? 1 : -1];
-typedef char State_largest_mm_stands_at_320[offsetof(State, largest_mm) == 320 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_328[offsetof(State, unknown_feed_line) == 328 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_332[offsetof(State, unknown_reported) == 332 ? 1 : -1];
-typedef char State_doubt_stands_at_336[offsetof(State, doubt) == 336 ? 1 : -1];
-typedef char State_motion_line_stands_at_340[offsetof(State, motion_line) == 340 ? 1 : -1];
-typedef char State_distance_line_stands_at_344[offsetof(State, distance_line) == 344 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_348[offsetof(State, feed_mode_line) == 348 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_352[offsetof(State, rotary_refused) == 352 ? 1 : -1];
-typedef char State_note_count_stands_at_356[offsetof(State, note_count) == 356 ? 1 : -1];
-typedef char State_note_line_stands_at_384[offsetof(State, note_line) == 384 ? 1 : -1];
-typedef char State_note_word_stands_at_412[offsetof(State, note_word) == 412 ? 1 : -1];
-typedef char State_moved_mm_stands_at_440[offsetof(State, moved_mm) == 440 ? 1 : -1];
-typedef char State_misfits_stands_at_512[offsetof(State, misfits) == 512 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_516[offsetof(State, misfits_other_centre) == 516 ? 1 : -1];
-typedef char State_spirals_stands_at_520[offsetof(State, spirals) == 520 ? 1 : -1];
-typedef char State_spiral_line_stands_at_524[offsetof(State, spiral_line) == 524 ? 1 : -1];
-typedef char State_spiral_start_stands_at_528[offsetof(State, spiral_start) == 528 ? 1 : -1];
-typedef char State_spiral_end_stands_at_536[offsetof(State, spiral_end) == 536 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_544[offsetof(State, spiral_unit_mm) == 544 ? 1 : -1];
-typedef char State_retract_stands_at_552[offsetof(State, retract) == 552 ? 1 : -1];
-typedef char State_retract_line_stands_at_556[offsetof(State, retract_line) == 556 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_560[offsetof(State, retract_unnamed_line) == 560 ? 1 : -1];
-typedef char State_in_cycles_stands_at_564[offsetof(State, in_cycles) == 564 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_568[offsetof(State, cycle_level_mm) == 568 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_576[offsetof(State, cycle_level_known) == 576 ? 1 : -1];
-typedef char State_cycle_r_stands_at_584[offsetof(State, cycle_r) == 584 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_592[offsetof(State, cycle_depth) == 592 ? 1 : -1];
-typedef char State_cycle_q_stands_at_600[offsetof(State, cycle_q) == 600 ? 1 : -1];
-typedef char State_cycle_p_stands_at_608[offsetof(State, cycle_p) == 608 ? 1 : -1];
-typedef char State_cycle_line_stands_at_616[offsetof(State, cycle_line) == 616 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_620[offsetof(State, cycle_plane) == 620 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_624[offsetof(State, cycle_unit_mm) == 624 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_632[offsetof(State, cycle_absolute) == 632 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 640 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_288[offsetof(State, rotary_deg) == 288 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_312[offsetof(State, rotary_unknown) == 312 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_320[offsetof(State, home_28_deg) == 320 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_344[offsetof(State, home_30_deg) == 344 ? 1 : -1];
+typedef char State_tool_vector_stands_at_368[offsetof(State, tool_vector) == 368 ? 1 : -1];
+typedef char State_has_vector_stands_at_392[offsetof(State, has_vector) == 392 ? 1 : -1];
+typedef char State_length_code_stands_at_396[offsetof(State, length_code) == 396 ? 1 : -1];
+typedef char State_feed_word_stands_at_400[offsetof(State, feed_word) == 400 ? 1 : -1];
+typedef char State_arcs_stands_at_408[offsetof(State, arcs) == 408 ? 1 : -1];
+typedef char State_mist_stands_at_412[offsetof(State, mist) == 412 ? 1 : -1];
+typedef char State_flood_stands_at_413[offsetof(State, flood) == 413 ? 1 : -1];
+typedef char State_ended_stands_at_414[offsetof(State, ended) == 414 ? 1 : -1];
+typedef char State_end_line_stands_at_416[offsetof(State, end_line) == 416 ? 1 : -1];
+typedef char State_tape_marks_stands_at_420[offsetof(State, tape_marks) == 420 ? 1 : -1];
+typedef char State_unit_named_stands_at_424[offsetof(State, unit_named) == 424 ? 1 : -1];
+typedef char State_blocks_stands_at_432[offsetof(State, blocks) == 432 ? 1 : -1];
+typedef char State_largest_mm_stands_at_440[offsetof(State, largest_mm) == 440 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_448[offsetof(State, unknown_feed_line) == 448 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_452[offsetof(State, unknown_reported) == 452 ? 1 : -1];
+typedef char State_doubt_stands_at_456[offsetof(State, doubt) == 456 ? 1 : -1];
+typedef char State_motion_line_stands_at_460[offsetof(State, motion_line) == 460 ? 1 : -1];
+typedef char State_distance_line_stands_at_464[offsetof(State, distance_line) == 464 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_468[offsetof(State, feed_mode_line) == 468 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_472[offsetof(State, rotary_refused) == 472 ? 1 : -1];
+typedef char State_note_count_stands_at_476[offsetof(State, note_count) == 476 ? 1 : -1];
+typedef char State_note_line_stands_at_504[offsetof(State, note_line) == 504 ? 1 : -1];
+typedef char State_note_word_stands_at_532[offsetof(State, note_word) == 532 ? 1 : -1];
+typedef char State_moved_mm_stands_at_560[offsetof(State, moved_mm) == 560 ? 1 : -1];
+typedef char State_misfits_stands_at_632[offsetof(State, misfits) == 632 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_636[offsetof(State, misfits_other_centre) == 636 ? 1 : -1];
+typedef char State_spirals_stands_at_640[offsetof(State, spirals) == 640 ? 1 : -1];
+typedef char State_spiral_line_stands_at_644[offsetof(State, spiral_line) == 644 ? 1 : -1];
+typedef char State_spiral_start_stands_at_648[offsetof(State, spiral_start) == 648 ? 1 : -1];
+typedef char State_spiral_end_stands_at_656[offsetof(State, spiral_end) == 656 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_664[offsetof(State, spiral_unit_mm) == 664 ? 1 : -1];
+typedef char State_retract_stands_at_672[offsetof(State, retract) == 672 ? 1 : -1];
+typedef char State_retract_line_stands_at_676[offsetof(State, retract_line) == 676 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_680[offsetof(State, retract_unnamed_line) == 680 ? 1 : -1];
+typedef char State_in_cycles_stands_at_684[offsetof(State, in_cycles) == 684 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_688[offsetof(State, cycle_level_mm) == 688 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_696[offsetof(State, cycle_level_known) == 696 ? 1 : -1];
+typedef char State_cycle_r_stands_at_704[offsetof(State, cycle_r) == 704 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_712[offsetof(State, cycle_depth) == 712 ? 1 : -1];
+typedef char State_cycle_q_stands_at_720[offsetof(State, cycle_q) == 720 ? 1 : -1];
+typedef char State_cycle_p_stands_at_728[offsetof(State, cycle_p) == 728 ? 1 : -1];
+typedef char State_cycle_line_stands_at_736[offsetof(State, cycle_line) == 736 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_740[offsetof(State, cycle_plane) == 740 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_744[offsetof(State, cycle_unit_mm) == 744 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_752[offsetof(State, cycle_absolute) == 752 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 760 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -759,6 +791,9 @@ typedef struct {
     Bools known;
     Floats length_offset_mm;
     Ints32 length_offset_tool;
+    Floats turn;
+    Ints32 turn_mode;
+    Floats time_s;
 } Rows;
 
 typedef struct {
@@ -777,6 +812,8 @@ typedef struct {
     double chord_tolerance_mm;
     int64_t block_delete;
     int64_t lengths_from_table;
+    int64_t rotary_axes;
+    int64_t tcpm;
 } Machine;
 
 typedef struct {

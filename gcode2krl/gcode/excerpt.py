@@ -63,6 +63,11 @@ _FIXED = {
     of_offsets.ADDED_WITHOUT_H: r"G\s*43",
     of_offsets.AT_START: r"G\s*(92|10)",
     of_offsets.LENGTH_DIFFERS: "[ZH]",
+    f.VECTOR_ZERO: "[IJK]",
+    f.VECTOR_ARC: _ARC_WORD,
+    f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
+    f.TURN_PER_REV: "[ABC]",
+    f.TURN_TOO_FAR: "[ABC]",
     c.R_BELOW_DEPTH: "R",
     c.REPEATS: "L",
     c.DWELL_NEGATIVE: "P",
@@ -108,9 +113,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return letter
     if number == of_offsets.FROM_UNKNOWN:
         return f"[{f.letters_of(b)}]"
-    if number == f.UNUSED_WORD:
+    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
         return f"[{f.letters_of(a)}]"
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, of_offsets.NO_AXES):
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
         return _word("G", b)

@@ -21,7 +21,9 @@ from gcode2krl.errors import Severity
     FROM_UNKNOWN,
     AT_START,
     LENGTH_DIFFERS,
-) = range(220, 234)
+    ROTARY,
+    ROTATION_WITH_ROTARY,
+) = range(220, 236)
 
 TEXTS: dict[int, tuple[Severity, str, str, str]] = {
     NO_AXES: ("error", "offset-no-axes", "G{g} names no axis", "name X, Y or Z with the value"),
@@ -97,5 +99,17 @@ TEXTS: dict[int, tuple[Severity, str, str, str]] = {
         "tool-length-differs",
         "the program gives tool {a:.0f} a length of {b:g} mm, {c:g} mm are declared",
         "correct length_mm in [tool.{a:.0f}] of the cell, or the program",
+    ),
+    ROTARY: (
+        "error",
+        "rotary-offset",
+        "G{h} with {words}: offsets of rotary axes are not read",
+        "let the post write the angles themselves",
+    ),
+    ROTATION_WITH_ROTARY: (
+        "error",
+        "rotary-offset",
+        "G10 L2 R{a:g} rotates a work offset of a machine with rotary axes, which is not read",
+        "rotate $BASE of the cell: [frames] base",
     ),
 }

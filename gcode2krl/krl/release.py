@@ -24,6 +24,7 @@ NEVER_RELEASED = frozenset(
         "offset-from-unknown",
         "tool-unknown",
         "tool-missing",
+        "tool-lies",
         "no-clearance",
         "no-feed",
         "template",

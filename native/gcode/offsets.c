@@ -3,6 +3,7 @@
 #include "gcode/offsets.h"
 
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/settings.h"
 #include "gcode/tool_lengths.h"
 
@@ -173,6 +174,10 @@ static void set_offset(Block *b, int32_t l, int32_t p) {
         report(b, FO_ROTATION_BY_POSITION, (Says){0});
         return;
     }
+    if (b->has[V_WORD_R] && b->word[V_WORD_R] != 0.0 && b->machine->rotary_axes) {
+        report(b, FO_ROTATION_WITH_ROTARY, (Says){.a = b->word[V_WORD_R]});
+        return;
+    }
     const int32_t system = p == 0 ? s->work_offset : p - 1;
     double *offset_mm = offset_of(b->machine, system);
     const double before_mm[3] = {offset_mm[0], offset_mm[1], offset_mm[2]};
@@ -209,6 +214,20 @@ static void g10(Block *b) {
 }
 
 /* --- the block ------------------------------------------------------------------------------------------ */
+
+/* Report rotary axes in a block that sets an offset; return whether there are any. */
+bool offsets_rotary(Block *b) {
+    int32_t named = 0;
+    for (int k = 0; k < V_ROTARY_AXES; k++)
+        if (is_declared(b->machine, k) && b->has[V_WORD_A + k])
+            named |= 1 << (V_WORD_A + k);
+    if (named == 0)
+        return false;
+    const int32_t length = b->g[V_LENGTH_OFFSET];
+    const bool by_length = length == V_G43_1 || length == V_G43_2;
+    report(b, FO_ROTARY, (Says){.a = named, .b = by_length ? length : b->g[V_NON_MODAL]});
+    return true;
+}
 
 /* Tell whether the axis words of a block belong to a code that sets an offset. */
 bool takes_axes(const Block *b, bool any_axis) {

@@ -4,6 +4,7 @@
 #define GCODE_ROWS_H
 
 #include "gcode/offsets.h"
+#include "gcode/rotary.h"
 
 enum { NO_ARC = -1 };
 static const double RAPID_MM_S = INFINITY;
@@ -44,6 +45,8 @@ static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool r
     CELL(rows->known, row, 2) = s->known_z != 0;
     if (s->rotated)
         emit_rotated(rows, row, s);
+    if (machine->rotary_axes)
+        emit_turn(machine, row);
 }
 
 static inline void stand_at(State *s, const double position_mm[3]) {

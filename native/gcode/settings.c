@@ -4,6 +4,7 @@
 
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/tool_lengths.h"
 
 enum { LARGEST_WHOLE = 99999 };
@@ -39,6 +40,7 @@ static void feed(Block *b, double f) {
         return;
     }
     s->feed = s->feed_mode == V_INVERSE_TIME ? f : f * s->unit_mm;
+    s->feed_word = f;
     s->doubt &= ~S_DOUBT_FEED;
 }
 
@@ -122,13 +124,16 @@ static void apply_length(Block *b) {
 }
 
 static void length_offset(Block *b) {
-    if (b->g[V_LENGTH_OFFSET] == V_G43) {
+    const int32_t code = b->g[V_LENGTH_OFFSET];
+    if (code >= 0 && !take_length_code(b, code))
+        return;
+    if (code == V_G43 || code == V_G43_4 || code == V_G43_5) {
         apply_length(b);
-    } else if (b->g[V_LENGTH_OFFSET] == V_G43_1) {
+    } else if (code == V_G43_1) {
         length_by_words(b);
-    } else if (b->g[V_LENGTH_OFFSET] == V_G43_2) {
+    } else if (code == V_G43_2) {
         length_added(b);
-    } else if (b->g[V_LENGTH_OFFSET] == V_G49 && !(b->machine->lengths_from_table && b->state->tool > 0)) {
+    } else if (code == V_G49 && !(b->machine->lengths_from_table && b->state->tool > 0)) {
         set_length_offset(b->state, NAN);
         b->state->offset_tool = -1;
     }

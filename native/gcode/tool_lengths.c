@@ -4,6 +4,7 @@
 
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/settings.h"
 
 enum { FIXTURE = 8 }; /* G59.3, in which G10 L11 measures */
@@ -19,6 +20,8 @@ void set_length_offset(State *s, double length_mm) {
     if (new != old) {
         s->z -= new - old;
         s->known_z = 0;
+        if (is_turned(s))
+            s->known_x = s->known_y = 0; /* the tip moves along the tool, not along Z */
     }
     s->length_offset = length_mm;
 }
