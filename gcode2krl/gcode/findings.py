@@ -352,6 +352,7 @@ FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
     ":": "write a program number as O1000, or remove the line",
+    "$": "remove the line: $ begins a command to the control, not a block",
     "%": "write % alone on its line, and nothing behind it",
     ",": "write a decimal point for a decimal comma, and no commas between words",
     ")": "write ( before the comment, or remove the )",
@@ -414,6 +415,11 @@ def decimals_needed(unit_mm: float) -> int:
     return math.ceil(math.log10(_LAST_PLACES * unit_mm / _DIFFERENCE_MM))
 
 
+def _listed(letters: str) -> str:
+    """Return letters as ``X, Y and Z``."""
+    return " and ".join(", ".join(letters).rsplit(", ", 1))
+
+
 def letters_of(bits: float) -> str:
     """Return the letters whose bits are set, A first."""
     return "".join(chr(LETTER_A + k) for k in range(v.LETTERS) if int(bits) >> k & 1)
@@ -433,7 +439,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
         "words": " and ".join(letters_of(a)) if number in (*_OF_LETTERS, of_offsets.ROTARY) else "",
-        "axes": " and ".join(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
+        "axes": _listed(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",
@@ -502,6 +508,8 @@ def _replacement(code: int) -> str:
     character = _foreign(code) if code >= FIRST_FOREIGN else ""
     if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
         return "write - (the minus sign of the keyboard)"
+    if character and unicodedata.category(character) == "Zs":
+        return "write a plain blank"
     return "remove it, or put it in a comment ( )"
 
 

@@ -80,6 +80,8 @@ STATE = np.dtype(
         ("moved_mm", "f8", 9),  # how far the first of each of NOTE_LOCAL, … moves the zero
         ("misfits", "i4"),  # arcs whose radii differ too much
         ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
+        ("misfits_reversed", "i4"),  # that would fit with the other signs of I, J, K
+        ("misfits_exchanged", "i4"),  # that would fit with the two centre words exchanged
         ("spirals", "i4"),  # arcs that are read although their radii differ
         ("spiral_line", "i4"),  # the worst of them
         ("spiral_start", "f8"),
