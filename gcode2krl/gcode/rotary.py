@@ -220,7 +220,7 @@ class _Way:
     def known(self) -> Bools:
         """Return which coordinates (n, 3) are known: of turned machine axes all or none."""
         known: Bools = self._columns["known"]
-        mixed = self._by_machine & self._to_deg.any(axis=1) & ~known.all(axis=1)
+        mixed = self._by_machine & self._to_deg.any(axis=1) & ~known.all(axis=1) & ~self._columns["machine"]
         return np.asarray(known & ~mixed[:, None])
 
     def time_s(self) -> Floats:
@@ -242,7 +242,11 @@ class _Way:
         turning = (self._from_deg != self._to_deg).any(axis=1)
         turning |= self._in_plane & (np.abs(self._from_axis - self._to_axis).max(axis=1) > 1e-12)
         self._refuse_reversals(turning & self._in_plane)
-        rows = np.flatnonzero(turning & ~columns["machine"] & columns["known"].all(axis=1))
+        is_place = ~columns["machine"] & self.known().all(axis=1)
+        is_place[:1] = False
+        rows = np.flatnonzero(
+            turning & is_place & np.append(False, is_place[:-1])
+        )  # else there is no way to it
         if not len(rows):
             return chords
         most_deg = np.abs(self._to_deg[rows] - self._from_deg[rows]).max(axis=1)

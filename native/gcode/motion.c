@@ -69,6 +69,8 @@ static void straight(Block *b, bool by_machine) {
         learn(b);
     emit(b->machine, b->line, mm_s, s->motion == V_MOTION_RAPID, by_machine, NO_ARC);
     note_time(b, time_s);
+    if (by_machine)
+        note_staying(b);
 }
 
 /* G28 and G30: by way of the programmed point, then the named axes (or all) to the machine's home. */
@@ -84,6 +86,8 @@ void machine_home(Block *b, bool any_axis) {
     stand_at(s, by_way_mm);
     stand_turned(s, b->turn_deg);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
     if (has[V_WORD_X] || !any_axis) {
         s->x = home_mm[0];
         s->known_x = 0;
@@ -100,6 +104,8 @@ void machine_home(Block *b, bool any_axis) {
     }
     rotary_home(b, any_axis);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
 }
 
 /* --- the motion of a block ------------------------------------------------------------------------------ */

@@ -204,6 +204,14 @@ def test_a_turn_about_the_tool_itself_is_one_move():
     assert len(toolpath) == 3
 
 
+@pytest.mark.parametrize("before", ["", "G0 X0 Y0 Z9\nG28 B0\n", "G0 X0 Y0 Z9\nG53 G0 C0\n"])
+def test_there_is_no_way_to_the_first_position(before):
+    """Where the machine stands before it is not known, or it is a machine move: nothing is put between."""
+    made_for = machine("head-head", tcpm=False, axes=("C", "B"), signs=(1, 1))
+    toolpath = read(HEAD + before + "G0 X10 Y20 Z30 B60 C90\nM2\n", made_for)
+    assert np.count_nonzero(toolpath.source_line == toolpath.source_line[-1]) == 1
+
+
 def test_no_shortest_way():
     """A of 370 is 370: the way from 10 goes once around."""
     made_for = machine("table-table", tcpm=True)
