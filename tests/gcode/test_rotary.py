@@ -370,6 +370,14 @@ def test_machine_axes_need_the_lengths_of_the_machine(kind, key):
         read(HEAD + "G0 X0 Y0 Z0 A10\nM2\n", made_for)
 
 
+@pytest.mark.parametrize("length", ["", "T99 M6\nG43 H99\n"])
+def test_a_turned_head_needs_the_length_of_the_tool(length):
+    text = "G21 G90\nT1 M6\n" + length + "S1000 M3\nG0 X0 Y0 Z0 A10\nM2\n"
+    with pytest.raises(Gcode2KrlError, match="length of the tool is not known"):
+        read(text, machine("head-head", tcpm=False))
+    read(text, machine("head-head", tcpm=True))
+
+
 def test_a_program_without_rotary_words_is_what_it_was():
     text = HEAD + "G0 X0 Y0 Z5\nG1 Z-1 F100\nX50 Y3\nG2 X60 Y13 I10\nG93\nG1 X0 F3\nM2\n"
     plain, declared = (read(text, made) for made in (None, machine("table-table", tcpm=False)))
