@@ -16,10 +16,12 @@
 #define CH_END_OF_TAPE 26
 #define CH_EXCLAMATION 33
 #define CH_HASH 35
+#define CH_DOLLAR 36
 #define CH_PERCENT 37
 #define CH_AMPERSAND 38
 #define CH_PAREN_OPEN 40
 #define CH_PAREN_CLOSE 41
+#define CH_ASTERISK 42
 #define CH_PLUS 43
 #define CH_COMMA 44
 #define CH_MINUS 45
@@ -39,9 +41,11 @@
 #define CH_LETTER_G 71
 #define CH_LETTER_I 73
 #define CH_LETTER_K 75
+#define CH_LETTER_L 76
 #define CH_LETTER_M 77
 #define CH_LETTER_N 78
 #define CH_LETTER_O 79
+#define CH_LETTER_P 80
 #define CH_LETTER_R 82
 #define CH_LETTER_S 83
 #define CH_LETTER_T 84
@@ -50,6 +54,7 @@
 #define CH_LETTER_Z 90
 #define CH_BRACKET_OPEN 91
 #define CH_BRACKET_CLOSE 93
+#define CH_UNDERSCORE 95
 #define CH_SMALL_A 97
 #define CH_SMALL_G 103
 #define CH_SMALL_M 109
@@ -159,10 +164,12 @@
 
 /* gcode2krl.gcode.vocabulary */
 #define V_CASE_BIT 32
+#define V_DOLLAR 36
 #define V_EXCLAMATION 33
 #define V_LETTER_A 65
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
+#define V_PROGRAM_LINE 36
 #define V_UNREAD_NUMBER 32
 #define V_LETTERS 26
 #define V_WORD_D 3
@@ -239,6 +246,7 @@
 #define V_M61 61
 #define V_M62 62
 #define V_M70 70
+#define V_M71 71
 #define V_M72 72
 #define V_M73 73
 #define V_M98 98
@@ -343,14 +351,22 @@
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
 #define F_ARC_TOO_LONG 51
-#define F_NO_MACHINE 52
-#define F_ROTARY_UNKNOWN 53
-#define F_VECTOR_ZERO 54
-#define F_VECTOR_AND_ANGLE 55
-#define F_VECTOR_ARC 56
-#define F_TURN_PER_REV 57
-#define F_TURN_TOO_FAR 58
-#define F_CYCLE_TURNED 59
+#define F_EXPRESSION_VALUE 52
+#define F_PARAMETER_UNDEFINED 53
+#define F_PARAMETER_NUMBER 54
+#define F_PARAMETER_READ_ONLY 55
+#define F_SUBPROGRAM_MISSING 56
+#define F_CALLS_TOO_DEEP 57
+#define F_TOO_MANY_STEPS 58
+#define F_TOO_MANY_ROWS 59
+#define F_NO_MACHINE 60
+#define F_ROTARY_UNKNOWN 61
+#define F_VECTOR_ZERO 62
+#define F_VECTOR_AND_ANGLE 63
+#define F_VECTOR_ARC 64
+#define F_TURN_PER_REV 65
+#define F_TURN_TOO_FAR 66
+#define F_CYCLE_TURNED 67
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -400,6 +416,117 @@
 #define S_EVENT_TEXT 5
 #define S_IMPLIED_M5 (-5)
 #define S_OF_CYCLE 1000
+
+/* gcode2krl.gcode.program_tables */
+#define P_LINE_LIMIT 4096
+#define P_MOST_PARAMETERS 5602
+#define P_LOCAL_PARAMETERS 30
+#define P_FRAMES 10
+#define P_MOST_NAMES 10000
+#define P_MOST_REPEATS 256
+#define P_LONGEST_NAME 255
+#define P_ROOM_OF_LINE 8194
+#define P_KIND_BLOCK 0
+#define P_KIND_NOTHING 1
+#define P_KIND_O_WORD 2
+#define P_KIND_SUB 3
+#define P_KIND_ENDSUB 4
+#define P_KIND_RETURN 5
+#define P_KIND_CALL 6
+#define P_KIND_IF 7
+#define P_KIND_ELSEIF 8
+#define P_KIND_ELSE 9
+#define P_KIND_ENDIF 10
+#define P_KIND_WHILE 11
+#define P_KIND_JUMP 12
+#define P_KIND_DO_WHILE 13
+#define P_KIND_REPEAT 14
+#define P_KIND_PROGRAM_NUMBER 15
+#define P_KIND_END_OF_FILE 16
+#define P_KIND_FAULT 17
+
+/* gcode2krl.gcode.program_faults */
+#define PF_NO_VALUE 0
+#define PF_UNCLOSED_BRACKET 1
+#define PF_UNKNOWN_FUNCTION 2
+#define PF_UNKNOWN_OPERATOR 3
+#define PF_NO_BRACKET 4
+#define PF_NO_SLASH 5
+#define PF_NO_EQUALS 6
+#define PF_NAME_UNCLOSED 7
+#define PF_NAME_TOO_LONG 8
+#define PF_TOO_MANY_NAMES 9
+#define PF_TOO_DEEP 10
+#define PF_NO_PARAMETER 11
+#define PF_BEHIND_O_WORD 12
+#define PF_DIVISION_BY_ZERO 0
+#define PF_SQUARE_ROOT 1
+#define PF_LOGARITHM 2
+#define PF_ARC_COSINE 3
+#define PF_ARC_SINE 4
+#define PF_POWER 5
+#define PF_NOT_A_NUMBER 6
+#define PF_INFINITE 7
+#define PF_FAULT_LABEL 0
+#define PF_FAULT_WORD 1
+#define PF_FAULT_NO_OPENING 2
+#define PF_FAULT_NO_CLOSING 3
+#define PF_FAULT_CROSSED 4
+#define PF_FAULT_LABEL_TWICE 5
+#define PF_FAULT_NESTED_SUB 6
+#define PF_FAULT_NOT_IN_SUB 7
+#define PF_FAULT_NOT_IN_LOOP 8
+#define PF_FAULT_TWO_STYLES 9
+#define PF_FAULT_FILE_ENDS 10
+#define PF_FAULT_M99_IN_MAIN 11
+#define PF_FAULT_M98_WORDS 12
+#define PF_FAULT_SUB_TWICE 13
+#define PF_FAULT_CALL_NUMBER 14
+#define PF_FAULT_ARGUMENTS 15
+#define PF_FAULT_REPEATS 16
+#define PF_FAULT_NOT_FIRST 17
+#define PF_FAULT_MODES 18
+
+/* gcode2krl.gcode.parameter_names */
+#define N_LINE 0
+#define N_MOTION_MODE 1
+#define N_PLANE 2
+#define N_CCOMP 3
+#define N_METRIC 4
+#define N_IMPERIAL 5
+#define N_ABSOLUTE 6
+#define N_INCREMENTAL 7
+#define N_INVERSE_TIME 8
+#define N_UNITS_PER_MINUTE 9
+#define N_UNITS_PER_REV 10
+#define N_COORD_SYSTEM 11
+#define N_TOOL_OFFSET 12
+#define N_RETRACT_R_PLANE 13
+#define N_RETRACT_OLD_Z 14
+#define N_SPINDLE_RPM_MODE 15
+#define N_SPINDLE_CSS_MODE 16
+#define N_IJK_ABSOLUTE_MODE 17
+#define N_LATHE_DIAMETER_MODE 18
+#define N_LATHE_RADIUS_MODE 19
+#define N_SPINDLE_ON 20
+#define N_SPINDLE_CW 21
+#define N_MIST 22
+#define N_FLOOD 23
+#define N_FEED 24
+#define N_RPM 25
+#define N_CURRENT_TOOL 26
+#define N_SELECTED_TOOL 27
+#define N_X 28
+#define N_Y 29
+#define N_Z 30
+#define N_ABS_X 31
+#define N_ABS_Y 32
+#define N_ABS_Z 33
+#define N_VALUE 34
+#define N_VALUE_RETURNED 35
+#define N_CALL_LEVEL 36
+#define N_TASK 37
+#define N_PREDEFINED 38
 
 /* gcode2krl.cutting.sweep */
 #define SW_LANES 16
@@ -665,6 +792,8 @@ typedef struct {
     int64_t mute;
     int64_t rows_wanted;
     int64_t events_wanted;
+    int64_t errors;
+    int64_t program_wanted;
 } Counts;
 typedef char Counts_rows_stands_at_0[offsetof(Counts, rows) == 0 ? 1 : -1];
 typedef char Counts_events_stands_at_8[offsetof(Counts, events) == 8 ? 1 : -1];
@@ -675,7 +804,9 @@ typedef char Counts_consequences_stands_at_40[offsetof(Counts, consequences) == 
 typedef char Counts_mute_stands_at_48[offsetof(Counts, mute) == 48 ? 1 : -1];
 typedef char Counts_rows_wanted_stands_at_56[offsetof(Counts, rows_wanted) == 56 ? 1 : -1];
 typedef char Counts_events_wanted_stands_at_64[offsetof(Counts, events_wanted) == 64 ? 1 : -1];
-typedef char Counts_has_its_size[sizeof(Counts) == 72 ? 1 : -1];
+typedef char Counts_errors_stands_at_72[offsetof(Counts, errors) == 72 ? 1 : -1];
+typedef char Counts_program_wanted_stands_at_80[offsetof(Counts, program_wanted) == 80 ? 1 : -1];
+typedef char Counts_has_its_size[sizeof(Counts) == 88 ? 1 : -1];
 VIEW(CountsView, Counts);
 
 typedef struct {
@@ -711,16 +842,158 @@ typedef char Found_has_its_size[sizeof(Found) == 32 ? 1 : -1];
 VIEW(FoundView, Found);
 
 typedef struct {
+    int64_t start;
+    int64_t target;
+    int64_t end;
+    int64_t expression;
+    int32_t kind;
+    int32_t subprogram;
+    int32_t first_message;
+    int32_t fault;
+} MarkedLine;
+typedef char MarkedLine_start_stands_at_0[offsetof(MarkedLine, start) == 0 ? 1 : -1];
+typedef char MarkedLine_target_stands_at_8[offsetof(MarkedLine, target) == 8 ? 1 : -1];
+typedef char MarkedLine_end_stands_at_16[offsetof(MarkedLine, end) == 16 ? 1 : -1];
+typedef char MarkedLine_expression_stands_at_24[offsetof(MarkedLine, expression) == 24 ? 1 : -1];
+typedef char MarkedLine_kind_stands_at_32[offsetof(MarkedLine, kind) == 32 ? 1 : -1];
+typedef char MarkedLine_subprogram_stands_at_36[offsetof(MarkedLine, subprogram) == 36 ? 1 : -1];
+typedef char MarkedLine_first_message_stands_at_40[offsetof(MarkedLine, first_message) == 40 ? 1 : -1];
+typedef char MarkedLine_fault_stands_at_44[offsetof(MarkedLine, fault) == 44 ? 1 : -1];
+typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 48 ? 1 : -1];
+VIEW(MarkedLineView, MarkedLine);
+
+typedef struct {
+    int64_t number;
+    int64_t entry;
+    int32_t is_ready;
+    int32_t is_program;
+} Subprogram;
+typedef char Subprogram_number_stands_at_0[offsetof(Subprogram, number) == 0 ? 1 : -1];
+typedef char Subprogram_entry_stands_at_8[offsetof(Subprogram, entry) == 8 ? 1 : -1];
+typedef char Subprogram_is_ready_stands_at_16[offsetof(Subprogram, is_ready) == 16 ? 1 : -1];
+typedef char Subprogram_is_program_stands_at_20[offsetof(Subprogram, is_program) == 20 ? 1 : -1];
+typedef char Subprogram_has_its_size[sizeof(Subprogram) == 24 ? 1 : -1];
+VIEW(SubprogramView, Subprogram);
+
+typedef struct {
+    int64_t hash;
+    int32_t start;
+    int32_t length;
+    double value;
+    int64_t is_set;
+} ParameterName;
+typedef char ParameterName_hash_stands_at_0[offsetof(ParameterName, hash) == 0 ? 1 : -1];
+typedef char ParameterName_start_stands_at_8[offsetof(ParameterName, start) == 8 ? 1 : -1];
+typedef char ParameterName_length_stands_at_12[offsetof(ParameterName, length) == 12 ? 1 : -1];
+typedef char ParameterName_value_stands_at_16[offsetof(ParameterName, value) == 16 ? 1 : -1];
+typedef char ParameterName_is_set_stands_at_24[offsetof(ParameterName, is_set) == 24 ? 1 : -1];
+typedef char ParameterName_has_its_size[sizeof(ParameterName) == 32 ? 1 : -1];
+VIEW(ParameterNameView, ParameterName);
+
+typedef struct {
+    int64_t return_to;
+    int64_t times;
+    int64_t generation;
+    int64_t entry;
+    int32_t is_program;
+    int32_t main_line;
+    int32_t repeats;
+    int32_t saved;
+    double parameters[30];
+} Frame;
+typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
+typedef char Frame_times_stands_at_8[offsetof(Frame, times) == 8 ? 1 : -1];
+typedef char Frame_generation_stands_at_16[offsetof(Frame, generation) == 16 ? 1 : -1];
+typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
+typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
+typedef char Frame_main_line_stands_at_36[offsetof(Frame, main_line) == 36 ? 1 : -1];
+typedef char Frame_repeats_stands_at_40[offsetof(Frame, repeats) == 40 ? 1 : -1];
+typedef char Frame_saved_stands_at_44[offsetof(Frame, saved) == 44 ? 1 : -1];
+typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 288 ? 1 : -1];
+VIEW(FrameView, Frame);
+
+typedef struct {
+    int64_t word;
+    int64_t end;
+    int64_t left;
+} Repeat;
+typedef char Repeat_word_stands_at_0[offsetof(Repeat, word) == 0 ? 1 : -1];
+typedef char Repeat_end_stands_at_8[offsetof(Repeat, end) == 8 ? 1 : -1];
+typedef char Repeat_left_stands_at_16[offsetof(Repeat, left) == 16 ? 1 : -1];
+typedef char Repeat_has_its_size[sizeof(Repeat) == 24 ? 1 : -1];
+VIEW(RepeatView, Repeat);
+
+typedef struct {
+    int64_t name;
+    int64_t number;
+    double value;
+} Assignment;
+typedef char Assignment_name_stands_at_0[offsetof(Assignment, name) == 0 ? 1 : -1];
+typedef char Assignment_number_stands_at_8[offsetof(Assignment, number) == 8 ? 1 : -1];
+typedef char Assignment_value_stands_at_16[offsetof(Assignment, value) == 16 ? 1 : -1];
+typedef char Assignment_has_its_size[sizeof(Assignment) == 24 ? 1 : -1];
+VIEW(AssignmentView, Assignment);
+
+typedef struct {
+    int64_t steps;
+    int64_t most_steps;
+    int64_t most_rows;
+    int64_t frame;
+    int64_t generation;
+    int64_t repeats;
+    int64_t names;
+    int64_t pool;
+    int64_t assignments;
+    int64_t words;
+    int64_t marks;
+    int64_t is_testing;
+    int64_t wanted;
+    int64_t wanted_number;
+    int64_t wanted_word;
+    int64_t main_words;
+    int64_t is_stopped;
+    double return_value;
+    int64_t value_returned;
+    int64_t subprograms;
+} Course;
+typedef char Course_steps_stands_at_0[offsetof(Course, steps) == 0 ? 1 : -1];
+typedef char Course_most_steps_stands_at_8[offsetof(Course, most_steps) == 8 ? 1 : -1];
+typedef char Course_most_rows_stands_at_16[offsetof(Course, most_rows) == 16 ? 1 : -1];
+typedef char Course_frame_stands_at_24[offsetof(Course, frame) == 24 ? 1 : -1];
+typedef char Course_generation_stands_at_32[offsetof(Course, generation) == 32 ? 1 : -1];
+typedef char Course_repeats_stands_at_40[offsetof(Course, repeats) == 40 ? 1 : -1];
+typedef char Course_names_stands_at_48[offsetof(Course, names) == 48 ? 1 : -1];
+typedef char Course_pool_stands_at_56[offsetof(Course, pool) == 56 ? 1 : -1];
+typedef char Course_assignments_stands_at_64[offsetof(Course, assignments) == 64 ? 1 : -1];
+typedef char Course_words_stands_at_72[offsetof(Course, words) == 72 ? 1 : -1];
+typedef char Course_marks_stands_at_80[offsetof(Course, marks) == 80 ? 1 : -1];
+typedef char Course_is_testing_stands_at_88[offsetof(Course, is_testing) == 88 ? 1 : -1];
+typedef char Course_wanted_stands_at_96[offsetof(Course, wanted) == 96 ? 1 : -1];
+typedef char Course_wanted_number_stands_at_104[offsetof(Course, wanted_number) == 104 ? 1 : -1];
+typedef char Course_wanted_word_stands_at_112[offsetof(Course, wanted_word) == 112 ? 1 : -1];
+typedef char Course_main_words_stands_at_120[offsetof(Course, main_words) == 120 ? 1 : -1];
+typedef char Course_is_stopped_stands_at_128[offsetof(Course, is_stopped) == 128 ? 1 : -1];
+typedef char Course_return_value_stands_at_136[offsetof(Course, return_value) == 136 ? 1 : -1];
+typedef char Course_value_returned_stands_at_144[offsetof(Course, value_returned) == 144 ? 1 : -1];
+typedef char Course_subprograms_stands_at_152[offsetof(Course, subprograms) == 152 ? 1 : -1];
+typedef char Course_has_its_size[sizeof(Course) == 160 ? 1 : -1];
+VIEW(CourseView, Course);
+
+typedef struct {
     Bytes text;
     Bytes letter;
     Floats value;
     Ints32 line;
     Floats extra;
     Ints message_span;
+    MarkedLineView lines;
+    int64_t whole_program;
     int64_t first_line;
     int64_t words;
     int64_t marks;
     int64_t messages;
+    int64_t program_lines;
     int64_t most_decimals;
 } Scan;
 
@@ -763,6 +1036,27 @@ typedef struct {
     int64_t rotary_axes;
     int64_t tcpm;
 } Machine;
+
+typedef struct {
+    Bytes text;
+    MarkedLineView lines;
+    SubprogramView subprograms;
+    ParameterNameView names;
+    Ints32 name_slots;
+    Bytes pool;
+    Floats local_value;
+    Ints local_generation;
+    Floats parameters;
+    FrameView frames;
+    StateView saved_states;
+    RepeatView repeats;
+    AssignmentView assignments;
+    CourseView course;
+    Bytes letter;
+    Floats value;
+    Ints32 line;
+    Floats extra;
+} Program;
 
 typedef struct {
     double bottom_mm;

@@ -57,10 +57,11 @@ _FIXED = {
 }
 
 
-def quote(block: bytes, number: int, a: float, b: float) -> str:
+def quote(block: bytes, number: int, a: float, b: float, c: float = -1.0) -> str:
     """Return the block with a caret before what finding ``number`` is about: ``G1 X10 ^I5``."""
     text = block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
-    at = _place(text, number, a, b)
+    told = number in f.WITH_COLUMN and c >= 0
+    at = min(int(c), len(text)) if told else _place(text, number, a, b)
     start = max(0, at - _BEFORE)
     stop = min(len(text), at + _AFTER)
     before, after = (_printable(part) for part in (text[start:at].lstrip(), text[at:stop].rstrip()))

@@ -14,6 +14,7 @@ from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -79,6 +80,14 @@ class Finding(NamedTuple):
     BAD_LINE_NUMBER,
     UNKNOWN_START,
     ARC_TOO_LONG,
+    EXPRESSION_VALUE,
+    PARAMETER_UNDEFINED,
+    PARAMETER_NUMBER,
+    PARAMETER_READ_ONLY,
+    SUBPROGRAM_MISSING,
+    CALLS_TOO_DEEP,
+    TOO_MANY_STEPS,
+    TOO_MANY_ROWS,
     NO_MACHINE,
     ROTARY_UNKNOWN,
     VECTOR_ZERO,
@@ -87,7 +96,7 @@ class Finding(NamedTuple):
     TURN_PER_REV,
     TURN_TOO_FAR,
     CYCLE_TURNED,
-) = range(60)
+) = range(68)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -106,17 +115,52 @@ FINDINGS: dict[int, Finding] = {
     COMMENT_NESTED: Finding(
         "error", "comment-nested", "a comment in a comment", "write it without the inner ( and )"
     ),
-    EXPRESSION: Finding(
-        "error",
-        "expression",
-        "parameters and expressions (#, [ ], =) are not read yet",
-        "let the CAM post write plain numbers",
+    EXPRESSION: Finding("error", "expression", "{fault}", "{remedy}"),
+    O_WORD: Finding("error", "o-word", "{fault}", "{remedy}"),
+    EXPRESSION_VALUE: Finding(
+        "error", "expression-value", "{fault}", "check the parameters that the expression takes"
     ),
-    O_WORD: Finding(
+    PARAMETER_UNDEFINED: Finding(
         "error",
-        "o-word",
-        "O-words (subprograms, loops, program numbers) are not read yet",
-        "expand subprograms in the post; remove a mere program number",
+        "parameter-undefined",
+        "the named parameter has not been set",
+        "set it before; a name without _ is known in its own subprogram only",
+    ),
+    PARAMETER_NUMBER: Finding(
+        "error",
+        "parameter-number",
+        "{a:g} is not the number of a parameter",
+        "parameters are #1 to #5601, whole numbers",
+    ),
+    PARAMETER_READ_ONLY: Finding(
+        "error",
+        "parameter-read-only",
+        "this parameter shows the state of the machine and cannot be set",
+        "use another; offsets are set by G10 and G92, or in [work_offsets] of the cell",
+    ),
+    SUBPROGRAM_MISSING: Finding(
+        "error",
+        "subprogram-missing",
+        "the subprogram is neither in this program nor a file",
+        "put its file (label.ngc) beside the program, or name its folder with --search",
+    ),
+    CALLS_TOO_DEEP: Finding(
+        "error",
+        "calls-too-deep",
+        "subprograms call each other more than {a:.0f} levels deep",
+        "does one call itself without end?",
+    ),
+    TOO_MANY_STEPS: Finding(
+        "error",
+        "endless-loop",
+        "the program has run {a:,.0f} lines and is not at its end",
+        "does the loop end? check its condition",
+    ),
+    TOO_MANY_ROWS: Finding(
+        "error",
+        "endless-loop",
+        "the program has made {a:,.0f} moves and is not at its end",
+        "does the loop end? check its condition",
     ),
     LINE_TOO_LONG: Finding(
         "error",
@@ -347,6 +391,11 @@ FINDINGS: dict[int, Finding] = {
 }
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 
+WITH_COLUMN = {
+    *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
+    *(SUBPROGRAM_MISSING, CALLS_TOO_DEEP),
+}
+"""Findings whose third number is the column of the culprit, -1 = not told."""
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
     ":": "write a program number as O1000, or remove the line",
@@ -393,8 +442,6 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
         f"digital and analogue I/O words: {_LATER}",
         "map an own M-code in [m_code] of the cell",
     ),
-    v.TENFOLD * v.M70: (f"saving modal state: {_LATER}", "remove it"),
-    v.TENFOLD * v.M98: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
 _OF_LETTERS = (UNUSED_WORD, ROTARY_UNKNOWN, VECTOR_AND_ANGLE)
@@ -445,6 +492,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
+        **_program_fault(number, a, b),
     }
     return Issue(
         finding.severity,
@@ -454,6 +502,17 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         _remedy(finding, number, a, b).format(**values),
         excerpt,
     )
+
+
+def _program_fault(number: int, a: float, b: float) -> dict[str, str]:
+    """Return what is wrong with an expression or an O-word, and the remedy."""
+    if number in (EXPRESSION, O_WORD):
+        faults = EXPRESSION_FAULTS if number == EXPRESSION else O_WORD_FAULTS
+        fault, remedy = faults.get(int(a), faults[0])
+        return {"fault": fault, "remedy": remedy}
+    if number == EXPRESSION_VALUE:
+        return {"fault": VALUE_FAULTS[int(a)].format(b=b)}
+    return {}
 
 
 def _sentence(finding: Finding, number: int, a: float, b: float) -> str:

@@ -79,7 +79,7 @@ def found_issues(
 def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     number, line = int(row["number"]), int(row["line"])
     a, b, c = (float(row[name]) for name in "abc")
-    excerpt = quote(texts[line], number, a, b) if line in texts else ""
+    excerpt = quote(texts[line], number, a, b, c) if line in texts else ""
     return f.make_issue(number, line, a, b, c, excerpt)
 
 

@@ -4,12 +4,14 @@ Plain module constants: the compiled core takes their values from here. In it a 
 value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import CASE_BIT, EXCLAMATION, LETTER_A
+from gcode2krl.ascii_codes import CASE_BIT, DOLLAR, EXCLAMATION, LETTER_A
 
 LINE_LIMIT = 4096
 """Longest line that is read, in bytes; a part program has none that long."""
 MARK = EXCLAMATION
 """Stands in the column of letters where something cannot be read."""
+PROGRAM_LINE = DOLLAR
+"""Stands for a whole line with an expression, a parameter or an O-word."""
 UNREAD_NUMBER = CASE_BIT
 """Added to a letter whose value cannot be read: the small letter."""
 
@@ -64,7 +66,8 @@ M6 = 6  # tool change
 M7, M9 = 7, 9  # mist, both off; M8 between them is flood
 M19 = 19  # spindle orientation
 M48, M53 = 48, 53  # overrides, M48 to M53
-M61, M62, M70, M72, M73 = 61, 62, 70, 72, 73  # tool number, inputs and outputs, modal state
+M61, M62 = 61, 62  # tool number, inputs and outputs
+M70, M71, M72, M73 = 70, 71, 72, 73  # modal state: save, forget, restore, save and restore on return
 M98, M99 = 98, 99  # subprograms
 
 MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3

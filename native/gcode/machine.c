@@ -5,7 +5,8 @@
    A block that was not understood is followed all the same, without further findings, so that the blocks
    after it are judged by their own faults. */
 
-#include "gcode/block.h"
+#include "gcode/machine.h"
+
 #include "gcode/block_words.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
@@ -225,6 +226,12 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
     Block block = {.machine = machine, .state = s, .counts = counts, .line = AT(words->line, from)};
     int32_t doubt;
     const BlockKind kind = gather(&block, words, from, to, &doubt);
+    if (counts->program_wanted) { /* as if the block had not begun */
+        *s = state_before;
+        *counts = counts_before;
+        counts->program_wanted = 1;
+        return false;
+    }
     if (kind == LEFT_OUT)
         return true;
     const bool all_axes_in_doubt = (doubt & S_DOUBT_POSITION) == S_DOUBT_POSITION;
@@ -256,10 +263,19 @@ static bool has_room(Machine *machine, int64_t words) {
            counts->events_wanted <= machine->events.rows;
 }
 
-/* Execute blocks from a word on; return the word at which to go on, earlier where room is wanted. */
+/* Execute the block of words `from` to `to`; return false, with nothing done, where more room is wanted, or the
+   whole program, as the block jumps. */
+bool run_block(Machine *machine, const Words *words, int64_t from, int64_t to) {
+    return has_room(machine, to - from) &&
+           (plain_block(machine, words, from, to) || any_block(machine, words, from, to));
+}
+
+/* Execute blocks from a word on; return the word at which to go on, earlier where room is wanted, or the whole
+   program. */
 EXPORT int64_t gcode_run(Machine *machine, Bytes letter, Floats value, Floats extra, Ints32 line,
                          int64_t from) {
     const Words words = {letter, value, extra, line};
+    machine->counts.at->program_wanted = 0;
     while (from < letter.rows && !machine->state.at->ended) {
         int64_t to = from + 1;
         while (to < letter.rows && AT(line, to) == AT(line, from))
