@@ -22,7 +22,6 @@ enum {
     LAST_OF_OFFSETS = 5390,
     TOOL = 5400,
     TOOL_OFFSET = 5401,
-    SHIFT = 5210, /* G92 and G52: in force or not, then the shift */
     OF_A_SYSTEM_ROTATION = 9,
     LAST_OF_TOOL = 5413,
     POSITION = 5420,
@@ -53,9 +52,9 @@ static double of_state(const Machine *machine, int64_t number) {
         return s->home_28[number - HOME_28];
     if (number >= HOME_30 && number < HOME_30 + 3)
         return s->home_30[number - HOME_30];
-    if (number > SHIFT && number <= SHIFT + 3)
-        return s->shift_kept_mm[number - SHIFT - 1];
-    if (number == SHIFT)
+    if (number >= SHIFT && number < SHIFT + 3)
+        return s->shift_kept_mm[number - SHIFT];
+    if (number == SHIFT - 1)
         return s->shift_mm[0] != 0.0 || s->shift_mm[1] != 0.0 || s->shift_mm[2] != 0.0;
     if (number == SYSTEM)
         return s->work_offset + 1;
