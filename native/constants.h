@@ -210,6 +210,8 @@
 #define V_G41 410
 #define V_G43 430
 #define V_G49 490
+#define V_G43_1 431
+#define V_G43_2 432
 #define V_G43_4 434
 #define V_G43_5 435
 #define V_G52 520
@@ -225,10 +227,13 @@
 #define V_G90 900
 #define V_G90_1 901
 #define V_G91_1 911
+#define V_G92 920
+#define V_G92_1 921
+#define V_G92_2 922
+#define V_G92_3 923
+#define V_G96 960
 #define V_G98 980
 #define V_G99 990
-#define V_G92 920
-#define V_G96 960
 #define V_M0 0
 #define V_M1 1
 #define V_M2 2
@@ -251,6 +256,11 @@
 #define V_M73 73
 #define V_M98 98
 #define V_M99 99
+#define V_L_TOOL 1
+#define V_L_OFFSET 2
+#define V_L_TOOL_FROM_POSITION 10
+#define V_L_TOOL_FROM_FIXTURE 11
+#define V_L_OFFSET_FROM_POSITION 20
 #define V_MOTION_CANCELLED (-1)
 #define V_MOTION_RAPID 0
 #define V_MOTION_LINE 1
@@ -287,7 +297,8 @@
 #define V_WORK_OFFSET 10
 #define V_PATH_CONTROL 11
 #define V_SPINDLE_MODE 12
-#define V_GROUPS 13
+#define V_SHIFT_STATE 13
+#define V_GROUPS 14
 #define V_M_STOP 4
 #define V_M_TOOL_CHANGE 6
 #define V_M_SPINDLE 7
@@ -388,6 +399,24 @@
 #define FC_SPINDLE_DIRECTION 214
 #define FC_TOO_LONG 215
 
+/* gcode2krl.gcode.offset_findings */
+#define FO_NO_AXES 220
+#define FO_WITHOUT_L 221
+#define FO_UNKNOWN_L 222
+#define FO_WRONG_SYSTEM 223
+#define FO_WRONG_TOOL 224
+#define FO_TOOL_UNDECLARED 225
+#define FO_NO_LENGTH 226
+#define FO_ROTATION_BY_POSITION 227
+#define FO_TOOL_ACROSS 228
+#define FO_ADDED_BY_WORDS 229
+#define FO_ADDED_WITHOUT_H 230
+#define FO_FROM_UNKNOWN 231
+#define FO_AT_START 232
+#define FO_LENGTH_DIFFERS 233
+#define FO_ROTARY 234
+#define FO_ROTATION_WITH_ROTARY 235
+
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
@@ -407,6 +436,9 @@
 #define S_NOTE_CENTRE 1
 #define S_NOTE_HOME 2
 #define S_NOTE_OVERRIDE 3
+#define S_NOTE_LOCAL 4
+#define S_NOTE_SHIFT 5
+#define S_NOTE_TABLE 6
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -656,6 +688,15 @@ typedef struct {
     int8_t exact_stop;
     double tolerance;
     int32_t work_offset;
+    double base_mm[3];
+    double shift_mm[3];
+    double shift_kept_mm[3];
+    int32_t shift_line;
+    double pivot_mm[2];
+    double rotation_cos;
+    double rotation_sin;
+    int8_t rotated;
+    int8_t offsets_taken;
     double home_28[3];
     double home_30[3];
     double rotary_deg[3];
@@ -682,11 +723,14 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[4];
-    int32_t note_line[4];
-    int32_t note_word[4];
+    int32_t note_count[7];
+    int32_t note_line[7];
+    int32_t note_word[7];
+    double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
+    int32_t misfits_reversed;
+    int32_t misfits_exchanged;
     int32_t spirals;
     int32_t spiral_line;
     double spiral_start;
@@ -729,57 +773,69 @@ typedef char State_offset_tool_stands_at_96[offsetof(State, offset_tool) == 96 ?
 typedef char State_exact_stop_stands_at_100[offsetof(State, exact_stop) == 100 ? 1 : -1];
 typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1 : -1];
 typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
-typedef char State_home_28_stands_at_120[offsetof(State, home_28) == 120 ? 1 : -1];
-typedef char State_home_30_stands_at_144[offsetof(State, home_30) == 144 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_168[offsetof(State, rotary_deg) == 168 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_192[offsetof(State, rotary_unknown) == 192 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_200[offsetof(State, home_28_deg) == 200 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_224[offsetof(State, home_30_deg) == 224 ? 1 : -1];
-typedef char State_tool_vector_stands_at_248[offsetof(State, tool_vector) == 248 ? 1 : -1];
-typedef char State_has_vector_stands_at_272[offsetof(State, has_vector) == 272 ? 1 : -1];
-typedef char State_length_code_stands_at_276[offsetof(State, length_code) == 276 ? 1 : -1];
-typedef char State_feed_word_stands_at_280[offsetof(State, feed_word) == 280 ? 1 : -1];
-typedef char State_arcs_stands_at_288[offsetof(State, arcs) == 288 ? 1 : -1];
-typedef char State_mist_stands_at_292[offsetof(State, mist) == 292 ? 1 : -1];
-typedef char State_flood_stands_at_293[offsetof(State, flood) == 293 ? 1 : -1];
-typedef char State_ended_stands_at_294[offsetof(State, ended) == 294 ? 1 : -1];
-typedef char State_end_line_stands_at_296[offsetof(State, end_line) == 296 ? 1 : -1];
-typedef char State_tape_marks_stands_at_300[offsetof(State, tape_marks) == 300 ? 1 : -1];
-typedef char State_unit_named_stands_at_304[offsetof(State, unit_named) == 304 ? 1 : -1];
-typedef char State_blocks_stands_at_312[offsetof(State, blocks) == 312 ? 1 : -1];
-typedef char State_largest_mm_stands_at_320[offsetof(State, largest_mm) == 320 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_328[offsetof(State, unknown_feed_line) == 328 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_332[offsetof(State, unknown_reported) == 332 ? 1 : -1];
-typedef char State_doubt_stands_at_336[offsetof(State, doubt) == 336 ? 1 : -1];
-typedef char State_motion_line_stands_at_340[offsetof(State, motion_line) == 340 ? 1 : -1];
-typedef char State_distance_line_stands_at_344[offsetof(State, distance_line) == 344 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_348[offsetof(State, feed_mode_line) == 348 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_352[offsetof(State, rotary_refused) == 352 ? 1 : -1];
-typedef char State_note_count_stands_at_356[offsetof(State, note_count) == 356 ? 1 : -1];
-typedef char State_note_line_stands_at_372[offsetof(State, note_line) == 372 ? 1 : -1];
-typedef char State_note_word_stands_at_388[offsetof(State, note_word) == 388 ? 1 : -1];
-typedef char State_misfits_stands_at_404[offsetof(State, misfits) == 404 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_408[offsetof(State, misfits_other_centre) == 408 ? 1 : -1];
-typedef char State_spirals_stands_at_412[offsetof(State, spirals) == 412 ? 1 : -1];
-typedef char State_spiral_line_stands_at_416[offsetof(State, spiral_line) == 416 ? 1 : -1];
-typedef char State_spiral_start_stands_at_424[offsetof(State, spiral_start) == 424 ? 1 : -1];
-typedef char State_spiral_end_stands_at_432[offsetof(State, spiral_end) == 432 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_440[offsetof(State, spiral_unit_mm) == 440 ? 1 : -1];
-typedef char State_retract_stands_at_448[offsetof(State, retract) == 448 ? 1 : -1];
-typedef char State_retract_line_stands_at_452[offsetof(State, retract_line) == 452 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_456[offsetof(State, retract_unnamed_line) == 456 ? 1 : -1];
-typedef char State_in_cycles_stands_at_460[offsetof(State, in_cycles) == 460 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_464[offsetof(State, cycle_level_mm) == 464 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_472[offsetof(State, cycle_level_known) == 472 ? 1 : -1];
-typedef char State_cycle_r_stands_at_480[offsetof(State, cycle_r) == 480 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_488[offsetof(State, cycle_depth) == 488 ? 1 : -1];
-typedef char State_cycle_q_stands_at_496[offsetof(State, cycle_q) == 496 ? 1 : -1];
-typedef char State_cycle_p_stands_at_504[offsetof(State, cycle_p) == 504 ? 1 : -1];
-typedef char State_cycle_line_stands_at_512[offsetof(State, cycle_line) == 512 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_516[offsetof(State, cycle_plane) == 516 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_520[offsetof(State, cycle_unit_mm) == 520 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_528[offsetof(State, cycle_absolute) == 528 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 536 ? 1 : -1];
+typedef char State_base_mm_stands_at_120[offsetof(State, base_mm) == 120 ? 1 : -1];
+typedef char State_shift_mm_stands_at_144[offsetof(State, shift_mm) == 144 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_168[offsetof(State, shift_kept_mm) == 168 ? 1 : -1];
+typedef char State_shift_line_stands_at_192[offsetof(State, shift_line) == 192 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_200[offsetof(State, pivot_mm) == 200 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_216[offsetof(State, rotation_cos) == 216 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_224[offsetof(State, rotation_sin) == 224 ? 1 : -1];
+typedef char State_rotated_stands_at_232[offsetof(State, rotated) == 232 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_233[offsetof(State, offsets_taken) == 233 ? 1 : -1];
+typedef char State_home_28_stands_at_240[offsetof(State, home_28) == 240 ? 1 : -1];
+typedef char State_home_30_stands_at_264[offsetof(State, home_30) == 264 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_288[offsetof(State, rotary_deg) == 288 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_312[offsetof(State, rotary_unknown) == 312 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_320[offsetof(State, home_28_deg) == 320 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_344[offsetof(State, home_30_deg) == 344 ? 1 : -1];
+typedef char State_tool_vector_stands_at_368[offsetof(State, tool_vector) == 368 ? 1 : -1];
+typedef char State_has_vector_stands_at_392[offsetof(State, has_vector) == 392 ? 1 : -1];
+typedef char State_length_code_stands_at_396[offsetof(State, length_code) == 396 ? 1 : -1];
+typedef char State_feed_word_stands_at_400[offsetof(State, feed_word) == 400 ? 1 : -1];
+typedef char State_arcs_stands_at_408[offsetof(State, arcs) == 408 ? 1 : -1];
+typedef char State_mist_stands_at_412[offsetof(State, mist) == 412 ? 1 : -1];
+typedef char State_flood_stands_at_413[offsetof(State, flood) == 413 ? 1 : -1];
+typedef char State_ended_stands_at_414[offsetof(State, ended) == 414 ? 1 : -1];
+typedef char State_end_line_stands_at_416[offsetof(State, end_line) == 416 ? 1 : -1];
+typedef char State_tape_marks_stands_at_420[offsetof(State, tape_marks) == 420 ? 1 : -1];
+typedef char State_unit_named_stands_at_424[offsetof(State, unit_named) == 424 ? 1 : -1];
+typedef char State_blocks_stands_at_432[offsetof(State, blocks) == 432 ? 1 : -1];
+typedef char State_largest_mm_stands_at_440[offsetof(State, largest_mm) == 440 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_448[offsetof(State, unknown_feed_line) == 448 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_452[offsetof(State, unknown_reported) == 452 ? 1 : -1];
+typedef char State_doubt_stands_at_456[offsetof(State, doubt) == 456 ? 1 : -1];
+typedef char State_motion_line_stands_at_460[offsetof(State, motion_line) == 460 ? 1 : -1];
+typedef char State_distance_line_stands_at_464[offsetof(State, distance_line) == 464 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_468[offsetof(State, feed_mode_line) == 468 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_472[offsetof(State, rotary_refused) == 472 ? 1 : -1];
+typedef char State_note_count_stands_at_476[offsetof(State, note_count) == 476 ? 1 : -1];
+typedef char State_note_line_stands_at_504[offsetof(State, note_line) == 504 ? 1 : -1];
+typedef char State_note_word_stands_at_532[offsetof(State, note_word) == 532 ? 1 : -1];
+typedef char State_moved_mm_stands_at_560[offsetof(State, moved_mm) == 560 ? 1 : -1];
+typedef char State_misfits_stands_at_632[offsetof(State, misfits) == 632 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_636[offsetof(State, misfits_other_centre) == 636 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_640[offsetof(State, misfits_reversed) == 640 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_644[offsetof(State, misfits_exchanged) == 644 ? 1 : -1];
+typedef char State_spirals_stands_at_648[offsetof(State, spirals) == 648 ? 1 : -1];
+typedef char State_spiral_line_stands_at_652[offsetof(State, spiral_line) == 652 ? 1 : -1];
+typedef char State_spiral_start_stands_at_656[offsetof(State, spiral_start) == 656 ? 1 : -1];
+typedef char State_spiral_end_stands_at_664[offsetof(State, spiral_end) == 664 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_672[offsetof(State, spiral_unit_mm) == 672 ? 1 : -1];
+typedef char State_retract_stands_at_680[offsetof(State, retract) == 680 ? 1 : -1];
+typedef char State_retract_line_stands_at_684[offsetof(State, retract_line) == 684 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_688[offsetof(State, retract_unnamed_line) == 688 ? 1 : -1];
+typedef char State_in_cycles_stands_at_692[offsetof(State, in_cycles) == 692 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_696[offsetof(State, cycle_level_mm) == 696 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_704[offsetof(State, cycle_level_known) == 704 ? 1 : -1];
+typedef char State_cycle_r_stands_at_712[offsetof(State, cycle_r) == 712 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_720[offsetof(State, cycle_depth) == 720 ? 1 : -1];
+typedef char State_cycle_q_stands_at_728[offsetof(State, cycle_q) == 728 ? 1 : -1];
+typedef char State_cycle_p_stands_at_736[offsetof(State, cycle_p) == 736 ? 1 : -1];
+typedef char State_cycle_line_stands_at_744[offsetof(State, cycle_line) == 744 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_748[offsetof(State, cycle_plane) == 748 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_752[offsetof(State, cycle_unit_mm) == 752 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_760[offsetof(State, cycle_absolute) == 760 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 768 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1023,7 +1079,7 @@ typedef struct {
     Rows rows;
     EventView events;
     FoundView found;
-    Floats offsets_mm;
+    Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
     Ints32 group_of_g;

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
 from gcode2krl.units import MM_PER_INCH
@@ -389,6 +390,7 @@ FINDINGS: dict[int, Finding] = {
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
 }
+FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 
 WITH_COLUMN = {
@@ -399,26 +401,24 @@ WITH_COLUMN = {
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
     ":": "write a program number as O1000, or remove the line",
+    "$": "remove the line: $ begins a command to the control, not a block",
     "%": "write % alone on its line, and nothing behind it",
     ",": "write a decimal point for a decimal comma, and no commas between words",
     ")": "write ( before the comment, or remove the )",
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
-_SHIFT_REMEDY = "put the offset into [work_offsets] of the cell"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
     v.G7: ("lathe diameter mode", "this is a milling translator"),
     v.G8: ("lathe radius mode", "this is a milling translator"),
-    v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     v.G38: ("probing is not a motion this program can make", "probe on the controller"),
     v.G41: (
         f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
-    v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
-    v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
+    v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     v.G70: ("lathe cycle", "this is a milling translator"),
     v.G76: ("threading cycle of a lathe", "mill the thread"),
     v.G87: (
@@ -429,7 +429,6 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
         "the operator retracts the tool by hand, which a robot's program cannot wait for",
         "use G86 or G89, or let the post write the cycle out",
     ),
-    v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
     v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
@@ -463,6 +462,11 @@ def decimals_needed(unit_mm: float) -> int:
     return math.ceil(math.log10(_LAST_PLACES * unit_mm / _DIFFERENCE_MM))
 
 
+def _listed(letters: str) -> str:
+    """Return letters as ``X, Y and Z``."""
+    return " and ".join(", ".join(letters).rsplit(", ", 1))
+
+
 def letters_of(bits: float) -> str:
     """Return the letters whose bits are set, A first."""
     return "".join(chr(LETTER_A + k) for k in range(v.LETTERS) if int(bits) >> k & 1)
@@ -481,7 +485,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
-        "words": " and ".join(letters_of(a)) if number in _OF_LETTERS else "",
+        "words": " and ".join(letters_of(a)) if number in (*_OF_LETTERS, of_offsets.ROTARY) else "",
+        "axes": _listed(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",
@@ -562,6 +567,8 @@ def _replacement(code: int) -> str:
     character = _foreign(code) if code >= FIRST_FOREIGN else ""
     if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
         return "write - (the minus sign of the keyboard)"
+    if character and unicodedata.category(character) == "Zs":
+        return "write a plain blank"
     return "remove it, or put it in a comment ( )"
 
 

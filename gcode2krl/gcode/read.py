@@ -151,7 +151,7 @@ def read_stream(
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
     interpreter = _Interpreter(
         name,
-        offsets_mm=offsets,
+        offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=lengths,
         chord_tolerance_mm=chord_tolerance_mm,
@@ -225,12 +225,23 @@ def _size_of(stream: BinaryIO) -> int:
 
 
 def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
-    offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
+    """Return G54 to G59.3 (9, 4), X, Y, Z in mm and the rotation about Z in degrees; and which are stated."""
+    offsets, known = np.zeros((9, 4)), np.zeros(9, dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
-        if frame.a_deg or frame.b_deg or frame.c_deg:
-            raise input_error("cell-key", f"work_offsets.{name}: found a rotation, allowed: x_mm, y_mm, z_mm")
+        if frame.b_deg or frame.c_deg:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: found a rotation about Y or X (b_deg, c_deg), allowed: Z (a_deg)",
+                "tilt $BASE itself: [frames] base",
+            )
+        if frame.a_deg and cell is not None and cell.machine is not None:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: with rotary axes in [machine] no rotation (a_deg) is read",
+                "rotate $BASE itself: [frames] base",
+            )
         index = WORK_OFFSETS.index(name)
-        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm
+        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm, frame.a_deg
         known[index] = True
     return offsets, known
 

@@ -143,7 +143,9 @@ class _Way:
         self._line = columns["source_line"]
         by_vector = self._mode == v.TURN_VECTOR
         self._by_machine = self._mode == v.TURN_MACHINE
-        self._require_lengths(self._by_machine & turn.any(axis=1))
+        turned = self._by_machine & turn.any(axis=1) & ~columns["machine"]
+        self._require_lengths(turned)
+        self._require_tool_lengths(turned)
         self._to_deg = np.where(by_vector[:, None], 0.0, turn)
         before_by_vector = np.append(False, by_vector[:-1])
         self._in_plane = by_vector | before_by_vector
@@ -165,6 +167,16 @@ class _Way:
         if lacking:
             reason = f"line {int(self._line[rows[0]])} turns rotary axes without TCPM"
             raise NotUnderstoodError([missing_key(key, reason) for key in lacking], self._source)
+
+    def _require_tool_lengths(self, used: Bools) -> None:
+        """Raise where a head is turned whose tip nobody can tell: no G43, or a tool of unknown length."""
+        offset = np.nan_to_num(self._columns["length_offset_mm"], nan=0.0)
+        rows = np.flatnonzero(used & (offset == 0.0))
+        if len(rows) and self._machine.head_axes:
+            sentence = "the head turns the tip about its pivot, and the length of the tool is not known here"
+            remedy = "program G43 with a tool that has length_mm in the cell"
+            line = int(self._line[rows[0]])
+            raise input_error("turned-length", sentence, remedy, line=line, source=self._source)
 
     def _ends(self, turn: Floats, by_vector: Bools) -> None:
         """Find where each row ends, and where it begins in its own terms."""

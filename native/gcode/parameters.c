@@ -22,13 +22,14 @@ enum {
     LAST_OF_OFFSETS = 5390,
     TOOL = 5400,
     TOOL_OFFSET = 5401,
+    OF_A_SYSTEM_ROTATION = 9,
     LAST_OF_TOOL = 5413,
     POSITION = 5420,
     LAST_OF_STATE = 5428
 };
 
 static const double *base_mm(const Machine *machine) {
-    return &CELL(machine->offsets_mm, machine->state.at->work_offset, 0);
+    return machine->state.at->base_mm;
 }
 
 /* Return where the tool stands along an axis, in the work offset and the unit in force. */
@@ -40,7 +41,8 @@ static double programmed(const Machine *machine, int axis) {
 
 static double of_work_offset(const Machine *machine, int64_t number) {
     const int64_t system = (number - FIRST_SYSTEM) / OF_A_SYSTEM, axis = (number - FIRST_SYSTEM) % OF_A_SYSTEM;
-    return system < SYSTEMS && axis < 3 ? CELL(machine->offsets_mm, system, axis) : 0.0;
+    const int64_t column = axis == OF_A_SYSTEM_ROTATION ? 3 : axis;
+    return system < SYSTEMS && column <= 3 && (axis < 3 || column != axis) ? CELL(machine->offsets, system, column) : 0.0;
 }
 
 /* Return one of #5161 to #5428, which show the state of the machine. */
@@ -50,6 +52,10 @@ static double of_state(const Machine *machine, int64_t number) {
         return s->home_28[number - HOME_28];
     if (number >= HOME_30 && number < HOME_30 + 3)
         return s->home_30[number - HOME_30];
+    if (number >= SHIFT && number < SHIFT + 3)
+        return s->shift_kept_mm[number - SHIFT];
+    if (number == SHIFT - 1)
+        return s->shift_mm[0] != 0.0 || s->shift_mm[1] != 0.0 || s->shift_mm[2] != 0.0;
     if (number == SYSTEM)
         return s->work_offset + 1;
     if (number >= FIRST_SYSTEM && number <= LAST_OF_OFFSETS)

@@ -51,7 +51,15 @@ def test_a_correct_arc_behind_a_refused_block_is_not_blamed(fault):
 
 @pytest.mark.parametrize(
     "fault",
-    ["G1 X#0 Y5", "G1 X[1+]", "#1=3 G1 X#<a>", "G87 X5 Y5 Z-5 R1", "G10 L2 P1 X5", "G91 G1 X5,5", "G92 X7"],
+    [
+        "G1 X#0 Y5",
+        "G1 X[1+]",
+        "#1=3 G1 X#<a>",
+        "G87 X5 Y5 Z-5 R1",
+        "G10 L2 P1.5 X5",
+        "G91 G1 X5,5",
+        "G92 X[7+]",
+    ],
 )
 def test_an_arc_from_a_position_in_doubt_is_not_judged(fault):
     found = errors(f"{fault}\nG2 X20 I5 F100\nG0 X20 Y0 Z0\nG90\nM2\n")
