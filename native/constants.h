@@ -309,6 +309,7 @@
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
 #define F_LETTER_A 65
+#define F_VALUE_REMEDY "check the parameters that the expression takes"
 #define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
@@ -499,6 +500,12 @@
 #define PF_POWER 5
 #define PF_NOT_A_NUMBER 6
 #define PF_INFINITE 7
+#define PF_IN_MACHINE_UNIT 8
+#define PF_OF_TOOL_TABLE 9
+#define PF_OF_OTHER_AXIS 10
+#define PF_FEED_OF_TIME 11
+#define PF_FEED_OF_OTHER_UNIT 12
+#define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
 #define PF_FAULT_NO_OPENING 2
@@ -517,7 +524,6 @@
 #define PF_FAULT_ARGUMENTS 15
 #define PF_FAULT_REPEATS 16
 #define PF_FAULT_NOT_FIRST 17
-#define PF_FAULT_MODES 18
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -679,6 +685,7 @@ typedef struct {
     int32_t motion;
     int32_t feed_mode;
     double feed;
+    double feed_of_other_unit;
     double rpm;
     int32_t direction;
     int32_t tool;
@@ -764,78 +771,79 @@ typedef char State_plane_stands_at_44[offsetof(State, plane) == 44 ? 1 : -1];
 typedef char State_motion_stands_at_48[offsetof(State, motion) == 48 ? 1 : -1];
 typedef char State_feed_mode_stands_at_52[offsetof(State, feed_mode) == 52 ? 1 : -1];
 typedef char State_feed_stands_at_56[offsetof(State, feed) == 56 ? 1 : -1];
-typedef char State_rpm_stands_at_64[offsetof(State, rpm) == 64 ? 1 : -1];
-typedef char State_direction_stands_at_72[offsetof(State, direction) == 72 ? 1 : -1];
-typedef char State_tool_stands_at_76[offsetof(State, tool) == 76 ? 1 : -1];
-typedef char State_selected_tool_stands_at_80[offsetof(State, selected_tool) == 80 ? 1 : -1];
-typedef char State_length_offset_stands_at_88[offsetof(State, length_offset) == 88 ? 1 : -1];
-typedef char State_offset_tool_stands_at_96[offsetof(State, offset_tool) == 96 ? 1 : -1];
-typedef char State_exact_stop_stands_at_100[offsetof(State, exact_stop) == 100 ? 1 : -1];
-typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1 : -1];
-typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
-typedef char State_base_mm_stands_at_120[offsetof(State, base_mm) == 120 ? 1 : -1];
-typedef char State_shift_mm_stands_at_144[offsetof(State, shift_mm) == 144 ? 1 : -1];
-typedef char State_shift_kept_mm_stands_at_168[offsetof(State, shift_kept_mm) == 168 ? 1 : -1];
-typedef char State_shift_line_stands_at_192[offsetof(State, shift_line) == 192 ? 1 : -1];
-typedef char State_pivot_mm_stands_at_200[offsetof(State, pivot_mm) == 200 ? 1 : -1];
-typedef char State_rotation_cos_stands_at_216[offsetof(State, rotation_cos) == 216 ? 1 : -1];
-typedef char State_rotation_sin_stands_at_224[offsetof(State, rotation_sin) == 224 ? 1 : -1];
-typedef char State_rotated_stands_at_232[offsetof(State, rotated) == 232 ? 1 : -1];
-typedef char State_offsets_taken_stands_at_233[offsetof(State, offsets_taken) == 233 ? 1 : -1];
-typedef char State_home_28_stands_at_240[offsetof(State, home_28) == 240 ? 1 : -1];
-typedef char State_home_30_stands_at_264[offsetof(State, home_30) == 264 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_288[offsetof(State, rotary_deg) == 288 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_312[offsetof(State, rotary_unknown) == 312 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_320[offsetof(State, home_28_deg) == 320 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_344[offsetof(State, home_30_deg) == 344 ? 1 : -1];
-typedef char State_tool_vector_stands_at_368[offsetof(State, tool_vector) == 368 ? 1 : -1];
-typedef char State_has_vector_stands_at_392[offsetof(State, has_vector) == 392 ? 1 : -1];
-typedef char State_length_code_stands_at_396[offsetof(State, length_code) == 396 ? 1 : -1];
-typedef char State_feed_word_stands_at_400[offsetof(State, feed_word) == 400 ? 1 : -1];
-typedef char State_arcs_stands_at_408[offsetof(State, arcs) == 408 ? 1 : -1];
-typedef char State_mist_stands_at_412[offsetof(State, mist) == 412 ? 1 : -1];
-typedef char State_flood_stands_at_413[offsetof(State, flood) == 413 ? 1 : -1];
-typedef char State_ended_stands_at_414[offsetof(State, ended) == 414 ? 1 : -1];
-typedef char State_end_line_stands_at_416[offsetof(State, end_line) == 416 ? 1 : -1];
-typedef char State_tape_marks_stands_at_420[offsetof(State, tape_marks) == 420 ? 1 : -1];
-typedef char State_unit_named_stands_at_424[offsetof(State, unit_named) == 424 ? 1 : -1];
-typedef char State_blocks_stands_at_432[offsetof(State, blocks) == 432 ? 1 : -1];
-typedef char State_largest_mm_stands_at_440[offsetof(State, largest_mm) == 440 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_448[offsetof(State, unknown_feed_line) == 448 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_452[offsetof(State, unknown_reported) == 452 ? 1 : -1];
-typedef char State_doubt_stands_at_456[offsetof(State, doubt) == 456 ? 1 : -1];
-typedef char State_motion_line_stands_at_460[offsetof(State, motion_line) == 460 ? 1 : -1];
-typedef char State_distance_line_stands_at_464[offsetof(State, distance_line) == 464 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_468[offsetof(State, feed_mode_line) == 468 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_472[offsetof(State, rotary_refused) == 472 ? 1 : -1];
-typedef char State_note_count_stands_at_476[offsetof(State, note_count) == 476 ? 1 : -1];
-typedef char State_note_line_stands_at_504[offsetof(State, note_line) == 504 ? 1 : -1];
-typedef char State_note_word_stands_at_532[offsetof(State, note_word) == 532 ? 1 : -1];
-typedef char State_moved_mm_stands_at_560[offsetof(State, moved_mm) == 560 ? 1 : -1];
-typedef char State_misfits_stands_at_632[offsetof(State, misfits) == 632 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_636[offsetof(State, misfits_other_centre) == 636 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_640[offsetof(State, misfits_reversed) == 640 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_644[offsetof(State, misfits_exchanged) == 644 ? 1 : -1];
-typedef char State_spirals_stands_at_648[offsetof(State, spirals) == 648 ? 1 : -1];
-typedef char State_spiral_line_stands_at_652[offsetof(State, spiral_line) == 652 ? 1 : -1];
-typedef char State_spiral_start_stands_at_656[offsetof(State, spiral_start) == 656 ? 1 : -1];
-typedef char State_spiral_end_stands_at_664[offsetof(State, spiral_end) == 664 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_672[offsetof(State, spiral_unit_mm) == 672 ? 1 : -1];
-typedef char State_retract_stands_at_680[offsetof(State, retract) == 680 ? 1 : -1];
-typedef char State_retract_line_stands_at_684[offsetof(State, retract_line) == 684 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_688[offsetof(State, retract_unnamed_line) == 688 ? 1 : -1];
-typedef char State_in_cycles_stands_at_692[offsetof(State, in_cycles) == 692 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_696[offsetof(State, cycle_level_mm) == 696 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_704[offsetof(State, cycle_level_known) == 704 ? 1 : -1];
-typedef char State_cycle_r_stands_at_712[offsetof(State, cycle_r) == 712 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_720[offsetof(State, cycle_depth) == 720 ? 1 : -1];
-typedef char State_cycle_q_stands_at_728[offsetof(State, cycle_q) == 728 ? 1 : -1];
-typedef char State_cycle_p_stands_at_736[offsetof(State, cycle_p) == 736 ? 1 : -1];
-typedef char State_cycle_line_stands_at_744[offsetof(State, cycle_line) == 744 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_748[offsetof(State, cycle_plane) == 748 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_752[offsetof(State, cycle_unit_mm) == 752 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_760[offsetof(State, cycle_absolute) == 760 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 768 ? 1 : -1];
+typedef char State_feed_of_other_unit_stands_at_64[offsetof(State, feed_of_other_unit) == 64 ? 1 : -1];
+typedef char State_rpm_stands_at_72[offsetof(State, rpm) == 72 ? 1 : -1];
+typedef char State_direction_stands_at_80[offsetof(State, direction) == 80 ? 1 : -1];
+typedef char State_tool_stands_at_84[offsetof(State, tool) == 84 ? 1 : -1];
+typedef char State_selected_tool_stands_at_88[offsetof(State, selected_tool) == 88 ? 1 : -1];
+typedef char State_length_offset_stands_at_96[offsetof(State, length_offset) == 96 ? 1 : -1];
+typedef char State_offset_tool_stands_at_104[offsetof(State, offset_tool) == 104 ? 1 : -1];
+typedef char State_exact_stop_stands_at_108[offsetof(State, exact_stop) == 108 ? 1 : -1];
+typedef char State_tolerance_stands_at_112[offsetof(State, tolerance) == 112 ? 1 : -1];
+typedef char State_work_offset_stands_at_120[offsetof(State, work_offset) == 120 ? 1 : -1];
+typedef char State_base_mm_stands_at_128[offsetof(State, base_mm) == 128 ? 1 : -1];
+typedef char State_shift_mm_stands_at_152[offsetof(State, shift_mm) == 152 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_176[offsetof(State, shift_kept_mm) == 176 ? 1 : -1];
+typedef char State_shift_line_stands_at_200[offsetof(State, shift_line) == 200 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_208[offsetof(State, pivot_mm) == 208 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_224[offsetof(State, rotation_cos) == 224 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_232[offsetof(State, rotation_sin) == 232 ? 1 : -1];
+typedef char State_rotated_stands_at_240[offsetof(State, rotated) == 240 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_241[offsetof(State, offsets_taken) == 241 ? 1 : -1];
+typedef char State_home_28_stands_at_248[offsetof(State, home_28) == 248 ? 1 : -1];
+typedef char State_home_30_stands_at_272[offsetof(State, home_30) == 272 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_296[offsetof(State, rotary_deg) == 296 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_320[offsetof(State, rotary_unknown) == 320 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_328[offsetof(State, home_28_deg) == 328 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_352[offsetof(State, home_30_deg) == 352 ? 1 : -1];
+typedef char State_tool_vector_stands_at_376[offsetof(State, tool_vector) == 376 ? 1 : -1];
+typedef char State_has_vector_stands_at_400[offsetof(State, has_vector) == 400 ? 1 : -1];
+typedef char State_length_code_stands_at_404[offsetof(State, length_code) == 404 ? 1 : -1];
+typedef char State_feed_word_stands_at_408[offsetof(State, feed_word) == 408 ? 1 : -1];
+typedef char State_arcs_stands_at_416[offsetof(State, arcs) == 416 ? 1 : -1];
+typedef char State_mist_stands_at_420[offsetof(State, mist) == 420 ? 1 : -1];
+typedef char State_flood_stands_at_421[offsetof(State, flood) == 421 ? 1 : -1];
+typedef char State_ended_stands_at_422[offsetof(State, ended) == 422 ? 1 : -1];
+typedef char State_end_line_stands_at_424[offsetof(State, end_line) == 424 ? 1 : -1];
+typedef char State_tape_marks_stands_at_428[offsetof(State, tape_marks) == 428 ? 1 : -1];
+typedef char State_unit_named_stands_at_432[offsetof(State, unit_named) == 432 ? 1 : -1];
+typedef char State_blocks_stands_at_440[offsetof(State, blocks) == 440 ? 1 : -1];
+typedef char State_largest_mm_stands_at_448[offsetof(State, largest_mm) == 448 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_456[offsetof(State, unknown_feed_line) == 456 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_460[offsetof(State, unknown_reported) == 460 ? 1 : -1];
+typedef char State_doubt_stands_at_464[offsetof(State, doubt) == 464 ? 1 : -1];
+typedef char State_motion_line_stands_at_468[offsetof(State, motion_line) == 468 ? 1 : -1];
+typedef char State_distance_line_stands_at_472[offsetof(State, distance_line) == 472 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_476[offsetof(State, feed_mode_line) == 476 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_480[offsetof(State, rotary_refused) == 480 ? 1 : -1];
+typedef char State_note_count_stands_at_484[offsetof(State, note_count) == 484 ? 1 : -1];
+typedef char State_note_line_stands_at_512[offsetof(State, note_line) == 512 ? 1 : -1];
+typedef char State_note_word_stands_at_540[offsetof(State, note_word) == 540 ? 1 : -1];
+typedef char State_moved_mm_stands_at_568[offsetof(State, moved_mm) == 568 ? 1 : -1];
+typedef char State_misfits_stands_at_640[offsetof(State, misfits) == 640 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_644[offsetof(State, misfits_other_centre) == 644 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_648[offsetof(State, misfits_reversed) == 648 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_652[offsetof(State, misfits_exchanged) == 652 ? 1 : -1];
+typedef char State_spirals_stands_at_656[offsetof(State, spirals) == 656 ? 1 : -1];
+typedef char State_spiral_line_stands_at_660[offsetof(State, spiral_line) == 660 ? 1 : -1];
+typedef char State_spiral_start_stands_at_664[offsetof(State, spiral_start) == 664 ? 1 : -1];
+typedef char State_spiral_end_stands_at_672[offsetof(State, spiral_end) == 672 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_680[offsetof(State, spiral_unit_mm) == 680 ? 1 : -1];
+typedef char State_retract_stands_at_688[offsetof(State, retract) == 688 ? 1 : -1];
+typedef char State_retract_line_stands_at_692[offsetof(State, retract_line) == 692 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_696[offsetof(State, retract_unnamed_line) == 696 ? 1 : -1];
+typedef char State_in_cycles_stands_at_700[offsetof(State, in_cycles) == 700 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_704[offsetof(State, cycle_level_mm) == 704 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_712[offsetof(State, cycle_level_known) == 712 ? 1 : -1];
+typedef char State_cycle_r_stands_at_720[offsetof(State, cycle_r) == 720 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_728[offsetof(State, cycle_depth) == 728 ? 1 : -1];
+typedef char State_cycle_q_stands_at_736[offsetof(State, cycle_q) == 736 ? 1 : -1];
+typedef char State_cycle_p_stands_at_744[offsetof(State, cycle_p) == 744 ? 1 : -1];
+typedef char State_cycle_line_stands_at_752[offsetof(State, cycle_line) == 752 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_756[offsetof(State, cycle_plane) == 756 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_760[offsetof(State, cycle_unit_mm) == 760 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_768[offsetof(State, cycle_absolute) == 768 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 776 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -954,7 +962,6 @@ typedef struct {
     int32_t is_program;
     int32_t main_line;
     int32_t repeats;
-    int32_t saved;
     double parameters[30];
 } Frame;
 typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
@@ -964,7 +971,6 @@ typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
 typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
 typedef char Frame_main_line_stands_at_36[offsetof(Frame, main_line) == 36 ? 1 : -1];
 typedef char Frame_repeats_stands_at_40[offsetof(Frame, repeats) == 40 ? 1 : -1];
-typedef char Frame_saved_stands_at_44[offsetof(Frame, saved) == 44 ? 1 : -1];
 typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
 typedef char Frame_has_its_size[sizeof(Frame) == 288 ? 1 : -1];
 VIEW(FrameView, Frame);
@@ -1104,7 +1110,6 @@ typedef struct {
     Ints local_generation;
     Floats parameters;
     FrameView frames;
-    StateView saved_states;
     RepeatView repeats;
     AssignmentView assignments;
     CourseView course;

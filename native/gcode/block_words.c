@@ -46,12 +46,10 @@ static Taken take_g(Block *b, double value) {
 
 /* --- M-codes -------------------------------------------------------------------------------------------- */
 
-static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code < V_M70); }
+static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code <= V_M73); }
 
-/* Tell whether an M-code jumps, or saves and restores modes: native/gcode/execute.c does that. */
-static bool is_of_program(int64_t code) {
-    return code == V_M98 || code == V_M99 || (code >= V_M70 && code <= V_M73);
-}
+/* Tell whether an M-code jumps: native/gcode/execute.c does that. */
+static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
 
 /* Return what is in doubt after an M-code that is not read. */
 static int32_t doubt_of_m(int64_t code) { return code == V_M61 ? S_DOUBT_TOOL : 0; }
