@@ -33,6 +33,8 @@
 #define CH_LESS 60
 #define CH_EQUALS 61
 #define CH_GREATER 62
+#define CH_AT_SIGN 64
+#define CH_CARET 94
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
 #define CH_LETTER_F 70
@@ -160,11 +162,11 @@
 /* gcode2krl.gcode.vocabulary */
 #define V_CASE_BIT 32
 #define V_EXCLAMATION 33
-#define V_LETTER_A 65
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
 #define V_UNREAD_NUMBER 32
-#define V_LETTERS 26
+#define V_ALPHABET "ABCDEFGHIJKLMNOPQRSTUVWXYZ@^"
+#define V_LETTERS 28
 #define V_WORD_D 3
 #define V_WORD_E 4
 #define V_WORD_F 5
@@ -181,6 +183,8 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_WORD_RADIUS 26
+#define V_WORD_ANGLE 27
 #define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
 #define V_TENFOLD 10
 #define V_LARGEST_G 999
@@ -282,7 +286,6 @@
 
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
-#define F_LETTER_A 65
 #define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
@@ -356,6 +359,12 @@
 #define FC_SPINDLE_OFF 213
 #define FC_SPINDLE_DIRECTION 214
 #define FC_TOO_LONG 215
+
+/* gcode2krl.gcode.polar_findings */
+#define FP_PLANE 220
+#define FP_WITH_AXIS 221
+#define FP_G53 222
+#define FP_AT_ZERO 223
 
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1

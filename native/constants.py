@@ -29,6 +29,7 @@ MODULES = {
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
     "FC": "gcode2krl.gcode.cycle_findings",
+    "FP": "gcode2krl.gcode.polar_findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",
     "ED": "gcode2krl.cutting.edge",

@@ -5,6 +5,7 @@ import re
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import polar_findings as p
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
@@ -45,6 +46,10 @@ _FIXED = {
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
     c.R_BELOW_DEPTH: "R",
+    p.PLANE: r"[@\^]",
+    p.WITH_AXIS: r"[@\^]",
+    p.G53: r"[@\^]",
+    p.AT_ZERO: r"[@\^]",
     c.REPEATS: "L",
     c.DWELL_NEGATIVE: "P",
     c.PECK_NOT_POSITIVE: "Q",
@@ -88,7 +93,7 @@ def _pattern(number: int, a: float, b: float) -> str:
     if number in _OF_LETTER_A:
         return letter
     if number == f.UNUSED_WORD:
-        return f"[{f.letters_of(a)}]"
+        return f"[{re.escape(f.letters_of(a))}]"
     if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):

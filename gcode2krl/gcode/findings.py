@@ -10,10 +10,12 @@ import math
 import unicodedata
 from typing import NamedTuple
 
-from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
+from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
+from gcode2krl.gcode import polar_findings as of_polar
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.never_read import NEVER_READ
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -293,6 +295,7 @@ FINDINGS: dict[int, Finding] = {
     ),
 }
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
+FINDINGS |= {number: Finding(*text) for number, text in of_polar.TEXTS.items()}
 
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
@@ -345,6 +348,7 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
 }
 
 
+UNSUPPORTED_G_REASONS |= NEVER_READ
 SPIRAL_SENTENCE = (
     "{count} with radii that differ at start and end, most by {difference:.4f} mm "
     "({a:.4f} and {b:.4f} mm); read as a spiral"
@@ -363,7 +367,7 @@ def decimals_needed(unit_mm: float) -> int:
 
 def letters_of(bits: float) -> str:
     """Return the letters whose bits are set, A first."""
-    return "".join(chr(LETTER_A + k) for k in range(v.LETTERS) if int(bits) >> k & 1)
+    return "".join(letter for k, letter in enumerate(v.ALPHABET) if int(bits) >> k & 1)
 
 
 def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0, excerpt: str = "") -> Issue:

@@ -4,7 +4,7 @@ Plain module constants: the compiled core takes their values from here. In it a 
 value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import CASE_BIT, EXCLAMATION, LETTER_A
+from gcode2krl.ascii_codes import CASE_BIT, EXCLAMATION
 
 LINE_LIMIT = 4096
 """Longest line that is read, in bytes; a part program has none that long."""
@@ -13,12 +13,14 @@ MARK = EXCLAMATION
 UNREAD_NUMBER = CASE_BIT
 """Added to a letter whose value cannot be read: the small letter."""
 
-LETTERS = 26
+ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ@^"
+"""Letters of words in the order of arrays by letter; the last two are polar words."""
+LETTERS = 28
 
 
 def index_of(letter: str) -> int:
-    """Return the place of a capital letter in arrays by letter (26,): A is 0."""
-    return ord(letter) - LETTER_A
+    """Return the place of a letter in arrays by letter (28,): A is 0."""
+    return ALPHABET.index(letter)
 
 
 WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (
@@ -26,6 +28,7 @@ WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T =
 )
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
+WORD_RADIUS, WORD_ANGLE = index_of("@"), index_of("^")
 OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
 """Rotary and secondary axes."""
 

@@ -6,6 +6,7 @@
 #include "gcode/block.h"
 
 enum { NO_ARC = -1 };
+static const double POLAR_ZERO_MM = 1e-9; /* nearer to the zero there is no direction */
 static const double RAPID_MM_S = INFINITY;
 
 /* Write the next row: it ends at the state's position. */

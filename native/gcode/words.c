@@ -138,7 +138,7 @@ static int lost_letter(const Scan *scan, int lost, int64_t line) {
     if (scan->words == 0 || AT(scan->line, scan->words - 1) != line)
         return 0;
     const int letter = AT(scan->letter, scan->words - 1);
-    return letter >= CH_LETTER_A && letter <= CH_LETTER_Z ? letter : 0;
+    return (letter >= CH_LETTER_A && letter <= CH_LETTER_Z) || is_polar_sign((uint8_t)letter) ? letter : 0;
 }
 
 /* Write what an item from `start` on makes; a line has one mark of its characters at most. */
@@ -179,13 +179,13 @@ EXPORT void gcode_scan(Scan *scan) {
             continue;
         }
         Item item;
-        if (is_letter(c)) {
+        if (is_letter(c) || is_polar_sign(c)) {
             const int letter = c & ~CH_CASE_BIT;
             const Number behind = number(text, i + 1);
             if (behind.digits > 0 && behind.finding == F_OK && letter != CH_LETTER_N &&
                 letter != CH_LETTER_O) {
                 put(scan, letter, behind.value, line);
-                if (letter >= CH_LETTER_X)
+                if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
                     most_decimals = most(most_decimals, behind.decimals);
                 i = behind.end;
                 first = false;
