@@ -45,6 +45,11 @@ _FIXED = {
     f.H_DIFFERS: "H",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
+    f.VECTOR_ZERO: "[IJK]",
+    f.VECTOR_ARC: _ARC_WORD,
+    f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
+    f.TURN_PER_REV: "[ABC]",
+    f.TURN_TOO_FAR: "[ABC]",
     c.R_BELOW_DEPTH: "R",
     p.PLANE: r"[@\^]",
     p.WITH_AXIS: r"[@\^]",
@@ -92,9 +97,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"{letter}(?=[^{letter}]*$)"
     if number in _OF_LETTER_A:
         return letter
-    if number == f.UNUSED_WORD:
+    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE):
         return f"[{re.escape(f.letters_of(a))}]"
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
         return _word("G", b)
