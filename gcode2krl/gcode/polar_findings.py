@@ -2,7 +2,7 @@
 
 from gcode2krl.errors import Severity
 
-PLANE, WITH_AXIS, G53, AT_ZERO = range(220, 224)
+PLANE, WITH_AXIS, G53, AT_ZERO = range(240, 244)
 TEXTS: dict[int, tuple[Severity, str, str, str]] = {
     PLANE: (
         "error",
