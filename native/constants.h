@@ -744,6 +744,8 @@ typedef struct {
     double spiral_unit_mm;
     int32_t retract;
     int32_t retract_line;
+    int32_t unset_parameter;
+    int32_t unset_line;
     int32_t retract_unnamed_line;
     int8_t in_cycles;
     double cycle_level_mm;
@@ -830,19 +832,21 @@ typedef char State_spiral_end_stands_at_672[offsetof(State, spiral_end) == 672 ?
 typedef char State_spiral_unit_mm_stands_at_680[offsetof(State, spiral_unit_mm) == 680 ? 1 : -1];
 typedef char State_retract_stands_at_688[offsetof(State, retract) == 688 ? 1 : -1];
 typedef char State_retract_line_stands_at_692[offsetof(State, retract_line) == 692 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_696[offsetof(State, retract_unnamed_line) == 696 ? 1 : -1];
-typedef char State_in_cycles_stands_at_700[offsetof(State, in_cycles) == 700 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_704[offsetof(State, cycle_level_mm) == 704 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_712[offsetof(State, cycle_level_known) == 712 ? 1 : -1];
-typedef char State_cycle_r_stands_at_720[offsetof(State, cycle_r) == 720 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_728[offsetof(State, cycle_depth) == 728 ? 1 : -1];
-typedef char State_cycle_q_stands_at_736[offsetof(State, cycle_q) == 736 ? 1 : -1];
-typedef char State_cycle_p_stands_at_744[offsetof(State, cycle_p) == 744 ? 1 : -1];
-typedef char State_cycle_line_stands_at_752[offsetof(State, cycle_line) == 752 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_756[offsetof(State, cycle_plane) == 756 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_760[offsetof(State, cycle_unit_mm) == 760 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_768[offsetof(State, cycle_absolute) == 768 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 776 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_696[offsetof(State, unset_parameter) == 696 ? 1 : -1];
+typedef char State_unset_line_stands_at_700[offsetof(State, unset_line) == 700 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_704[offsetof(State, retract_unnamed_line) == 704 ? 1 : -1];
+typedef char State_in_cycles_stands_at_708[offsetof(State, in_cycles) == 708 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_712[offsetof(State, cycle_level_mm) == 712 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_720[offsetof(State, cycle_level_known) == 720 ? 1 : -1];
+typedef char State_cycle_r_stands_at_728[offsetof(State, cycle_r) == 728 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_736[offsetof(State, cycle_depth) == 736 ? 1 : -1];
+typedef char State_cycle_q_stands_at_744[offsetof(State, cycle_q) == 744 ? 1 : -1];
+typedef char State_cycle_p_stands_at_752[offsetof(State, cycle_p) == 752 ? 1 : -1];
+typedef char State_cycle_line_stands_at_760[offsetof(State, cycle_line) == 760 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_764[offsetof(State, cycle_plane) == 764 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_768[offsetof(State, cycle_unit_mm) == 768 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_776[offsetof(State, cycle_absolute) == 776 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 784 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

@@ -287,7 +287,7 @@ def _empty_program(course: NDArray[Any]) -> Any:
     course["wanted"] = _NOTHING_WANTED
     course["generation"] = frames["generation"][0] = 1
     names = np.zeros(tables.MOST_NAMES, tables.NAME)
-    parameters = np.zeros(tables.MOST_PARAMETERS)
+    parameters = np.full(tables.MOST_PARAMETERS, np.nan)  # none is set
     parameters[_DEBUG_IS_SHOWN] = 1.0
     program = tables.PROGRAM(
         text=np.frombuffer("\n".join(f"<{name}>" for name in NAMES).encode(), np.uint8),

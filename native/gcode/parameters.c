@@ -115,8 +115,19 @@ int fault_of_name(const Machine *machine, int64_t name) {
     return s->feed != 0.0 && s->feed == s->feed_of_other_unit ? PF_FEED_OF_OTHER_UNIT : KNOWN;
 }
 
+/* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC; the first such place is kept. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
-    return is_read_only(number) ? of_state(e->machine, number) : AT(e->program->parameters, number);
+    if (is_read_only(number))
+        return of_state(e->machine, number);
+    const double value = AT(e->program->parameters, number);
+    if (!isnan(value))
+        return value;
+    State *s = e->machine->state.at;
+    if (s->unset_line == 0) {
+        s->unset_line = e->line;
+        s->unset_parameter = (int32_t)number;
+    }
+    return 0.0;
 }
 
 /* --- names ---------------------------------------------------------------------------------------------- */
