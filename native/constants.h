@@ -165,6 +165,8 @@
 #define V_MARK 33
 #define V_UNREAD_NUMBER 32
 #define V_LETTERS 26
+#define V_WORD_D 3
+#define V_WORD_L 11
 #define V_WORD_E 4
 #define V_WORD_F 5
 #define V_WORD_H 7
@@ -196,7 +198,11 @@
 #define V_G30_1 301
 #define V_G33 330
 #define V_G38 380
+#define V_G40 400
 #define V_G41 410
+#define V_G41_1 411
+#define V_G42 420
+#define V_G42_1 421
 #define V_G43 430
 #define V_G49 490
 #define V_G52 520
@@ -242,6 +248,7 @@
 #define V_MOTION_ARC_CCW 3
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
+#define V_PLANE_YZ 19
 #define V_INVERSE_TIME 93
 #define V_PER_MINUTE 94
 #define V_PER_REVOLUTION 95
@@ -322,10 +329,25 @@
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
 #define F_ARC_TOO_LONG 51
+#define F_CUTTER_ON 52
+#define F_CUTTER_PLANE 53
+#define F_CUTTER_NO_D 54
+#define F_CUTTER_NO_TOOL 55
+#define F_CUTTER_NO_DIAMETER 56
+#define F_CUTTER_LATHE 57
+#define F_CUTTER_DIFFERS 58
+#define F_CUTTER_ENTRY 59
+#define F_CUTTER_ENTRY_ARC 60
+#define F_CUTTER_EXIT_ARC 61
+#define F_CUTTER_ARC 62
+#define F_CUTTER_CORNER 63
+#define F_CUTTER_SHORT 64
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
 /* gcode2krl.gcode.state */
+#define S_CUTTER_ON 1
+#define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
 #define S_DOUBT_Z 4
@@ -509,6 +531,23 @@ typedef struct {
     double spiral_start;
     double spiral_end;
     double spiral_unit_mm;
+    int32_t cutter_mode;
+    int32_t cutter_side;
+    int32_t cutter_code;
+    int32_t cutter_line;
+    double cutter_radius_mm;
+    int8_t cutter_entered;
+    int8_t cutter_failed;
+    double cutter_normal[2];
+    int32_t held_turn;
+    int32_t held_line;
+    double held_from[2];
+    double held_along[2];
+    double held_centre[2];
+    double held_w[2];
+    double held_sweep;
+    int64_t held_rows[2];
+    int64_t held_events;
 } State;
 typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
 typedef char State_y_stands_at_8[offsetof(State, y) == 8 ? 1 : -1];
@@ -560,7 +599,24 @@ typedef char State_spiral_line_stands_at_296[offsetof(State, spiral_line) == 296
 typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 304 ? 1 : -1];
 typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_328[offsetof(State, cutter_mode) == 328 ? 1 : -1];
+typedef char State_cutter_side_stands_at_332[offsetof(State, cutter_side) == 332 ? 1 : -1];
+typedef char State_cutter_code_stands_at_336[offsetof(State, cutter_code) == 336 ? 1 : -1];
+typedef char State_cutter_line_stands_at_340[offsetof(State, cutter_line) == 340 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_344[offsetof(State, cutter_radius_mm) == 344 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_352[offsetof(State, cutter_entered) == 352 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_353[offsetof(State, cutter_failed) == 353 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_360[offsetof(State, cutter_normal) == 360 ? 1 : -1];
+typedef char State_held_turn_stands_at_376[offsetof(State, held_turn) == 376 ? 1 : -1];
+typedef char State_held_line_stands_at_380[offsetof(State, held_line) == 380 ? 1 : -1];
+typedef char State_held_from_stands_at_384[offsetof(State, held_from) == 384 ? 1 : -1];
+typedef char State_held_along_stands_at_400[offsetof(State, held_along) == 400 ? 1 : -1];
+typedef char State_held_centre_stands_at_416[offsetof(State, held_centre) == 416 ? 1 : -1];
+typedef char State_held_w_stands_at_432[offsetof(State, held_w) == 432 ? 1 : -1];
+typedef char State_held_sweep_stands_at_448[offsetof(State, held_sweep) == 448 ? 1 : -1];
+typedef char State_held_rows_stands_at_456[offsetof(State, held_rows) == 456 ? 1 : -1];
+typedef char State_held_events_stands_at_472[offsetof(State, held_events) == 472 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 480 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -658,6 +714,8 @@ typedef struct {
     Floats offsets_mm;
     Bools offset_known;
     Floats tool_length_mm;
+    Floats tool_diameter_mm;
+    Floats cutter_diameter_mm;
     Ints32 group_of_g;
     Ints32 doubt_of_g;
     Ints32 doubt_of_group;

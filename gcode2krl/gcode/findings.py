@@ -78,7 +78,20 @@ class Finding(NamedTuple):
     BAD_LINE_NUMBER,
     UNKNOWN_START,
     ARC_TOO_LONG,
-) = range(52)
+    CUTTER_ON,
+    CUTTER_PLANE,
+    CUTTER_NO_D,
+    CUTTER_NO_TOOL,
+    CUTTER_NO_DIAMETER,
+    CUTTER_LATHE,
+    CUTTER_DIFFERS,
+    CUTTER_ENTRY,
+    CUTTER_ENTRY_ARC,
+    CUTTER_EXIT_ARC,
+    CUTTER_ARC,
+    CUTTER_CORNER,
+    CUTTER_SHORT,
+) = range(65)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -287,6 +300,86 @@ FINDINGS: dict[int, Finding] = {
         "feed move from a position that has not been programmed{state}; arcs after it cannot fit",
         "program X, Y and Z with G0 (and G90) first",
     ),
+    CUTTER_ON: Finding(
+        "error",
+        "cutter-compensation-on",
+        "{code} while cutter compensation is on (G{h} of line {c:.0f})",
+        "write G40 and a straight move before it",
+    ),
+    CUTTER_PLANE: Finding(
+        "error",
+        "cutter-compensation-plane",
+        "G{g} in the plane of G19",
+        "cutter compensation works in G17 and G18",
+    ),
+    CUTTER_NO_D: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} without D",
+        "give the diameter of the cutter, G{g} D6.0; G41 and G42 take that of a tool",
+    ),
+    CUTTER_NO_TOOL: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} without D, and no tool is in the spindle",
+        "program T and M6 first, or name the tool by D",
+    ),
+    CUTTER_NO_DIAMETER: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} takes the diameter of tool {b:.0f}, which is not declared",
+        "add [tool.{b:.0f}] with diameter_mm to the cell, or a D to its line of the tool table",
+    ),
+    CUTTER_LATHE: Finding(
+        "error",
+        "cutter-lathe",
+        "L names the orientation of a lathe tool",
+        "remove L: this is a milling translator",
+    ),
+    CUTTER_DIFFERS: Finding(
+        "warning",
+        "cutter-differs",
+        "G{g} compensates for a diameter of {b:.4f} mm, the tool in the spindle has {c:.4f} mm in the cell: "
+        "the cut contour is {half:.4f} mm off the programmed one",
+        "nothing to do where wear is meant, or the program is the path of the centre; else use the D of the tool",
+    ),
+    CUTTER_ENTRY: Finding(
+        "error",
+        "cutter-entry",
+        "the entry move of cutter compensation is {a:.4f} mm long in its plane, not more than the radius "
+        "{b:.4f} mm of the tool",
+        "begin farther away from the contour; move along the tool before G41 or G42",
+    ),
+    CUTTER_ENTRY_ARC: Finding(
+        "error",
+        "cutter-entry",
+        "the entry arc of cutter compensation is too short for the radius {b:.4f} mm of the tool",
+        "begin with a straight move, or with a longer arc",
+    ),
+    CUTTER_EXIT_ARC: Finding(
+        "error",
+        "cutter-exit-arc",
+        "an arc as the first move after G40",
+        "leave cutter compensation with a straight move",
+    ),
+    CUTTER_ARC: Finding(
+        "error",
+        "cutter-arc",
+        "the arc of radius {a:.4f} mm is too small for the radius {b:.4f} mm of the tool inside it",
+        "use a smaller tool, or a larger radius",
+    ),
+    CUTTER_CORNER: Finding(
+        "error",
+        "cutter-gouge",
+        "the tool of radius {b:.4f} mm cannot reach the inside corner at the start of this block without gouging",
+        "use a smaller tool, or round the corner with a larger radius",
+    ),
+    CUTTER_SHORT: Finding(
+        "error",
+        "cutter-gouge",
+        "the move of line {a:.0f} is too short for the radius {b:.4f} mm of the tool between its inside corners",
+        "use a smaller tool, or leave the detail out",
+    ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
@@ -309,10 +402,6 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     v.G38: ("probing is not a motion this program can make", "probe on the controller"),
-    v.G41: (
-        f"cutter radius compensation: {_LATER}",
-        "let the CAM compensate the radius (computer compensation)",
-    ),
     v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
     v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
     v.G70: ("lathe cycle", "this is a milling translator"),
@@ -377,6 +466,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "g": f"{a / v.TENFOLD:g}",
         "h": f"{b / v.TENFOLD:g}",
         "difference": abs(a - b),
+        "half": abs(c - b) / 2.0,
+        "code": f"{'M' if a < 0 else 'G'}{abs(a) / v.TENFOLD:g}",
         "decimals": decimals_needed(MM_PER_INCH if c < 0 else 1.0),
         "state": _state(number, line, a, b, c),
         "reason": reason,

@@ -21,6 +21,7 @@ def index_of(letter: str) -> int:
     return ord(letter) - LETTER_A
 
 
+WORD_D, WORD_L = index_of("D"), index_of("L")
 WORD_E, WORD_F, WORD_H, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (index_of(letter) for letter in "EFHPQRST")
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
@@ -39,7 +40,7 @@ G20 = 200  # inch; else mm
 G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
 G33 = 330  # spindle-synchronised motion
 G38 = 380  # probing, G38.2 to G38.5
-G41 = 410  # cutter radius compensation, G41 to G42.1
+G40, G41, G41_1, G42, G42_1 = 400, 410, 411, 420, 421  # cutter radius compensation off, left, right
 G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
@@ -61,8 +62,8 @@ M98, M99 = 98, 99  # subprograms
 
 MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3
 """Motion modes of the state: none after G80 and before the first motion code, else the G number."""
-PLANE_XY, PLANE_ZX = 17, 18
-"""Planes of the state: the G number; 19 is Y Z."""
+PLANE_XY, PLANE_ZX, PLANE_YZ = 17, 18, 19
+"""Planes of the state: the G number."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
 """Feed modes of the state: the G number."""
 

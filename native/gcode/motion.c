@@ -3,6 +3,8 @@
 #include "gcode/motion.h"
 
 #include "gcode/arc_motion.h"
+#include "gcode/compensate.h"
+#include "gcode/cutter_settings.h"
 #include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
@@ -28,8 +30,8 @@ static void machine_target(const Block *b, double to_mm[3]) {
     to_mm[2] = b->has[V_WORD_Z] ? b->word[V_WORD_Z] * s->unit_mm - length_offset_of(s) : s->z;
 }
 
-/* G0 and G1, also under G53. */
-static void straight(Block *b, bool by_machine) {
+/* G0 and G1, also under G53; return false where there is no room for the rows. */
+static bool straight(Block *b, bool by_machine) {
     State *s = b->state;
     double to_mm[3], mm_s = RAPID_MM_S;
     if (by_machine)
@@ -44,6 +46,13 @@ static void straight(Block *b, bool by_machine) {
         if (finding != F_OK)
             report_speed(b, finding);
     }
+    s->cutter_mode &= ~S_CUTTER_BESIDE;
+    if (compensates(s)) {
+        learn(b);
+        const bool done = compensated_line(b, to_mm, mm_s);
+        stand_at(s, to_mm);
+        return done;
+    }
     stand_at(s, to_mm);
     if (by_machine) {
         s->known_x &= !b->has[V_WORD_X];
@@ -53,6 +62,7 @@ static void straight(Block *b, bool by_machine) {
         learn(b);
     }
     emit(b->machine, b->line, mm_s, s->motion == V_MOTION_RAPID, by_machine, NO_ARC);
+    return true;
 }
 
 /* G28 and G30: by way of the programmed point, then the named axes (or all) to the machine's home. */
@@ -114,8 +124,12 @@ bool move(Block *b) {
     } else if (special == V_G4 && s->motion >= V_MOTION_ARC_CW) {
         report(b, F_DWELL_WITH_ARC, (Says){0});
         follow(b);
+    } else if (special == V_G53 && compensates(s)) {
+        refuse_under_compensation(b, V_G53);
+        s->doubt |= S_DOUBT_POSITION;
     } else if (s->motion <= V_MOTION_LINE) {
-        straight(b, special == V_G53);
+        if (!straight(b, special == V_G53))
+            return false;
     } else {
         note_unknown_start(b);
         Arc arc = arc_of(b);
