@@ -41,6 +41,10 @@ _FIXED = {
     f.G53_INCREMENTAL: r"G\s*53",
     f.DWELL_WITH_ARC: r"G\s*0*4(?![\d.])",
     f.H_DIFFERS: "H",
+    f.CUTTER_EXIT_ARC: r"G\s*0*[23](?![\d.])|[XYZ]",
+    f.CUTTER_LATHE: "L",
+    f.CUTTER_NO_DIAMETER: r"D|G\s*4[12]",
+    f.CUTTER_DIFFERS: r"D|G\s*4[12]",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
 }
@@ -83,7 +87,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return letter
     if number == f.UNUSED_WORD:
         return f"[{f.letters_of(a)}]"
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
+    if number == f.CUTTER_ON:
+        return _word("M" if a < 0 else "G", abs(a))
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.CUTTER_PLANE, f.CUTTER_NO_D, f.CUTTER_NO_TOOL):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
         return _word("G", b)

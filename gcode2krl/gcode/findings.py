@@ -302,13 +302,13 @@ FINDINGS: dict[int, Finding] = {
     ),
     CUTTER_ON: Finding(
         "error",
-        "cutter-compensation-on",
+        "cutter-on",
         "{code} while cutter compensation is on (G{h} of line {c:.0f})",
         "write G40 and a straight move before it",
     ),
     CUTTER_PLANE: Finding(
         "error",
-        "cutter-compensation-plane",
+        "cutter-plane",
         "G{g} in the plane of G19",
         "cutter compensation works in G17 and G18",
     ),

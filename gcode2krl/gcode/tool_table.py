@@ -50,9 +50,7 @@ def tools_from_cell(cell: "Cell | None") -> Tools:
     """Return lengths and diameters from a cell."""
     tools = cell.tool if cell is not None else {}
     return Tools(
-        _by_number(
-            {number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None}
-        ),
+        _by_number({number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None}),
         _by_number({number: tool.diameter_mm for number, tool in tools.items()}),
     )
 
