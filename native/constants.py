@@ -28,6 +28,7 @@ MODULES = {
     "U": "gcode2krl.units",
     "V": "gcode2krl.gcode.vocabulary",
     "F": "gcode2krl.gcode.findings",
+    "FC": "gcode2krl.gcode.cycle_findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",
     "ED": "gcode2krl.cutting.edge",

@@ -83,6 +83,20 @@ STATE = np.dtype(
         ("held_sweep", "f8"),  # rad of an arc before its end is moved, above 0
         ("held_rows", "i8", 2),  # its first row, and the one behind its last
         ("held_events", "i8"),  # events before it
+        ("retract", "i4"),  # ten times 98 or 99
+        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
+        ("in_cycles", "i1"),  # a row of cycles has begun and no other motion has ended it
+        ("cycle_level_mm", "f8"),  # programmed height along the tool where it began, to which G98 leads back
+        ("cycle_level_known", "i1"),
+        ("cycle_r", "f8"),  # words of the last cycle, which hold for the next; programmed units
+        ("cycle_depth", "f8"),
+        ("cycle_q", "f8"),
+        ("cycle_p", "f8"),
+        ("cycle_line", "i4"),  # the last cycle, and the modes under which it stood
+        ("cycle_plane", "i4"),
+        ("cycle_unit_mm", "f8"),
+        ("cycle_absolute", "i1"),
     ],
     align=True,  # as C lays it out
 )
@@ -110,6 +124,7 @@ def initial_state() -> NDArray[np.void]:
     state["length_offset"] = np.nan
     state["offset_tool"] = -1
     state["tolerance"] = np.nan
+    state["retract"] = v.G99
     return state
 
 
@@ -118,7 +133,7 @@ UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2
 
 _GROUPS: dict[int, tuple[float, ...]] = {
     v.NON_MODAL: (4, 28, 28.1, 30, 30.1, 53),
-    v.MOTION: (0, 1, 2, 3, 80),
+    v.MOTION: (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89),
     v.PLANE: (17, 18, 19),
     v.DISTANCE: (90, 91),
     v.CENTRE: (90.1, 91.1),
@@ -134,8 +149,8 @@ _GROUPS: dict[int, tuple[float, ...]] = {
 """Modal group: the G-codes in it that are read."""
 _UNSUPPORTED = (
     *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5),
-    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76),
-    *(81, 82, 83, 84, 85, 86, 87, 88, 89, 92, 92.1, 92.2, 92.3, 96),
+    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76),
+    *(87, 88, 92, 92.1, 92.2, 92.3, 96),
 )
 """G-codes of this and other dialects that are known and not read."""
 
@@ -204,3 +219,5 @@ WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5
 """M number of a spindle stop that a tool change brings about."""
+OF_CYCLE = 1000
+"""In a spindle event of a canned cycle the cycle's number stands before that of the M-code, times this."""

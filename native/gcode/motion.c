@@ -5,6 +5,7 @@
 #include "gcode/arc_motion.h"
 #include "gcode/compensate.h"
 #include "gcode/cutter_settings.h"
+#include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
@@ -115,13 +116,13 @@ bool move(Block *b) {
         report(b, F_NO_MOTION_MODE, (Says){.a = s->motion_line});
         s->doubt |= S_DOUBT_MOTION;
         follow(b);
-    } else if (special == V_G53 && s->motion >= V_MOTION_ARC_CW) {
+    } else if (special == V_G53 && s->motion > V_MOTION_LINE) {
         report(b, F_G53_NEEDS_RAPID_OR_FEED, (Says){0});
         s->doubt |= S_DOUBT_POSITION;
     } else if (special == V_G53 && !s->absolute) {
         report_unless(b, S_DOUBT_DISTANCE, F_G53_INCREMENTAL, (Says){0});
         s->doubt |= S_DOUBT_POSITION;
-    } else if (special == V_G4 && s->motion >= V_MOTION_ARC_CW) {
+    } else if (special == V_G4 && s->motion > V_MOTION_LINE) {
         report(b, F_DWELL_WITH_ARC, (Says){0});
         follow(b);
     } else if (special == V_G53 && compensates(s)) {
@@ -129,6 +130,13 @@ bool move(Block *b) {
         s->doubt |= S_DOUBT_POSITION;
     } else if (s->motion <= V_MOTION_LINE) {
         if (!straight(b, special == V_G53))
+            return false;
+    } else if (is_cycle(s->motion) && s->cutter_mode & S_CUTTER_ON) {
+        refuse_under_compensation(b, s->motion * V_TENFOLD);
+        follow(b);
+        s->doubt |= S_DOUBT_Z;
+    } else if (is_cycle(s->motion)) {
+        if (!cycle_move(b))
             return false;
     } else {
         note_unknown_start(b);

@@ -169,7 +169,7 @@ def _canon(calls: list[Call]) -> Canon:
 
 
 def _prefixes(program: bytes) -> list[bytes]:
-    """Return the beginnings of a program; under cutter compensation M2 brings out the move that is held back."""
+    """Return the beginnings of a program; under cutter compensation M2 brings out the last move."""
     lines = program.splitlines(keepends=True)
     end = b"\nM2\n" if COMPENSATED.search(program) else b""
     return [b"".join(lines[:count]) + end for count in range(1, len(lines) + 1)]
