@@ -278,7 +278,8 @@ def targets_and_joints(
     if simplify_mm is not None:
         planned = _simplified(planned, toolpath, cell, simplify_mm, tolerance_mm)
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
-    return checked(replace(planned, issues=(*planned.issues, *warnings)), cell)
+    tilts = program.tilt_issues(planned, toolpath, cell)
+    return checked(replace(planned, issues=(*planned.issues, *warnings, *tilts)), cell)
 
 
 def _simplified(
@@ -463,8 +464,8 @@ def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
             return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
 
         if spin == "stiffest":
-            return program.stiffest_spin(position, quality, bending)
-        return program.smooth_spin(position, quality)
+            return program.stiffest_spin(position, quality, bending, axis)
+        return program.smooth_spin(position, quality, axis)
 
     return searched
 

@@ -5,13 +5,21 @@ import re
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
 _ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
-_OF_LETTER_A = {f.NUMBER_TOO_LONG, f.UNKNOWN_LETTER, f.ROTARY_WORD, f.BAD_INTEGER, f.ARC_WRONG_OFFSET}
+_OF_LETTER_A = {
+    f.NUMBER_TOO_LONG,
+    f.UNKNOWN_LETTER,
+    f.ROTARY_WORD,
+    f.BAD_INTEGER,
+    f.ARC_WRONG_OFFSET,
+    of_offsets.TOOL_ACROSS,
+}
 _FIXED = {
     f.COMMENT_OPEN: r"\((?!.*\))",
     f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()",
@@ -48,6 +56,22 @@ _FIXED = {
     f.CUTTER_DIFFERS: r"D|G\s*4[12]",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
+    of_offsets.WITHOUT_L: r"G\s*10",
+    of_offsets.UNKNOWN_L: "L",
+    of_offsets.WRONG_SYSTEM: r"P|G\s*10",
+    of_offsets.WRONG_TOOL: r"P|G\s*10",
+    of_offsets.TOOL_UNDECLARED: "P",
+    of_offsets.NO_LENGTH: r"G\s*10",
+    of_offsets.ROTATION_BY_POSITION: "R",
+    of_offsets.ADDED_BY_WORDS: "[XYZABCUVW]",
+    of_offsets.ADDED_WITHOUT_H: r"G\s*43",
+    of_offsets.AT_START: r"G\s*(92|10)",
+    of_offsets.LENGTH_DIFFERS: "[ZH]",
+    f.VECTOR_ZERO: "[IJK]",
+    f.VECTOR_ARC: _ARC_WORD,
+    f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
+    f.TURN_PER_REV: "[ABC]",
+    f.TURN_TOO_FAR: "[ABC]",
     c.R_BELOW_DEPTH: "R",
     c.REPEATS: "L",
     c.DWELL_NEGATIVE: "P",
@@ -56,10 +80,11 @@ _FIXED = {
 }
 
 
-def quote(block: bytes, number: int, a: float, b: float) -> str:
+def quote(block: bytes, number: int, a: float, b: float, c: float = -1.0) -> str:
     """Return the block with a caret before what finding ``number`` is about: ``G1 X10 ^I5``."""
     text = block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
-    at = _place(text, number, a, b)
+    told = number in f.WITH_COLUMN and c >= 0
+    at = min(int(c), len(text)) if told else _place(text, number, a, b)
     start = max(0, at - _BEFORE)
     stop = min(len(text), at + _AFTER)
     before, after = (_printable(part) for part in (text[start:at].lstrip(), text[at:stop].rstrip()))
@@ -91,11 +116,15 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"{letter}(?=[^{letter}]*$)"
     if number in _OF_LETTER_A:
         return letter
-    if number == f.UNUSED_WORD:
+    if number == of_offsets.FROM_UNKNOWN:
+        return f"[{f.letters_of(b)}]"
+    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
         return f"[{f.letters_of(a)}]"
     if number == f.CUTTER_ON:
         return _word("M" if a < 0 else "G", abs(a))
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.CUTTER_PLANE, f.CUTTER_NO_D, f.CUTTER_NO_TOOL):
+    if number in (f.CUTTER_PLANE, f.CUTTER_NO_D, f.CUTTER_NO_TOOL):
+        return _word("G", a)
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
         return _word("G", b)

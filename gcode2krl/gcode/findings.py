@@ -13,7 +13,9 @@ from typing import NamedTuple
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -79,6 +81,22 @@ class Finding(NamedTuple):
     BAD_LINE_NUMBER,
     UNKNOWN_START,
     ARC_TOO_LONG,
+    EXPRESSION_VALUE,
+    PARAMETER_UNDEFINED,
+    PARAMETER_NUMBER,
+    PARAMETER_READ_ONLY,
+    SUBPROGRAM_MISSING,
+    CALLS_TOO_DEEP,
+    TOO_MANY_STEPS,
+    TOO_MANY_ROWS,
+    NO_MACHINE,
+    ROTARY_UNKNOWN,
+    VECTOR_ZERO,
+    VECTOR_AND_ANGLE,
+    VECTOR_ARC,
+    TURN_PER_REV,
+    TURN_TOO_FAR,
+    CYCLE_TURNED,
     CUTTER_ON,
     CUTTER_PLANE,
     CUTTER_NO_D,
@@ -92,7 +110,10 @@ class Finding(NamedTuple):
     CUTTER_ARC,
     CUTTER_CORNER,
     CUTTER_SHORT,
-) = range(65)
+    CUTTER_ROTATED,
+    CUTTER_TURNED,
+    CUTTER_PARAMETER,
+) = range(84)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -111,17 +132,52 @@ FINDINGS: dict[int, Finding] = {
     COMMENT_NESTED: Finding(
         "error", "comment-nested", "a comment in a comment", "write it without the inner ( and )"
     ),
-    EXPRESSION: Finding(
-        "error",
-        "expression",
-        "parameters and expressions (#, [ ], =) are not read yet",
-        "let the CAM post write plain numbers",
+    EXPRESSION: Finding("error", "expression", "{fault}", "{remedy}"),
+    O_WORD: Finding("error", "o-word", "{fault}", "{remedy}"),
+    EXPRESSION_VALUE: Finding(
+        "error", "expression-value", "{fault}", "check the parameters that the expression takes"
     ),
-    O_WORD: Finding(
+    PARAMETER_UNDEFINED: Finding(
         "error",
-        "o-word",
-        "O-words (subprograms, loops, program numbers) are not read yet",
-        "expand subprograms in the post; remove a mere program number",
+        "parameter-undefined",
+        "the named parameter has not been set",
+        "set it before; a name without _ is known in its own subprogram only",
+    ),
+    PARAMETER_NUMBER: Finding(
+        "error",
+        "parameter-number",
+        "{a:g} is not the number of a parameter",
+        "parameters are #1 to #5601, whole numbers",
+    ),
+    PARAMETER_READ_ONLY: Finding(
+        "error",
+        "parameter-read-only",
+        "this parameter shows the state of the machine and cannot be set",
+        "use another; offsets are set by G10 and G92, or in [work_offsets] of the cell",
+    ),
+    SUBPROGRAM_MISSING: Finding(
+        "error",
+        "subprogram-missing",
+        "the subprogram is neither in this program nor a file",
+        "put its file (label.ngc) beside the program, or name its folder with --search",
+    ),
+    CALLS_TOO_DEEP: Finding(
+        "error",
+        "calls-too-deep",
+        "subprograms call each other more than {a:.0f} levels deep",
+        "does one call itself without end?",
+    ),
+    TOO_MANY_STEPS: Finding(
+        "error",
+        "endless-loop",
+        "the program has run {a:,.0f} lines and is not at its end",
+        "does the loop end? check its condition",
+    ),
+    TOO_MANY_ROWS: Finding(
+        "error",
+        "endless-loop",
+        "the program has made {a:,.0f} moves and is not at its end",
+        "does the loop end? check its condition",
     ),
     LINE_TOO_LONG: Finding(
         "error",
@@ -134,7 +190,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "rotary-axis",
         "{word} is a rotary or secondary axis, here at {b:g}, and the cell declares no machine",
-        "leave {word} at 0; rotary axes need a [machine] in the cell, which this version does not know",
+        "leave {word} at 0, or declare the machine that the program is for: [machine] in the cell",
     ),
     REPEATED_WORD: Finding("error", "repeated-word", "{word} stands twice in the block", "keep one"),
     SAME_GROUP_G: Finding(
@@ -381,31 +437,98 @@ FINDINGS: dict[int, Finding] = {
         "the move of line {a:.0f} is too short for the tool of radius {b:.4f} mm between its inside corners",
         "use a smaller tool, or leave the detail out",
     ),
+    CUTTER_ROTATED: Finding(
+        "error",
+        "cutter-frame",
+        "G{g} under a rotated work offset (G10 L2 R, or rotation_deg of the cell)",
+        "rotate the part's frame in the cell instead, or let the CAM compensate the radius",
+    ),
+    CUTTER_TURNED: Finding(
+        "error",
+        "cutter-frame",
+        "cutter compensation (G{g}) with rotary axes that are turned or move, or with tool vectors",
+        "turn to zero before G41 or G42, or let the CAM compensate the radius",
+    ),
+    CUTTER_PARAMETER: Finding(
+        "error",
+        "cutter-parameter",
+        "the diameter of the tool, or its place under cutter compensation, is not read from a parameter",
+        "write the number into the program, or read the place before G41 or G42",
+    ),
+    NO_MACHINE: Finding(
+        "error",
+        "machine-missing",
+        "G{g} programs the tip of a machine with rotary axes, and the cell declares no machine",
+        "declare the machine that the program is for: [machine] in the cell",
+    ),
+    ROTARY_UNKNOWN: Finding(
+        "error",
+        "rotary-unknown",
+        "where {words} stands is not known since tool vectors (G43.5) turned the tool",
+        "program {words} under G90, or G28, after G43.5",
+    ),
+    VECTOR_ZERO: Finding(
+        "error",
+        "tool-vector",
+        "the tool vector I{a:g} J{b:g} K{c:g} has no direction",
+        "give the direction from the tip to the holder",
+    ),
+    VECTOR_AND_ANGLE: Finding(
+        "error",
+        "tool-vector",
+        "{words} under G43.5, where I, J and K say how the tool stands",
+        "use G43.4 for rotary words",
+    ),
+    VECTOR_ARC: Finding(
+        "error",
+        "tool-vector",
+        "an arc under G43.5, where I, J and K are the tool vector",
+        "let the post write G1, or use G43.4",
+    ),
+    TURN_PER_REV: Finding(
+        "error",
+        "turn-per-rev",
+        "rotary axes alone under G95 of line {a:.0f}: degrees a revolution of the spindle have no use",
+        "use G93 or G94",
+    ),
+    CYCLE_TURNED: Finding(
+        "error",
+        "cycle-turned",
+        "G{g} moves along Z, and rotary axes turn in it or have turned the tool away from Z",
+        "turn before the cycle, without G43.4; or let the post write the cycle out in G0 and G1",
+    ),
+    TURN_TOO_FAR: Finding(
+        "error", "too-far", "a rotary axis at {a:g} degrees is beyond 1000 turns", "check the number"
+    ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
 }
+FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 
+WITH_COLUMN = {
+    *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
+    *(SUBPROGRAM_MISSING, CALLS_TOO_DEEP, CUTTER_PARAMETER),
+}
+"""Findings whose third number is the column of the culprit, -1 = not told."""
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
     ":": "write a program number as O1000, or remove the line",
+    "$": "remove the line: $ begins a command to the control, not a block",
     "%": "write % alone on its line, and nothing behind it",
     ",": "write a decimal point for a decimal comma, and no commas between words",
     ")": "write ( before the comment, or remove the )",
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
-_SHIFT_REMEDY = "put the offset into [work_offsets] of the cell"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
     v.G7: ("lathe diameter mode", "this is a milling translator"),
     v.G8: ("lathe radius mode", "this is a milling translator"),
-    v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     v.G38: ("probing is not a motion this program can make", "probe on the controller"),
-    v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
-    v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
+    v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     v.G70: ("lathe cycle", "this is a milling translator"),
     v.G76: ("threading cycle of a lathe", "mill the thread"),
     v.G87: (
@@ -416,7 +539,6 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
         "the operator retracts the tool by hand, which a robot's program cannot wait for",
         "use G86 or G89, or let the post write the cycle out",
     ),
-    v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
     v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
@@ -429,10 +551,10 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
         f"digital and analogue I/O words: {_LATER}",
         "map an own M-code in [m_code] of the cell",
     ),
-    v.TENFOLD * v.M70: (f"saving modal state: {_LATER}", "remove it"),
-    v.TENFOLD * v.M98: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
+_OF_LETTERS = (UNUSED_WORD, ROTARY_UNKNOWN, VECTOR_AND_ANGLE)
+"""Findings whose first number has the bits of letters."""
 
 SPIRAL_SENTENCE = (
     "{count} with radii that differ at start and end, most by {difference:.4f} mm "
@@ -448,6 +570,11 @@ and end are each off by half a unit in two coordinates, the centre by as much an
 def decimals_needed(unit_mm: float) -> int:
     """Return the decimals that keep the radii of an arc within 0.01 mm, for words in units of ``unit_mm``."""
     return math.ceil(math.log10(_LAST_PLACES * unit_mm / _DIFFERENCE_MM))
+
+
+def _listed(letters: str) -> str:
+    """Return letters as ``X, Y and Z``."""
+    return " and ".join(", ".join(letters).rsplit(", ", 1))
 
 
 def letters_of(bits: float) -> str:
@@ -468,7 +595,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
-        "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
+        "words": " and ".join(letters_of(a)) if number in (*_OF_LETTERS, of_offsets.ROTARY) else "",
+        "axes": _listed(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",
@@ -481,6 +609,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
+        **_program_fault(number, a, b),
     }
     return Issue(
         finding.severity,
@@ -490,6 +619,17 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         _remedy(finding, number, a, b).format(**values),
         excerpt,
     )
+
+
+def _program_fault(number: int, a: float, b: float) -> dict[str, str]:
+    """Return what is wrong with an expression or an O-word, and the remedy."""
+    if number in (EXPRESSION, O_WORD):
+        faults = EXPRESSION_FAULTS if number == EXPRESSION else O_WORD_FAULTS
+        fault, remedy = faults.get(int(a), faults[0])
+        return {"fault": fault, "remedy": remedy}
+    if number == EXPRESSION_VALUE:
+        return {"fault": VALUE_FAULTS[int(a)].format(b=b)}
+    return {}
 
 
 def _sentence(finding: Finding, number: int, a: float, b: float) -> str:
@@ -539,6 +679,8 @@ def _replacement(code: int) -> str:
     character = _foreign(code) if code >= FIRST_FOREIGN else ""
     if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
         return "write - (the minus sign of the keyboard)"
+    if character and unicodedata.category(character) == "Zs":
+        return "write a plain blank"
     return "remove it, or put it in a comment ( )"
 
 

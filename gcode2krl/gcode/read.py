@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import cycle
@@ -19,7 +19,9 @@ from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
+from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
+from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.state import (
     DOUBT_OF_G,
     DOUBT_OF_GROUP,
@@ -64,6 +66,7 @@ def read_gcode(
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    search: Sequence[str | Path] = (),
     progress: Progress | None = None,
 ) -> Toolpath:
     """Read a G-code file into a `Toolpath`.
@@ -76,6 +79,7 @@ def read_gcode(
     tools : a LinuxCNC ``tool.tbl`` in mm, used instead of the cell's tools.
     chord_tolerance_mm : largest distance between an arc and the chords that replace it.
     block_delete : skip lines that begin with ``/``.
+    search : folders with files of subprograms, looked into behind the program's own folder.
     progress : called with the number of bytes read.
 
     Raises
@@ -108,6 +112,7 @@ def read_gcode(
                 tools=tools,
                 chord_tolerance_mm=chord_tolerance_mm,
                 block_delete=block_delete,
+                folders=(Path(path).parent, *map(Path, search)),
                 progress=progress,
             )
     except OSError as error:
@@ -125,9 +130,13 @@ def read_stream(
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    folders: Sequence[Path] = (),
     progress: Progress | None = None,
 ) -> Toolpath:
-    """Read G-code from an open binary stream; see `read_gcode`."""
+    """Read G-code from an open binary stream; see `read_gcode`.
+
+    ``folders`` are all in which a file of a subprogram may be.
+    """
     if dialect != "linuxcnc":
         raise input_error("dialect-unknown", f"dialect {dialect!r}; allowed: linuxcnc", source=name)
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
@@ -141,7 +150,7 @@ def read_stream(
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
     interpreter = _Interpreter(
         name,
-        offsets_mm=offsets,
+        offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=stated.length_mm,
         tool_diameter_mm=stated.diameter_mm,
@@ -149,14 +158,21 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
+        **_rotary_settings(cell),
     )
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    for first_line, text, words in _scanned(_pieces(stream, name)):
+    scanned = _scanned(_pieces(stream, name))
+    for first_line, text, words in scanned:
         if not interpreter.ended:
             head = head or text[:4000]
-            interpreter.feed(words, text, first_line, size)
+            stopped_at = interpreter.feed(words, text, first_line, size)
+            if stopped_at is not None:
+                rest = text[_start_of_line(text, stopped_at - first_line) :]
+                whole = b"".join((rest, *(more for _, more, _ in scanned)))
+                interpreter.run_whole(whole, stopped_at, folders)
+                break
             diameters += named_diameters(text, first_line)
             if progress is not None:
                 progress(len(text))
@@ -164,10 +180,18 @@ def read_stream(
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    toolpath = interpreter.finish(head)
+    toolpath = interpreter.finish(head, cell)
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
+
+
+def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
+    """Return what the interpreter has to know of the machine: its letters, and what X, Y, Z mean."""
+    machine = cell.machine if cell is not None else None
+    if machine is None:
+        return {"rotary_axes": 0, "tcpm": 0}
+    return {"rotary_axes": sum(1 << v.index_of(letter) for letter in machine.axes), "tcpm": int(machine.tcpm)}
 
 
 def _scanned(
@@ -188,6 +212,11 @@ def _scanned(
             scanned = ahead.result()
 
 
+def _start_of_line(text: bytes, line: int) -> int:
+    """Return the place in a text at which a line begins, the first being 0."""
+    return int(np.flatnonzero(np.frombuffer(text, np.uint8) == NEWLINE)[line - 1]) + 1 if line else 0
+
+
 def _size_of(stream: BinaryIO) -> int:
     """Return the size of a file in bytes, 0 where the stream is none."""
     try:
@@ -197,12 +226,23 @@ def _size_of(stream: BinaryIO) -> int:
 
 
 def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
-    offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
+    """Return G54 to G59.3 (9, 4), X, Y, Z in mm and the rotation about Z in degrees; and which are stated."""
+    offsets, known = np.zeros((9, 4)), np.zeros(9, dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
-        if frame.a_deg or frame.b_deg or frame.c_deg:
-            raise input_error("cell-key", f"work_offsets.{name}: found a rotation, allowed: x_mm, y_mm, z_mm")
+        if frame.b_deg or frame.c_deg:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: found a rotation about Y or X (b_deg, c_deg), allowed: Z (a_deg)",
+                "tilt $BASE itself: [frames] base",
+            )
+        if frame.a_deg and cell is not None and cell.machine is not None:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: with rotary axes in [machine] no rotation (a_deg) is read",
+                "rotate $BASE itself: [frames] base",
+            )
         index = WORK_OFFSETS.index(name)
-        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm
+        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm, frame.a_deg
         known[index] = True
     return offsets, known
 
@@ -279,7 +319,8 @@ class _Interpreter:
     def __init__(self, name: str, **settings: Any) -> None:
         self.name = name
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
-        self.columns = Columns(_FIRST_ROWS)
+        self.columns = Columns(_FIRST_ROWS, with_rotary=settings["rotary_axes"] != 0)
+        self.chord_tolerance_mm = settings["chord_tolerance_mm"]
         self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
@@ -299,6 +340,7 @@ class _Interpreter:
         self.messages: list[str] = []
         self.most_decimals = 0
         self.rest_line = 0
+        self.program: Program | None = None
 
     @property
     def ended(self) -> bool:
@@ -307,16 +349,20 @@ class _Interpreter:
     def _count(self, what: str) -> int:
         return int(self.counts[what][0])
 
-    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> None:
-        """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
+    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> int | None:
+        """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown.
+
+        Return the line from which on the program has to be read as a whole, None if all of it was executed.
+        """
         found_before = self._count("findings")
         if self._count("rows") == 1 and len(words.line):
             lines = int(words.line[-1] - words.line[0]) + 1
             self._reserve(int(_ROOM * lines * max(1.0, size / len(text))))
-        self._execute(words, text)
+        stopped_at = self._execute(words, text)
         self._remember_lines(text, first_line, found_before)
+        return stopped_at
 
-    def _execute(self, words: Words, text: bytes) -> None:
+    def _execute(self, words: Words, text: bytes) -> int | None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         if len(words.message_span):
             words.value[words.letter == PAREN_OPEN] += len(self.messages)
@@ -326,8 +372,22 @@ class _Interpreter:
         while True:
             at = machine.run(self.machine, words.letter, words.value, words.extra, words.line, at)
             if at >= len(words.letter) or self.ended:
-                return
+                return None
+            if self._count("program_wanted"):
+                return int(words.line[at])
             self._make_room()
+
+    def run_whole(self, text: bytes, first_line: int, folders: Sequence[Path]) -> None:
+        """Run the rest of a program from its first line on that computes or jumps."""
+        program = Program(self.name, folders, block_delete=bool(self.machine.block_delete))
+        program.add(self.name, text, first_line, len(self.messages))
+        program.run(HandsOver(self.machine, self.state, self.counts, self.found), self._make_room)
+        self.messages += [_decode(message) for message in program.messages]
+        self.most_decimals = max(self.most_decimals, program.most_decimals)
+        found = self.found[: self._count("findings")]
+        wanted = {n for n in lines_to_quote(found, self.state[0]) if n >= first_line}
+        self.texts |= program.texts(wanted)
+        self.program = program
 
     def _remember_lines(self, text: bytes, first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
@@ -360,7 +420,7 @@ class _Interpreter:
                 return True
         return False
 
-    def finish(self, head: bytes) -> Toolpath:
+    def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
         found = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if any(issue.severity == "error" for issue in found):
@@ -372,15 +432,21 @@ class _Interpreter:
             most_decimals=self.most_decimals,
             head=head,
         )
-        return self._toolpath((*found, *whole))
+        return self._toolpath((*found, *whole), cell)
 
-    def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
+    def _toolpath(self, issues: tuple[Issue, ...], cell: "Cell | None") -> Toolpath:
         rows = self._count("rows")
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
+        columns = self.columns.finished(rows)
+        events = (*self._events(), *self._stopped_by_end())
+        axis: Floats = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
+        if cell is not None and cell.machine is not None:
+            vel_ori_deg_s = cell.controller.vel_ori_deg_s
+            part = in_part(columns, events, cell.machine, self.chord_tolerance_mm, vel_ori_deg_s, self.name)
+            columns, axis, events, issues = part.columns, part.axis, part.events, (*issues, *part.issues)
         return Toolpath(
-            **self.columns.finished(rows),
+            **columns,
             axis=axis,
-            events=(*self._events(), *self._stopped_by_end()),
+            events=events,
             issues=issues,
             source=self.name,
             restart=None,

@@ -34,7 +34,9 @@ static bool axis_word_is_harmless(Block *b, const Arc *arc) {
     const int index = V_WORD_I + arc->third, letter = CH_LETTER_I + arc->third;
     if (!b->has[index])
         return true;
-    if (b->word[index] != 0.0) {
+    const bool plane_named = b->has[V_WORD_X + arc->second] || b->has[V_WORD_I + arc->second] ||
+                             !b->has[V_WORD_X + arc->third];
+    if (b->word[index] != 0.0 || !plane_named) { /* X Z I K name the plane of G18, under G17 it is missing */
         const Says says = {.a = letter, .b = b->word[index], .c = b->state->plane};
         report_unless(b, S_DOUBT_PLANE, F_ARC_WRONG_OFFSET, says);
         return false;
@@ -103,19 +105,27 @@ static void report_unknown_start(Block *b) {
     s->unknown_reported = 1;
 }
 
+static bool would_fit(const Block *b, const Arc *arc, Point centre) {
+    return radii_fit(distance(arc->from, centre), distance(arc->to, centre), b->state->unit_mm) != MISFIT;
+}
+
 static void report_misfit(Block *b, const Arc *arc) {
     State *s = b->state;
     if (b->counts->mute)
         return;
     const Point other = other_centre(b, arc);
     s->misfits++;
-    s->misfits_other_centre +=
-        radii_fit(distance(arc->from, other), distance(arc->to, other), s->unit_mm) != MISFIT;
+    const Point centre = arc->centre, from = arc->from;
+    const Point reversed = {2.0 * from.u - centre.u, 2.0 * from.v - centre.v};
+    const Point exchanged = {from.u + (centre.v - from.v), from.v + (centre.u - from.u)};
+    s->misfits_other_centre += would_fit(b, arc, other);
+    s->misfits_reversed += !s->arc_absolute && would_fit(b, arc, reversed);
+    s->misfits_exchanged += !s->arc_absolute && would_fit(b, arc, exchanged);
     if (s->misfits > MOST_MISFITS)
         return;
-    const int centre = s->arc_absolute ? V_G90_1 : V_G91_1;
+    const int mode = s->arc_absolute ? V_G90_1 : V_G91_1;
     report(b, F_ARC_RADIUS_MISMATCH,
-           (Says){arc->from_radius_mm, arc->to_radius_mm, s->unit_mm == 1.0 ? centre : -centre});
+           (Says){arc->from_radius_mm, arc->to_radius_mm, s->unit_mm == 1.0 ? mode : -mode});
 }
 
 static void misfit(Block *b, const Arc *arc) {
@@ -145,6 +155,8 @@ static void note_spiral(Block *b, const Arc *arc) {
 /* Write the rows of an arc; the last ends exactly where the block says. */
 void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
     State *s = b->state;
+    const double from_deg[3] = {s->rotary_deg[0], s->rotary_deg[1], s->rotary_deg[2]};
+    const double time_s = compensates(s) ? NAN : feed_time_s(b, INFINITY, chords);
     double at_mm[3];
     for (int64_t k = 1; k <= chords; k++) {
         const double part = (double)k / (double)chords;
@@ -153,7 +165,9 @@ void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t c
         at_mm[arc->second] = arc->centre.v + r * sin(angle + sweep * part);
         at_mm[arc->third] = arc->from_w + (arc->to_w - arc->from_w) * part;
         stand_at(s, k == chords ? arc->to_mm : at_mm);
+        stand_turned_between(s, from_deg, b->turn_deg, part);
         emit(b->machine, b->line, mm_s, false, false, s->arcs);
+        note_time(b, time_s);
     }
     s->arcs++;
 }
@@ -196,7 +210,7 @@ bool arc_move(Block *b, Arc *arc) {
         b->state->cutter_mode &= ~S_CUTTER_BESIDE;
         return true;
     }
-    if (!axis_word_is_harmless(b, arc))
+    if (!take_turn(b, false) || !axis_word_is_harmless(b, arc))
         return true;
     if (!(b->has[V_WORD_R] ? centre_by_radius(b, arc) : centre_by_words(b, arc)))
         return true;

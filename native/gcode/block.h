@@ -22,6 +22,7 @@ typedef struct {
     bool has[V_LETTERS], used[V_LETTERS];
     double word[V_LETTERS];
     int32_t g[V_GROUPS], m_codes[V_M_CODES];
+    double turn_deg[V_ROTARY_AXES]; /* where the rotary words lead, once they have been read */
 } Block;
 
 static const int OTHER_AXES[] = V_OTHER_AXES;

@@ -3,6 +3,7 @@
 #include "gcode/block_words.h"
 
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 
 /* A code this far from a whole number is one that a post has rounded. */
 static const double CODE_SLACK = 1e-6;
@@ -45,16 +46,15 @@ static Taken take_g(Block *b, double value) {
 
 /* --- M-codes -------------------------------------------------------------------------------------------- */
 
-static bool is_unsupported_m(int64_t code) {
-    return code == V_M19 || code == V_M98 || code == V_M99 || (code >= V_M61 && code <= V_M73);
+static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code < V_M70); }
+
+/* Tell whether an M-code jumps, or saves and restores modes: native/gcode/execute.c does that. */
+static bool is_of_program(int64_t code) {
+    return code == V_M98 || code == V_M99 || (code >= V_M70 && code <= V_M73);
 }
 
 /* Return what is in doubt after an M-code that is not read. */
-static int32_t doubt_of_m(int64_t code) {
-    if (code == V_M61)
-        return S_DOUBT_TOOL;
-    return code >= V_M72 ? S_DOUBT_ALL : 0; /* modal state restored, or a subprogram */
-}
+static int32_t doubt_of_m(int64_t code) { return code == V_M61 ? S_DOUBT_TOOL : 0; }
 
 /* Return the modal group of an M-code, 0 for none. */
 static int m_group(int64_t code) {
@@ -78,6 +78,10 @@ static Taken take_m(Block *b, double value) {
     if (is_unsupported_m(code)) {
         report(b, F_UNSUPPORTED_M, (Says){.a = (double)(code * V_TENFOLD)});
         return faulty(doubt_of_m(code));
+    }
+    if (is_of_program(code)) {
+        b->counts->program_wanted = 1;
+        return WITHOUT_DOUBT;
     }
     const int group = m_group(code);
     bool good = true;
@@ -149,7 +153,7 @@ static bool rotary_is_harmless(Block *b) {
     bool good = true;
     for (int k = 0; k < OTHER_AXES_COUNT; k++) {
         const int index = OTHER_AXES[k], letter = index + CH_LETTER_A;
-        if (!b->has[index])
+        if (!b->has[index] || is_declared(b->machine, k))
             continue;
         if (b->word[index] == 0.0) {
             note(b, S_NOTE_ROTARY, letter);
@@ -189,6 +193,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             return LEFT_OUT;
         } else if (c == CH_PAREN_OPEN) {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
+        } else if (c == V_PROGRAM_LINE) {
+            b->counts->program_wanted = 1;
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;

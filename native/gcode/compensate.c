@@ -151,11 +151,12 @@ static void shorten_held(Block *b, int64_t fewer) {
     const int64_t last = s->held_rows[1] - 1;
     AT(rows->dwell_s, last - fewer) = AT(rows->dwell_s, last);
     for (int64_t row = last + 1; row < counts->rows; row++)
-        copy_row(rows, row, row - fewer);
+        copy_row(b->machine, row, row - fewer);
     for (int64_t k = s->held_events; k < counts->events; k++)
         if (AT(b->machine->events, k).row >= last)
             AT(b->machine->events, k).row -= fewer;
     counts->rows -= fewer;
+    s->cutter_rows_removed += fewer;
     s->held_rows[1] -= fewer;
 }
 
@@ -273,13 +274,13 @@ bool compensated_line(Block *b, const double to_mm[3], double mm_s) {
     const double from_w = along_tool(s, here_mm), to_w = along_tool(s, to_mm);
     const Point here = in_plane(s, here_mm), to = in_plane(s, to_mm), way = minus(to, here);
     const double length_mm = hypot(way.u, way.v);
-    if (!has_room_for(b, chords_of(b, radius_mm, 2.0 * PI) + 1))
-        return false;
     if (!s->cutter_entered && length_mm <= radius_mm) {
         fault(b, F_CUTTER_ENTRY, length_mm);
         emit_at(b, to, to_w, mm_s);
         return true;
     }
+    if (!has_room_for(b, chords_of(b, radius_mm, 2.0 * PI) + 1))
+        return false;
     if (length_mm <= STANDING_MM) {
         emit_at(b, tool_at(s), to_w, mm_s);
         return true;

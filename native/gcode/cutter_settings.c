@@ -4,6 +4,7 @@
 
 #include "gcode/compensate.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/settings.h"
 
 /* From this difference on the diameter is not that of the tool in the spindle. */
@@ -34,7 +35,8 @@ void refuse_before_compensation(Block *b) {
 
 /* Refuse what comes behind G40: everything that moves or measures the coordinates anew. */
 static void refuse_behind_compensation(Block *b) {
-    static const int32_t GROUPS[] = {V_LENGTH_OFFSET, V_WORK_OFFSET, V_PATH_CONTROL, V_RETRACT, V_NON_MODAL};
+    static const int32_t GROUPS[] = {V_LENGTH_OFFSET, V_WORK_OFFSET, V_PATH_CONTROL, V_RETRACT, V_NON_MODAL,
+                                     V_SHIFT_STATE};
     if (!(b->state->cutter_mode & S_CUTTER_ON))
         return;
     for (size_t k = 0; k < sizeof GROUPS / sizeof *GROUPS; k++) {
@@ -94,6 +96,10 @@ static void turn_on(Block *b, int32_t code) {
     State *s = b->state;
     if (s->plane == V_PLANE_YZ)
         report_unless(b, S_DOUBT_PLANE, F_CUTTER_PLANE, (Says){.a = code});
+    if (s->rotated)
+        report(b, F_CUTTER_ROTATED, (Says){.a = code});
+    if (is_turned(s) || s->length_code == V_G43_5)
+        report(b, F_CUTTER_TURNED, (Says){.a = code});
     if (b->has[V_WORD_L])
         report(b, F_CUTTER_LATHE, (Says){0});
     const double diameter_mm = diameter(b, code);

@@ -26,15 +26,28 @@ static void note_unknown_start(Block *b) {
 /* Find where a block under G53 leads, the coordinates being the machine's. */
 static void machine_target(const Block *b, double to_mm[3]) {
     const State *s = b->state;
-    to_mm[0] = b->has[V_WORD_X] ? b->word[V_WORD_X] * s->unit_mm : s->x;
-    to_mm[1] = b->has[V_WORD_Y] ? b->word[V_WORD_Y] * s->unit_mm : s->y;
-    to_mm[2] = b->has[V_WORD_Z] ? b->word[V_WORD_Z] * s->unit_mm - length_offset_of(s) : s->z;
+    tip_position(s, to_mm);
+    for (int axis = 0; axis < 3; axis++)
+        if (b->has[V_WORD_X + axis])
+            to_mm[axis] = b->word[V_WORD_X + axis] * s->unit_mm - (axis == 2 ? length_offset_of(s) : 0.0);
+    unrotate(s, to_mm);
+}
+
+/* Forget the axes that a block has moved in machine coordinates; a rotation mixes X and Y. */
+static void forget(Block *b) {
+    State *s = b->state;
+    const bool mixed = s->rotated && (b->has[V_WORD_X] || b->has[V_WORD_Y]);
+    s->known_x &= !(b->has[V_WORD_X] || mixed);
+    s->known_y &= !(b->has[V_WORD_Y] || mixed);
+    s->known_z &= !b->has[V_WORD_Z];
 }
 
 /* G0 and G1, also under G53; return false where there is no room for the rows. */
 static bool straight(Block *b, bool by_machine) {
     State *s = b->state;
-    double to_mm[3], mm_s = RAPID_MM_S;
+    double to_mm[3], mm_s = RAPID_MM_S, time_s = NAN;
+    if (!take_turn(b, by_machine))
+        return true;
     if (by_machine)
         machine_target(b, to_mm);
     else
@@ -43,7 +56,10 @@ static bool straight(Block *b, bool by_machine) {
         note_unknown_start(b);
         const double dx = to_mm[0] - s->x, dy = to_mm[1] - s->y, dz = to_mm[2] - s->z;
         mm_s = 0.0;
-        const int finding = feed_speed(b, sqrt(dx * dx + dy * dy + dz * dz), &mm_s);
+        const double length_mm = sqrt(dx * dx + dy * dy + dz * dz);
+        const int finding = feed_speed(b, length_mm, &mm_s);
+        time_s = feed_time_s(b, length_mm, 1);
+        check_turn_feed(b, length_mm);
         if (finding != F_OK)
             report_speed(b, finding);
     }
@@ -55,14 +71,15 @@ static bool straight(Block *b, bool by_machine) {
         return done;
     }
     stand_at(s, to_mm);
-    if (by_machine) {
-        s->known_x &= !b->has[V_WORD_X];
-        s->known_y &= !b->has[V_WORD_Y];
-        s->known_z &= !b->has[V_WORD_Z];
-    } else {
+    stand_turned(s, b->turn_deg);
+    if (by_machine)
+        forget(b);
+    else
         learn(b);
-    }
     emit(b->machine, b->line, mm_s, s->motion == V_MOTION_RAPID, by_machine, NO_ARC);
+    note_time(b, time_s);
+    if (by_machine)
+        note_staying(b);
     return true;
 }
 
@@ -70,11 +87,17 @@ static bool straight(Block *b, bool by_machine) {
 void machine_home(Block *b, bool any_axis) {
     State *s = b->state;
     const bool *has = b->has;
-    const double *home_mm = b->g[V_NON_MODAL] == V_G28 ? s->home_28 : s->home_30;
-    double by_way_mm[3];
+    const double *stored_mm = b->g[V_NON_MODAL] == V_G28 ? s->home_28 : s->home_30;
+    double home_mm[3] = {stored_mm[0], stored_mm[1], stored_mm[2] - length_offset_of(s)}, by_way_mm[3];
+    unrotate(s, home_mm);
+    if (!take_turn(b, true))
+        return;
     target(b, by_way_mm);
     stand_at(s, by_way_mm);
+    stand_turned(s, b->turn_deg);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
     if (has[V_WORD_X] || !any_axis) {
         s->x = home_mm[0];
         s->known_x = 0;
@@ -86,10 +109,13 @@ void machine_home(Block *b, bool any_axis) {
     if (has[V_WORD_X] && has[V_WORD_Y])
         s->known_z = 0; /* the robot goes to HOME: the old height must not come back by itself */
     if (has[V_WORD_Z] || !any_axis) {
-        s->z = home_mm[2] - length_offset_of(s);
+        s->z = home_mm[2];
         s->known_z = 0;
     }
+    rotary_home(b, any_axis);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
 }
 
 /* --- the motion of a block ------------------------------------------------------------------------------ */
@@ -127,6 +153,9 @@ bool move(Block *b) {
         follow(b);
     } else if (special == V_G53 && compensates(s)) {
         refuse_under_compensation(b, V_G53);
+        s->doubt |= S_DOUBT_POSITION;
+    } else if (s->cutter_mode & S_CUTTER_ON && rotary_words(b)) {
+        report(b, F_CUTTER_TURNED, (Says){.a = s->cutter_code});
         s->doubt |= S_DOUBT_POSITION;
     } else if (s->motion <= V_MOTION_LINE) {
         if (!straight(b, special == V_G53))
