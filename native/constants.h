@@ -35,6 +35,8 @@
 #define CH_LESS 60
 #define CH_EQUALS 61
 #define CH_GREATER 62
+#define CH_AT_SIGN 64
+#define CH_CARET 94
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
 #define CH_LETTER_F 70
@@ -166,12 +168,12 @@
 #define V_CASE_BIT 32
 #define V_DOLLAR 36
 #define V_EXCLAMATION 33
-#define V_LETTER_A 65
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
 #define V_PROGRAM_LINE 36
 #define V_UNREAD_NUMBER 32
-#define V_LETTERS 26
+#define V_ALPHABET "ABCDEFGHIJKLMNOPQRSTUVWXYZ@^"
+#define V_LETTERS 28
 #define V_WORD_D 3
 #define V_WORD_E 4
 #define V_WORD_F 5
@@ -188,6 +190,8 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_WORD_RADIUS 26
+#define V_WORD_ANGLE 27
 #define V_WORD_A 0
 #define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
 #define V_ROTARY_AXES 3
@@ -196,17 +200,12 @@
 #define V_LARGEST_M 9999
 #define V_G0 0
 #define V_G4 40
-#define V_G5 50
-#define V_G7 70
-#define V_G8 80
 #define V_G10 100
 #define V_G20 200
 #define V_G28 280
 #define V_G28_1 281
 #define V_G30 300
 #define V_G30_1 301
-#define V_G33 330
-#define V_G38 380
 #define V_G40 400
 #define V_G41 410
 #define V_G41_1 411
@@ -223,10 +222,6 @@
 #define V_G54 540
 #define V_G59 590
 #define V_G64 640
-#define V_G70 700
-#define V_G76 760
-#define V_G87 870
-#define V_G88 880
 #define V_G80 800
 #define V_G90 900
 #define V_G90_1 901
@@ -235,7 +230,6 @@
 #define V_G92_1 921
 #define V_G92_2 922
 #define V_G92_3 923
-#define V_G96 960
 #define V_G98 980
 #define V_G99 990
 #define V_M0 0
@@ -313,7 +307,6 @@
 
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
-#define F_LETTER_A 65
 #define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
@@ -419,6 +412,12 @@
 #define FC_SPINDLE_OFF 213
 #define FC_SPINDLE_DIRECTION 214
 #define FC_TOO_LONG 215
+
+/* gcode2krl.gcode.polar_findings */
+#define FP_PLANE 240
+#define FP_WITH_AXIS 241
+#define FP_G53 242
+#define FP_AT_ZERO 243
 
 /* gcode2krl.gcode.offset_findings */
 #define FO_NO_AXES 220

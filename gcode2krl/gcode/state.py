@@ -232,10 +232,11 @@ _DOUBTS_OF_LETTER = {
     "G": DOUBT_ALL,
     "M": DOUBT_ALL,
     "O": DOUBT_ALL,
+    "@": DOUBT_X | DOUBT_Y,
+    "^": DOUBT_X | DOUBT_Y,
 }
-_ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in _ALPHABET], dtype=np.int32)
-"""What is in doubt after a word whose value cannot be read, by its letter, (26,)."""
+DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in v.ALPHABET], dtype=np.int32)
+"""What is in doubt after a word whose value cannot be read, by its letter, (28,)."""
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5
