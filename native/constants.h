@@ -778,6 +778,8 @@ typedef struct {
     int64_t held_events;
     int32_t retract;
     int32_t retract_line;
+    int32_t unset_parameter;
+    int32_t unset_line;
     int32_t retract_unnamed_line;
     int8_t in_cycles;
     double cycle_level_mm;
@@ -881,19 +883,21 @@ typedef char State_cutter_rows_removed_stands_at_824[offsetof(State, cutter_rows
 typedef char State_held_events_stands_at_832[offsetof(State, held_events) == 832 ? 1 : -1];
 typedef char State_retract_stands_at_840[offsetof(State, retract) == 840 ? 1 : -1];
 typedef char State_retract_line_stands_at_844[offsetof(State, retract_line) == 844 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_848[offsetof(State, retract_unnamed_line) == 848 ? 1 : -1];
-typedef char State_in_cycles_stands_at_852[offsetof(State, in_cycles) == 852 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_856[offsetof(State, cycle_level_mm) == 856 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_864[offsetof(State, cycle_level_known) == 864 ? 1 : -1];
-typedef char State_cycle_r_stands_at_872[offsetof(State, cycle_r) == 872 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_880[offsetof(State, cycle_depth) == 880 ? 1 : -1];
-typedef char State_cycle_q_stands_at_888[offsetof(State, cycle_q) == 888 ? 1 : -1];
-typedef char State_cycle_p_stands_at_896[offsetof(State, cycle_p) == 896 ? 1 : -1];
-typedef char State_cycle_line_stands_at_904[offsetof(State, cycle_line) == 904 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_908[offsetof(State, cycle_plane) == 908 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_912[offsetof(State, cycle_unit_mm) == 912 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_920[offsetof(State, cycle_absolute) == 920 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 928 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_848[offsetof(State, unset_parameter) == 848 ? 1 : -1];
+typedef char State_unset_line_stands_at_852[offsetof(State, unset_line) == 852 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_856[offsetof(State, retract_unnamed_line) == 856 ? 1 : -1];
+typedef char State_in_cycles_stands_at_860[offsetof(State, in_cycles) == 860 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_864[offsetof(State, cycle_level_mm) == 864 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_872[offsetof(State, cycle_level_known) == 872 ? 1 : -1];
+typedef char State_cycle_r_stands_at_880[offsetof(State, cycle_r) == 880 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_888[offsetof(State, cycle_depth) == 888 ? 1 : -1];
+typedef char State_cycle_q_stands_at_896[offsetof(State, cycle_q) == 896 ? 1 : -1];
+typedef char State_cycle_p_stands_at_904[offsetof(State, cycle_p) == 904 ? 1 : -1];
+typedef char State_cycle_line_stands_at_912[offsetof(State, cycle_line) == 912 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_916[offsetof(State, cycle_plane) == 916 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_920[offsetof(State, cycle_unit_mm) == 920 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_928[offsetof(State, cycle_absolute) == 928 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 936 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

@@ -107,6 +107,8 @@ STATE = np.dtype(
         ("held_events", "i8"),  # events before it
         ("retract", "i4"),  # ten times 98 or 99
         ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
+        ("unset_line", "i4"),  # where, 0 = nowhere
         ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
         ("in_cycles", "i1"),  # a row of cycles has begun and no other motion has ended it
         ("cycle_level_mm", "f8"),  # programmed height along the tool where it began, to which G98 leads back
