@@ -242,6 +242,8 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
             return e->dry || is_name_set(e, name);
         if (!is_name_set(e, name))
             return wrong(e, F_PARAMETER_UNDEFINED, 0.0, 0.0, place);
+        if (is_name_of_cutter(e->machine, name))
+            return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
         const int fault = fault_of_name(e->machine, name);
         return fault == KNOWN ? named_parameter(e, name) : wrong(e, F_EXPRESSION_VALUE, fault, 0.0, place);
     }
@@ -249,6 +251,8 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
         const int64_t number = parameter_number(e, i);
         if (number == 0 || e->dry)
             return 1.0;
+        if (is_of_cutter(e->machine, number))
+            return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
         const int fault = fault_of_number(e->machine, number);
         return fault == KNOWN ? numbered_parameter(e, number)
                               : wrong(e, F_EXPRESSION_VALUE, fault, (double)number, place);

@@ -43,6 +43,8 @@ bool is_read_only(int64_t number);
 enum { KNOWN = -1 };
 int fault_of_number(const Machine *machine, int64_t number);
 int fault_of_name(const Machine *machine, int64_t name);
+bool is_of_cutter(const Machine *machine, int64_t number);
+bool is_name_of_cutter(const Machine *machine, int64_t name);
 int64_t name_at(Evaluation *e, int64_t *i);
 bool is_name_set(const Evaluation *e, int64_t name);
 double named_parameter(const Evaluation *e, int64_t name);

@@ -147,7 +147,6 @@ def test_a_finding_names_the_line_of_another_file_that_led_to_it(tmp_path):
         "G20\nX#5221",
         "G20\nX#5161",
         "X#5403",
-        "X#5410",
         "X#5423",
         "G20\nF#<_feed>",
         "G93 G1 X1 F2\nX2 F#<_feed>",
