@@ -22,14 +22,9 @@ MM_PER_INCH = 25.4
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 PLANES = {"CANON_PLANE_XY": "xy", "CANON_PLANE_XZ": "zx", "CANON_PLANE_YZ": "yz"}
 AXES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}
-<<<<<<< HEAD
-CALL = re.compile(r"^\s*\d+ N[\s\d.]*([A-Z][A-Z0-9_]*)\((.*)\)$")
+CALL = re.compile(r"^\s*\d+ N([\s\d.]*?)\s*([A-Z][A-Z0-9_]*)\((.*)\)$")
 TOOL_SIZE = re.compile(r"([ZD])([-+]?\d*\.?\d+)")
 COMPENSATED = re.compile(rb"G4[12]", re.IGNORECASE)
-=======
-CALL = re.compile(r"^\s*\d+ N([\s\d.]*?)\s*([A-Z][A-Z0-9_]*)\((.*)\)$")
-TOOL_LENGTH = re.compile(r"Z([-+]?\d*\.?\d+)")
->>>>>>> 56824c5e903a7a1596c556423c2e36d7a8996f29
 UNFINISHED = "File ended with no percent sign"
 Call = tuple[str, list[str]]
 
