@@ -12,7 +12,7 @@
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 
-enum { MOST_CYCLE_ROWS = 1000000, ROWS_AROUND = 4, ROWS_PER_PECK = 3, EVENTS_PER_HOLE = 4 };
+enum { MOST_CYCLE_ROWS = 1000000, ROWS_AROUND = 5, ROWS_PER_PECK = 3, EVENTS_PER_HOLE = 4 };
 
 /* --- moves ---------------------------------------------------------------------------------------------- */
 
