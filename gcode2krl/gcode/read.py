@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
+from gcode2krl.ascii_codes import PAREN_OPEN
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
@@ -33,8 +33,8 @@ from gcode2krl.gcode.state import (
     WORK_OFFSETS,
     initial_state,
 )
+from gcode2krl.gcode.text import pieces
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
-from gcode2krl.gcode.vocabulary import LINE_LIMIT
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
@@ -42,7 +42,6 @@ if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
 
 CHORD_TOLERANCE_MM = 0.01
-_PIECE_BYTES = 1_000_000
 _ROOM = 1.25
 """Room for rows is made for the estimated lines of the file, from its first piece, times this."""
 _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
@@ -50,7 +49,6 @@ _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 Progress = Callable[[int], None]
 
@@ -151,7 +149,7 @@ def read_stream(
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    for first_line, text, words in _scanned(_pieces(stream, name)):
+    for first_line, text, words in _scanned(pieces(stream, name)):
         if not interpreter.ended:
             head = head or text[:4000]
             interpreter.feed(words, text, first_line, size)
@@ -169,13 +167,13 @@ def read_stream(
 
 
 def _scanned(
-    pieces: Iterator[tuple[int, bytes]],
+    whole_lines: Iterator[tuple[int, bytes]],
 ) -> Iterator[tuple[int, bytes, Words]]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
     scanners = cycle((Scanner(), Scanner()))  # one's words are read while the other writes
 
     def scan_next() -> tuple[int, bytes, Words] | None:
-        piece = next(pieces, None)
+        piece = next(whole_lines, None)
         return None if piece is None else (*piece, next(scanners).scan(piece[1], piece[0]))
 
     with ThreadPoolExecutor(1) as pool:
@@ -203,72 +201,6 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
         offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm
         known[index] = True
     return offsets, known
-
-
-def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
-    """Yield (first line, whole lines) with bounded memory, whatever the file holds."""
-    line, rest, first = 1, b"", True
-    while True:
-        block = stream.read(_PIECE_BYTES)
-        if first:
-            first = False
-            block = block.removeprefix(_BYTE_ORDER_MARK)
-            if len(block) < _PIECE_BYTES and not block.strip():
-                raise input_error("empty", "the file is empty", "export the program again", source=name)
-            _reject_binary(block, name)
-            _reject_lone_returns(block, name)
-        at_end = not block
-        text = rest + (block if not at_end or not rest else b"\n")
-        end = text.rfind(b"\n") + 1
-        if len(text) - end > LINE_LIMIT:
-            place = line + text.count(b"\n")
-            raise input_error(
-                "line-too-long",
-                f"the line is longer than {LINE_LIMIT} characters",
-                "is this a G-code file?",
-                line=place,
-                source=name,
-            )
-        if end:
-            whole = text[:end]
-            yield line, whole
-            line += _line_count(whole)
-        rest = text[end:]
-        if not block:
-            return
-
-
-def _line_count(text: bytes) -> int:
-    """Return the number of line ends; for lines as short as these `bytes.count` takes five times as long."""
-    return int(np.count_nonzero(np.frombuffer(text, np.uint8) == NEWLINE))
-
-
-def _reject_binary(block: bytes, name: str) -> None:
-    place = block[:65536].find(b"\x00")
-    if place >= 0 and block[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        what = "this file is text in UTF-16, two bytes a character"
-        raise input_error("binary-file", what, "save it as UTF-8 or ASCII", line=1, source=name)
-    if place >= 0:
-        remedy = (
-            "unpack or export the program as text"
-            if block[:2] == b"\x1f\x8b"
-            else "export the program as text"
-        )
-        line = 1 + block.count(b"\n", 0, place)
-        what = f"this is not a text file: byte {place + 1} is NUL"
-        raise input_error("binary-file", what, remedy, line=line, source=name)
-
-
-def _reject_lone_returns(block: bytes, name: str) -> None:
-    """Refuse line ends of one CR: the whole program would be one block."""
-    if b"\n" not in block and block.rstrip().count(b"\r"):
-        raise input_error(
-            "line-ends",
-            "the lines end in CR alone, so the whole file is one line",
-            "save the program with line ends LF or CRLF",
-            line=1,
-            source=name,
-        )
 
 
 class _Interpreter:

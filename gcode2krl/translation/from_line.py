@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gcode2krl.errors import input_error
+from gcode2krl.files.program_names import program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.inputs import STANDARD, StandardInput, read_part
 
@@ -30,10 +31,10 @@ def restart_name(
     from gcode2krl.krl_words import LONGEST_NAME
 
     externals, suffix = cell.program.externals, f"_from{from_line}"
-    whole = f"{Path(part).stem}{suffix}"
+    whole = f"{program_stem(part)}{suffix}"
     if not name_problem(whole, externals):
         return whole
-    stem = suggested_name(Path(part).stem, externals)[: LONGEST_NAME - len(suffix)]
+    stem = suggested_name(program_stem(part), externals)[: LONGEST_NAME - len(suffix)]
     return suggested_name(f"{stem}{suffix}", externals)
 
 

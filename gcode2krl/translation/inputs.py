@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
+from gcode2krl.files.program_names import PACKED_ENDING
 from gcode2krl.progress import Begin, unseen
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ def read_part(
     """Read G-code from a file, or from standard input (which may be given, to ask it for its hash)."""
     from gcode2krl.gcode import read_gcode, read_stream
 
-    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else 0
+    whole = part != STANDARD and Path(part).is_file() and not part.lower().endswith(PACKED_ENDING)
+    size = Path(part).stat().st_size if whole else 0
     read, progress = 0, begin("reading")
 
     def advance(amount: int) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from gcode2krl.errors import Gcode2KrlError, Issue
+from gcode2krl.files.program_names import program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.attempt import Attempt
 from gcode2krl.translation.checks import outputs_of, place_of, refuse_early, refuse_online
@@ -180,7 +181,7 @@ def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
 
     name = ready.name
     if ready.place is None and name is None and str(order.part) != STANDARD:
-        name = suggested_name(Path(order.part).stem, ready.cell.program.externals)
+        name = suggested_name(program_stem(order.part), ready.cell.program.externals)
     return write_krl(
         _done(known.forecast),
         ready.place,
