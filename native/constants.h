@@ -15,7 +15,9 @@
 #define CH_SPACE 32
 #define CH_END_OF_TAPE 26
 #define CH_EXCLAMATION 33
+#define CH_QUOTE 34
 #define CH_HASH 35
+#define CH_DOLLAR 36
 #define CH_PERCENT 37
 #define CH_AMPERSAND 38
 #define CH_PAREN_OPEN 40
@@ -29,19 +31,23 @@
 #define CH_DIGIT_1 49
 #define CH_DIGIT_6 54
 #define CH_DIGIT_9 57
+#define CH_COLON 58
 #define CH_SEMICOLON 59
 #define CH_LESS 60
 #define CH_EQUALS 61
 #define CH_GREATER 62
+#define CH_QUESTION 63
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
 #define CH_LETTER_F 70
 #define CH_LETTER_G 71
 #define CH_LETTER_I 73
+#define CH_LETTER_J 74
 #define CH_LETTER_K 75
 #define CH_LETTER_M 77
 #define CH_LETTER_N 78
 #define CH_LETTER_O 79
+#define CH_LETTER_P 80
 #define CH_LETTER_R 82
 #define CH_LETTER_S 83
 #define CH_LETTER_T 84
@@ -50,6 +56,7 @@
 #define CH_LETTER_Z 90
 #define CH_BRACKET_OPEN 91
 #define CH_BRACKET_CLOSE 93
+#define CH_UNDERSCORE 95
 #define CH_SMALL_A 97
 #define CH_SMALL_G 103
 #define CH_SMALL_M 109
@@ -57,6 +64,7 @@
 #define CH_SMALL_Z 122
 #define CH_BRACE_OPEN 123
 #define CH_BRACE_CLOSE 125
+#define CH_TILDE 126
 #define CH_CASE_BIT 32
 #define CH_FIRST_FOREIGN 128
 
@@ -266,6 +274,54 @@
 #define V_M_OVERRIDE 9
 #define V_M_CODES 4
 
+/* gcode2krl.gcode.dialect_marks */
+#define D_AMPERSAND 38
+#define D_EQUALS 61
+#define D_GREATER 62
+#define D_LESS 60
+#define D_POINT 46
+#define D_SKIP_LEVEL 1
+#define D_HEAD_LINES 2
+#define D_DOLLAR_LINES 4
+#define D_STATEMENTS 8
+#define D_POINTS 16
+#define D_NEXT_ABSOLUTE 60
+#define D_NEXT_INCREMENTAL 62
+#define D_NEXT_POINTLESS 46
+#define D_SKIPPED 38
+#define D_FRAME 61
+#define D_HARMLESS 0
+#define D_REFUSED 1
+#define D_RADIUS 2
+#define D_TURNS 3
+#define D_MESSAGE 4
+#define D_CODE 5
+#define D_ENDS 6
+#define D_FRAME_SET 7
+#define D_FRAME_ADDED 8
+#define D_WHOLE_LINE 9
+#define D_KIND_STEP 16
+#define D_AS_WRITTEN 0
+#define D_POINT_REQUIRED 1
+#define D_THOUSANDTHS 2
+#define D_MOST_CODES 9999
+#define D_CODE_UNKNOWN (-1)
+#define D_CODE_HARMLESS (-2)
+#define D_CODE_EXACT (-3)
+#define D_CODE_REFUSED (-4)
+
+/* gcode2krl.gcode.dialects */
+#define DR_REASON_SETTING 13
+#define DR_REASON_JOG 12
+#define DR_REASON_TOOL_NAME 17
+#define DR_REASON_VALUES 10
+#define DR_REASON_EDGE 22
+#define DR_REASON_FLOW 9
+#define DR_REASON_BESIDE 21
+#define DR_REASON_SHIFT 20
+#define DR_REASON_VECTORS 11
+#define DR_DEFAULT "linuxcnc"
+
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
 #define F_LETTER_A 65
@@ -322,6 +378,10 @@
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
 #define F_ARC_TOO_LONG 51
+#define F_DIALECT_CODE 52
+#define F_DIALECT_STATEMENT 53
+#define F_NO_POINT 54
+#define F_COUNTED_FROM_UNKNOWN 55
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -344,6 +404,8 @@
 #define S_NOTE_CENTRE 1
 #define S_NOTE_HOME 2
 #define S_NOTE_OVERRIDE 3
+#define S_NOTE_CODE 4
+#define S_NOTE_STATEMENT 5
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -499,9 +561,9 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[4];
-    int32_t note_line[4];
-    int32_t note_word[4];
+    int32_t note_count[6];
+    int32_t note_line[6];
+    int32_t note_word[6];
     int32_t misfits;
     int32_t misfits_other_centre;
     int32_t spirals;
@@ -551,16 +613,16 @@ typedef char State_distance_line_stands_at_224[offsetof(State, distance_line) ==
 typedef char State_feed_mode_line_stands_at_228[offsetof(State, feed_mode_line) == 228 ? 1 : -1];
 typedef char State_rotary_refused_stands_at_232[offsetof(State, rotary_refused) == 232 ? 1 : -1];
 typedef char State_note_count_stands_at_236[offsetof(State, note_count) == 236 ? 1 : -1];
-typedef char State_note_line_stands_at_252[offsetof(State, note_line) == 252 ? 1 : -1];
-typedef char State_note_word_stands_at_268[offsetof(State, note_word) == 268 ? 1 : -1];
-typedef char State_misfits_stands_at_284[offsetof(State, misfits) == 284 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_288[offsetof(State, misfits_other_centre) == 288 ? 1 : -1];
-typedef char State_spirals_stands_at_292[offsetof(State, spirals) == 292 ? 1 : -1];
-typedef char State_spiral_line_stands_at_296[offsetof(State, spiral_line) == 296 ? 1 : -1];
-typedef char State_spiral_start_stands_at_304[offsetof(State, spiral_start) == 304 ? 1 : -1];
-typedef char State_spiral_end_stands_at_312[offsetof(State, spiral_end) == 312 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_320[offsetof(State, spiral_unit_mm) == 320 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 328 ? 1 : -1];
+typedef char State_note_line_stands_at_260[offsetof(State, note_line) == 260 ? 1 : -1];
+typedef char State_note_word_stands_at_284[offsetof(State, note_word) == 284 ? 1 : -1];
+typedef char State_misfits_stands_at_308[offsetof(State, misfits) == 308 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_312[offsetof(State, misfits_other_centre) == 312 ? 1 : -1];
+typedef char State_spirals_stands_at_316[offsetof(State, spirals) == 316 ? 1 : -1];
+typedef char State_spiral_line_stands_at_320[offsetof(State, spiral_line) == 320 ? 1 : -1];
+typedef char State_spiral_start_stands_at_328[offsetof(State, spiral_start) == 328 ? 1 : -1];
+typedef char State_spiral_end_stands_at_336[offsetof(State, spiral_end) == 336 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_344[offsetof(State, spiral_unit_mm) == 344 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 352 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -620,6 +682,9 @@ VIEW(FoundView, Found);
 
 typedef struct {
     Bytes text;
+    Bytes statement_names;
+    Ints32 statement_kinds;
+    int64_t syntax;
     Bytes letter;
     Floats value;
     Ints32 line;
@@ -658,6 +723,11 @@ typedef struct {
     Floats offsets_mm;
     Bools offset_known;
     Floats tool_length_mm;
+    Ints32 core_g;
+    Floats dwell_by_letter;
+    int64_t points;
+    int64_t length_by_d;
+    int64_t end_m;
     Ints32 group_of_g;
     Ints32 doubt_of_g;
     Ints32 doubt_of_group;

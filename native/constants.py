@@ -27,6 +27,8 @@ MODULES = {
     "W": "gcode2krl.krl_words",
     "U": "gcode2krl.units",
     "V": "gcode2krl.gcode.vocabulary",
+    "D": "gcode2krl.gcode.dialect_marks",
+    "DR": "gcode2krl.gcode.dialects",
     "F": "gcode2krl.gcode.findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",

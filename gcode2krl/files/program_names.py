@@ -7,6 +7,8 @@ ENDINGS: Final = frozenset(
     [".nc", ".ngc", ".ncc", ".cnc", ".tap", ".gcode", ".gc", ".mpf", ".eia", ".min", ".iso", ".h"]
 )
 """Endings of programs; ``.h`` is Heidenhain's plain text, which is refused with a sentence of its own."""
+DIALECT_NAMES: Final = ("linuxcnc", "fanuc", "fanuc-calculator", "fanuc-increments", "grbl", "sinumerik")
+"""Dialects of G-code, the default first; what they are says `gcode.dialects`."""
 PACKED_ENDING: Final = ".gz"
 _TIMES_PACKED = 10
 """A packed program of a CAM system is about a tenth of its text."""

@@ -10,7 +10,14 @@ _BEFORE, _AFTER = 24, 32
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
 _ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
-_OF_LETTER_A = {f.NUMBER_TOO_LONG, f.UNKNOWN_LETTER, f.ROTARY_WORD, f.BAD_INTEGER, f.ARC_WRONG_OFFSET}
+_OF_LETTER_A = {
+    f.NUMBER_TOO_LONG,
+    f.UNKNOWN_LETTER,
+    f.ROTARY_WORD,
+    f.BAD_INTEGER,
+    f.ARC_WRONG_OFFSET,
+    f.COUNTED_FROM_UNKNOWN,
+}
 _FIXED = {
     f.COMMENT_OPEN: r"\((?!.*\))",
     f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()",
@@ -43,6 +50,7 @@ _FIXED = {
     f.H_DIFFERS: "H",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
+    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=",
 }
 
 
@@ -85,7 +93,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"[{f.letters_of(a)}]"
     if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
         return _word("G", a)
-    if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
+    if number == f.NO_POINT:
+        return letter + r"\s*[-+]?\d+(?![\d.])"
+    if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES, f.DIALECT_CODE):
         return _word("G", b)
     if number in (f.UNSUPPORTED_M, f.SAME_GROUP_M):
         return _word("M", a if number == f.UNSUPPORTED_M else b)

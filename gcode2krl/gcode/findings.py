@@ -13,6 +13,7 @@ from typing import NamedTuple
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -78,7 +79,11 @@ class Finding(NamedTuple):
     BAD_LINE_NUMBER,
     UNKNOWN_START,
     ARC_TOO_LONG,
-) = range(52)
+    DIALECT_CODE,
+    DIALECT_STATEMENT,
+    NO_POINT,
+    COUNTED_FROM_UNKNOWN,
+) = range(56)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -287,6 +292,21 @@ FINDINGS: dict[int, Finding] = {
         "feed move from a position that has not been programmed{state}; arcs after it cannot fit",
         "program X, Y and Z with G0 (and G90) first",
     ),
+    DIALECT_CODE: Finding("error", "dialect-code", "G{h}: {reason}", "{remedy}"),
+    DIALECT_STATEMENT: Finding("error", "dialect-statement", "this statement: {reason}", "{remedy}"),
+    NO_POINT: Finding(
+        "error",
+        "decimal-point",
+        "{word}{b:g} has no decimal point: on a Fanuc it is {b:g} or a thousandth of it, by a parameter",
+        "write {word}{b:g}. in the post, or say --dialect fanuc-calculator ({b:g}) or fanuc-increments "
+        "(1/1000)",
+    ),
+    COUNTED_FROM_UNKNOWN: Finding(
+        "error",
+        "undefined-position",
+        "{word} counts from a position that has not been programmed",
+        "program {word} with G0 and G90 first",
+    ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
@@ -365,6 +385,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     if number in (UNSUPPORTED_G, UNSUPPORTED_M):
         reasons = UNSUPPORTED_G_REASONS if number == UNSUPPORTED_G else UNSUPPORTED_M_REASONS
         reason, remedy = _nearest_below(reasons, int(a))
+    if number in (DIALECT_CODE, DIALECT_STATEMENT):
+        reason, remedy = REASONS[int(a)]
     character = int(a) if number == BAD_CHARACTER else 0
     values = {
         "a": a,

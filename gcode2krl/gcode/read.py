@@ -18,7 +18,9 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
+from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
+from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.state import (
     DOUBT_OF_G,
@@ -57,7 +59,7 @@ def read_gcode(
     path: str | Path,
     cell: "Cell | None" = None,
     *,
-    dialect: str = "linuxcnc",
+    dialect: str = DEFAULT,
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
@@ -69,7 +71,7 @@ def read_gcode(
     ----------
     path : the file, UTF-8 or Latin-1, any line ends.
     cell : gives tool lengths and work offsets; without it (and without ``tools``) every length is 0.
-    dialect : only ``linuxcnc`` so far.
+    dialect : ``linuxcnc``, ``fanuc``, ``fanuc-calculator``, ``fanuc-increments``, ``grbl`` or ``sinumerik``.
     tools : a LinuxCNC ``tool.tbl`` in mm, used instead of the cell's tools.
     chord_tolerance_mm : largest distance between an arc and the chords that replace it.
     block_delete : skip lines that begin with ``/``.
@@ -95,22 +97,28 @@ def read_gcode(
     (14, 20.0)
     """
     name = str(path)
+
+    def read(as_dialect: str, hear: Progress | None) -> Toolpath:
+        try:
+            with Path(path).open("rb") as stream:
+                return read_stream(
+                    stream,
+                    name,
+                    cell,
+                    dialect=as_dialect,
+                    tools=tools,
+                    chord_tolerance_mm=chord_tolerance_mm,
+                    block_delete=block_delete,
+                    progress=hear,
+                )
+        except OSError as error:
+            what = f"cannot read: {error.strerror}"
+            raise input_error("file-unreadable", what, "check the path", source=name) from None
+
     try:
-        with Path(path).open("rb") as stream:
-            return read_stream(
-                stream,
-                name,
-                cell,
-                dialect=dialect,
-                tools=tools,
-                chord_tolerance_mm=chord_tolerance_mm,
-                block_delete=block_delete,
-                progress=progress,
-            )
-    except OSError as error:
-        raise input_error(
-            "file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name
-        ) from None
+        return read(dialect, progress)
+    except NotUnderstoodError as error:
+        raise with_other_dialects(error, dialect, lambda other: read(other, None)) from None
 
 
 def read_stream(
@@ -118,15 +126,14 @@ def read_stream(
     name: str,
     cell: "Cell | None" = None,
     *,
-    dialect: str = "linuxcnc",
+    dialect: str = DEFAULT,
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
     progress: Progress | None = None,
 ) -> Toolpath:
     """Read G-code from an open binary stream; see `read_gcode`."""
-    if dialect != "linuxcnc":
-        raise input_error("dialect-unknown", f"dialect {dialect!r}; allowed: linuxcnc", source=name)
+    spoken = dialect_of(dialect, name)
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -135,10 +142,11 @@ def read_stream(
         tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
     )
     offsets, offset_known = _work_offsets(cell)
-    from_table = cell is not None and cell.program.tool_length == "from_table"
+    from_table = spoken.length_by_d or (cell is not None and cell.program.tool_length == "from_table")
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
     interpreter = _Interpreter(
         name,
+        spoken,
         offsets_mm=offsets,
         offset_known=offset_known,
         tool_length_mm=lengths,
@@ -149,9 +157,11 @@ def read_stream(
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    for first_line, text, words in _scanned(pieces(stream, name)):
+    for first_line, text, words in _scanned(pieces(stream, name), spoken):
         if not interpreter.ended:
-            head = head or text[:4000]
+            if not head:
+                head = text[:4000]
+                refuse_other_languages(head, name)
             interpreter.feed(words, text, first_line, size)
             diameters += named_diameters(text, first_line)
             if progress is not None:
@@ -168,9 +178,10 @@ def read_stream(
 
 def _scanned(
     whole_lines: Iterator[tuple[int, bytes]],
+    spoken: Dialect,
 ) -> Iterator[tuple[int, bytes, Words]]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
-    scanners = cycle((Scanner(), Scanner()))  # one's words are read while the other writes
+    scanners = cycle((Scanner(spoken), Scanner(spoken)))  # one's words are read while the other writes
 
     def scan_next() -> tuple[int, bytes, Words] | None:
         piece = next(whole_lines, None)
@@ -206,9 +217,11 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(self, name: str, **settings: Any) -> None:
+    def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
         self.name = name
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
+        for key, value in spoken.start.items():
+            self.state[key] = value
         self.columns = Columns(_FIRST_ROWS)
         self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
@@ -219,6 +232,7 @@ class _Interpreter:
             rows=self.columns.views(),
             events=self.events,
             found=self.found,
+            **spoken.settings(),
             group_of_g=GROUP_OF_G,
             doubt_of_g=DOUBT_OF_G,
             doubt_of_group=DOUBT_OF_GROUP,
@@ -353,4 +367,4 @@ class _Interpreter:
 
 def _decode(span: bytes) -> str:
     text = span.decode("utf-8", errors="replace").strip()
-    return text[3:].lstrip(" ,").strip()
+    return text[3:].lstrip(" ,").removeprefix('("').strip()

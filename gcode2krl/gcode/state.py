@@ -56,9 +56,9 @@ STATE = np.dtype(
         ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
-        ("note_count", "i4", 4),  # blocks with something harmless, by NOTE_…
-        ("note_line", "i4", 4),  # the first of them
-        ("note_word", "i4", 4),
+        ("note_count", "i4", 6),  # blocks with something harmless, by NOTE_…
+        ("note_line", "i4", 6),  # the first of them
+        ("note_word", "i4", 6),
         ("misfits", "i4"),  # arcs whose radii differ too much
         ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
         ("spirals", "i4"),  # arcs that are read although their radii differ
@@ -76,7 +76,7 @@ DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SP
 )
 DOUBT_POSITION = DOUBT_X | DOUBT_Y | DOUBT_Z
 DOUBT_ALL = (1 << 12) - 1
-NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE = range(4)
+NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_CODE, NOTE_STATEMENT = range(6)
 
 
 def initial_state() -> NDArray[np.void]:

@@ -2,6 +2,7 @@
 
 #include "gcode/block_words.h"
 
+#include "gcode/dialect_words.h"
 #include "gcode/reporting.h"
 
 /* A code this far from a whole number is one that a post has rounded. */
@@ -20,8 +21,13 @@ static inline Taken faulty(int32_t doubt) { return (Taken){false, doubt}; }
 
 static Taken take_g(Block *b, double value) {
     const double tenfold = value * V_TENFOLD;
-    const int64_t code = (int64_t)rint(tenfold);
-    const bool outside = code < 0 || code > V_LARGEST_G || fabs(tenfold - (double)code) > CODE_SLACK;
+    const int64_t written = (int64_t)rint(tenfold);
+    bool read = true;
+    const bool no_code = written < 0 || written > D_MOST_CODES || fabs(tenfold - (double)written) > CODE_SLACK;
+    const int32_t code = no_code ? D_CODE_UNKNOWN : core_code(b, written, &read);
+    if (code < D_CODE_UNKNOWN)
+        return read ? UNDERSTOOD : faulty(S_DOUBT_MOTION | S_DOUBT_POSITION);
+    const bool outside = code < 0;
     const int32_t group = outside ? S_UNKNOWN_GROUP : AT(b->machine->group_of_g, code);
     if (group == S_UNKNOWN_GROUP) {
         report(b, F_UNKNOWN_G, (Says){.a = tenfold});
@@ -70,8 +76,8 @@ static int m_group(int64_t code) {
 }
 
 static Taken take_m(Block *b, double value) {
-    const int64_t code = (int64_t)rint(value);
-    if (fabs(value - (double)code) > CODE_SLACK || code < 0 || code > V_LARGEST_M) {
+    const int64_t written = (int64_t)rint(value), code = written == b->machine->end_m ? V_M30 : written;
+    if (fabs(value - (double)written) > CODE_SLACK || code < 0 || code > V_LARGEST_M) {
         report(b, F_BAD_M, (Says){.a = value});
         return WITHOUT_DOUBT;
     }
@@ -109,6 +115,8 @@ static Taken take(Block *b, uint8_t c, double value) {
         return take_m(b, value);
     const int index = c - CH_LETTER_A;
     const bool repeated = b->has[index];
+    if (b->next_word)
+        say_of_word(b, index);
     b->has[index] = true;
     b->word[index] = value;
     if (!repeated)
@@ -192,6 +200,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
+        } else if (c < CH_LETTER_A) {
+            take_dialect_mark(b, c, AT(words->value, k));
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;
@@ -203,6 +213,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
         good = false;
     }
+    if (good && !to_core_words(b))
+        good = false;
     if (!rotary_is_harmless(b))
         good = false;
     if (!used && good)
