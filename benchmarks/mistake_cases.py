@@ -319,8 +319,8 @@ START_MISTAKES = (
 
 CODE_MISTAKES = (
     Mistake("unknown G code", r"G12\b", {27: "@N240 G12 X100. F900."}),
-    Mistake("drilling cycle G81 left in", r"G81|cycle", {27: "@N240 G81 X100. Y20. Z-10. R2. F200."}),
-    Mistake("drilling cycle G83 left in", r"G83|cycle", {27: "@N240 G83 X100. Y20. Z-10. R2. Q3. F200."}),
+    Mistake("drilling cycle without R", r"G81|cycle", {27: "@N240 G81 X100. Y20. Z-10. F200."}),
+    Mistake("pecking cycle without Q", r"G83|cycle", {27: "@N240 G83 X100. Y20. Z-10. R2. F200."}),
     Mistake("cutter compensation G41 left in", r"G41|compensation", {12: "@N90 G1 G41 D7 Z-4. F600."}),
     Mistake("G92 sets the zero", r"G92", {9: "@N55 G92 X0. Y0.\nN60 G0 X-10. Y-10."}),
     Mistake("G10 sets an offset", r"G10", {5: "@N15 G10 L2 P1 X0. Y0. Z-20.\nN20 G54"}),

@@ -173,9 +173,11 @@
 #define V_MARK 33
 #define V_UNREAD_NUMBER 32
 #define V_LETTERS 26
+#define V_WORD_D 3
 #define V_WORD_E 4
 #define V_WORD_F 5
 #define V_WORD_H 7
+#define V_WORD_L 11
 #define V_WORD_P 15
 #define V_WORD_Q 16
 #define V_WORD_R 17
@@ -213,13 +215,15 @@
 #define V_G59 590
 #define V_G64 640
 #define V_G70 700
-#define V_G73 730
 #define V_G76 760
-#define V_G81 810
+#define V_G87 870
+#define V_G88 880
 #define V_G80 800
 #define V_G90 900
 #define V_G90_1 901
 #define V_G91_1 911
+#define V_G98 980
+#define V_G99 990
 #define V_G92 920
 #define V_G96 960
 #define V_M0 0
@@ -248,6 +252,16 @@
 #define V_MOTION_LINE 1
 #define V_MOTION_ARC_CW 2
 #define V_MOTION_ARC_CCW 3
+#define V_FIRST_CYCLE 73
+#define V_CYCLE_CHIP 73
+#define V_CYCLE_TAP_LEFT 74
+#define V_CYCLE_DRILL 81
+#define V_CYCLE_DWELL 82
+#define V_CYCLE_PECK 83
+#define V_CYCLE_TAP 84
+#define V_CYCLE_REAM 85
+#define V_CYCLE_BORE_STOP 86
+#define V_CYCLE_BORE 89
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
 #define V_INVERSE_TIME 93
@@ -385,6 +399,24 @@
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
+/* gcode2krl.gcode.cycle_findings */
+#define FC_NO_AXES 200
+#define FC_INVERSE_TIME 201
+#define FC_MODES_CHANGED 202
+#define FC_NO_R 203
+#define FC_NO_DEPTH 204
+#define FC_DISTANCE_CHANGED 205
+#define FC_R_BELOW_DEPTH 206
+#define FC_REPEATS 207
+#define FC_NO_DWELL 208
+#define FC_DWELL_NEGATIVE 209
+#define FC_NO_PECK 210
+#define FC_PECK_NOT_POSITIVE 211
+#define FC_CLEARANCE_NEGATIVE 212
+#define FC_SPINDLE_OFF 213
+#define FC_SPINDLE_DIRECTION 214
+#define FC_TOO_LONG 215
+
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
@@ -414,6 +446,7 @@
 #define S_EVENT_M 4
 #define S_EVENT_TEXT 5
 #define S_IMPLIED_M5 (-5)
+#define S_OF_CYCLE 1000
 
 /* gcode2krl.cutting.sweep */
 #define SW_LANES 16
@@ -571,6 +604,20 @@ typedef struct {
     double spiral_start;
     double spiral_end;
     double spiral_unit_mm;
+    int32_t retract;
+    int32_t retract_line;
+    int32_t retract_unnamed_line;
+    int8_t in_cycles;
+    double cycle_level_mm;
+    int8_t cycle_level_known;
+    double cycle_r;
+    double cycle_depth;
+    double cycle_q;
+    double cycle_p;
+    int32_t cycle_line;
+    int32_t cycle_plane;
+    double cycle_unit_mm;
+    int8_t cycle_absolute;
 } State;
 typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
 typedef char State_y_stands_at_8[offsetof(State, y) == 8 ? 1 : -1];
@@ -622,7 +669,21 @@ typedef char State_spiral_line_stands_at_320[offsetof(State, spiral_line) == 320
 typedef char State_spiral_start_stands_at_328[offsetof(State, spiral_start) == 328 ? 1 : -1];
 typedef char State_spiral_end_stands_at_336[offsetof(State, spiral_end) == 336 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_344[offsetof(State, spiral_unit_mm) == 344 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 352 ? 1 : -1];
+typedef char State_retract_stands_at_352[offsetof(State, retract) == 352 ? 1 : -1];
+typedef char State_retract_line_stands_at_356[offsetof(State, retract_line) == 356 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_360[offsetof(State, retract_unnamed_line) == 360 ? 1 : -1];
+typedef char State_in_cycles_stands_at_364[offsetof(State, in_cycles) == 364 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_368[offsetof(State, cycle_level_mm) == 368 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_376[offsetof(State, cycle_level_known) == 376 ? 1 : -1];
+typedef char State_cycle_r_stands_at_384[offsetof(State, cycle_r) == 384 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_392[offsetof(State, cycle_depth) == 392 ? 1 : -1];
+typedef char State_cycle_q_stands_at_400[offsetof(State, cycle_q) == 400 ? 1 : -1];
+typedef char State_cycle_p_stands_at_408[offsetof(State, cycle_p) == 408 ? 1 : -1];
+typedef char State_cycle_line_stands_at_416[offsetof(State, cycle_line) == 416 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_420[offsetof(State, cycle_plane) == 420 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_424[offsetof(State, cycle_unit_mm) == 424 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_432[offsetof(State, cycle_absolute) == 432 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 440 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -727,6 +788,8 @@ typedef struct {
     Floats dwell_by_letter;
     int64_t points;
     int64_t length_by_d;
+    double cycle_dwell_s;
+    int64_t repeats_by_k;
     int64_t end_m;
     Ints32 group_of_g;
     Ints32 doubt_of_g;

@@ -30,6 +30,7 @@ MODULES = {
     "D": "gcode2krl.gcode.dialect_marks",
     "DR": "gcode2krl.gcode.dialects",
     "F": "gcode2krl.gcode.findings",
+    "FC": "gcode2krl.gcode.cycle_findings",
     "S": "gcode2krl.gcode.state",
     "SW": "gcode2krl.cutting.sweep",
     "ED": "gcode2krl.cutting.edge",

@@ -79,6 +79,8 @@ class Dialect:
     """Kind of `dialect_marks`, with its value: names."""
     end_m: int = -1
     """M number that ends the program beside M2 and M30."""
+    repeats_by_k: bool = False
+    """K of a drilling cycle is the number of holes, as L is in LinuxCNC."""
     length_by_d: bool = False
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
     start: Mapping[str, float] = field(default_factory=dict)
@@ -124,6 +126,8 @@ class Dialect:
             "dwell_by_letter": self.dwell_by_letter(),
             "points": self.points,
             "length_by_d": int(self.length_by_d),
+            "cycle_dwell_s": self.dwell_s.get("P", 1.0),
+            "repeats_by_k": int(self.repeats_by_k),
             "end_m": self.end_m,
         }
 
@@ -159,6 +163,7 @@ _FANUC: dict[str, Any] = {
     "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1, 97.1),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
+    "repeats_by_k": True,
 }
 _SINUMERIK_STATEMENTS = {
     _kind(d.RADIUS): ("CR",),

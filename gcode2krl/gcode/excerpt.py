@@ -3,6 +3,7 @@
 import re
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN
+from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.vocabulary import TENFOLD
 
@@ -51,6 +52,11 @@ _FIXED = {
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
     f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=",
+    c.R_BELOW_DEPTH: "R",
+    c.REPEATS: "L",
+    c.DWELL_NEGATIVE: "P",
+    c.PECK_NOT_POSITIVE: "Q",
+    c.CLEARANCE_NEGATIVE: "D",
 }
 
 

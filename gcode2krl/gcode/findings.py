@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
+from gcode2krl.gcode import cycle_findings as of_cycles
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.units import MM_PER_INCH
@@ -277,7 +278,7 @@ FINDINGS: dict[int, Finding] = {
     DWELL_WITH_ARC: Finding(
         "error",
         "two-uses",
-        "G4 and an arc share one block, so P would mean two things",
+        "G4 and an arc or a cycle share one block, so P would mean two things",
         "write them in separate blocks",
     ),
     BAD_LINE_NUMBER: Finding(
@@ -311,6 +312,7 @@ FINDINGS: dict[int, Finding] = {
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
 }
+FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
@@ -336,9 +338,15 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
     v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
     v.G70: ("lathe cycle", "this is a milling translator"),
-    v.G73: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
     v.G76: ("threading cycle of a lathe", "mill the thread"),
-    v.G81: (f"drilling cycles: {_LATER}", "let the post write the cycle out in G0 and G1"),
+    v.G87: (
+        "back boring orients the spindle and moves the tool off centre through the hole",
+        "let the post write it out, with M19 mapped in [m_code] of the cell",
+    ),
+    v.G88: (
+        "the operator retracts the tool by hand, which a robot's program cannot wait for",
+        "use G86 or G89, or let the post write the cycle out",
+    ),
     v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
     v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
@@ -400,6 +408,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "h": f"{b / v.TENFOLD:g}",
         "difference": abs(a - b),
         "decimals": decimals_needed(MM_PER_INCH if c < 0 else 1.0),
+        "letter": chr(int(b)) if number in of_cycles.TEXTS and 0 < b < FIRST_FOREIGN else "",
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,

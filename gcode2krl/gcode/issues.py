@@ -126,6 +126,8 @@ def program_issues(
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
+    if state["retract_unnamed_line"]:
+        yield _retract_unnamed(int(state["retract_unnamed_line"]))
     if not state["ended"]:
         yield _no_end(cut_off=state["tape_marks"] == 1)
     if rest_line:
@@ -177,6 +179,16 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         }
         blocks = "in one block" if count == 1 else f"in {count} blocks"
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
+
+
+def _retract_unnamed(line: int) -> Issue:
+    return Issue(
+        "warning",
+        "retract-unnamed",
+        line,
+        "the cycles retract to R between holes, as in LinuxCNC: neither G98 nor G99 is named",
+        "write G98 (back to the height before the cycles) or G99 (to R) before them",
+    )
 
 
 def _no_end(*, cut_off: bool) -> Issue:

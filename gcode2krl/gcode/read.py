@@ -32,6 +32,7 @@ from gcode2krl.gcode.state import (
     EVENT_TOOL,
     GROUP_OF_G,
     IMPLIED_M5,
+    OF_CYCLE,
     WORK_OFFSETS,
     initial_state,
 )
@@ -354,7 +355,10 @@ class _Interpreter:
         if kind == EVENT_TOOL:
             return "tool", {"tool": int(a), "line": line}
         if kind == EVENT_SPINDLE:
-            spindle: dict[str, Any] = {"rpm": a, "m": abs(int(b)), "line": line}
+            cycle, m = divmod(abs(int(b)), OF_CYCLE)
+            spindle: dict[str, Any] = {"rpm": a, "m": m, "line": line}
+            if cycle:
+                spindle["cycle"] = f"G{cycle}"
             return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
         if kind == EVENT_COOLANT:
             mist, flood = bool(int(b) & 1), bool(int(b) & 2)

@@ -66,6 +66,20 @@ STATE = np.dtype(
         ("spiral_start", "f8"),
         ("spiral_end", "f8"),
         ("spiral_unit_mm", "f8"),
+        ("retract", "i4"),  # ten times 98 or 99
+        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
+        ("in_cycles", "i1"),  # a row of cycles has begun and no other motion has ended it
+        ("cycle_level_mm", "f8"),  # programmed height along the tool where it began, to which G98 leads back
+        ("cycle_level_known", "i1"),
+        ("cycle_r", "f8"),  # words of the last cycle, which hold for the next; programmed units
+        ("cycle_depth", "f8"),
+        ("cycle_q", "f8"),
+        ("cycle_p", "f8"),
+        ("cycle_line", "i4"),  # the last cycle, and the modes under which it stood
+        ("cycle_plane", "i4"),
+        ("cycle_unit_mm", "f8"),
+        ("cycle_absolute", "i1"),
     ],
     align=True,  # as C lays it out
 )
@@ -91,6 +105,7 @@ def initial_state() -> NDArray[np.void]:
     state["length_offset"] = np.nan
     state["offset_tool"] = -1
     state["tolerance"] = np.nan
+    state["retract"] = v.G99
     return state
 
 
@@ -99,7 +114,7 @@ UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2
 
 _GROUPS: dict[int, tuple[float, ...]] = {
     v.NON_MODAL: (4, 28, 28.1, 30, 30.1, 53),
-    v.MOTION: (0, 1, 2, 3, 80),
+    v.MOTION: (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89),
     v.PLANE: (17, 18, 19),
     v.DISTANCE: (90, 91),
     v.CENTRE: (90.1, 91.1),
@@ -115,8 +130,8 @@ _GROUPS: dict[int, tuple[float, ...]] = {
 """Modal group: the G-codes in it that are read."""
 _UNSUPPORTED = (
     *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
-    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 73, 74, 76),
-    *(81, 82, 83, 84, 85, 86, 87, 88, 89, 92, 92.1, 92.2, 92.3, 96),
+    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76),
+    *(87, 88, 92, 92.1, 92.2, 92.3, 96),
 )
 """G-codes of this and other dialects that are known and not read."""
 
@@ -186,3 +201,5 @@ WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5
 """M number of a spindle stop that a tool change brings about."""
+OF_CYCLE = 1000
+"""In a spindle event of a canned cycle the cycle's number stands before that of the M-code, times this."""

@@ -21,7 +21,9 @@ def index_of(letter: str) -> int:
     return ord(letter) - LETTER_A
 
 
-WORD_E, WORD_F, WORD_H, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (index_of(letter) for letter in "EFHPQRST")
+WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (
+    index_of(letter) for letter in "DEFHLPQRST"
+)
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
 OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
@@ -44,10 +46,11 @@ G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
 G64 = 640  # blending; else exact stop
-G70, G73, G76, G81 = 700, 730, 760, 810  # lathe cycles, chip-breaking drilling, threading, drilling cycles
+G70, G76, G87, G88 = 700, 760, 870, 880  # lathe cycles, threading, back boring, boring with a manual retract
 G80 = 800  # ends the motion mode
 G90 = 900  # absolute distances; else incremental
 G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
+G98, G99 = 980, 990  # retract of a canned cycle to where it began; to R
 G92, G96 = 920, 960  # coordinate shift, constant surface speed
 
 M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change
@@ -61,6 +64,9 @@ M98, M99 = 98, 99  # subprograms
 
 MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3
 """Motion modes of the state: none after G80 and before the first motion code, else the G number."""
+FIRST_CYCLE, CYCLE_CHIP, CYCLE_TAP_LEFT, CYCLE_DRILL, CYCLE_DWELL, CYCLE_PECK = 73, 73, 74, 81, 82, 83
+CYCLE_TAP, CYCLE_REAM, CYCLE_BORE_STOP, CYCLE_BORE = 84, 85, 86, 89
+"""Canned cycles among the motion modes; no other mode has a number as large as the first."""
 PLANE_XY, PLANE_ZX = 17, 18
 """Planes of the state: the G number; 19 is Y Z."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95

@@ -163,9 +163,15 @@ class _Composer:
 
     def _subprogram(self, part: _Part) -> Iterator[bytes]:
         """Yield a part, which states its speed and CDIS."""
-        needed = f"{DECLARATIONS}\n{MESSAGE_SETUP}" if self._has_message(part) else ""
-        yield from (NEWLINE, _text(f"{w.DEF} {part.name}( )\n{needed}"))
-        yield from self._motions(part.start, part.end, np.array(_NOTHING_IN_FORCE))
+        first = self._first_message(part)
+        yield from (NEWLINE, _text(f"{w.DEF} {part.name}( )\n{'' if first is None else DECLARATIONS}"))
+        state, begin = np.array(_NOTHING_IN_FORCE), part.start
+        if first is not None:  # set up where the robot stands anyway: the part may begin in a blended corner
+            yield from self._motions(begin, first, state)
+            yield from self._lines(first, first + 1, state)
+            yield from (_text(MESSAGE_SETUP), self._around(first))
+            begin = first + 1
+        yield from self._motions(begin, part.end, state)
         yield _text(w.END)
 
     def _part_file(self, part: _Part) -> Iterator[bytes]:
@@ -180,8 +186,10 @@ class _Composer:
         if self.pilot and self.pilot.subprogram:
             yield from (NEWLINE, _text(self.pilot.subprogram))
 
-    def _has_message(self, part: _Part) -> bool:
-        return any(_MESSAGE in self._around(row) for row in self._with_events(part.start, part.end).tolist())
+    def _first_message(self, part: _Part) -> int | None:
+        """Return the first row of a part with a message, whose variables are those of the part."""
+        rows = self._with_events(part.start, part.end).tolist()
+        return next((row for row in rows if _MESSAGE in self._around(row)), None)
 
     def _with_events(self, start: int, end: int) -> Ints:
         """Return the rows of start..end at which something stands beside a motion and its dwell."""

@@ -16,7 +16,7 @@ from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
 from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
@@ -226,7 +226,8 @@ def compare(
     issues += differences.issues
     if intended is not None:
         read, wished = (
-            tuple(s for s in p.statements if paired or s.motion <= count) for p in (program, intended)
+            _behind_split(tuple(s for s in p.statements if paired or s.motion <= count))
+            for p in (program, intended)
         )
         issues += _statement_issues(read, wished, program)
         own, wanted = (_own_declarations(p.declarations) for p in (program, intended))
@@ -308,6 +309,12 @@ def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, .
     return tuple(
         s for s in declarations if not re.match(rf"{w.EXT}\s+\w+_\d{{3,}}\s*\(\s*\)", s.text, re.IGNORECASE)
     )
+
+
+def _behind_split(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements but those with which a part prepares its messages, as the split decides that."""
+    set_up = frozenset(_normal(line) for line in MESSAGE_SETUP.splitlines())
+    return tuple(s for s in statements if s.motion == 0 or _normal(s.text) not in set_up)
 
 
 def _statement_issues(

@@ -127,7 +127,9 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             f"feed move with the spindle off{_why_off(toolpath, row)}",
             "program S and M3 before it",
         )
-    for row in _stretches(feed & (speed < 0)):
+    tapping = {int(event.values["line"]): event.values["cycle"] for event in toolpath.events if _taps(event)}
+    yield from _tapping(tapping)
+    for row in _stretches(feed & (speed < 0) & ~np.isin(toolpath.source_line, list(tapping))):
         yield Issue(
             "error",
             "spindle-direction",
@@ -138,6 +140,22 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     for event in toolpath.events:
         if event.kind == "spindle":
             yield from _spindle_speed(event, toolpath, cell)
+
+
+def _taps(event: Event) -> bool:
+    return event.kind == "spindle" and event.values.get("cycle") in ("G74", "G84")
+
+
+def _tapping(cycles: dict[int, str]) -> Iterator[Issue]:
+    """Yield a finding on each tapping cycle, given by line: the spindle is not coupled to the robot."""
+    for line, code in cycles.items():
+        yield Issue(
+            "error",
+            "tapping-cycle",
+            line,
+            f"{code} taps a thread: the robot cannot couple its feed to the turning of the spindle",
+            "mill the thread (G2 or G3 helix); for a head that compensates length: --allow tapping-cycle",
+        )
 
 
 def _why_off(toolpath: Toolpath, row: int) -> str:

@@ -18,7 +18,7 @@ typedef struct {
     Machine *machine;
     State *state;
     Counts *counts;
-    int32_t line;
+    int32_t line, motion_before; /* the motion mode that the blocks before have left */
     bool has[V_LETTERS], used[V_LETTERS];
     double word[V_LETTERS];
     int32_t g[V_GROUPS], m_codes[V_M_CODES];

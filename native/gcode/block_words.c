@@ -41,7 +41,7 @@ static Taken take_g(Block *b, double value) {
     if (*of_group < 0) {
         *of_group = (int32_t)code;
     } else if (group == V_MOTION && (*of_group == V_G80 || code == V_G80)) { /* header lines say G0 … G80 */
-        *of_group = (int32_t)most(0, least(*of_group, code));
+        *of_group = (int32_t)(code == V_G80 ? *of_group : code);
     } else {
         report(b, F_SAME_GROUP_G, (Says){.a = *of_group, .b = (double)code});
         return faulty(AT(b->machine->doubt_of_group, group));

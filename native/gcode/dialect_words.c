@@ -2,6 +2,7 @@
 
 #include "gcode/dialect_words.h"
 
+#include "gcode/cycles.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 
@@ -112,6 +113,20 @@ static bool read_edge(Block *b) {
     return true;
 }
 
+/* Dwells and repeats of a drilling cycle. */
+static void read_cycle(Block *b) {
+    const bool named = b->g[V_MOTION] >= 0;
+    if (!is_cycle(named ? b->g[V_MOTION] / V_TENFOLD : b->state->motion) || b->g[V_NON_MODAL] == V_G4)
+        return;
+    b->word[V_WORD_P] *= b->machine->cycle_dwell_s;
+    if (!b->machine->repeats_by_k || !b->has[V_WORD_K])
+        return;
+    b->has[V_WORD_K] = false;
+    b->pointless &= ~(1 << V_WORD_K); /* a count */
+    b->has[V_WORD_L] = true;
+    b->word[V_WORD_L] = b->word[V_WORD_K];
+}
+
 /* --- coordinates that say for themselves how they count ------------------------------------------------- */
 
 static bool is_absolute_here(const Block *b) {
@@ -166,6 +181,7 @@ static bool use_harmless_words(Block *b) {
 /* Make the words of a block those of the core; return false, with a finding, where that cannot be. */
 bool to_core_words(Block *b) {
     bool good = true;
+    read_cycle(b);
     if (b->pointless)
         good = read_pointless(b);
     if (b->g[V_NON_MODAL] == V_G4)

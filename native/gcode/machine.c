@@ -7,12 +7,13 @@
 
 #include "gcode/block.h"
 #include "gcode/block_words.h"
+#include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 #include "gcode/settings.h"
 
-enum { ROWS_PER_BLOCK = 4, EVENTS_PER_BLOCK = 16 }; /* but for an arc, and for messages */
+enum { ROWS_PER_BLOCK = 4, EVENTS_PER_BLOCK = 16 }; /* but for an arc or a cycle, and for messages */
 
 /* --- the bulk of a CAM file ----------------------------------------------------------------------------- */
 
@@ -79,10 +80,11 @@ static bool names_axis(const Block *b) {
 
 static bool names_motion(const Block *b) { return b->g[V_MOTION] >= 0 && b->g[V_MOTION] != V_G80; }
 
+static bool is_arc(int32_t motion) { return motion == V_MOTION_ARC_CW || motion == V_MOTION_ARC_CCW; }
+
 /* Tell whether a centre is named while an arc mode is in force: a full circle. */
 static bool names_centre_alone(const Block *b) {
-    return b->state->motion >= V_MOTION_ARC_CW &&
-           (b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K]);
+    return is_arc(b->state->motion) && (b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K]);
 }
 
 static void use_axes(Block *b) { b->used[V_WORD_X] = b->used[V_WORD_Y] = b->used[V_WORD_Z] = true; }
@@ -140,6 +142,7 @@ static void non_modal(Block *b, bool any_axis) {
 
 static void motion_mode(Block *b) {
     State *s = b->state;
+    b->motion_before = s->motion;
     if (b->g[V_MOTION] < 0)
         return;
     s->motion = b->g[V_MOTION] == V_G80 ? V_MOTION_CANCELLED : b->g[V_MOTION] / V_TENFOLD;
@@ -180,6 +183,7 @@ static bool execute(Block *b) {
     const bool homes = special == V_G28 || special == V_G30, any_axis = names_axis(b);
     non_modal(b, any_axis);
     motion_mode(b);
+    b->state->in_cycles &= is_cycle(b->state->motion);
     const bool moves = !homes && (any_axis || names_motion(b) || names_centre_alone(b));
     if (special == V_G53 && (!moves || b->state->motion == V_MOTION_CANCELLED)) {
         report_unless(b, S_DOUBT_MOTION, F_G53_NEEDS_RAPID_OR_FEED, (Says){0});
@@ -188,8 +192,10 @@ static bool execute(Block *b) {
     }
     if (moves) {
         use_axes(b);
-        if (b->state->motion >= V_MOTION_ARC_CW)
+        if (is_arc(b->state->motion))
             use_arc_words(b);
+        else if (is_cycle(b->state->motion))
+            use_cycle_words(b);
         if (!move(b))
             return false;
     }
@@ -220,11 +226,12 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
     if (block.exact_once && block.g[V_PATH_CONTROL] < 0)
         s->exact_stop = stops_exactly;
     counts->mute = 0;
-    if (!done) { /* an arc needs more rows than there are: as if the block had not begun */
-        const int64_t wanted = counts->rows_wanted;
+    if (!done) { /* an arc or a cycle needs more room than there is: as if the block had not begun */
+        const int64_t rows_wanted = counts->rows_wanted, events_wanted = counts->events_wanted;
         *s = state_before;
         *counts = counts_before;
-        counts->rows_wanted = wanted;
+        counts->rows_wanted = rows_wanted;
+        counts->events_wanted = events_wanted;
         return false;
     }
     s->doubt |= doubt;

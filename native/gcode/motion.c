@@ -3,6 +3,7 @@
 #include "gcode/motion.h"
 
 #include "gcode/arc_motion.h"
+#include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
@@ -105,17 +106,20 @@ bool move(Block *b) {
         report(b, F_NO_MOTION_MODE, (Says){.a = s->motion_line});
         s->doubt |= S_DOUBT_MOTION;
         follow(b);
-    } else if (special == V_G53 && s->motion >= V_MOTION_ARC_CW) {
+    } else if (special == V_G53 && s->motion > V_MOTION_LINE) {
         report(b, F_G53_NEEDS_RAPID_OR_FEED, (Says){0});
         s->doubt |= S_DOUBT_POSITION;
     } else if (special == V_G53 && !s->absolute) {
         report_unless(b, S_DOUBT_DISTANCE, F_G53_INCREMENTAL, (Says){0});
         s->doubt |= S_DOUBT_POSITION;
-    } else if (special == V_G4 && s->motion >= V_MOTION_ARC_CW) {
+    } else if (special == V_G4 && s->motion > V_MOTION_LINE) {
         report(b, F_DWELL_WITH_ARC, (Says){0});
         follow(b);
     } else if (s->motion <= V_MOTION_LINE) {
         straight(b, special == V_G53);
+    } else if (is_cycle(s->motion)) {
+        if (!cycle_move(b))
+            return false;
     } else {
         note_unknown_start(b);
         Arc arc = arc_of(b);

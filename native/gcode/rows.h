@@ -45,6 +45,19 @@ static inline const double *work_offset_mm(const Block *block) {
     return &CELL(block->machine->offsets_mm, block->state->work_offset, 0);
 }
 
+/* The tip at programmed coordinates, and the other way round; both may be one array. */
+static inline void tip_of(const Block *block, const double programmed_mm[3], double tip_mm[3]) {
+    const double *base_mm = work_offset_mm(block);
+    for (int axis = 0; axis < 3; axis++)
+        tip_mm[axis] = programmed_mm[axis] + base_mm[axis];
+}
+
+static inline void programmed_of(const Block *block, const double tip_mm[3], double programmed_mm[3]) {
+    const double *base_mm = work_offset_mm(block);
+    for (int axis = 0; axis < 3; axis++)
+        programmed_mm[axis] = tip_mm[axis] - base_mm[axis];
+}
+
 void target(const Block *block, double to_mm[3]);
 void learn(Block *block);
 void follow(Block *block);

@@ -237,6 +237,10 @@ static void distance_modes(Block *b) {
         s->arc_absolute = b->g[V_CENTRE] == V_G90_1;
         s->doubt &= ~S_DOUBT_CENTRE;
     }
+    if (b->g[V_RETRACT] >= 0) {
+        s->retract = b->g[V_RETRACT];
+        s->retract_line = b->line;
+    }
 }
 
 /* Take over all modes and values of a block; `used` notes which words have been used. */

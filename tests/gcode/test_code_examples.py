@@ -17,9 +17,9 @@ _NO_GCODE = {"line-too-long", "undefined-position"}
 """The example is a whole file, or a later check of the program finds it too."""
 
 
-def _found(text: str) -> set[str]:
+def _found(text: str, dialect: str) -> set[str]:
     try:
-        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", load_cell())
+        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", load_cell(), dialect=dialect)
     except Gcode2KrlError as error:
         return {issue.code for issue in error.issues}
     return {issue.code for issue in toolpath.issues}
@@ -34,4 +34,5 @@ def _texts(example: str) -> list[str]:
 @pytest.mark.parametrize("code", sorted({finding.code for finding in FINDINGS.values()} - _NO_GCODE))
 def test_the_example_of_a_code_causes_it(code: str) -> None:
     example = all_codes()[code].example
-    assert any(code in _found(text) for text in _texts(example)), example
+    example, _, dialect = example.partition(", with --dialect ")
+    assert any(code in _found(text, dialect or "linuxcnc") for text in _texts(example)), example

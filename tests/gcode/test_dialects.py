@@ -70,6 +70,11 @@ def test_a_table_is_whole(name):
         ("/2 G1 X1. F100\n", "G1 X1 F100\n"),
         (":1234\nG1 X1. F100\n", "G1 X1 F100\n"),
         ("G1 X0 Y-0 Z1. F100\n", "G1 X0 Y0 Z1 F100\n"),
+        ("G99 G82 X5. Z-5. R1. P500 F100\nX8.\nG80\n", "G99 G82 X5 Z-5 R1 P0.5 F100\nX8\nG80\n"),
+        (
+            "G81 X5. Z-5. R1. F100\nG91 X2. Z-6. R-4. K3\nG80\n",
+            "G81 X5 Z-5 R1 F100\nG91 X2 Z-6 R-4 L3\nG80\n",
+        ),
         ("G2 X10. Y0 R5. F100\n", "G2 X10 Y0 R5 F100\n"),
     ],
 )

@@ -51,7 +51,7 @@ def test_a_correct_arc_behind_a_refused_block_is_not_blamed(fault):
 
 @pytest.mark.parametrize(
     "fault",
-    ["G1 X#1 Y5", "G1 X[1+1]", "#1=3 G1 X#1", "G81 X5 Y5 Z-5 R1", "G10 L2 P1 X5", "G91 G1 X5,5", "G92 X7"],
+    ["G1 X#1 Y5", "G1 X[1+1]", "#1=3 G1 X#1", "G87 X5 Y5 Z-5 R1", "G10 L2 P1 X5", "G91 G1 X5,5", "G92 X7"],
 )
 def test_an_arc_from_a_position_in_doubt_is_not_judged(fault):
     found = errors(f"{fault}\nG2 X20 I5 F100\nG0 X20 Y0 Z0\nG90\nM2\n")
@@ -64,13 +64,13 @@ def test_an_arc_is_judged_again_from_a_position_that_is_stated_anew():
 
 
 def test_words_under_a_cycle_that_is_not_read_are_consequences():
-    text = "G81 X5 Y5 Z-5 R1\nX10 R2\nX15 P1\nX20 K3\nG80\nG0 Z5\nM2\n"
+    text = "G87 X5 Y5 Z-5 R1\nX10 R2\nX15 P1\nX20 K3\nG80\nG0 Z5\nM2\n"
     assert errors(text) == [("unsupported-g", 3)]
 
 
 def test_consequences_are_counted_behind_their_cause():
     with pytest.raises(Gcode2KrlError) as caught:
-        read_stream(io.BytesIO((HEAD + "G81 X5 Y5 Z-5 R1\nX10 R2\nX15 P1\nG80\nM2\n").encode()), "part.nc")
+        read_stream(io.BytesIO((HEAD + "G87 X5 Y5 Z-5 R1\nX10 R2\nX15 P1\nG80\nM2\n").encode()), "part.nc")
     cause, rest = caught.value.issues
     assert (cause.code, rest.code, rest.severity) == ("unsupported-g", "consequences", "note")
     assert rest.message.startswith("2 more findings")

@@ -308,6 +308,20 @@ def test_parts_of_a_long_program(make, tmp_path, split, most):
     assert (len(files) > 1) == (split == "files")
 
 
+@pytest.mark.parametrize("split", ["defs", "files"])
+def test_messages_in_parts_that_begin_in_a_blended_corner(make, tmp_path, split):
+    """The variables of messages are set where the first message stops the robot, not at the part's start."""
+    lines = ZIGZAG.splitlines()
+    lines.insert(len(lines) * 3 // 4, "(MSG, nearly done)")
+    part = "\n".join(lines) + "\n"
+    made = make(part, data={"program": {"max_lines": 100}}, split=split)
+    text = "".join(file.read_text("ascii") for file in tmp_path.rglob("*.src"))
+    assert text.index('"nearly done"') > text.rindex("GK_PAR[1]={") > text.rindex("DECL KRLMSG_T")
+    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    usual = make(part, stem="usual")
+    assert verify_krl(made.src, made.toolpath, usual.cell).ok, "how it is split is no difference"
+
+
 def test_each_verifies_with_the_cell_of_the_other(make, tmp_path):
     """How the text is laid out is no difference."""
     made = make(ZIGZAG, data={"program": {"max_lines": 100}})
