@@ -40,6 +40,14 @@ LINES = (
     b"G59.3 Y2",
     b"/G1 X100",
     b"G0 A0 B1 X3",
+    b"G1 X1 A30 C-370 F500",
+    b"G43.4 H1",
+    b"G43.5 H1",
+    b"G1 X2 I.3 J-.2 K.9",
+    b"G93 G1 A-20 F7",
+    b"G2 X10 Y0 I5 A40",
+    b"G28 A0 C0",
+    b"G53 G0 C5",
     b"#1 = [2 * ABS[#3]] X#<name>",
     b"X[1+2] Y2 ATAN[1]/[2]",
     b"G81 X1 Y1 Z-1 R2",
@@ -68,18 +76,21 @@ LINES = (
     b"M30",
 )
 """What the interpreter takes, and what it has a finding for."""
+_LENGTHS = {"pivot_mm": 150.0, "centre_mm": (10.0, 0.0, -50.0)}
 OPTIONS = ({}, {}, {"block_delete": True}, {"chord_tolerance_mm": 0.0005}, {"chord_tolerance_mm": 10.0})
 
 
 def prepare(place: Path) -> Try:
     """Read the sound programs; return the function that tries a case."""
     from gcode2krl import load_cell
+    from gcode2krl.cell.sections import Machine
     from gcode2krl.errors import NotUnderstoodError, input_error
     from gcode2krl.gcode import read
 
     files = (*ROOT.glob("examples/*.nc"), *ROOT.glob("tests/golden/programs/*.nc"))
     sound = [file.read_bytes()[:8000] for file in sorted(files)]
-    cells = (None, load_cell())
+    machine = Machine(kind="table-head", axes=("C", "A"), signs=(-1, 1), tcpm=False, **_LENGTHS)
+    cells = (None, load_cell(), load_cell().model_copy(update={"machine": machine}))
 
     def attempt(rng: np.random.Generator, _: Path) -> str:
         read._PIECE_BYTES = int(rng.choice((300, 5000, 1_000_000)))
@@ -93,6 +104,7 @@ def prepare(place: Path) -> Try:
                 raise ValueError("a finding of several lines") from error
             raise input_error(error.issues[0].code, error.issues[0].message) from None
         assert np.isfinite(toolpath.position_mm).all()
+        assert np.abs((toolpath.axis**2).sum(axis=1) - 1.0).max() < 1e-9
         assert (np.diff(toolpath.source_line) >= 0).all()
         return f"{len(toolpath)} rows"
 

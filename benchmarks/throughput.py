@@ -14,7 +14,9 @@ the figures are printed.
 
 import argparse
 import importlib.util
+import itertools
 import json
+import math
 import os
 import re
 import shutil
@@ -53,6 +55,9 @@ motion = plan_motion(targets, cell, dt_s={cycle})
 joints = solve_joints(motion, cell)
 write_krl(targets, {out!r}, cell)
 """
+READ_FIVE_AXES = (
+    "from gcode2krl import load_cell, read_gcode; read_gcode({part!r}, load_cell('five_axes.toml'))"
+)
 COMPLIANCE = CHAIN.replace(
     "write_krl(targets",
     """import numpy as np
@@ -157,6 +162,20 @@ def rewrite(part: Path, name: str, change: Callable[[str], str], most: int | Non
     return copy
 
 
+def with_rotary_words(part: Path) -> Path:
+    """Write a part with A and C in every block that has an X word, as a post for five axes does."""
+    blocks = itertools.count()
+
+    def turned(line: str) -> str:
+        if "X" not in line or "(" in line:
+            return line
+        k = next(blocks)
+        a_deg, c_deg = 15.0 + 10.0 * math.sin(0.01 * k), 40.0 * math.sin(0.003 * k)
+        return f"{line.rstrip()} A{a_deg:.3f} C{c_deg:.3f}\n"
+
+    return rewrite(part, f"five_axes_{part.name}", turned)
+
+
 def count_lines(part: Path) -> int:
     with part.open("rb") as file:
         return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
@@ -173,6 +192,11 @@ def write_inputs(folder: Path) -> None:
         'based_on = "demonstration"\n[controller]\nadvance = "unlimited"\n[stock]\nresolution_mm = 0.25\n'
     )
     (folder / "material.toml").write_text(material, encoding="ascii")
+    (folder / "five_axes.toml").write_text(
+        'based_on = "demonstration"\n[machine]\nkind = "table-table"\naxes = ["A", "C"]\n'
+        "signs = [-1, -1]\ntcpm = true\n",
+        encoding="ascii",
+    )
     (folder / "look_ahead.toml").write_text('based_on = "demonstration"\n', encoding="ascii")
 
 
@@ -264,6 +288,13 @@ def our_work(part: Path) -> list[Work]:
     out = str(part.with_name("out.src"))
     read = [sys.executable, "-c", READ.format(part=str(part))]
     work = [Work("read into a Toolpath", read, 0.2), Work(AS_TYPED, translate(part, out), 2.5)]
+    turned = with_rotary_words(part)
+    work.append(
+        Work(
+            "read with A and C in every block",
+            [sys.executable, "-c", READ_FIVE_AXES.format(part=str(turned))],
+        )
+    )
     if HAS_MOTION:
         work.append(chain_work("read, 12 ms plan, joints, KRL verified", part, "unlimited.toml", 0.6))
         work.append(chain_work("the same with compliance", part, "unlimited.toml", 0.7, COMPLIANCE))

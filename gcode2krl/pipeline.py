@@ -281,7 +281,8 @@ def targets_and_joints(
     if simplify_mm is not None:
         planned = _simplified(planned, toolpath, cell, simplify_mm, tolerance_mm)
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
-    return checked(replace(planned, issues=(*planned.issues, *warnings)), cell)
+    tilts = program.tilt_issues(planned, toolpath, cell)
+    return checked(replace(planned, issues=(*planned.issues, *warnings, *tilts)), cell)
 
 
 def _simplified(

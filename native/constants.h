@@ -189,7 +189,9 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_WORD_A 0
 #define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
+#define V_ROTARY_AXES 3
 #define V_TENFOLD 10
 #define V_LARGEST_G 999
 #define V_LARGEST_M 9999
@@ -209,6 +211,8 @@
 #define V_G41 410
 #define V_G43 430
 #define V_G49 490
+#define V_G43_4 434
+#define V_G43_5 435
 #define V_G52 520
 #define V_G53 530
 #define V_G54 540
@@ -267,6 +271,9 @@
 #define V_INVERSE_TIME 93
 #define V_PER_MINUTE 94
 #define V_PER_REVOLUTION 95
+#define V_TURN_MACHINE 0
+#define V_TURN_TIP 1
+#define V_TURN_VECTOR 2
 #define V_NON_MODAL 0
 #define V_MOTION 1
 #define V_PLANE 2
@@ -396,6 +403,14 @@
 #define F_DIALECT_STATEMENT 53
 #define F_NO_POINT 54
 #define F_COUNTED_FROM_UNKNOWN 55
+#define F_NO_MACHINE 56
+#define F_ROTARY_UNKNOWN 57
+#define F_VECTOR_ZERO 58
+#define F_VECTOR_AND_ANGLE 59
+#define F_VECTOR_ARC 60
+#define F_TURN_PER_REV 61
+#define F_TURN_TOO_FAR 62
+#define F_CYCLE_TURNED 63
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -578,6 +593,14 @@ typedef struct {
     int32_t work_offset;
     double home_28[3];
     double home_30[3];
+    double rotary_deg[3];
+    int32_t rotary_unknown;
+    double home_28_deg[3];
+    double home_30_deg[3];
+    double tool_vector[3];
+    int8_t has_vector;
+    int32_t length_code;
+    double feed_word;
     int32_t arcs;
     int8_t mist;
     int8_t flood;
@@ -643,47 +666,55 @@ typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1
 typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
 typedef char State_home_28_stands_at_120[offsetof(State, home_28) == 120 ? 1 : -1];
 typedef char State_home_30_stands_at_144[offsetof(State, home_30) == 144 ? 1 : -1];
-typedef char State_arcs_stands_at_168[offsetof(State, arcs) == 168 ? 1 : -1];
-typedef char State_mist_stands_at_172[offsetof(State, mist) == 172 ? 1 : -1];
-typedef char State_flood_stands_at_173[offsetof(State, flood) == 173 ? 1 : -1];
-typedef char State_ended_stands_at_174[offsetof(State, ended) == 174 ? 1 : -1];
-typedef char State_end_line_stands_at_176[offsetof(State, end_line) == 176 ? 1 : -1];
-typedef char State_tape_marks_stands_at_180[offsetof(State, tape_marks) == 180 ? 1 : -1];
-typedef char State_unit_named_stands_at_184[offsetof(State, unit_named) == 184 ? 1 : -1];
-typedef char State_blocks_stands_at_192[offsetof(State, blocks) == 192 ? 1 : -1];
-typedef char State_largest_mm_stands_at_200[offsetof(State, largest_mm) == 200 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_208[offsetof(State, unknown_feed_line) == 208 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_212[offsetof(State, unknown_reported) == 212 ? 1 : -1];
-typedef char State_doubt_stands_at_216[offsetof(State, doubt) == 216 ? 1 : -1];
-typedef char State_motion_line_stands_at_220[offsetof(State, motion_line) == 220 ? 1 : -1];
-typedef char State_distance_line_stands_at_224[offsetof(State, distance_line) == 224 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_228[offsetof(State, feed_mode_line) == 228 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_232[offsetof(State, rotary_refused) == 232 ? 1 : -1];
-typedef char State_note_count_stands_at_236[offsetof(State, note_count) == 236 ? 1 : -1];
-typedef char State_note_line_stands_at_260[offsetof(State, note_line) == 260 ? 1 : -1];
-typedef char State_note_word_stands_at_284[offsetof(State, note_word) == 284 ? 1 : -1];
-typedef char State_misfits_stands_at_308[offsetof(State, misfits) == 308 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_312[offsetof(State, misfits_other_centre) == 312 ? 1 : -1];
-typedef char State_spirals_stands_at_316[offsetof(State, spirals) == 316 ? 1 : -1];
-typedef char State_spiral_line_stands_at_320[offsetof(State, spiral_line) == 320 ? 1 : -1];
-typedef char State_spiral_start_stands_at_328[offsetof(State, spiral_start) == 328 ? 1 : -1];
-typedef char State_spiral_end_stands_at_336[offsetof(State, spiral_end) == 336 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_344[offsetof(State, spiral_unit_mm) == 344 ? 1 : -1];
-typedef char State_retract_stands_at_352[offsetof(State, retract) == 352 ? 1 : -1];
-typedef char State_retract_line_stands_at_356[offsetof(State, retract_line) == 356 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_360[offsetof(State, retract_unnamed_line) == 360 ? 1 : -1];
-typedef char State_in_cycles_stands_at_364[offsetof(State, in_cycles) == 364 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_368[offsetof(State, cycle_level_mm) == 368 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_376[offsetof(State, cycle_level_known) == 376 ? 1 : -1];
-typedef char State_cycle_r_stands_at_384[offsetof(State, cycle_r) == 384 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_392[offsetof(State, cycle_depth) == 392 ? 1 : -1];
-typedef char State_cycle_q_stands_at_400[offsetof(State, cycle_q) == 400 ? 1 : -1];
-typedef char State_cycle_p_stands_at_408[offsetof(State, cycle_p) == 408 ? 1 : -1];
-typedef char State_cycle_line_stands_at_416[offsetof(State, cycle_line) == 416 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_420[offsetof(State, cycle_plane) == 420 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_424[offsetof(State, cycle_unit_mm) == 424 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_432[offsetof(State, cycle_absolute) == 432 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 440 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_168[offsetof(State, rotary_deg) == 168 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_192[offsetof(State, rotary_unknown) == 192 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_200[offsetof(State, home_28_deg) == 200 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_224[offsetof(State, home_30_deg) == 224 ? 1 : -1];
+typedef char State_tool_vector_stands_at_248[offsetof(State, tool_vector) == 248 ? 1 : -1];
+typedef char State_has_vector_stands_at_272[offsetof(State, has_vector) == 272 ? 1 : -1];
+typedef char State_length_code_stands_at_276[offsetof(State, length_code) == 276 ? 1 : -1];
+typedef char State_feed_word_stands_at_280[offsetof(State, feed_word) == 280 ? 1 : -1];
+typedef char State_arcs_stands_at_288[offsetof(State, arcs) == 288 ? 1 : -1];
+typedef char State_mist_stands_at_292[offsetof(State, mist) == 292 ? 1 : -1];
+typedef char State_flood_stands_at_293[offsetof(State, flood) == 293 ? 1 : -1];
+typedef char State_ended_stands_at_294[offsetof(State, ended) == 294 ? 1 : -1];
+typedef char State_end_line_stands_at_296[offsetof(State, end_line) == 296 ? 1 : -1];
+typedef char State_tape_marks_stands_at_300[offsetof(State, tape_marks) == 300 ? 1 : -1];
+typedef char State_unit_named_stands_at_304[offsetof(State, unit_named) == 304 ? 1 : -1];
+typedef char State_blocks_stands_at_312[offsetof(State, blocks) == 312 ? 1 : -1];
+typedef char State_largest_mm_stands_at_320[offsetof(State, largest_mm) == 320 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_328[offsetof(State, unknown_feed_line) == 328 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_332[offsetof(State, unknown_reported) == 332 ? 1 : -1];
+typedef char State_doubt_stands_at_336[offsetof(State, doubt) == 336 ? 1 : -1];
+typedef char State_motion_line_stands_at_340[offsetof(State, motion_line) == 340 ? 1 : -1];
+typedef char State_distance_line_stands_at_344[offsetof(State, distance_line) == 344 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_348[offsetof(State, feed_mode_line) == 348 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_352[offsetof(State, rotary_refused) == 352 ? 1 : -1];
+typedef char State_note_count_stands_at_356[offsetof(State, note_count) == 356 ? 1 : -1];
+typedef char State_note_line_stands_at_380[offsetof(State, note_line) == 380 ? 1 : -1];
+typedef char State_note_word_stands_at_404[offsetof(State, note_word) == 404 ? 1 : -1];
+typedef char State_misfits_stands_at_428[offsetof(State, misfits) == 428 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_432[offsetof(State, misfits_other_centre) == 432 ? 1 : -1];
+typedef char State_spirals_stands_at_436[offsetof(State, spirals) == 436 ? 1 : -1];
+typedef char State_spiral_line_stands_at_440[offsetof(State, spiral_line) == 440 ? 1 : -1];
+typedef char State_spiral_start_stands_at_448[offsetof(State, spiral_start) == 448 ? 1 : -1];
+typedef char State_spiral_end_stands_at_456[offsetof(State, spiral_end) == 456 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_464[offsetof(State, spiral_unit_mm) == 464 ? 1 : -1];
+typedef char State_retract_stands_at_472[offsetof(State, retract) == 472 ? 1 : -1];
+typedef char State_retract_line_stands_at_476[offsetof(State, retract_line) == 476 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_480[offsetof(State, retract_unnamed_line) == 480 ? 1 : -1];
+typedef char State_in_cycles_stands_at_484[offsetof(State, in_cycles) == 484 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_488[offsetof(State, cycle_level_mm) == 488 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_496[offsetof(State, cycle_level_known) == 496 ? 1 : -1];
+typedef char State_cycle_r_stands_at_504[offsetof(State, cycle_r) == 504 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_512[offsetof(State, cycle_depth) == 512 ? 1 : -1];
+typedef char State_cycle_q_stands_at_520[offsetof(State, cycle_q) == 520 ? 1 : -1];
+typedef char State_cycle_p_stands_at_528[offsetof(State, cycle_p) == 528 ? 1 : -1];
+typedef char State_cycle_line_stands_at_536[offsetof(State, cycle_line) == 536 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_540[offsetof(State, cycle_plane) == 540 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_544[offsetof(State, cycle_unit_mm) == 544 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_552[offsetof(State, cycle_absolute) == 552 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 560 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -773,6 +804,9 @@ typedef struct {
     Bools known;
     Floats length_offset_mm;
     Ints32 length_offset_tool;
+    Floats turn;
+    Ints32 turn_mode;
+    Floats time_s;
 } Rows;
 
 typedef struct {
@@ -798,6 +832,8 @@ typedef struct {
     double chord_tolerance_mm;
     int64_t block_delete;
     int64_t lengths_from_table;
+    int64_t rotary_axes;
+    int64_t tcpm;
 } Machine;
 
 typedef struct {

@@ -18,6 +18,9 @@ SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
     "bull-nose",
+    "head-head",
+    "table-head",
+    "table-table",
     "install-hook",
     "kilograms-force",
     "latin-1",

@@ -34,6 +34,7 @@ from gcode2krl.cell.sections import (
     GuardInput,
     Home,
     Load,
+    Machine,
     Material,
     OneLine,
     Pilot,
@@ -54,7 +55,7 @@ from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.units import RAD_PER_DEG
 
-_REACHING = ("controller", "frames", "load", "spindle", "program", "pilot", "online")
+_REACHING = ("controller", "machine", "frames", "load", "spindle", "program", "pilot", "online")
 """Sections with defaults that go into a program."""
 _MODELS = (("robot", "robots"), ("controller", "controllers"), ("material", "materials"))
 _CUTTER = ("kind", "diameter_mm", "teeth", "corner_radius_mm", "helix_deg", "taper_deg", "point_deg")
@@ -85,6 +86,8 @@ class Cell(Section):
     verified: Verified | None = None
     robot: Robot = Robot()
     controller: Controller = Controller()
+    machine: Machine | None = None
+    """The machine tool that a five-axis program was made for."""
     tool: dict[ToolNumber, Tool] = Field(default_factory=dict)
     mounted_tool: Annotated[int, Field(strict=True, ge=1, le=99999)] | None = None
     """The tool in the spindle when the program starts without a T word."""

@@ -62,8 +62,8 @@ class Watch:
                     "error",
                     "axis-changes",
                     0,
-                    "the tool axis changes: material removal needs one direction",
-                    "split the program by its set-up directions",
+                    "the tool axis changes: forces and collisions with the stock are not predicted",
+                    "check stock and shank in the CAM, or split the program by set-up directions",
                 )
             )
         numbers = tuple(sorted(self._lowest_mm))

@@ -22,9 +22,16 @@ _COLUMNS = {
     "known": OUT_BOOLS,
     "length_offset_mm": OUT_FLOATS,
     "length_offset_tool": OUT_INTS32,
+    "turn": OUT_FLOATS,
+    "turn_mode": OUT_INTS32,
+    "time_s": OUT_FLOATS,
 }
 """Column of the Toolpath: its type."""
-_WIDTH = {"position_mm": 3, "known": 3}
+_WIDTH = {"position_mm": 3, "known": 3, "turn": 3}
+ROTARY = ("turn", "turn_mode", "time_s")
+"""Columns that are filled only where the cell declares a machine: angles A, B, C in deg or a tool vector,
+what they mean (`vocabulary.TURN_MACHINE` …), and the time that the block asks for, NaN where it asks for a
+speed. `rotary.in_part` makes tip and tool axis of them."""
 _START = {
     "rapid": True,
     "feed_mm_s": np.inf,
@@ -32,6 +39,7 @@ _START = {
     "arc": -1,
     "length_offset_mm": np.nan,
     "length_offset_tool": -1,
+    "time_s": np.nan,
 }
 """What is not 0 in the row of the start point, from which nothing has moved."""
 ROWS = StructOf(**_COLUMNS)
@@ -40,11 +48,13 @@ ROWS = StructOf(**_COLUMNS)
 class Columns:
     """Columns with room for more rows; pages that no row has reached yet cost nothing."""
 
-    def __init__(self, room: int) -> None:
-        self._arrays = {name: self._empty(name, room) for name in _COLUMNS}
+    def __init__(self, room: int, *, with_rotary: bool = False) -> None:
+        unused = () if with_rotary else ROTARY
+        self._arrays = {name: self._empty(name, 0 if name in unused else room) for name in _COLUMNS}
         self.room = room
-        for name, array in self._arrays.items():
-            array[0] = _START.get(name, 0)
+        self._filled = tuple(name for name in _COLUMNS if name not in unused)
+        for name in self._filled:
+            self._arrays[name][0] = _START.get(name, 0)
 
     @staticmethod
     def _empty(name: str, room: int) -> NDArray[Any]:
@@ -56,7 +66,8 @@ class Columns:
         if rows <= self.room:
             return
         self.room = max(rows, self.room * 3 // 2)
-        for name, old in self._arrays.items():
+        for name in self._filled:
+            old = self._arrays[name]
             larger = self._empty(name, self.room)
             larger[:used] = old[:used]
             self._arrays[name] = larger
@@ -67,4 +78,4 @@ class Columns:
 
     def finished(self, count: int) -> dict[str, NDArray[Any]]:
         """Return the first ``count`` rows of the columns by their names in the Toolpath."""
-        return {name: array[:count] for name, array in self._arrays.items()}
+        return {name: self._arrays[name][:count] for name in self._filled}

@@ -52,6 +52,11 @@ _FIXED = {
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
     f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=",
+    f.VECTOR_ZERO: "[IJK]",
+    f.VECTOR_ARC: _ARC_WORD,
+    f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
+    f.TURN_PER_REV: "[ABC]",
+    f.TURN_TOO_FAR: "[ABC]",
     c.R_BELOW_DEPTH: "R",
     c.REPEATS: "L",
     c.DWELL_NEGATIVE: "P",
@@ -95,9 +100,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"{letter}(?=[^{letter}]*$)"
     if number in _OF_LETTER_A:
         return letter
-    if number == f.UNUSED_WORD:
+    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE):
         return f"[{f.letters_of(a)}]"
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G):
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE):
         return _word("G", a)
     if number == f.NO_POINT:
         return letter + r"\s*[-+]?\d+(?![\d.])"

@@ -84,7 +84,15 @@ class Finding(NamedTuple):
     DIALECT_STATEMENT,
     NO_POINT,
     COUNTED_FROM_UNKNOWN,
-) = range(56)
+    NO_MACHINE,
+    ROTARY_UNKNOWN,
+    VECTOR_ZERO,
+    VECTOR_AND_ANGLE,
+    VECTOR_ARC,
+    TURN_PER_REV,
+    TURN_TOO_FAR,
+    CYCLE_TURNED,
+) = range(64)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -126,7 +134,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "rotary-axis",
         "{word} is a rotary or secondary axis, here at {b:g}, and the cell declares no machine",
-        "leave {word} at 0; rotary axes need a [machine] in the cell, which this version does not know",
+        "leave {word} at 0, or declare the machine that the program is for: [machine] in the cell",
     ),
     REPEATED_WORD: Finding("error", "repeated-word", "{word} stands twice in the block", "keep one"),
     SAME_GROUP_G: Finding(
@@ -308,6 +316,51 @@ FINDINGS: dict[int, Finding] = {
         "{word} counts from a position that has not been programmed",
         "program {word} with G0 and G90 first",
     ),
+    NO_MACHINE: Finding(
+        "error",
+        "machine-missing",
+        "G{g} programs the tip of a machine with rotary axes, and the cell declares no machine",
+        "declare the machine that the program is for: [machine] in the cell",
+    ),
+    ROTARY_UNKNOWN: Finding(
+        "error",
+        "rotary-unknown",
+        "where {words} stands is not known since tool vectors (G43.5) turned the tool",
+        "program {words} under G90, or G28, after G43.5",
+    ),
+    VECTOR_ZERO: Finding(
+        "error",
+        "tool-vector",
+        "the tool vector I{a:g} J{b:g} K{c:g} has no direction",
+        "give the direction from the tip to the holder",
+    ),
+    VECTOR_AND_ANGLE: Finding(
+        "error",
+        "tool-vector",
+        "{words} under G43.5, where I, J and K say how the tool stands",
+        "use G43.4 for rotary words",
+    ),
+    VECTOR_ARC: Finding(
+        "error",
+        "tool-vector",
+        "an arc under G43.5, where I, J and K are the tool vector",
+        "let the post write G1, or use G43.4",
+    ),
+    TURN_PER_REV: Finding(
+        "error",
+        "turn-per-rev",
+        "rotary axes alone under G95 of line {a:.0f}: degrees a revolution of the spindle have no use",
+        "use G93 or G94",
+    ),
+    CYCLE_TURNED: Finding(
+        "error",
+        "cycle-turned",
+        "G{g} moves along Z, and rotary axes turn in it or have turned the tool away from Z",
+        "turn before the cycle, without G43.4; or let the post write the cycle out in G0 and G1",
+    ),
+    TURN_TOO_FAR: Finding(
+        "error", "too-far", "a rotary axis at {a:g} degrees is beyond 1000 turns", "check the number"
+    ),
     TOO_MANY_M: Finding(
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
@@ -364,6 +417,8 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
     v.TENFOLD * v.M98: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
+_OF_LETTERS = (UNUSED_WORD, ROTARY_UNKNOWN, VECTOR_AND_ANGLE)
+"""Findings whose first number has the bits of letters."""
 
 SPIRAL_SENTENCE = (
     "{count} with radii that differ at start and end, most by {difference:.4f} mm "
@@ -401,7 +456,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
-        "words": " and ".join(letters_of(a)) if number == UNUSED_WORD else "",
+        "words": " and ".join(letters_of(a)) if number in _OF_LETTERS else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",

@@ -41,6 +41,8 @@ MACHINE = StructOf(
     chord_tolerance_mm=FLOAT,
     block_delete=INT,
     lengths_from_table=INT,
+    rotary_axes=INT,
+    tcpm=INT,
 )
 """What the interpreter goes on with from block to block."""
 

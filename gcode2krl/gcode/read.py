@@ -22,6 +22,7 @@ from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
+from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.state import (
     DOUBT_OF_G,
     DOUBT_OF_GROUP,
@@ -154,6 +155,7 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
+        **_rotary_settings(cell),
     )
     size = _size_of(stream)
     head, rest_bytes = b"", 0
@@ -171,10 +173,18 @@ def read_stream(
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    toolpath = interpreter.finish(head)
+    toolpath = interpreter.finish(head, cell)
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
+
+
+def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
+    """Return what the interpreter has to know of the machine: its letters, and what X, Y, Z mean."""
+    machine = cell.machine if cell is not None else None
+    if machine is None:
+        return {"rotary_axes": 0, "tcpm": 0}
+    return {"rotary_axes": sum(1 << v.index_of(letter) for letter in machine.axes), "tcpm": int(machine.tcpm)}
 
 
 def _scanned(
@@ -223,7 +233,8 @@ class _Interpreter:
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
         for key, value in spoken.start.items():
             self.state[key] = value
-        self.columns = Columns(_FIRST_ROWS)
+        self.columns = Columns(_FIRST_ROWS, with_rotary=settings["rotary_axes"] != 0)
+        self.chord_tolerance_mm = settings["chord_tolerance_mm"]
         self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
@@ -305,7 +316,7 @@ class _Interpreter:
                 return True
         return False
 
-    def finish(self, head: bytes) -> Toolpath:
+    def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
         found = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if any(issue.severity == "error" for issue in found):
@@ -317,15 +328,21 @@ class _Interpreter:
             most_decimals=self.most_decimals,
             head=head,
         )
-        return self._toolpath((*found, *whole))
+        return self._toolpath((*found, *whole), cell)
 
-    def _toolpath(self, issues: tuple[Issue, ...]) -> Toolpath:
+    def _toolpath(self, issues: tuple[Issue, ...], cell: "Cell | None") -> Toolpath:
         rows = self._count("rows")
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
+        columns = self.columns.finished(rows)
+        events = (*self._events(), *self._stopped_by_end())
+        axis: Floats = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
+        if cell is not None and cell.machine is not None:
+            vel_ori_deg_s = cell.controller.vel_ori_deg_s
+            part = in_part(columns, events, cell.machine, self.chord_tolerance_mm, vel_ori_deg_s, self.name)
+            columns, axis, events, issues = part.columns, part.axis, part.events, (*issues, *part.issues)
         return Toolpath(
-            **self.columns.finished(rows),
+            **columns,
             axis=axis,
-            events=(*self._events(), *self._stopped_by_end()),
+            events=events,
             issues=issues,
             source=self.name,
             restart=None,

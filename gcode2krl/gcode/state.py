@@ -40,6 +40,14 @@ STATE = np.dtype(
         ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
         ("home_28", "f8", 3),  # machine coordinates, mm
         ("home_30", "f8", 3),
+        ("rotary_deg", "f8", 3),  # A, B, C
+        ("rotary_unknown", "i4"),  # bits of those that nobody has stated since tool vectors moved them
+        ("home_28_deg", "f8", 3),
+        ("home_30_deg", "f8", 3),
+        ("tool_vector", "f8", 3),  # I, J, K under G43.5
+        ("has_vector", "i1"),
+        ("length_code", "i4"),  # G43, G43.4, G43.5 or G49, tenfold
+        ("feed_word", "f8"),  # F as written: degrees a minute of a turn alone
         ("arcs", "i4"),
         ("mist", "i1"),
         ("flood", "i1"),
@@ -121,7 +129,7 @@ _GROUPS: dict[int, tuple[float, ...]] = {
     v.FEED_MODE: (93, 94, 95),
     v.UNIT: (20, 21),
     v.RADIUS_COMPENSATION: (40,),
-    v.LENGTH_OFFSET: (43, 49),
+    v.LENGTH_OFFSET: (43, 43.4, 43.5, 49),
     v.RETRACT: (98, 99),
     v.WORK_OFFSET: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
     v.PATH_CONTROL: (61, 61.1, 64),
@@ -130,7 +138,7 @@ _GROUPS: dict[int, tuple[float, ...]] = {
 """Modal group: the G-codes in it that are read."""
 _UNSUPPORTED = (
     *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
-    *(43.1, 43.2, 43.4, 43.5, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76),
+    *(43.1, 43.2, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76),
     *(87, 88, 92, 92.1, 92.2, 92.3, 96),
 )
 """G-codes of this and other dialects that are known and not read."""
@@ -151,7 +159,7 @@ GROUP_OF_G = _group_table()
 _DOUBTS: dict[int, tuple[float, ...]] = {
     DOUBT_X: (7, 8),
     DOUBT_Z: (43.1, 43.2),
-    DOUBT_POSITION: (10, 43.4, 43.5, 52, 92, 92.1, 92.2, 92.3),
+    DOUBT_POSITION: (10, 52, 92, 92.1, 92.2, 92.3),
     DOUBT_SPEED: (96,),
     0: (41, 41.1, 42, 42.1),
 }

@@ -26,8 +26,12 @@ WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T =
 )
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
+WORD_A = index_of("A")
+"""The first rotary axis; B and C follow."""
 OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
 """Rotary and secondary axes."""
+ROTARY_AXES = 3
+"""The first of them."""
 
 TENFOLD = 10
 LARGEST_G = 999
@@ -43,6 +47,7 @@ G33 = 330  # spindle-synchronised motion
 G38 = 380  # probing, G38.2 to G38.5
 G41 = 410  # cutter radius compensation, G41 to G42.1
 G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
+G43_4, G43_5 = 434, 435  # the tip is programmed: with rotary words, with tool vectors I J K
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
 G64 = 640  # blending; else exact stop
@@ -71,6 +76,8 @@ PLANE_XY, PLANE_ZX = 17, 18
 """Planes of the state: the G number; 19 is Y Z."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
 """Feed modes of the state: the G number."""
+TURN_MACHINE, TURN_TIP, TURN_VECTOR = range(3)
+"""What X, Y, Z and the turn of a row mean: machine axes, tip and angles, tip and tool vector."""
 
 NON_MODAL, MOTION, PLANE, DISTANCE, CENTRE, FEED_MODE, UNIT = range(7)
 RADIUS_COMPENSATION, LENGTH_OFFSET, RETRACT, WORK_OFFSET, PATH_CONTROL, SPINDLE_MODE = range(7, 13)

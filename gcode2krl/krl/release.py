@@ -14,6 +14,7 @@ NEVER_RELEASED = frozenset(
         "undefined-position",
         "tool-unknown",
         "tool-missing",
+        "tool-lies",
         "no-clearance",
         "no-feed",
         "template",

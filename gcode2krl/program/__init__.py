@@ -15,6 +15,7 @@ from gcode2krl.program.restart import (
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
+from gcode2krl.program.tilts import tilt_issues
 
 __all__ = [
     "approached_row",
@@ -33,5 +34,6 @@ __all__ = [
     "smooth_spin",
     "state_words",
     "stiffest_spin",
+    "tilt_issues",
     "tool_rotation",
 ]

@@ -116,9 +116,9 @@ def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue
         return
     row = np.arange(len(feed))
     begin = np.maximum.accumulate(np.where(feed, 0, row))  # the row before the feed run
-    height = np.einsum("ij,ij->i", toolpath.position_mm, toolpath.axis)
+    position, axis = toolpath.position_mm, toolpath.axis
     for event in stops:
-        depth_mm = float(height[begin[event.row]] - height[event.row])
+        depth_mm = float((position[begin[event.row]] - position[event.row]) @ axis[event.row])
         if feed[event.row] and depth_mm > _DOWN_MM:
             turning = "the spindle turning" if _spindle_on(toolpath, event) else "the spindle stopped"
             yield Issue(

@@ -31,6 +31,9 @@ GRID_MM = 1e-3
 """Decimals of the KRL text: rows that print as the same point are one target."""
 
 _UP = np.array([0.0, 0.0, 1.0])
+_UPRIGHT = 1.0 - 1e-12
+LEAST_UPRIGHT = 0.17364817766693033
+"""Cosine of 80 degrees: a tool that is tilted further has no way to the clearance plane along its axis."""
 
 
 def plan_targets(
@@ -135,27 +138,35 @@ class _Plan:
         self._add(self.home_pose(self.tool)[0], move, _HOME)
         self.place = "home"
 
-    def _above(self, position: Floats) -> Floats:
-        return np.array([position[0], position[1], max(position[2], self.clearance)])
+    def _above(self, position: Floats, axis: Floats) -> Floats:
+        """Return where the axis of a tool at a position meets the clearance plane, or the position above it.
+
+        Along its axis a tool that is tilted leaves the work through the hole that it stands in.
+        """
+        if axis[2] > _UPRIGHT:
+            return np.array([position[0], position[1], max(position[2], self.clearance)])
+        way_mm = max(self.clearance - position[2], 0.0) / max(float(axis[2]), LEAST_UPRIGHT)
+        return np.asarray(position + way_mm * axis)
 
     def _retract(self, move: int) -> None:
         """Add the retract from the path straight up to the clearance plane."""
         if self.place == "path":
             if self.here[2] < self.clearance:
-                self._add(self._above(self.here), move)
+                self._add(self._above(self.here, self.axis), move)
             self.place = "clearance"
 
     def _run(self, start: int, end: int) -> None:
         """Add a run of plain rows, approached over the clearance plane if the robot is not on the path."""
         rows = slice(start, end)
         position = self.toolpath.position_mm[rows]
+        turns = not np.array_equal(self.axis, self.toolpath.axis[start])
         self.axis = self.toolpath.axis[start]
-        above = self._above(position[0])
+        above = self._above(position[0], self.axis)
         moves = np.arange(start, end, dtype=np.int32)
         direct = np.array_equal(above, position[0])  # the first position lies on the plane or above it
         if self.place == "home":
             self._add(above, start if direct else -1, _PTP)
-        elif self.place == "clearance" and not direct and not np.array_equal(above, self.here):
+        elif self.place == "clearance" and not direct and (turns or not np.array_equal(above, self.here)):
             self._add(above, -1)
         self.columns.append(position, self.toolpath.axis[rows], moves, self.tool, _LIN)
         self.here, self.axis, self.place = position[-1], self.toolpath.axis[end - 1], "path"

@@ -144,6 +144,8 @@ static void note_spiral(Block *b, const Arc *arc) {
 /* Write the rows of an arc; the last ends exactly where the block says. */
 static void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
     State *s = b->state;
+    const double from_deg[3] = {s->rotary_deg[0], s->rotary_deg[1], s->rotary_deg[2]};
+    const double time_s = feed_time_s(b, INFINITY, chords);
     double at_mm[3];
     for (int64_t k = 1; k <= chords; k++) {
         const double part = (double)k / (double)chords;
@@ -152,7 +154,9 @@ static void emit_chords(Block *b, const Arc *arc, double angle, double sweep, in
         at_mm[arc->second] = arc->centre.v + r * sin(angle + sweep * part);
         at_mm[arc->third] = arc->from_w + (arc->to_w - arc->from_w) * part;
         stand_at(s, k == chords ? arc->to_mm : at_mm);
+        stand_turned_between(s, from_deg, b->turn_deg, part);
         emit(b->machine, b->line, mm_s, false, false, s->arcs);
+        note_time(b, time_s);
     }
     s->arcs++;
 }
@@ -188,7 +192,7 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
 
 /* Carry out G2 or G3; return false where there is no room for its rows. */
 bool arc_move(Block *b, Arc *arc) {
-    if (!axis_word_is_harmless(b, arc))
+    if (!take_turn(b, false) || !axis_word_is_harmless(b, arc))
         return true;
     if (!(b->has[V_WORD_R] ? centre_by_radius(b, arc) : centre_by_words(b, arc)))
         return true;

@@ -26,6 +26,7 @@ typedef struct {
     int32_t pointless, absolute, incremental; /* bits of the letters of which it has been said */
     int32_t frame, harmless;                  /* a frame statement, and a code that says nothing */
     bool exact_once;                          /* an exact stop of this block alone */
+    double turn_deg[V_ROTARY_AXES]; /* where the rotary words lead, once they have been read */
 } Block;
 
 static const int OTHER_AXES[] = V_OTHER_AXES;

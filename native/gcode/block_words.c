@@ -4,6 +4,7 @@
 
 #include "gcode/dialect_words.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 
 /* A code this far from a whole number is one that a post has rounded. */
 static const double CODE_SLACK = 1e-6;
@@ -157,7 +158,7 @@ static bool rotary_is_harmless(Block *b) {
     bool good = true;
     for (int k = 0; k < OTHER_AXES_COUNT; k++) {
         const int index = OTHER_AXES[k], letter = index + CH_LETTER_A;
-        if (!b->has[index])
+        if (!b->has[index] || is_declared(b->machine, k))
             continue;
         if (b->word[index] == 0.0) {
             note(b, S_NOTE_ROTARY, letter);

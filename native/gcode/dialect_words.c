@@ -140,7 +140,9 @@ static bool count_axis(Block *b, int axis) {
     const double here_mm[3] = {s->x, s->y, s->z};
     const bool known[3] = {s->known_x != 0, s->known_y != 0, s->known_z != 0};
     const double unit_mm = b->g[V_UNIT] < 0 ? s->unit_mm : b->g[V_UNIT] == V_G20 ? U_MM_PER_INCH : 1.0;
-    const double from_base = (here_mm[axis] - work_offset_mm(b)[axis]) / unit_mm;
+    double programmed_mm[3];
+    programmed_of(b, here_mm, programmed_mm);
+    const double from_base = programmed_mm[axis] / unit_mm;
     const bool absolute = is_absolute_here(b), differs = absolute ? b->incremental & 1 << index : b->absolute & 1 << index;
     if (!differs)
         return true;
@@ -157,8 +159,10 @@ static void count_centre(Block *b, int axis) {
     const State *s = b->state;
     const double here_mm[3] = {s->x, s->y, s->z};
     const int index = V_WORD_I + axis;
+    double programmed_mm[3];
+    programmed_of(b, here_mm, programmed_mm);
     if (b->absolute & 1 << index)
-        b->word[index] -= (here_mm[axis] - work_offset_mm(b)[axis]) / s->unit_mm;
+        b->word[index] -= programmed_mm[axis] / s->unit_mm;
 }
 
 /* --- all ------------------------------------------------------------------------------------------------ */

@@ -10,6 +10,7 @@
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/rows.h"
 #include "gcode/settings.h"
 
@@ -26,7 +27,8 @@ enum { X_NAMED = 1, Y_NAMED = 2, Z_NAMED = 4, F_NAMED = 8, ALL_AXES = X_NAMED | 
 static inline bool plain_block(Machine *machine, const Words *words, int64_t from, int64_t to) {
     State *s = machine->state.at;
     const bool feeding = s->motion == V_MOTION_LINE;
-    if ((!feeding && s->motion != V_MOTION_RAPID) || s->feed_mode != V_PER_MINUTE || s->doubt)
+    if ((!feeding && s->motion != V_MOTION_RAPID) || s->feed_mode != V_PER_MINUTE || s->doubt |
+            s->rotary_unknown)
         return false;
     double x = 0.0, y = 0.0, z = 0.0, feed = s->feed;
     int named = 0;
@@ -37,7 +39,7 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
         case CH_LETTER_X: x = value, bit = X_NAMED; break;
         case CH_LETTER_Y: y = value, bit = Y_NAMED; break;
         case CH_LETTER_Z: z = value, bit = Z_NAMED; break;
-        case CH_LETTER_F: feed = value * s->unit_mm, bit = F_NAMED; break;
+        case CH_LETTER_F: feed = value * s->unit_mm, bit = machine->rotary_axes ? 0 : F_NAMED; break;
         }
         if (bit == 0 || named & bit)
             return false;
@@ -87,7 +89,11 @@ static bool names_centre_alone(const Block *b) {
     return is_arc(b->state->motion) && (b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K]);
 }
 
-static void use_axes(Block *b) { b->used[V_WORD_X] = b->used[V_WORD_Y] = b->used[V_WORD_Z] = true; }
+static void use_axes(Block *b) {
+    b->used[V_WORD_X] = b->used[V_WORD_Y] = b->used[V_WORD_Z] = true;
+    for (int k = 0; k < V_ROTARY_AXES; k++)
+        b->used[V_WORD_A + k] = true;
+}
 
 static void use_arc_words(Block *b) {
     b->used[V_WORD_I] = b->used[V_WORD_J] = b->used[V_WORD_K] = true;
@@ -119,7 +125,9 @@ static void home(Block *b, bool any_axis) {
     machine_home(b, any_axis);
 }
 
-static void set_home(State *s, double home_mm[3]) {
+static void set_home(State *s, double home_mm[3], double home_deg[3]) {
+    for (int k = 0; k < V_ROTARY_AXES; k++)
+        home_deg[k] = s->rotary_deg[k];
     home_mm[0] = s->x;
     home_mm[1] = s->y;
     home_mm[2] = s->z + length_offset_of(s);
@@ -135,8 +143,8 @@ static void non_modal(Block *b, bool any_axis) {
         use_axes(b);
         home(b, any_axis);
         break;
-    case V_G28_1: set_home(s, s->home_28); break;
-    case V_G30_1: set_home(s, s->home_30); break;
+    case V_G28_1: set_home(s, s->home_28, s->home_28_deg); break;
+    case V_G30_1: set_home(s, s->home_30, s->home_30_deg); break;
     }
 }
 
@@ -179,7 +187,7 @@ static bool execute(Block *b) {
     const int32_t special = b->g[V_NON_MODAL];
     apply_settings(b);
     for (int k = 0; k < OTHER_AXES_COUNT; k++)
-        b->used[OTHER_AXES[k]] |= b->has[OTHER_AXES[k]];
+        b->used[OTHER_AXES[k]] |= b->has[OTHER_AXES[k]] && !is_declared(b->machine, k);
     const bool homes = special == V_G28 || special == V_G30, any_axis = names_axis(b);
     non_modal(b, any_axis);
     motion_mode(b);
@@ -196,6 +204,10 @@ static bool execute(Block *b) {
             use_arc_words(b);
         else if (is_cycle(b->state->motion))
             use_cycle_words(b);
+        else
+            use_vector(b);
+        if (is_cycle(b->state->motion) && !may_cycle(b))
+            return true;
         if (!move(b))
             return false;
     }

@@ -32,7 +32,9 @@ static void machine_target(const Block *b, double to_mm[3]) {
 /* G0 and G1, also under G53. */
 static void straight(Block *b, bool by_machine) {
     State *s = b->state;
-    double to_mm[3], mm_s = RAPID_MM_S;
+    double to_mm[3], mm_s = RAPID_MM_S, time_s = NAN;
+    if (!take_turn(b, by_machine))
+        return;
     if (by_machine)
         machine_target(b, to_mm);
     else
@@ -41,11 +43,15 @@ static void straight(Block *b, bool by_machine) {
         note_unknown_start(b);
         const double dx = to_mm[0] - s->x, dy = to_mm[1] - s->y, dz = to_mm[2] - s->z;
         mm_s = 0.0;
-        const int finding = feed_speed(b, sqrt(dx * dx + dy * dy + dz * dz), &mm_s);
+        const double length_mm = sqrt(dx * dx + dy * dy + dz * dz);
+        const int finding = feed_speed(b, length_mm, &mm_s);
+        time_s = feed_time_s(b, length_mm, 1);
+        check_turn_feed(b, length_mm);
         if (finding != F_OK)
             report_speed(b, finding);
     }
     stand_at(s, to_mm);
+    stand_turned(s, b->turn_deg);
     if (by_machine) {
         s->known_x &= !b->has[V_WORD_X];
         s->known_y &= !b->has[V_WORD_Y];
@@ -54,6 +60,7 @@ static void straight(Block *b, bool by_machine) {
         learn(b);
     }
     emit(b->machine, b->line, mm_s, s->motion == V_MOTION_RAPID, by_machine, NO_ARC);
+    note_time(b, time_s);
 }
 
 /* G28 and G30: by way of the programmed point, then the named axes (or all) to the machine's home. */
@@ -62,8 +69,11 @@ void machine_home(Block *b, bool any_axis) {
     const bool *has = b->has;
     const double *home_mm = b->g[V_NON_MODAL] == V_G28 ? s->home_28 : s->home_30;
     double by_way_mm[3];
+    if (!take_turn(b, true))
+        return;
     target(b, by_way_mm);
     stand_at(s, by_way_mm);
+    stand_turned(s, b->turn_deg);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
     if (has[V_WORD_X] || !any_axis) {
         s->x = home_mm[0];
@@ -79,6 +89,7 @@ void machine_home(Block *b, bool any_axis) {
         s->z = home_mm[2] - length_offset_of(s);
         s->known_z = 0;
     }
+    rotary_home(b, any_axis);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
 }
 

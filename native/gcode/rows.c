@@ -40,5 +40,6 @@ void follow(Block *block) {
     block->state->x = to_mm[0];
     block->state->y = to_mm[1];
     block->state->z = to_mm[2];
+    follow_rotary(block);
     learn(block);
 }

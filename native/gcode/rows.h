@@ -4,6 +4,7 @@
 #define GCODE_ROWS_H
 
 #include "gcode/block.h"
+#include "gcode/rotary.h"
 
 enum { NO_ARC = -1 };
 static const double RAPID_MM_S = INFINITY;
@@ -32,6 +33,8 @@ static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool r
     CELL(rows->known, row, 0) = s->known_x != 0;
     CELL(rows->known, row, 1) = s->known_y != 0;
     CELL(rows->known, row, 2) = s->known_z != 0;
+    if (machine->rotary_axes)
+        emit_turn(machine, row);
 }
 
 static inline void stand_at(State *s, const double position_mm[3]) {

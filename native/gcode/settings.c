@@ -3,6 +3,7 @@
 #include "gcode/settings.h"
 
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 
 enum { LARGEST_WHOLE = 99999 };
 static const double WHOLE_SLACK = 1e-6;
@@ -37,6 +38,7 @@ static void feed(Block *b, double f) {
         return;
     }
     s->feed = s->feed_mode == V_INVERSE_TIME ? f : f * s->unit_mm;
+    s->feed_word = f;
     s->doubt &= ~S_DOUBT_FEED;
 }
 
@@ -63,6 +65,8 @@ static void set_length_offset(State *s, double length_mm) {
     if (new != old) {
         s->z -= new - old;
         s->known_z = 0;
+        if (is_turned(s))
+            s->known_x = s->known_y = 0; /* the tip moves along the tool, not along Z */
     }
     s->length_offset = length_mm;
 }
@@ -134,9 +138,12 @@ static void apply_length(Block *b) {
 }
 
 static void length_offset(Block *b) {
-    if (b->g[V_LENGTH_OFFSET] == V_G43) {
+    const int32_t code = b->g[V_LENGTH_OFFSET];
+    if (code >= 0 && !take_length_code(b, code))
+        return;
+    if (code == V_G43 || code == V_G43_4 || code == V_G43_5) {
         apply_length(b);
-    } else if (b->g[V_LENGTH_OFFSET] == V_G49 && !(b->machine->lengths_from_table && b->state->tool > 0)) {
+    } else if (code == V_G49 && !(b->machine->lengths_from_table && b->state->tool > 0)) {
         set_length_offset(b->state, NAN);
         b->state->offset_tool = -1;
     }

@@ -6,6 +6,7 @@ import re
 import pytest
 
 from gcode2krl import load_cell
+from gcode2krl.cell.sections import Machine
 from gcode2krl.codes import all_codes
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gcode import read_stream
@@ -17,9 +18,13 @@ _NO_GCODE = {"line-too-long", "undefined-position"}
 """The example is a whole file, or a later check of the program finds it too."""
 
 
-def _found(text: str, dialect: str) -> set[str]:
+_FIVE_AXES = Machine(kind="head-head", axes=("C", "A"), signs=(1, 1), tcpm=True)
+
+
+def _found(text: str, machine: Machine | None, dialect: str) -> set[str]:
+    cell = load_cell().model_copy(update={"machine": machine})
     try:
-        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", load_cell(), dialect=dialect)
+        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", cell, dialect=dialect)
     except Gcode2KrlError as error:
         return {issue.code for issue in error.issues}
     return {issue.code for issue in toolpath.issues}
@@ -35,4 +40,6 @@ def _texts(example: str) -> list[str]:
 def test_the_example_of_a_code_causes_it(code: str) -> None:
     example = all_codes()[code].example
     example, _, dialect = example.partition(", with --dialect ")
-    assert any(code in _found(text, dialect or "linuxcnc") for text in _texts(example)), example
+    spoken = dialect or "linuxcnc"
+    machines = (None, _FIVE_AXES)
+    assert any(code in _found(text, made, spoken) for text in _texts(example) for made in machines), example

@@ -18,6 +18,7 @@ from gcode2krl.cell.sections.fields import (
     missing,
     missing_key,
 )
+from gcode2krl.cell.sections.machine import Machine
 from gcode2krl.cell.sections.machining import (
     GuardInput,
     Kienzle,
@@ -67,6 +68,7 @@ __all__ = [
     "Limits",
     "LinearEdge",
     "Load",
+    "Machine",
     "Material",
     "NotNegative",
     "OneLine",

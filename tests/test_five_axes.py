@@ -1,0 +1,129 @@
+"""A five-axis program through the whole chain: A, B, C of the written program against scipy."""
+
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gcode2krl import Gcode2KrlError, load_cell, predict, read_gcode, set_targets, write_krl
+from gcode2krl.cell.sections import Machine
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "five_axis"
+PART, CELL = EXAMPLE / "five_axis.nc", EXAMPLE / "cell.toml"
+LIN = re.compile(r"^LIN \{X (\S+),Y (\S+),Z (\S+),A (\S+),B (\S+),C (\S+)\}", re.MULTILINE)
+
+
+def frame_of(axis):
+    """Return the frame turned by the smallest angle from z to an axis: rotation vector along z x axis."""
+    across = np.cross([0.0, 0.0, 1.0], axis)
+    size = np.linalg.norm(across)
+    angle = np.arctan2(size, axis[2])
+    return Rotation.from_rotvec(across / size * angle if size > 1e-12 else np.zeros(3))
+
+
+def programmed():
+    """Yield tip and axis of each block of the example, from its words and the chain of the table alone."""
+    here = dict.fromkeys("XYZAC", 0.0)
+    for line in PART.read_text().splitlines():
+        if line.startswith("G49"):
+            return
+        words = dict(re.findall(r"([XYZAC])(-?[\d.]+)", line)) if not line.startswith("(") else {}
+        if not words:
+            continue
+        here |= {letter: float(value) for letter, value in words.items()}
+        table = Rotation.from_euler("x", -here["A"], degrees=True) * Rotation.from_euler(
+            "z", -here["C"], degrees=True
+        )
+        yield np.array([here[letter] for letter in "XYZ"]), table.inv().apply([0.0, 0.0, 1.0])
+
+
+def test_poses_of_the_written_program():
+    cell = load_cell(CELL)
+    targets = set_targets(read_gcode(PART, cell), cell)
+    written = write_krl(targets, None, cell, name="PART")
+    poses = np.array(
+        [
+            [float(value) for value in found]
+            for found in LIN.findall(written.texts["PART.src"].decode("ascii"))
+        ]
+    )
+    at = 0
+    count = 0
+    for tip, axis in programmed():
+        want = frame_of(axis)
+        near = np.flatnonzero(np.abs(poses[at:, :3] - tip).max(axis=1) < 0.00051)
+        turned = Rotation.from_euler("ZYX", poses[at:, 3:][near], degrees=True)
+        off_deg = np.degrees((want.inv() * turned).magnitude())
+        assert off_deg.min() < 1e-3, (tip, off_deg)
+        abc = want.as_euler("ZYX", degrees=True)
+        k = at + near[np.argmin(off_deg)]
+        np.testing.assert_allclose(poses[k, 3:], abc, atol=1e-3)
+        at, count = k, count + 1
+    assert count > 35
+
+
+def test_between_blocks_the_tool_turns_as_the_table_does():
+    """On the cone A stays and C turns evenly: every chord has the tilt of the cone's flank."""
+    toolpath = read_gcode(PART, load_cell(CELL))
+    on_cone = (toolpath.source_line >= 23) & (toolpath.source_line <= 46) & ~toolpath.rapid
+    tilt_deg = np.degrees(np.arccos(toolpath.axis[on_cone, 2]))
+    np.testing.assert_allclose(tilt_deg, 15.0, atol=1e-6)
+    turn_deg = np.degrees(np.arctan2(toolpath.axis[on_cone, 0], -toolpath.axis[on_cone, 1]))
+    steps = np.diff(np.unwrap(np.radians(turn_deg)))
+    assert np.degrees(steps).max() < 8.0
+    assert np.degrees(steps.sum()) == pytest.approx(352.5, abs=8.0)
+
+
+def test_the_example_is_translated_and_says_what_is_not_predicted(run, tmp_path):
+    done = run(PART, "--cell", CELL, "-o", "part.src")
+    assert done.code == 0, done.err
+    assert "collisions with the stock are not predicted" in done.err
+    head = (tmp_path / "part.src").read_text().split(";ENDFOLD")[0]
+    assert "material removal (rapids through stock" in head
+    assert run("verify", "part.src", PART, "--cell", CELL).code == 0
+
+
+def test_predict_leaves_out_forces_with_a_word():
+    prediction = predict(PART, load_cell(CELL))
+    assert prediction.forces is None
+    assert any(issue.code == "axis-changes" for issue in prediction.issues)
+    axis = Rotation.from_quat(prediction.motion.rotation).apply([0.0, 0.0, 1.0])
+    assert np.degrees(np.arccos(axis[:, 2])).max() < 21.0
+
+
+def test_a_tilted_tool_leaves_along_its_axis():
+    cell = load_cell(CELL)
+    toolpath = read_gcode(PART, cell)
+    targets = set_targets(toolpath, cell)
+    axis = Rotation.from_quat(targets.rotation).apply([0.0, 0.0, 1.0])
+    added = np.flatnonzero((targets.move < 0) & ~targets.home)
+    assert len(added)
+    first = int(np.flatnonzero(targets.move >= 0)[0])
+    way = targets.position_mm[first - 1] - targets.position_mm[first]
+    np.testing.assert_allclose(way / np.linalg.norm(way), axis[first], atol=1e-9)
+    assert targets.position_mm[first - 1, 2] == pytest.approx(cell.clearance_z_mm)
+
+
+LYING = "G21 G90\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z5 A85 C0\nG1 X5 F500\nM30\n"
+
+
+def test_a_lying_tool_is_refused_where_it_has_to_leave(tmp_path):
+    part = tmp_path / "lying.nc"
+    part.write_text(LYING)
+    made_for = Machine(kind="head-head", axes=("C", "A"), signs=(1, 1), tcpm=True)
+    cell = load_cell().model_copy(update={"machine": made_for})
+    targets = set_targets(read_gcode(part, cell), cell)
+    found = [issue for issue in targets.issues if issue.code == "tool-lies"]
+    assert [issue.line for issue in found] == [5]
+    with pytest.raises(Gcode2KrlError):
+        write_krl(targets, None, cell, name="PART")
+
+
+def test_the_example_is_what_its_maker_writes(tmp_path, monkeypatch):
+    out = tmp_path / "again.nc"
+    monkeypatch.setattr("sys.argv", ["make.py", str(out)])
+    runpy.run_path(str(EXAMPLE / "make.py"), run_name="__main__")
+    assert out.read_bytes() == PART.read_bytes()
