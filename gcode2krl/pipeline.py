@@ -467,8 +467,8 @@ def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
             return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
 
         if spin == "stiffest":
-            return program.stiffest_spin(position, quality, bending)
-        return program.smooth_spin(position, quality)
+            return program.stiffest_spin(position, quality, bending, axis)
+        return program.smooth_spin(position, quality, axis)
 
     return searched
 

@@ -22,6 +22,7 @@
 #define CH_AMPERSAND 38
 #define CH_PAREN_OPEN 40
 #define CH_PAREN_CLOSE 41
+#define CH_ASTERISK 42
 #define CH_PLUS 43
 #define CH_COMMA 44
 #define CH_MINUS 45
@@ -44,6 +45,7 @@
 #define CH_LETTER_I 73
 #define CH_LETTER_J 74
 #define CH_LETTER_K 75
+#define CH_LETTER_L 76
 #define CH_LETTER_M 77
 #define CH_LETTER_N 78
 #define CH_LETTER_O 79
@@ -167,10 +169,12 @@
 
 /* gcode2krl.gcode.vocabulary */
 #define V_CASE_BIT 32
+#define V_DOLLAR 36
 #define V_EXCLAMATION 33
 #define V_LETTER_A 65
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
+#define V_PROGRAM_LINE 36
 #define V_UNREAD_NUMBER 32
 #define V_LETTERS 26
 #define V_WORD_D 3
@@ -211,6 +215,8 @@
 #define V_G41 410
 #define V_G43 430
 #define V_G49 490
+#define V_G43_1 431
+#define V_G43_2 432
 #define V_G43_4 434
 #define V_G43_5 435
 #define V_G52 520
@@ -226,10 +232,13 @@
 #define V_G90 900
 #define V_G90_1 901
 #define V_G91_1 911
+#define V_G92 920
+#define V_G92_1 921
+#define V_G92_2 922
+#define V_G92_3 923
+#define V_G96 960
 #define V_G98 980
 #define V_G99 990
-#define V_G92 920
-#define V_G96 960
 #define V_M0 0
 #define V_M1 1
 #define V_M2 2
@@ -247,10 +256,16 @@
 #define V_M61 61
 #define V_M62 62
 #define V_M70 70
+#define V_M71 71
 #define V_M72 72
 #define V_M73 73
 #define V_M98 98
 #define V_M99 99
+#define V_L_TOOL 1
+#define V_L_OFFSET 2
+#define V_L_TOOL_FROM_POSITION 10
+#define V_L_TOOL_FROM_FIXTURE 11
+#define V_L_OFFSET_FROM_POSITION 20
 #define V_MOTION_CANCELLED (-1)
 #define V_MOTION_RAPID 0
 #define V_MOTION_LINE 1
@@ -287,7 +302,8 @@
 #define V_WORK_OFFSET 10
 #define V_PATH_CONTROL 11
 #define V_SPINDLE_MODE 12
-#define V_GROUPS 13
+#define V_SHIFT_STATE 13
+#define V_GROUPS 14
 #define V_M_STOP 4
 #define V_M_TOOL_CHANGE 6
 #define V_M_SPINDLE 7
@@ -297,7 +313,6 @@
 
 /* gcode2krl.gcode.dialect_marks */
 #define D_AMPERSAND 38
-#define D_EQUALS 61
 #define D_GREATER 62
 #define D_LESS 60
 #define D_POINT 46
@@ -310,7 +325,6 @@
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
 #define D_SKIPPED 38
-#define D_FRAME 61
 #define D_HARMLESS 0
 #define D_REFUSED 1
 #define D_RADIUS 2
@@ -318,13 +332,12 @@
 #define D_MESSAGE 4
 #define D_CODE 5
 #define D_ENDS 6
-#define D_FRAME_SET 7
-#define D_FRAME_ADDED 8
-#define D_WHOLE_LINE 9
+#define D_WHOLE_LINE 7
 #define D_KIND_STEP 16
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
 #define D_THOUSANDTHS 2
+#define D_CALCULATOR 3
 #define D_MOST_CODES 9999
 #define D_CODE_UNKNOWN (-1)
 #define D_CODE_HARMLESS (-2)
@@ -339,8 +352,11 @@
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
-#define DR_REASON_SHIFT 20
 #define DR_REASON_VECTORS 11
+#define DR_REASON_PROGRAM 23
+#define DR_REASON_STILL 27
+#define DR_REASON_TWICE 28
+#define DR_REASON_MOVED 29
 #define DR_DEFAULT "linuxcnc"
 
 /* gcode2krl.gcode.findings */
@@ -403,14 +419,22 @@
 #define F_DIALECT_STATEMENT 53
 #define F_NO_POINT 54
 #define F_COUNTED_FROM_UNKNOWN 55
-#define F_NO_MACHINE 56
-#define F_ROTARY_UNKNOWN 57
-#define F_VECTOR_ZERO 58
-#define F_VECTOR_AND_ANGLE 59
-#define F_VECTOR_ARC 60
-#define F_TURN_PER_REV 61
-#define F_TURN_TOO_FAR 62
-#define F_CYCLE_TURNED 63
+#define F_EXPRESSION_VALUE 56
+#define F_PARAMETER_UNDEFINED 57
+#define F_PARAMETER_NUMBER 58
+#define F_PARAMETER_READ_ONLY 59
+#define F_SUBPROGRAM_MISSING 60
+#define F_CALLS_TOO_DEEP 61
+#define F_TOO_MANY_STEPS 62
+#define F_TOO_MANY_ROWS 63
+#define F_NO_MACHINE 64
+#define F_ROTARY_UNKNOWN 65
+#define F_VECTOR_ZERO 66
+#define F_VECTOR_AND_ANGLE 67
+#define F_VECTOR_ARC 68
+#define F_TURN_PER_REV 69
+#define F_TURN_TOO_FAR 70
+#define F_CYCLE_TURNED 71
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -432,6 +456,24 @@
 #define FC_SPINDLE_DIRECTION 214
 #define FC_TOO_LONG 215
 
+/* gcode2krl.gcode.offset_findings */
+#define FO_NO_AXES 220
+#define FO_WITHOUT_L 221
+#define FO_UNKNOWN_L 222
+#define FO_WRONG_SYSTEM 223
+#define FO_WRONG_TOOL 224
+#define FO_TOOL_UNDECLARED 225
+#define FO_NO_LENGTH 226
+#define FO_ROTATION_BY_POSITION 227
+#define FO_TOOL_ACROSS 228
+#define FO_ADDED_BY_WORDS 229
+#define FO_ADDED_WITHOUT_H 230
+#define FO_FROM_UNKNOWN 231
+#define FO_AT_START 232
+#define FO_LENGTH_DIFFERS 233
+#define FO_ROTARY 234
+#define FO_ROTATION_WITH_ROTARY 235
+
 /* gcode2krl.gcode.state */
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
@@ -451,8 +493,11 @@
 #define S_NOTE_CENTRE 1
 #define S_NOTE_HOME 2
 #define S_NOTE_OVERRIDE 3
-#define S_NOTE_CODE 4
-#define S_NOTE_STATEMENT 5
+#define S_NOTE_LOCAL 4
+#define S_NOTE_SHIFT 5
+#define S_NOTE_TABLE 6
+#define S_NOTE_CODE 7
+#define S_NOTE_STATEMENT 8
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -462,6 +507,117 @@
 #define S_EVENT_TEXT 5
 #define S_IMPLIED_M5 (-5)
 #define S_OF_CYCLE 1000
+
+/* gcode2krl.gcode.program_tables */
+#define P_LINE_LIMIT 4096
+#define P_MOST_PARAMETERS 5602
+#define P_LOCAL_PARAMETERS 30
+#define P_FRAMES 10
+#define P_MOST_NAMES 10000
+#define P_MOST_REPEATS 256
+#define P_LONGEST_NAME 255
+#define P_ROOM_OF_LINE 8194
+#define P_KIND_BLOCK 0
+#define P_KIND_NOTHING 1
+#define P_KIND_O_WORD 2
+#define P_KIND_SUB 3
+#define P_KIND_ENDSUB 4
+#define P_KIND_RETURN 5
+#define P_KIND_CALL 6
+#define P_KIND_IF 7
+#define P_KIND_ELSEIF 8
+#define P_KIND_ELSE 9
+#define P_KIND_ENDIF 10
+#define P_KIND_WHILE 11
+#define P_KIND_JUMP 12
+#define P_KIND_DO_WHILE 13
+#define P_KIND_REPEAT 14
+#define P_KIND_PROGRAM_NUMBER 15
+#define P_KIND_END_OF_FILE 16
+#define P_KIND_FAULT 17
+
+/* gcode2krl.gcode.program_faults */
+#define PF_NO_VALUE 0
+#define PF_UNCLOSED_BRACKET 1
+#define PF_UNKNOWN_FUNCTION 2
+#define PF_UNKNOWN_OPERATOR 3
+#define PF_NO_BRACKET 4
+#define PF_NO_SLASH 5
+#define PF_NO_EQUALS 6
+#define PF_NAME_UNCLOSED 7
+#define PF_NAME_TOO_LONG 8
+#define PF_TOO_MANY_NAMES 9
+#define PF_TOO_DEEP 10
+#define PF_NO_PARAMETER 11
+#define PF_BEHIND_O_WORD 12
+#define PF_DIVISION_BY_ZERO 0
+#define PF_SQUARE_ROOT 1
+#define PF_LOGARITHM 2
+#define PF_ARC_COSINE 3
+#define PF_ARC_SINE 4
+#define PF_POWER 5
+#define PF_NOT_A_NUMBER 6
+#define PF_INFINITE 7
+#define PF_FAULT_LABEL 0
+#define PF_FAULT_WORD 1
+#define PF_FAULT_NO_OPENING 2
+#define PF_FAULT_NO_CLOSING 3
+#define PF_FAULT_CROSSED 4
+#define PF_FAULT_LABEL_TWICE 5
+#define PF_FAULT_NESTED_SUB 6
+#define PF_FAULT_NOT_IN_SUB 7
+#define PF_FAULT_NOT_IN_LOOP 8
+#define PF_FAULT_TWO_STYLES 9
+#define PF_FAULT_FILE_ENDS 10
+#define PF_FAULT_M99_IN_MAIN 11
+#define PF_FAULT_M98_WORDS 12
+#define PF_FAULT_SUB_TWICE 13
+#define PF_FAULT_CALL_NUMBER 14
+#define PF_FAULT_ARGUMENTS 15
+#define PF_FAULT_REPEATS 16
+#define PF_FAULT_NOT_FIRST 17
+#define PF_FAULT_MODES 18
+
+/* gcode2krl.gcode.parameter_names */
+#define N_LINE 0
+#define N_MOTION_MODE 1
+#define N_PLANE 2
+#define N_CCOMP 3
+#define N_METRIC 4
+#define N_IMPERIAL 5
+#define N_ABSOLUTE 6
+#define N_INCREMENTAL 7
+#define N_INVERSE_TIME 8
+#define N_UNITS_PER_MINUTE 9
+#define N_UNITS_PER_REV 10
+#define N_COORD_SYSTEM 11
+#define N_TOOL_OFFSET 12
+#define N_RETRACT_R_PLANE 13
+#define N_RETRACT_OLD_Z 14
+#define N_SPINDLE_RPM_MODE 15
+#define N_SPINDLE_CSS_MODE 16
+#define N_IJK_ABSOLUTE_MODE 17
+#define N_LATHE_DIAMETER_MODE 18
+#define N_LATHE_RADIUS_MODE 19
+#define N_SPINDLE_ON 20
+#define N_SPINDLE_CW 21
+#define N_MIST 22
+#define N_FLOOD 23
+#define N_FEED 24
+#define N_RPM 25
+#define N_CURRENT_TOOL 26
+#define N_SELECTED_TOOL 27
+#define N_X 28
+#define N_Y 29
+#define N_Z 30
+#define N_ABS_X 31
+#define N_ABS_Y 32
+#define N_ABS_Z 33
+#define N_VALUE 34
+#define N_VALUE_RETURNED 35
+#define N_CALL_LEVEL 36
+#define N_TASK 37
+#define N_PREDEFINED 38
 
 /* gcode2krl.cutting.sweep */
 #define SW_LANES 16
@@ -591,6 +747,15 @@ typedef struct {
     int8_t exact_stop;
     double tolerance;
     int32_t work_offset;
+    double base_mm[3];
+    double shift_mm[3];
+    double shift_kept_mm[3];
+    int32_t shift_line;
+    double pivot_mm[2];
+    double rotation_cos;
+    double rotation_sin;
+    int8_t rotated;
+    int8_t offsets_taken;
     double home_28[3];
     double home_30[3];
     double rotary_deg[3];
@@ -617,11 +782,14 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[6];
-    int32_t note_line[6];
-    int32_t note_word[6];
+    int32_t note_count[9];
+    int32_t note_line[9];
+    int32_t note_word[9];
+    double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
+    int32_t misfits_reversed;
+    int32_t misfits_exchanged;
     int32_t spirals;
     int32_t spiral_line;
     double spiral_start;
@@ -664,57 +832,69 @@ typedef char State_offset_tool_stands_at_96[offsetof(State, offset_tool) == 96 ?
 typedef char State_exact_stop_stands_at_100[offsetof(State, exact_stop) == 100 ? 1 : -1];
 typedef char State_tolerance_stands_at_104[offsetof(State, tolerance) == 104 ? 1 : -1];
 typedef char State_work_offset_stands_at_112[offsetof(State, work_offset) == 112 ? 1 : -1];
-typedef char State_home_28_stands_at_120[offsetof(State, home_28) == 120 ? 1 : -1];
-typedef char State_home_30_stands_at_144[offsetof(State, home_30) == 144 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_168[offsetof(State, rotary_deg) == 168 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_192[offsetof(State, rotary_unknown) == 192 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_200[offsetof(State, home_28_deg) == 200 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_224[offsetof(State, home_30_deg) == 224 ? 1 : -1];
-typedef char State_tool_vector_stands_at_248[offsetof(State, tool_vector) == 248 ? 1 : -1];
-typedef char State_has_vector_stands_at_272[offsetof(State, has_vector) == 272 ? 1 : -1];
-typedef char State_length_code_stands_at_276[offsetof(State, length_code) == 276 ? 1 : -1];
-typedef char State_feed_word_stands_at_280[offsetof(State, feed_word) == 280 ? 1 : -1];
-typedef char State_arcs_stands_at_288[offsetof(State, arcs) == 288 ? 1 : -1];
-typedef char State_mist_stands_at_292[offsetof(State, mist) == 292 ? 1 : -1];
-typedef char State_flood_stands_at_293[offsetof(State, flood) == 293 ? 1 : -1];
-typedef char State_ended_stands_at_294[offsetof(State, ended) == 294 ? 1 : -1];
-typedef char State_end_line_stands_at_296[offsetof(State, end_line) == 296 ? 1 : -1];
-typedef char State_tape_marks_stands_at_300[offsetof(State, tape_marks) == 300 ? 1 : -1];
-typedef char State_unit_named_stands_at_304[offsetof(State, unit_named) == 304 ? 1 : -1];
-typedef char State_blocks_stands_at_312[offsetof(State, blocks) == 312 ? 1 : -1];
-typedef char State_largest_mm_stands_at_320[offsetof(State, largest_mm) == 320 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_328[offsetof(State, unknown_feed_line) == 328 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_332[offsetof(State, unknown_reported) == 332 ? 1 : -1];
-typedef char State_doubt_stands_at_336[offsetof(State, doubt) == 336 ? 1 : -1];
-typedef char State_motion_line_stands_at_340[offsetof(State, motion_line) == 340 ? 1 : -1];
-typedef char State_distance_line_stands_at_344[offsetof(State, distance_line) == 344 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_348[offsetof(State, feed_mode_line) == 348 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_352[offsetof(State, rotary_refused) == 352 ? 1 : -1];
-typedef char State_note_count_stands_at_356[offsetof(State, note_count) == 356 ? 1 : -1];
-typedef char State_note_line_stands_at_380[offsetof(State, note_line) == 380 ? 1 : -1];
-typedef char State_note_word_stands_at_404[offsetof(State, note_word) == 404 ? 1 : -1];
-typedef char State_misfits_stands_at_428[offsetof(State, misfits) == 428 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_432[offsetof(State, misfits_other_centre) == 432 ? 1 : -1];
-typedef char State_spirals_stands_at_436[offsetof(State, spirals) == 436 ? 1 : -1];
-typedef char State_spiral_line_stands_at_440[offsetof(State, spiral_line) == 440 ? 1 : -1];
-typedef char State_spiral_start_stands_at_448[offsetof(State, spiral_start) == 448 ? 1 : -1];
-typedef char State_spiral_end_stands_at_456[offsetof(State, spiral_end) == 456 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_464[offsetof(State, spiral_unit_mm) == 464 ? 1 : -1];
-typedef char State_retract_stands_at_472[offsetof(State, retract) == 472 ? 1 : -1];
-typedef char State_retract_line_stands_at_476[offsetof(State, retract_line) == 476 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_480[offsetof(State, retract_unnamed_line) == 480 ? 1 : -1];
-typedef char State_in_cycles_stands_at_484[offsetof(State, in_cycles) == 484 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_488[offsetof(State, cycle_level_mm) == 488 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_496[offsetof(State, cycle_level_known) == 496 ? 1 : -1];
-typedef char State_cycle_r_stands_at_504[offsetof(State, cycle_r) == 504 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_512[offsetof(State, cycle_depth) == 512 ? 1 : -1];
-typedef char State_cycle_q_stands_at_520[offsetof(State, cycle_q) == 520 ? 1 : -1];
-typedef char State_cycle_p_stands_at_528[offsetof(State, cycle_p) == 528 ? 1 : -1];
-typedef char State_cycle_line_stands_at_536[offsetof(State, cycle_line) == 536 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_540[offsetof(State, cycle_plane) == 540 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_544[offsetof(State, cycle_unit_mm) == 544 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_552[offsetof(State, cycle_absolute) == 552 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 560 ? 1 : -1];
+typedef char State_base_mm_stands_at_120[offsetof(State, base_mm) == 120 ? 1 : -1];
+typedef char State_shift_mm_stands_at_144[offsetof(State, shift_mm) == 144 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_168[offsetof(State, shift_kept_mm) == 168 ? 1 : -1];
+typedef char State_shift_line_stands_at_192[offsetof(State, shift_line) == 192 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_200[offsetof(State, pivot_mm) == 200 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_216[offsetof(State, rotation_cos) == 216 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_224[offsetof(State, rotation_sin) == 224 ? 1 : -1];
+typedef char State_rotated_stands_at_232[offsetof(State, rotated) == 232 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_233[offsetof(State, offsets_taken) == 233 ? 1 : -1];
+typedef char State_home_28_stands_at_240[offsetof(State, home_28) == 240 ? 1 : -1];
+typedef char State_home_30_stands_at_264[offsetof(State, home_30) == 264 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_288[offsetof(State, rotary_deg) == 288 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_312[offsetof(State, rotary_unknown) == 312 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_320[offsetof(State, home_28_deg) == 320 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_344[offsetof(State, home_30_deg) == 344 ? 1 : -1];
+typedef char State_tool_vector_stands_at_368[offsetof(State, tool_vector) == 368 ? 1 : -1];
+typedef char State_has_vector_stands_at_392[offsetof(State, has_vector) == 392 ? 1 : -1];
+typedef char State_length_code_stands_at_396[offsetof(State, length_code) == 396 ? 1 : -1];
+typedef char State_feed_word_stands_at_400[offsetof(State, feed_word) == 400 ? 1 : -1];
+typedef char State_arcs_stands_at_408[offsetof(State, arcs) == 408 ? 1 : -1];
+typedef char State_mist_stands_at_412[offsetof(State, mist) == 412 ? 1 : -1];
+typedef char State_flood_stands_at_413[offsetof(State, flood) == 413 ? 1 : -1];
+typedef char State_ended_stands_at_414[offsetof(State, ended) == 414 ? 1 : -1];
+typedef char State_end_line_stands_at_416[offsetof(State, end_line) == 416 ? 1 : -1];
+typedef char State_tape_marks_stands_at_420[offsetof(State, tape_marks) == 420 ? 1 : -1];
+typedef char State_unit_named_stands_at_424[offsetof(State, unit_named) == 424 ? 1 : -1];
+typedef char State_blocks_stands_at_432[offsetof(State, blocks) == 432 ? 1 : -1];
+typedef char State_largest_mm_stands_at_440[offsetof(State, largest_mm) == 440 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_448[offsetof(State, unknown_feed_line) == 448 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_452[offsetof(State, unknown_reported) == 452 ? 1 : -1];
+typedef char State_doubt_stands_at_456[offsetof(State, doubt) == 456 ? 1 : -1];
+typedef char State_motion_line_stands_at_460[offsetof(State, motion_line) == 460 ? 1 : -1];
+typedef char State_distance_line_stands_at_464[offsetof(State, distance_line) == 464 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_468[offsetof(State, feed_mode_line) == 468 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_472[offsetof(State, rotary_refused) == 472 ? 1 : -1];
+typedef char State_note_count_stands_at_476[offsetof(State, note_count) == 476 ? 1 : -1];
+typedef char State_note_line_stands_at_512[offsetof(State, note_line) == 512 ? 1 : -1];
+typedef char State_note_word_stands_at_548[offsetof(State, note_word) == 548 ? 1 : -1];
+typedef char State_moved_mm_stands_at_584[offsetof(State, moved_mm) == 584 ? 1 : -1];
+typedef char State_misfits_stands_at_656[offsetof(State, misfits) == 656 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_660[offsetof(State, misfits_other_centre) == 660 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_664[offsetof(State, misfits_reversed) == 664 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_668[offsetof(State, misfits_exchanged) == 668 ? 1 : -1];
+typedef char State_spirals_stands_at_672[offsetof(State, spirals) == 672 ? 1 : -1];
+typedef char State_spiral_line_stands_at_676[offsetof(State, spiral_line) == 676 ? 1 : -1];
+typedef char State_spiral_start_stands_at_680[offsetof(State, spiral_start) == 680 ? 1 : -1];
+typedef char State_spiral_end_stands_at_688[offsetof(State, spiral_end) == 688 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_696[offsetof(State, spiral_unit_mm) == 696 ? 1 : -1];
+typedef char State_retract_stands_at_704[offsetof(State, retract) == 704 ? 1 : -1];
+typedef char State_retract_line_stands_at_708[offsetof(State, retract_line) == 708 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_712[offsetof(State, retract_unnamed_line) == 712 ? 1 : -1];
+typedef char State_in_cycles_stands_at_716[offsetof(State, in_cycles) == 716 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_720[offsetof(State, cycle_level_mm) == 720 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_728[offsetof(State, cycle_level_known) == 728 ? 1 : -1];
+typedef char State_cycle_r_stands_at_736[offsetof(State, cycle_r) == 736 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_744[offsetof(State, cycle_depth) == 744 ? 1 : -1];
+typedef char State_cycle_q_stands_at_752[offsetof(State, cycle_q) == 752 ? 1 : -1];
+typedef char State_cycle_p_stands_at_760[offsetof(State, cycle_p) == 760 ? 1 : -1];
+typedef char State_cycle_line_stands_at_768[offsetof(State, cycle_line) == 768 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_772[offsetof(State, cycle_plane) == 772 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_776[offsetof(State, cycle_unit_mm) == 776 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_784[offsetof(State, cycle_absolute) == 784 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 792 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -727,6 +907,8 @@ typedef struct {
     int64_t mute;
     int64_t rows_wanted;
     int64_t events_wanted;
+    int64_t errors;
+    int64_t program_wanted;
 } Counts;
 typedef char Counts_rows_stands_at_0[offsetof(Counts, rows) == 0 ? 1 : -1];
 typedef char Counts_events_stands_at_8[offsetof(Counts, events) == 8 ? 1 : -1];
@@ -737,7 +919,9 @@ typedef char Counts_consequences_stands_at_40[offsetof(Counts, consequences) == 
 typedef char Counts_mute_stands_at_48[offsetof(Counts, mute) == 48 ? 1 : -1];
 typedef char Counts_rows_wanted_stands_at_56[offsetof(Counts, rows_wanted) == 56 ? 1 : -1];
 typedef char Counts_events_wanted_stands_at_64[offsetof(Counts, events_wanted) == 64 ? 1 : -1];
-typedef char Counts_has_its_size[sizeof(Counts) == 72 ? 1 : -1];
+typedef char Counts_errors_stands_at_72[offsetof(Counts, errors) == 72 ? 1 : -1];
+typedef char Counts_program_wanted_stands_at_80[offsetof(Counts, program_wanted) == 80 ? 1 : -1];
+typedef char Counts_has_its_size[sizeof(Counts) == 88 ? 1 : -1];
 VIEW(CountsView, Counts);
 
 typedef struct {
@@ -773,6 +957,145 @@ typedef char Found_has_its_size[sizeof(Found) == 32 ? 1 : -1];
 VIEW(FoundView, Found);
 
 typedef struct {
+    int64_t start;
+    int64_t target;
+    int64_t end;
+    int64_t expression;
+    int32_t kind;
+    int32_t subprogram;
+    int32_t first_message;
+    int32_t fault;
+} MarkedLine;
+typedef char MarkedLine_start_stands_at_0[offsetof(MarkedLine, start) == 0 ? 1 : -1];
+typedef char MarkedLine_target_stands_at_8[offsetof(MarkedLine, target) == 8 ? 1 : -1];
+typedef char MarkedLine_end_stands_at_16[offsetof(MarkedLine, end) == 16 ? 1 : -1];
+typedef char MarkedLine_expression_stands_at_24[offsetof(MarkedLine, expression) == 24 ? 1 : -1];
+typedef char MarkedLine_kind_stands_at_32[offsetof(MarkedLine, kind) == 32 ? 1 : -1];
+typedef char MarkedLine_subprogram_stands_at_36[offsetof(MarkedLine, subprogram) == 36 ? 1 : -1];
+typedef char MarkedLine_first_message_stands_at_40[offsetof(MarkedLine, first_message) == 40 ? 1 : -1];
+typedef char MarkedLine_fault_stands_at_44[offsetof(MarkedLine, fault) == 44 ? 1 : -1];
+typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 48 ? 1 : -1];
+VIEW(MarkedLineView, MarkedLine);
+
+typedef struct {
+    int64_t number;
+    int64_t entry;
+    int32_t is_ready;
+    int32_t is_program;
+} Subprogram;
+typedef char Subprogram_number_stands_at_0[offsetof(Subprogram, number) == 0 ? 1 : -1];
+typedef char Subprogram_entry_stands_at_8[offsetof(Subprogram, entry) == 8 ? 1 : -1];
+typedef char Subprogram_is_ready_stands_at_16[offsetof(Subprogram, is_ready) == 16 ? 1 : -1];
+typedef char Subprogram_is_program_stands_at_20[offsetof(Subprogram, is_program) == 20 ? 1 : -1];
+typedef char Subprogram_has_its_size[sizeof(Subprogram) == 24 ? 1 : -1];
+VIEW(SubprogramView, Subprogram);
+
+typedef struct {
+    int64_t hash;
+    int32_t start;
+    int32_t length;
+    double value;
+    int64_t is_set;
+} ParameterName;
+typedef char ParameterName_hash_stands_at_0[offsetof(ParameterName, hash) == 0 ? 1 : -1];
+typedef char ParameterName_start_stands_at_8[offsetof(ParameterName, start) == 8 ? 1 : -1];
+typedef char ParameterName_length_stands_at_12[offsetof(ParameterName, length) == 12 ? 1 : -1];
+typedef char ParameterName_value_stands_at_16[offsetof(ParameterName, value) == 16 ? 1 : -1];
+typedef char ParameterName_is_set_stands_at_24[offsetof(ParameterName, is_set) == 24 ? 1 : -1];
+typedef char ParameterName_has_its_size[sizeof(ParameterName) == 32 ? 1 : -1];
+VIEW(ParameterNameView, ParameterName);
+
+typedef struct {
+    int64_t return_to;
+    int64_t times;
+    int64_t generation;
+    int64_t entry;
+    int32_t is_program;
+    int32_t main_line;
+    int32_t repeats;
+    int32_t saved;
+    double parameters[30];
+} Frame;
+typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
+typedef char Frame_times_stands_at_8[offsetof(Frame, times) == 8 ? 1 : -1];
+typedef char Frame_generation_stands_at_16[offsetof(Frame, generation) == 16 ? 1 : -1];
+typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
+typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
+typedef char Frame_main_line_stands_at_36[offsetof(Frame, main_line) == 36 ? 1 : -1];
+typedef char Frame_repeats_stands_at_40[offsetof(Frame, repeats) == 40 ? 1 : -1];
+typedef char Frame_saved_stands_at_44[offsetof(Frame, saved) == 44 ? 1 : -1];
+typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 288 ? 1 : -1];
+VIEW(FrameView, Frame);
+
+typedef struct {
+    int64_t word;
+    int64_t end;
+    int64_t left;
+} Repeat;
+typedef char Repeat_word_stands_at_0[offsetof(Repeat, word) == 0 ? 1 : -1];
+typedef char Repeat_end_stands_at_8[offsetof(Repeat, end) == 8 ? 1 : -1];
+typedef char Repeat_left_stands_at_16[offsetof(Repeat, left) == 16 ? 1 : -1];
+typedef char Repeat_has_its_size[sizeof(Repeat) == 24 ? 1 : -1];
+VIEW(RepeatView, Repeat);
+
+typedef struct {
+    int64_t name;
+    int64_t number;
+    double value;
+} Assignment;
+typedef char Assignment_name_stands_at_0[offsetof(Assignment, name) == 0 ? 1 : -1];
+typedef char Assignment_number_stands_at_8[offsetof(Assignment, number) == 8 ? 1 : -1];
+typedef char Assignment_value_stands_at_16[offsetof(Assignment, value) == 16 ? 1 : -1];
+typedef char Assignment_has_its_size[sizeof(Assignment) == 24 ? 1 : -1];
+VIEW(AssignmentView, Assignment);
+
+typedef struct {
+    int64_t steps;
+    int64_t most_steps;
+    int64_t most_rows;
+    int64_t frame;
+    int64_t generation;
+    int64_t repeats;
+    int64_t names;
+    int64_t pool;
+    int64_t assignments;
+    int64_t words;
+    int64_t marks;
+    int64_t is_testing;
+    int64_t wanted;
+    int64_t wanted_number;
+    int64_t wanted_word;
+    int64_t main_words;
+    int64_t is_stopped;
+    double return_value;
+    int64_t value_returned;
+    int64_t subprograms;
+} Course;
+typedef char Course_steps_stands_at_0[offsetof(Course, steps) == 0 ? 1 : -1];
+typedef char Course_most_steps_stands_at_8[offsetof(Course, most_steps) == 8 ? 1 : -1];
+typedef char Course_most_rows_stands_at_16[offsetof(Course, most_rows) == 16 ? 1 : -1];
+typedef char Course_frame_stands_at_24[offsetof(Course, frame) == 24 ? 1 : -1];
+typedef char Course_generation_stands_at_32[offsetof(Course, generation) == 32 ? 1 : -1];
+typedef char Course_repeats_stands_at_40[offsetof(Course, repeats) == 40 ? 1 : -1];
+typedef char Course_names_stands_at_48[offsetof(Course, names) == 48 ? 1 : -1];
+typedef char Course_pool_stands_at_56[offsetof(Course, pool) == 56 ? 1 : -1];
+typedef char Course_assignments_stands_at_64[offsetof(Course, assignments) == 64 ? 1 : -1];
+typedef char Course_words_stands_at_72[offsetof(Course, words) == 72 ? 1 : -1];
+typedef char Course_marks_stands_at_80[offsetof(Course, marks) == 80 ? 1 : -1];
+typedef char Course_is_testing_stands_at_88[offsetof(Course, is_testing) == 88 ? 1 : -1];
+typedef char Course_wanted_stands_at_96[offsetof(Course, wanted) == 96 ? 1 : -1];
+typedef char Course_wanted_number_stands_at_104[offsetof(Course, wanted_number) == 104 ? 1 : -1];
+typedef char Course_wanted_word_stands_at_112[offsetof(Course, wanted_word) == 112 ? 1 : -1];
+typedef char Course_main_words_stands_at_120[offsetof(Course, main_words) == 120 ? 1 : -1];
+typedef char Course_is_stopped_stands_at_128[offsetof(Course, is_stopped) == 128 ? 1 : -1];
+typedef char Course_return_value_stands_at_136[offsetof(Course, return_value) == 136 ? 1 : -1];
+typedef char Course_value_returned_stands_at_144[offsetof(Course, value_returned) == 144 ? 1 : -1];
+typedef char Course_subprograms_stands_at_152[offsetof(Course, subprograms) == 152 ? 1 : -1];
+typedef char Course_has_its_size[sizeof(Course) == 160 ? 1 : -1];
+VIEW(CourseView, Course);
+
+typedef struct {
     Bytes text;
     Bytes statement_names;
     Ints32 statement_kinds;
@@ -782,10 +1105,13 @@ typedef struct {
     Ints32 line;
     Floats extra;
     Ints message_span;
+    MarkedLineView lines;
+    int64_t whole_program;
     int64_t first_line;
     int64_t words;
     int64_t marks;
     int64_t messages;
+    int64_t program_lines;
     int64_t most_decimals;
 } Scan;
 
@@ -815,9 +1141,10 @@ typedef struct {
     Rows rows;
     EventView events;
     FoundView found;
-    Floats offsets_mm;
+    Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
+    int64_t runs_programs;
     Ints32 core_g;
     Floats dwell_by_letter;
     int64_t points;
@@ -825,6 +1152,7 @@ typedef struct {
     double cycle_dwell_s;
     int64_t repeats_by_k;
     int64_t end_m;
+    int64_t whole_dwell_letter;
     Ints32 group_of_g;
     Ints32 doubt_of_g;
     Ints32 doubt_of_group;
@@ -835,6 +1163,27 @@ typedef struct {
     int64_t rotary_axes;
     int64_t tcpm;
 } Machine;
+
+typedef struct {
+    Bytes text;
+    MarkedLineView lines;
+    SubprogramView subprograms;
+    ParameterNameView names;
+    Ints32 name_slots;
+    Bytes pool;
+    Floats local_value;
+    Ints local_generation;
+    Floats parameters;
+    FrameView frames;
+    StateView saved_states;
+    RepeatView repeats;
+    AssignmentView assignments;
+    CourseView course;
+    Bytes letter;
+    Floats value;
+    Ints32 line;
+    Floats extra;
+} Program;
 
 typedef struct {
     double bottom_mm;

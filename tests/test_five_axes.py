@@ -107,6 +107,19 @@ def test_a_tilted_tool_leaves_along_its_axis():
     assert targets.position_mm[first - 1, 2] == pytest.approx(cell.clearance_z_mm)
 
 
+SET_UP = "G21 G90\nT1 M6\nS8000 M3\nG43.4 H1\nG0 X-60 Y-70 Z40 A20 C0\nG0 Z-12\nG1 X60 F1200\nG0 Z40\n"
+
+
+def test_one_tilted_set_up_has_forces(tmp_path):
+    """G49 and G28 Z0 behind it do not turn the tool: the retract is along its axis, HOME comes last."""
+    part = tmp_path / "set_up.nc"
+    part.write_text(SET_UP + "G49\nG91 G28 Z0\nM5\nM30\n")
+    prediction = predict(part, load_cell(CELL))
+    assert prediction.forces is not None
+    axis = Rotation.from_quat(prediction.motion.rotation).apply([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(axis, np.broadcast_to(axis[0], axis.shape), atol=1e-9)
+
+
 LYING = "G21 G90\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z5 A85 C0\nG1 X5 F500\nM30\n"
 
 

@@ -157,10 +157,13 @@ def _stock_of(job: Job, cell: Cell, folder: Path, source: str) -> tuple[Stock | 
     kept = cell.stock.model_dump(include={"resolution_mm", "through_mm"}) if cell.stock is not None else {}
     offset = next((frame for name, frame in cell.work_offsets.items() if name == job.work_offset), None)
     shift_mm = (offset.x_mm, offset.y_mm, offset.z_mm) if offset is not None else (0.0, 0.0, 0.0)
+    remedy = "state [stock] in the cell, or program in $BASE"
+    if offset is not None and any((offset.a_deg, offset.b_deg, offset.c_deg)):
+        sentence = f"{job.work_offset} of the cell is rotated, and the stock of the job with it"
+        return cell.stock, [Issue("warning", "job-stock", 0, sentence, remedy)]
     if job.stock.mesh is not None:
         if any(shift_mm):
             sentence = f"the stock of the job is a mesh, and {job.work_offset} of the cell shifts the program"
-            remedy = "state [stock] in the cell, or program in $BASE"
             return cell.stock, [Issue("warning", "job-stock", 0, sentence, remedy)]
         shape: dict[str, Any] = {"mesh": str(folder / job.stock.mesh), "box_mm": None}
     else:

@@ -2,8 +2,9 @@
 
 A dialect is no interpreter of its own. Its G numbers are replaced by those of the core, its statements become
 words (``CR=5`` is R5), its words the core's (G4 X2. is a dwell of 2 s); what the core has no meaning for is
-refused with a reason, and what says nothing to a robot is noted once. Sources: the controls' programming
-manuals (Fanuc 0i/30i for milling, Grbl 1.1, Sinumerik 840D sl / 828D).
+refused with a reason, and what says nothing to a robot is noted once. The tables say what is commonly
+documented of Fanuc milling, Grbl 1.1 and Sinumerik 840D sl / 828D; none has been checked on a control. Where
+what a control does depends on its parameters, or is in doubt, the block is refused.
 """
 
 from collections.abc import Mapping
@@ -41,17 +42,37 @@ REASONS: Final = (
     ("a tool by its name", "let the post write the tool's number, as in [tool.N] of the cell"),
     ("return from the reference point", "write G0 to the point"),
     ("a point of the machine", "remove the line: the robot goes to HOME by itself"),
-    ("an offset of all axes in the program", "let the post write TRANS or ATRANS, or final coordinates"),
+    (
+        "an offset of the zero in the program",
+        "let the post write final coordinates, or state the zero in [work_offsets] of the cell",
+    ),
     ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
     ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
+    (
+        "variables, jumps and subprograms are read in the dialect linuxcnc alone",
+        "let the post write the program out in plain numbers",
+    ),
+    (
+        "it sets offsets by this control's own numbers",
+        "remove the block; state them in [work_offsets] and [tool.N] of the cell",
+    ),
+    ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
+    ("how this control leads in and out is not known", "let the post write the path of the tool's centre"),
+    (
+        "the spindle stands still, so its turns take no time",
+        "start the spindle, or write G4 F in seconds",
+    ),
+    ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
+    ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
-REASON_EDGE, REASON_FLOW, REASON_BESIDE = _EDGE, _FLOW, _BESIDE
-REASON_SHIFT, REASON_VECTORS = _SHIFT, _VECTORS
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED = range(23, 30)
+REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
+REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
 
 @dataclass(frozen=True)
@@ -62,6 +83,12 @@ class Dialect:
     title: str
     syntax: int = 0
     """Bits of `dialect_marks`: what of its text is no word."""
+    runs_programs: bool = False
+    """Parameters, expressions, O-words, M98 and M99 are read."""
+    turns_axes: bool = True
+    """Rotary words of a cell with rotary axes are read."""
+    own: tuple[float, ...] = ()
+    """The only G numbers that are those of the core; empty: all that it does not read otherwise."""
     same: Mapping[int, int] = field(default_factory=dict)
     """G numbers that are others of the core: 710 is 21."""
     exact: tuple[float, ...] = ()
@@ -93,7 +120,8 @@ class Dialect:
     def core_g(self) -> Ints32:
         """Return the core's G number by that of the dialect, both ten times, (10000,); below 0: none."""
         table = np.full(d.MOST_CODES + 1, d.CODE_UNKNOWN, np.int32)
-        table[: v.LARGEST_G + 1] = np.arange(v.LARGEST_G + 1)
+        own = np.array([_tenfold(code) for code in self.own]) if self.own else np.arange(v.LARGEST_G + 1)
+        table[own] = own
         for special, codes in ((d.CODE_HARMLESS, self.harmless), (d.CODE_EXACT, self.exact)):
             for code in codes:
                 table[_tenfold(code)] = special
@@ -122,6 +150,7 @@ class Dialect:
     def settings(self) -> dict[str, Any]:
         """Return what the interpreter is given."""
         return {
+            "runs_programs": int(self.runs_programs),
             "core_g": self.core_g(),
             "dwell_by_letter": self.dwell_by_letter(),
             "points": self.points,
@@ -129,6 +158,7 @@ class Dialect:
             "cycle_dwell_s": self.dwell_s.get("P", 1.0),
             "repeats_by_k": int(self.repeats_by_k),
             "end_m": self.end_m,
+            "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
         }
 
 
@@ -154,13 +184,15 @@ _FANUC_REFUSED = {
     _RETURN: (29,),
     _HOME: (27,),
     _SETTING: (22,),
+    _NUMBERS: (10, 11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
+    _LEAD: (41, 41.1, 42, 42.1),
     _CYCLE: (70, 71, 72, 75, 77, 78, 79),
 }
 _FANUC: dict[str, Any] = {
     "syntax": d.SKIP_LEVEL | d.HEAD_LINES,
     "same": {63: 64, 62: 64},
     "exact": (9,),
-    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1, 97.1),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
@@ -171,8 +203,6 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.MESSAGE): ("MSG",),
     _kind(d.CODE, v.G53 // v.TENFOLD): ("SUPA",),
     _kind(d.ENDS): ("RET",),
-    _kind(d.FRAME_SET): ("TRANS",),
-    _kind(d.FRAME_ADDED): ("ATRANS",),
     _kind(d.HARMLESS): (
         *("ADIS", "ADISPOS", "COMPCAD", "COMPCURV", "COMPON", "COMPOF", "COMPSURF", "CYCLE832", "WORKPIECE"),
         *("FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "STOPRE", "FIFOCTRL", "STARTFIFO", "STOPFIFO"),
@@ -184,6 +214,7 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
     _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
+    _kind(d.REFUSED, _SHIFT): ("TRANS", "ATRANS"),
     _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
@@ -204,9 +235,9 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }
 _LIST: Final = (
-    Dialect("linuxcnc", "LinuxCNC's RS274/NGC"),
+    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True),
     Dialect("fanuc", "Fanuc milling; a number without a point is refused", **_FANUC, points=d.POINT_REQUIRED),
-    Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC),
+    Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC, points=d.CALCULATOR),
     Dialect("fanuc-increments", "Fanuc milling; X100 is 0.1 mm", **_FANUC, points=d.THOUSANDTHS),
     Dialect(
         "grbl",
@@ -218,10 +249,11 @@ _LIST: Final = (
         "sinumerik",
         "Sinumerik 840D sl, as CAM posts write it",
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
-        same={700: 20, 710: 21, 70: 20, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64}
-        | {153: 53},
+        turns_axes=False,
+        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
+        same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
-        harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 25, 26, 971, 961, 621, 62),
+        harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
         refused={
             _OFFSETS: (500, *range(505, 600)),
             _THREAD: (33, 34, 35, 331, 332, 63),
@@ -229,6 +261,9 @@ _LIST: Final = (
             _SMOOTH: (140, 141, 142, 143, 147, 148, 247, 248, 340, 341, 347, 348),
             _HOME: (74, 75),
             _SHIFT: (58, 59),
+            _SETTING: (25, 26),
+            _INCHES: (70,),
+            _LEAD: (41, 42),
         },
         dwell_s={"F": 1.0},
         dwell_turns="S",

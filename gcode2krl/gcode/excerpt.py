@@ -5,6 +5,7 @@ import re
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
@@ -18,6 +19,7 @@ _OF_LETTER_A = {
     f.BAD_INTEGER,
     f.ARC_WRONG_OFFSET,
     f.COUNTED_FROM_UNKNOWN,
+    of_offsets.TOOL_ACROSS,
 }
 _FIXED = {
     f.COMMENT_OPEN: r"\((?!.*\))",
@@ -51,7 +53,18 @@ _FIXED = {
     f.H_DIFFERS: "H",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
-    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=",
+    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=|#|\[|M\s*0*(?:9[89]|7[0-3])(?!\d)|G\s*0*4(?!\d)",
+    of_offsets.WITHOUT_L: r"G\s*10",
+    of_offsets.UNKNOWN_L: "L",
+    of_offsets.WRONG_SYSTEM: r"P|G\s*10",
+    of_offsets.WRONG_TOOL: r"P|G\s*10",
+    of_offsets.TOOL_UNDECLARED: "P",
+    of_offsets.NO_LENGTH: r"G\s*10",
+    of_offsets.ROTATION_BY_POSITION: "R",
+    of_offsets.ADDED_BY_WORDS: "[XYZABCUVW]",
+    of_offsets.ADDED_WITHOUT_H: r"G\s*43",
+    of_offsets.AT_START: r"G\s*(92|10)",
+    of_offsets.LENGTH_DIFFERS: "[ZH]",
     f.VECTOR_ZERO: "[IJK]",
     f.VECTOR_ARC: _ARC_WORD,
     f.CYCLE_TURNED: r"G\s*[78]\d|[XYZABC]",
@@ -65,10 +78,11 @@ _FIXED = {
 }
 
 
-def quote(block: bytes, number: int, a: float, b: float) -> str:
+def quote(block: bytes, number: int, a: float, b: float, c: float = -1.0) -> str:
     """Return the block with a caret before what finding ``number`` is about: ``G1 X10 ^I5``."""
     text = block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
-    at = _place(text, number, a, b)
+    told = number in f.WITH_COLUMN and c >= 0
+    at = min(int(c), len(text)) if told else _place(text, number, a, b)
     start = max(0, at - _BEFORE)
     stop = min(len(text), at + _AFTER)
     before, after = (_printable(part) for part in (text[start:at].lstrip(), text[at:stop].rstrip()))
@@ -100,9 +114,11 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"{letter}(?=[^{letter}]*$)"
     if number in _OF_LETTER_A:
         return letter
-    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE):
+    if number == of_offsets.FROM_UNKNOWN:
+        return f"[{f.letters_of(b)}]"
+    if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
         return f"[{f.letters_of(a)}]"
-    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE):
+    if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
     if number == f.NO_POINT:
         return letter + r"\s*[-+]?\d+(?![\d.])"

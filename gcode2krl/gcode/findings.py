@@ -13,8 +13,10 @@ from typing import NamedTuple
 from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
+from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.dialects import REASONS
+from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -84,6 +86,14 @@ class Finding(NamedTuple):
     DIALECT_STATEMENT,
     NO_POINT,
     COUNTED_FROM_UNKNOWN,
+    EXPRESSION_VALUE,
+    PARAMETER_UNDEFINED,
+    PARAMETER_NUMBER,
+    PARAMETER_READ_ONLY,
+    SUBPROGRAM_MISSING,
+    CALLS_TOO_DEEP,
+    TOO_MANY_STEPS,
+    TOO_MANY_ROWS,
     NO_MACHINE,
     ROTARY_UNKNOWN,
     VECTOR_ZERO,
@@ -92,7 +102,7 @@ class Finding(NamedTuple):
     TURN_PER_REV,
     TURN_TOO_FAR,
     CYCLE_TURNED,
-) = range(64)
+) = range(72)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -111,17 +121,52 @@ FINDINGS: dict[int, Finding] = {
     COMMENT_NESTED: Finding(
         "error", "comment-nested", "a comment in a comment", "write it without the inner ( and )"
     ),
-    EXPRESSION: Finding(
-        "error",
-        "expression",
-        "parameters and expressions (#, [ ], =) are not read yet",
-        "let the CAM post write plain numbers",
+    EXPRESSION: Finding("error", "expression", "{fault}", "{remedy}"),
+    O_WORD: Finding("error", "o-word", "{fault}", "{remedy}"),
+    EXPRESSION_VALUE: Finding(
+        "error", "expression-value", "{fault}", "check the parameters that the expression takes"
     ),
-    O_WORD: Finding(
+    PARAMETER_UNDEFINED: Finding(
         "error",
-        "o-word",
-        "O-words (subprograms, loops, program numbers) are not read yet",
-        "expand subprograms in the post; remove a mere program number",
+        "parameter-undefined",
+        "the named parameter has not been set",
+        "set it before; a name without _ is known in its own subprogram only",
+    ),
+    PARAMETER_NUMBER: Finding(
+        "error",
+        "parameter-number",
+        "{a:g} is not the number of a parameter",
+        "parameters are #1 to #5601, whole numbers",
+    ),
+    PARAMETER_READ_ONLY: Finding(
+        "error",
+        "parameter-read-only",
+        "this parameter shows the state of the machine and cannot be set",
+        "use another; offsets are set by G10 and G92, or in [work_offsets] of the cell",
+    ),
+    SUBPROGRAM_MISSING: Finding(
+        "error",
+        "subprogram-missing",
+        "the subprogram is neither in this program nor a file",
+        "put its file (label.ngc) beside the program, or name its folder with --search",
+    ),
+    CALLS_TOO_DEEP: Finding(
+        "error",
+        "calls-too-deep",
+        "subprograms call each other more than {a:.0f} levels deep",
+        "does one call itself without end?",
+    ),
+    TOO_MANY_STEPS: Finding(
+        "error",
+        "endless-loop",
+        "the program has run {a:,.0f} lines and is not at its end",
+        "does the loop end? check its condition",
+    ),
+    TOO_MANY_ROWS: Finding(
+        "error",
+        "endless-loop",
+        "the program has made {a:,.0f} moves and is not at its end",
+        "does the loop end? check its condition",
     ),
     LINE_TOO_LONG: Finding(
         "error",
@@ -365,31 +410,35 @@ FINDINGS: dict[int, Finding] = {
         "error", "too-many-m", "more than four M-codes in one block", "write them in separate blocks"
     ),
 }
+FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 
+WITH_COLUMN = {
+    *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
+    *(SUBPROGRAM_MISSING, CALLS_TOO_DEEP),
+}
+"""Findings whose third number is the column of the culprit, -1 = not told."""
 _OF_CHARACTER = {
     "*": "let the post write no checksums (*57)",
     ":": "write a program number as O1000, or remove the line",
+    "$": "remove the line: $ begins a command to the control, not a block",
     "%": "write % alone on its line, and nothing behind it",
     ",": "write a decimal point for a decimal comma, and no commas between words",
     ")": "write ( before the comment, or remove the )",
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
-_SHIFT_REMEDY = "put the offset into [work_offsets] of the cell"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
     v.G7: ("lathe diameter mode", "this is a milling translator"),
     v.G8: ("lathe radius mode", "this is a milling translator"),
-    v.G10: (f"setting offsets in the program: {_LATER}", "put the offsets into [work_offsets] of the cell"),
     v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
     v.G38: ("probing is not a motion this program can make", "probe on the controller"),
     v.G41: (
         f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
-    v.G43: (f"dynamic tool offsets: {_LATER}", "use G43 H"),
-    v.G52: (f"local offsets: {_LATER}", "let the post write final coordinates"),
+    v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     v.G70: ("lathe cycle", "this is a milling translator"),
     v.G76: ("threading cycle of a lathe", "mill the thread"),
     v.G87: (
@@ -400,7 +449,6 @@ UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
         "the operator retracts the tool by hand, which a robot's program cannot wait for",
         "use G86 or G89, or let the post write the cycle out",
     ),
-    v.G92: (f"coordinate shifts in the program: {_LATER}", _SHIFT_REMEDY),
     v.G96: ("constant surface speed is for lathes", "program S in rpm"),
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
@@ -413,8 +461,6 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
         f"digital and analogue I/O words: {_LATER}",
         "map an own M-code in [m_code] of the cell",
     ),
-    v.TENFOLD * v.M70: (f"saving modal state: {_LATER}", "remove it"),
-    v.TENFOLD * v.M98: (f"subprograms: {_LATER}", "let the post write the program out"),
 }
 
 _OF_LETTERS = (UNUSED_WORD, ROTARY_UNKNOWN, VECTOR_AND_ANGLE)
@@ -434,6 +480,11 @@ and end are each off by half a unit in two coordinates, the centre by as much an
 def decimals_needed(unit_mm: float) -> int:
     """Return the decimals that keep the radii of an arc within 0.01 mm, for words in units of ``unit_mm``."""
     return math.ceil(math.log10(_LAST_PLACES * unit_mm / _DIFFERENCE_MM))
+
+
+def _listed(letters: str) -> str:
+    """Return letters as ``X, Y and Z``."""
+    return " and ".join(", ".join(letters).rsplit(", ", 1))
 
 
 def letters_of(bits: float) -> str:
@@ -456,7 +507,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "b": b,
         "c": c,
         "word": chr(int(a)) if 0 < a < FIRST_FOREIGN else "?",
-        "words": " and ".join(letters_of(a)) if number in _OF_LETTERS else "",
+        "words": " and ".join(letters_of(a)) if number in (*_OF_LETTERS, of_offsets.ROTARY) else "",
+        "axes": _listed(letters_of(b)) if number == of_offsets.FROM_UNKNOWN else "",
         "char": _printable(character),
         "replacement": _replacement(character),
         "g": f"{a / v.TENFOLD:g}",
@@ -467,6 +519,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
+        **_program_fault(number, a, b),
     }
     return Issue(
         finding.severity,
@@ -476,6 +529,17 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         _remedy(finding, number, a, b).format(**values),
         excerpt,
     )
+
+
+def _program_fault(number: int, a: float, b: float) -> dict[str, str]:
+    """Return what is wrong with an expression or an O-word, and the remedy."""
+    if number in (EXPRESSION, O_WORD):
+        faults = EXPRESSION_FAULTS if number == EXPRESSION else O_WORD_FAULTS
+        fault, remedy = faults.get(int(a), faults[0])
+        return {"fault": fault, "remedy": remedy}
+    if number == EXPRESSION_VALUE:
+        return {"fault": VALUE_FAULTS[int(a)].format(b=b)}
+    return {}
 
 
 def _sentence(finding: Finding, number: int, a: float, b: float) -> str:
@@ -525,6 +589,8 @@ def _replacement(code: int) -> str:
     character = _foreign(code) if code >= FIRST_FOREIGN else ""
     if (character and unicodedata.category(character) == "Pd") or character == "\u2212":
         return "write - (the minus sign of the keyboard)"
+    if character and unicodedata.category(character) == "Zs":
+        return "write a plain blank"
     return "remove it, or put it in a comment ( )"
 
 

@@ -12,6 +12,8 @@ from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
+from gcode2krl.gcode.offset_issues import zero_issues
+from gcode2krl.gcode.slips import slip
 from gcode2krl.gcode.state import (
     NOTE_CENTRE,
     NOTE_CODE,
@@ -98,8 +100,11 @@ def found_issues(
 def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     number, line = int(row["number"]), int(row["line"])
     a, b, c = (float(row[name]) for name in "abc")
-    excerpt = quote(texts[line], number, a, b) if line in texts else ""
-    return f.make_issue(number, line, a, b, c, excerpt)
+    excerpt = quote(texts[line], number, a, b, c) if line in texts else ""
+    issue = f.make_issue(number, line, a, b, c, excerpt)
+    letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
+    usual = slip(texts[line], issue.code, letter) if line in texts else None
+    return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
 
 
 def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) -> Issue:
@@ -117,6 +122,12 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
         )
         message += f"; {now} is in force, and with {other} the radii fit"
         remedy = f"write {other} before the first arc: I, J, K look {how}"
+    elif state["misfits_reversed"] == count:
+        message += "; with the signs of I, J, K reversed the radii fit"
+        remedy = "I, J, K count from the start to the centre: reverse their signs in the post"
+    elif state["misfits_exchanged"] == count:
+        message += "; with the centre words exchanged the radii fit"
+        remedy = "check which of I, J, K belongs to which axis (X: I, Y: J, Z: K)"
     return replace(issue, message=message, remedy=remedy)
 
 
@@ -126,6 +137,7 @@ def program_issues(
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
+    yield from zero_issues(state)
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
     if not state["ended"]:

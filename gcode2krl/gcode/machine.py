@@ -4,12 +4,13 @@ What of the state a block may change is in `state`, what it hands over beside ro
 """
 
 from gcode2krl.compiled.core import (
-    BOOLS,
     BYTES,
     FLOAT,
     FLOATS,
     INT,
     INTS32,
+    OUT_BOOLS,
+    OUT_FLOATS,
     ArrayOf,
     StructOf,
     core_function,
@@ -24,9 +25,10 @@ MACHINE = StructOf(
     rows=ROWS,
     events=ArrayOf(EVENT, written=True),
     found=ArrayOf(FOUND, written=True),
-    offsets_mm=FLOATS,
-    offset_known=BOOLS,
-    tool_length_mm=FLOATS,
+    offsets=OUT_FLOATS,
+    offset_known=OUT_BOOLS,
+    tool_length_mm=OUT_FLOATS,
+    runs_programs=INT,
     core_g=INTS32,
     dwell_by_letter=FLOATS,
     points=INT,
@@ -34,6 +36,7 @@ MACHINE = StructOf(
     cycle_dwell_s=FLOAT,
     repeats_by_k=INT,
     end_m=INT,
+    whole_dwell_letter=INT,
     group_of_g=INTS32,
     doubt_of_g=INTS32,
     doubt_of_group=INTS32,
@@ -44,7 +47,11 @@ MACHINE = StructOf(
     rotary_axes=INT,
     tcpm=INT,
 )
-"""What the interpreter goes on with from block to block."""
+"""What the interpreter goes on with from block to block.
+
+``offsets`` are the work offsets G54 to G59.3 (9, 4): X, Y, Z in mm and the rotation about Z in degrees. G10
+writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared.
+"""
 
 run = core_function("gcode_run", MACHINE, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)
 """Execute the blocks of words (letter, value, extra, line) from a word on; return the word at which to go on.

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import cycle
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.ascii_codes import PAREN_OPEN
+from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
@@ -21,6 +21,7 @@ from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
+from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.state import (
@@ -65,6 +66,7 @@ def read_gcode(
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    search: Sequence[str | Path] = (),
     progress: Progress | None = None,
 ) -> Toolpath:
     """Read a G-code file into a `Toolpath`.
@@ -77,6 +79,7 @@ def read_gcode(
     tools : a LinuxCNC ``tool.tbl`` in mm, used instead of the cell's tools.
     chord_tolerance_mm : largest distance between an arc and the chords that replace it.
     block_delete : skip lines that begin with ``/``.
+    search : folders with files of subprograms, looked into behind the program's own folder.
     progress : called with the number of bytes read.
 
     Raises
@@ -111,6 +114,7 @@ def read_gcode(
                     tools=tools,
                     chord_tolerance_mm=chord_tolerance_mm,
                     block_delete=block_delete,
+                    folders=(Path(path).parent, *map(Path, search)),
                     progress=hear,
                 )
         except OSError as error:
@@ -132,10 +136,21 @@ def read_stream(
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    folders: Sequence[Path] = (),
     progress: Progress | None = None,
 ) -> Toolpath:
-    """Read G-code from an open binary stream; see `read_gcode`."""
+    """Read G-code from an open binary stream; see `read_gcode`.
+
+    ``folders`` are all in which a file of a subprogram may be.
+    """
     spoken = dialect_of(dialect, name)
+    if cell is not None and cell.machine is not None and not spoken.turns_axes:
+        raise input_error(
+            "option-value",
+            f"the cell declares rotary axes in [machine], which are not read in dialect {dialect}",
+            "let the post write for LinuxCNC with G43.4, or use a cell without [machine] for three axes",
+            source=name,
+        )
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -149,7 +164,7 @@ def read_stream(
     interpreter = _Interpreter(
         name,
         spoken,
-        offsets_mm=offsets,
+        offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=lengths,
         chord_tolerance_mm=chord_tolerance_mm,
@@ -160,12 +175,18 @@ def read_stream(
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    for first_line, text, words in _scanned(pieces(stream, name), spoken):
+    scanned = _scanned(pieces(stream, name), spoken)
+    for first_line, text, words in scanned:
         if not interpreter.ended:
             if not head:
                 head = text[:4000]
                 refuse_other_languages(head, name)
-            interpreter.feed(words, text, first_line, size)
+            stopped_at = interpreter.feed(words, text, first_line, size)
+            if stopped_at is not None:
+                rest = text[_start_of_line(text, stopped_at - first_line) :]
+                whole = b"".join((rest, *(more for _, more, _ in scanned)))
+                interpreter.run_whole(whole, stopped_at, folders)
+                break
             diameters += named_diameters(text, first_line)
             if progress is not None:
                 progress(len(text))
@@ -206,6 +227,11 @@ def _scanned(
             scanned = ahead.result()
 
 
+def _start_of_line(text: bytes, line: int) -> int:
+    """Return the place in a text at which a line begins, the first being 0."""
+    return int(np.flatnonzero(np.frombuffer(text, np.uint8) == NEWLINE)[line - 1]) + 1 if line else 0
+
+
 def _size_of(stream: BinaryIO) -> int:
     """Return the size of a file in bytes, 0 where the stream is none."""
     try:
@@ -215,12 +241,23 @@ def _size_of(stream: BinaryIO) -> int:
 
 
 def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
-    offsets, known = np.zeros((9, 3)), np.zeros(9, dtype=np.bool_)
+    """Return G54 to G59.3 (9, 4), X, Y, Z in mm and the rotation about Z in degrees; and which are stated."""
+    offsets, known = np.zeros((9, 4)), np.zeros(9, dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
-        if frame.a_deg or frame.b_deg or frame.c_deg:
-            raise input_error("cell-key", f"work_offsets.{name}: found a rotation, allowed: x_mm, y_mm, z_mm")
+        if frame.b_deg or frame.c_deg:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: found a rotation about Y or X (b_deg, c_deg), allowed: Z (a_deg)",
+                "tilt $BASE itself: [frames] base",
+            )
+        if frame.a_deg and cell is not None and cell.machine is not None:
+            raise input_error(
+                "cell-key",
+                f"work_offsets.{name}: with rotary axes in [machine] no rotation (a_deg) is read",
+                "rotate $BASE itself: [frames] base",
+            )
         index = WORK_OFFSETS.index(name)
-        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm
+        offsets[index] = frame.x_mm, frame.y_mm, frame.z_mm, frame.a_deg
         known[index] = True
     return offsets, known
 
@@ -255,6 +292,7 @@ class _Interpreter:
         self.messages: list[str] = []
         self.most_decimals = 0
         self.rest_line = 0
+        self.program: Program | None = None
 
     @property
     def ended(self) -> bool:
@@ -263,16 +301,20 @@ class _Interpreter:
     def _count(self, what: str) -> int:
         return int(self.counts[what][0])
 
-    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> None:
-        """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown."""
+    def feed(self, words: Words, text: bytes, first_line: int, size: int) -> int | None:
+        """Execute a piece of words; ``size`` bytes are in the whole file, 0 = unknown.
+
+        Return the line from which on the program has to be read as a whole, None if all of it was executed.
+        """
         found_before = self._count("findings")
         if self._count("rows") == 1 and len(words.line):
             lines = int(words.line[-1] - words.line[0]) + 1
             self._reserve(int(_ROOM * lines * max(1.0, size / len(text))))
-        self._execute(words, text)
+        stopped_at = self._execute(words, text)
         self._remember_lines(text, first_line, found_before)
+        return stopped_at
 
-    def _execute(self, words: Words, text: bytes) -> None:
+    def _execute(self, words: Words, text: bytes) -> int | None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         if len(words.message_span):
             words.value[words.letter == PAREN_OPEN] += len(self.messages)
@@ -282,8 +324,22 @@ class _Interpreter:
         while True:
             at = machine.run(self.machine, words.letter, words.value, words.extra, words.line, at)
             if at >= len(words.letter) or self.ended:
-                return
+                return None
+            if self._count("program_wanted"):
+                return int(words.line[at])
             self._make_room()
+
+    def run_whole(self, text: bytes, first_line: int, folders: Sequence[Path]) -> None:
+        """Run the rest of a program from its first line on that computes or jumps."""
+        program = Program(self.name, folders, block_delete=bool(self.machine.block_delete))
+        program.add(self.name, text, first_line, len(self.messages))
+        program.run(HandsOver(self.machine, self.state, self.counts, self.found), self._make_room)
+        self.messages += [_decode(message) for message in program.messages]
+        self.most_decimals = max(self.most_decimals, program.most_decimals)
+        found = self.found[: self._count("findings")]
+        wanted = {n for n in lines_to_quote(found, self.state[0]) if n >= first_line}
+        self.texts |= program.texts(wanted)
+        self.program = program
 
     def _remember_lines(self, text: bytes, first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""

@@ -15,5 +15,7 @@ COUNTS = np.dtype(
         ("mute", "i8"),  # not 0 while a block is followed that has been reported already
         ("rows_wanted", "i8"),  # room that the next block needs, in all
         ("events_wanted", "i8"),
+        ("errors", "i8"),  # findings that are no warnings
+        ("program_wanted", "i8"),  # not 0: the next block takes the whole program, as it jumps or computes
     ]
 )

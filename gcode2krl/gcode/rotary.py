@@ -143,7 +143,9 @@ class _Way:
         self._line = columns["source_line"]
         by_vector = self._mode == v.TURN_VECTOR
         self._by_machine = self._mode == v.TURN_MACHINE
-        self._require_lengths(self._by_machine & turn.any(axis=1))
+        turned = self._by_machine & turn.any(axis=1) & ~columns["machine"]
+        self._require_lengths(turned)
+        self._require_tool_lengths(turned)
         self._to_deg = np.where(by_vector[:, None], 0.0, turn)
         before_by_vector = np.append(False, by_vector[:-1])
         self._in_plane = by_vector | before_by_vector
@@ -165,6 +167,16 @@ class _Way:
         if lacking:
             reason = f"line {int(self._line[rows[0]])} turns rotary axes without TCPM"
             raise NotUnderstoodError([missing_key(key, reason) for key in lacking], self._source)
+
+    def _require_tool_lengths(self, used: Bools) -> None:
+        """Raise where a head is turned whose tip nobody can tell: no G43, or a tool of unknown length."""
+        offset = np.nan_to_num(self._columns["length_offset_mm"], nan=0.0)
+        rows = np.flatnonzero(used & (offset == 0.0))
+        if len(rows) and self._machine.head_axes:
+            sentence = "the head turns the tip about its pivot, and the length of the tool is not known here"
+            remedy = "program G43 with a tool that has length_mm in the cell"
+            line = int(self._line[rows[0]])
+            raise input_error("turned-length", sentence, remedy, line=line, source=self._source)
 
     def _ends(self, turn: Floats, by_vector: Bools) -> None:
         """Find where each row ends, and where it begins in its own terms."""
@@ -220,7 +232,7 @@ class _Way:
     def known(self) -> Bools:
         """Return which coordinates (n, 3) are known: of turned machine axes all or none."""
         known: Bools = self._columns["known"]
-        mixed = self._by_machine & self._to_deg.any(axis=1) & ~known.all(axis=1)
+        mixed = self._by_machine & self._to_deg.any(axis=1) & ~known.all(axis=1) & ~self._columns["machine"]
         return np.asarray(known & ~mixed[:, None])
 
     def time_s(self) -> Floats:
@@ -242,7 +254,11 @@ class _Way:
         turning = (self._from_deg != self._to_deg).any(axis=1)
         turning |= self._in_plane & (np.abs(self._from_axis - self._to_axis).max(axis=1) > 1e-12)
         self._refuse_reversals(turning & self._in_plane)
-        rows = np.flatnonzero(turning & ~columns["machine"] & columns["known"].all(axis=1))
+        is_place = ~columns["machine"] & self.known().all(axis=1)
+        is_place[:1] = False
+        rows = np.flatnonzero(
+            turning & is_place & np.append(False, is_place[:-1])
+        )  # else there is no way to it
         if not len(rows):
             return chords
         most_deg = np.abs(self._to_deg[rows] - self._from_deg[rows]).max(axis=1)

@@ -1,7 +1,8 @@
 """The modal state of the interpreter, and which G-code belongs to which modal group.
 
 The state is one numpy record, so that compiled code can read and write it and a run can stop and go on
-between pieces of a file. All lengths in it are mm; the position is the tool tip in the part frame.
+between pieces of a file. All lengths in it are mm; the position is the tool tip in the part frame, before the
+rotation of the work offset in force: rows get the rotated one (``native/gcode/offsets.h``).
 
 After a block that was not understood some of the state is in *doubt*: a bit of ``doubt`` for each thing that
 the block might have set. A finding that rests on doubtful state is a consequence: it is counted, not
@@ -38,6 +39,15 @@ STATE = np.dtype(
         ("exact_stop", "i1"),
         ("tolerance", "f8"),  # NaN = none
         ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
+        ("base_mm", "f8", 3),  # zero of the programmed numbers: work offset plus shift, before its rotation
+        ("shift_mm", "f8", 3),  # by G52 and G92, in force
+        ("shift_kept_mm", "f8", 3),  # what G92.3 restores
+        ("shift_line", "i4"),  # where the shift was set last, 0 = nowhere
+        ("pivot_mm", "f8", 2),  # about which the work offset in force is rotated
+        ("rotation_cos", "f8"),
+        ("rotation_sin", "f8"),
+        ("rotated", "i1"),  # the work offset in force is rotated
+        ("offsets_taken", "i1"),  # the offsets of the start are in force
         ("home_28", "f8", 3),  # machine coordinates, mm
         ("home_30", "f8", 3),
         ("rotary_deg", "f8", 3),  # A, B, C
@@ -64,11 +74,14 @@ STATE = np.dtype(
         ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
-        ("note_count", "i4", 6),  # blocks with something harmless, by NOTE_…
-        ("note_line", "i4", 6),  # the first of them
-        ("note_word", "i4", 6),
+        ("note_count", "i4", 9),  # blocks with something harmless, by NOTE_…
+        ("note_line", "i4", 9),  # the first of them
+        ("note_word", "i4", 9),
+        ("moved_mm", "f8", 9),  # how far the first of each of NOTE_LOCAL, … moves the zero
         ("misfits", "i4"),  # arcs whose radii differ too much
         ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
+        ("misfits_reversed", "i4"),  # that would fit with the other signs of I, J, K
+        ("misfits_exchanged", "i4"),  # that would fit with the two centre words exchanged
         ("spirals", "i4"),  # arcs that are read although their radii differ
         ("spiral_line", "i4"),  # the worst of them
         ("spiral_start", "f8"),
@@ -98,7 +111,8 @@ DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SP
 )
 DOUBT_POSITION = DOUBT_X | DOUBT_Y | DOUBT_Z
 DOUBT_ALL = (1 << 12) - 1
-NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_CODE, NOTE_STATEMENT = range(6)
+NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_LOCAL, NOTE_SHIFT, NOTE_TABLE = range(7)
+NOTE_CODE, NOTE_STATEMENT = 7, 8
 
 
 def initial_state() -> NDArray[np.void]:
@@ -121,7 +135,7 @@ UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2
 
 
 _GROUPS: dict[int, tuple[float, ...]] = {
-    v.NON_MODAL: (4, 28, 28.1, 30, 30.1, 53),
+    v.NON_MODAL: (4, 10, 28, 28.1, 30, 30.1, 52, 53, 92),
     v.MOTION: (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89),
     v.PLANE: (17, 18, 19),
     v.DISTANCE: (90, 91),
@@ -129,17 +143,17 @@ _GROUPS: dict[int, tuple[float, ...]] = {
     v.FEED_MODE: (93, 94, 95),
     v.UNIT: (20, 21),
     v.RADIUS_COMPENSATION: (40,),
-    v.LENGTH_OFFSET: (43, 43.4, 43.5, 49),
+    v.LENGTH_OFFSET: (43, 43.1, 43.2, 43.4, 43.5, 49),
     v.RETRACT: (98, 99),
     v.WORK_OFFSET: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
     v.PATH_CONTROL: (61, 61.1, 64),
     v.SPINDLE_MODE: (97,),
+    v.SHIFT_STATE: (92.1, 92.2, 92.3),
 }
 """Modal group: the G-codes in it that are read."""
 _UNSUPPORTED = (
-    *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 10, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
-    *(43.1, 43.2, 52, 70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76),
-    *(87, 88, 92, 92.1, 92.2, 92.3, 96),
+    *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
+    *(70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76, 87, 88, 96),
 )
 """G-codes of this and other dialects that are known and not read."""
 
@@ -158,8 +172,6 @@ GROUP_OF_G = _group_table()
 """Modal group of a G-code given as ten times its number, (1000,)."""
 _DOUBTS: dict[int, tuple[float, ...]] = {
     DOUBT_X: (7, 8),
-    DOUBT_Z: (43.1, 43.2),
-    DOUBT_POSITION: (10, 52, 92, 92.1, 92.2, 92.3),
     DOUBT_SPEED: (96,),
     0: (41, 41.1, 42, 42.1),
 }
@@ -188,6 +200,7 @@ _DOUBTS_OF_GROUP = {
     v.LENGTH_OFFSET: DOUBT_Z,
     v.WORK_OFFSET: DOUBT_POSITION,
     v.SPINDLE_MODE: DOUBT_SPEED,
+    v.SHIFT_STATE: DOUBT_POSITION,
 }
 DOUBT_OF_GROUP = np.array([_DOUBTS_OF_GROUP.get(group, 0) for group in range(v.GROUPS)], dtype=np.int32)
 """What is in doubt after two codes of one modal group, (GROUPS,)."""

@@ -4,12 +4,14 @@ Plain module constants: the compiled core takes their values from here. In it a 
 value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import CASE_BIT, EXCLAMATION, LETTER_A
+from gcode2krl.ascii_codes import CASE_BIT, DOLLAR, EXCLAMATION, LETTER_A
 
 LINE_LIMIT = 4096
 """Longest line that is read, in bytes; a part program has none that long."""
 MARK = EXCLAMATION
 """Stands in the column of letters where something cannot be read."""
+PROGRAM_LINE = DOLLAR
+"""Stands for a whole line with an expression, a parameter or an O-word."""
 UNREAD_NUMBER = CASE_BIT
 """Added to a letter whose value cannot be read: the small letter."""
 
@@ -46,7 +48,8 @@ G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
 G33 = 330  # spindle-synchronised motion
 G38 = 380  # probing, G38.2 to G38.5
 G41 = 410  # cutter radius compensation, G41 to G42.1
-G43, G49 = 430, 490  # tool length offset on (G43.1 to G43.5: dynamic), off
+G43, G49 = 430, 490  # tool length offset on, off
+G43_1, G43_2 = 431, 432  # given by words, added
 G43_4, G43_5 = 434, 435  # the tip is programmed: with rotary words, with tool vectors I J K
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
@@ -55,8 +58,9 @@ G70, G76, G87, G88 = 700, 760, 870, 880  # lathe cycles, threading, back boring,
 G80 = 800  # ends the motion mode
 G90 = 900  # absolute distances; else incremental
 G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
+G92, G92_1, G92_2, G92_3 = 920, 921, 922, 923  # coordinate shift: set, clear, suspend, restore
+G96 = 960  # constant surface speed
 G98, G99 = 980, 990  # retract of a canned cycle to where it began; to R
-G92, G96 = 920, 960  # coordinate shift, constant surface speed
 
 M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change
 M3, M4, M5 = 3, 4, 5  # spindle clockwise, counter-clockwise, off
@@ -64,8 +68,12 @@ M6 = 6  # tool change
 M7, M9 = 7, 9  # mist, both off; M8 between them is flood
 M19 = 19  # spindle orientation
 M48, M53 = 48, 53  # overrides, M48 to M53
-M61, M62, M70, M72, M73 = 61, 62, 70, 72, 73  # tool number, inputs and outputs, modal state
+M61, M62 = 61, 62  # tool number, inputs and outputs
+M70, M71, M72, M73 = 70, 71, 72, 73  # modal state: save, forget, restore, save and restore on return
 M98, M99 = 98, 99  # subprograms
+
+L_TOOL, L_OFFSET, L_TOOL_FROM_POSITION, L_TOOL_FROM_FIXTURE, L_OFFSET_FROM_POSITION = 1, 2, 10, 11, 20
+"""What G10 sets, its word L."""
 
 MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1, 0, 1, 2, 3
 """Motion modes of the state: none after G80 and before the first motion code, else the G number."""
@@ -81,7 +89,8 @@ TURN_MACHINE, TURN_TIP, TURN_VECTOR = range(3)
 
 NON_MODAL, MOTION, PLANE, DISTANCE, CENTRE, FEED_MODE, UNIT = range(7)
 RADIUS_COMPENSATION, LENGTH_OFFSET, RETRACT, WORK_OFFSET, PATH_CONTROL, SPINDLE_MODE = range(7, 13)
-GROUPS = 13
+SHIFT_STATE = 13
+GROUPS = 14
 """Modal groups of G-codes, numbered in the order of the tables in `state`."""
 M_STOP, M_TOOL_CHANGE, M_SPINDLE, M_COOLANT, M_OVERRIDE = 4, 6, 7, 8, 9
 """Modal groups of M-codes as RS274/NGC numbers them; M-codes of no group are 0."""

@@ -6,12 +6,22 @@ from dataclasses import replace
 
 from gcode2krl.errors import Issue, RefusedError, input_error
 
-STRICTER_HERE = frozenset({"h-differs", "work-offset-unknown", "unit-doubtful", "cut-off"})
+STRICTER_HERE = frozenset(
+    {
+        "h-differs",
+        "work-offset-unknown",
+        "unit-doubtful",
+        "cut-off",
+        "offset-from-unknown",
+        "tool-length-differs",
+    }
+)
 """Warnings of reading and predicting that are errors in a program for a robot."""
 NEVER_RELEASED = frozenset(
     {
         "out-of-reach",
         "undefined-position",
+        "offset-from-unknown",
         "tool-unknown",
         "tool-missing",
         "tool-lies",

@@ -27,13 +27,14 @@ _CHANGE_COST = 0.05
 _SAMPLES = 400
 
 
-def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
+def smooth_spin(position_mm: Floats, quality: Quality, axis: Floats | None = None) -> Floats | float:
     """Return the spin in rad: one number, or (p,) where no constant angle is good enough.
 
     ``quality(rows, spin)`` gives (len(rows), branches): the distance to the nearest limit or
     singularity, 1 = 30° and more, 0 = at it, negative = impossible. One branch serves the whole program.
+    Where the tool axis (p, 3) is given, its outermost directions are judged too.
     """
-    rows = _judged_rows(position_mm)
+    rows = _judged_rows(position_mm, axis)
     spins = _grid()
     table = np.stack([quality(rows, float(spin)) for spin in spins])  # (spins, rows, branches)
     worst = np.minimum(table.min(axis=1).max(axis=1), GOOD_ENOUGH + 0.1)
@@ -45,20 +46,22 @@ def smooth_spin(position_mm: Floats, quality: Quality) -> Floats | float:
     return float(spins[best]) if changing is None else changing
 
 
-def stiffest_spin(position_mm: Floats, quality: Quality, bending: Quality) -> Floats | float:
+def stiffest_spin(
+    position_mm: Floats, quality: Quality, bending: Quality, axis: Floats | None = None
+) -> Floats | float:
     """Return the spin in rad that bends least: one number, or (p,) where a changing angle saves more.
 
     ``quality`` as in `smooth_spin`; ``bending(rows, spin)`` gives (len(rows), branches) in mm, under
     any load, NaN where the pose is impossible. One branch serves the whole program.
     """
-    rows, spins = _judged_rows(position_mm), _grid()
+    rows, spins = _judged_rows(position_mm, axis), _grid()
     comfort = np.stack([quality(rows, float(spin)) for spin in spins])
     bend_mm = np.stack([bending(rows, float(spin)) for spin in spins])
     possible = (comfort >= STIFF_QUALITY) & np.isfinite(bend_mm)
     constant = np.where(possible, bend_mm, np.inf).mean(axis=1)  # (spins, branches)
     best = np.unravel_index(np.argmin(constant), constant.shape)
     if not np.isfinite(constant[best]):
-        return smooth_spin(position_mm, quality)
+        return smooth_spin(position_mm, quality, axis)
     order = np.argsort(spins)
     path = _way(position_mm)
     branch = int(best[1])
@@ -76,10 +79,11 @@ def _grid() -> Floats:
     return spins[np.argsort(np.abs(spins), kind="stable")]
 
 
-def _judged_rows(position_mm: Floats) -> Ints:
-    """Return rows spread over the program, its outermost points among them."""
+def _judged_rows(position_mm: Floats, axis: Floats | None = None) -> Ints:
+    """Return rows spread over the program, its outermost points and tilts among them."""
     rows = np.linspace(0, len(position_mm) - 1, min(_SAMPLES, len(position_mm))).astype(np.int64)
-    extremes = [op(position_mm[:, k]) for k in range(3) for op in (np.argmin, np.argmax)]
+    tables = [position_mm] if axis is None or axis.strides[0] == 0 else [position_mm, axis]
+    extremes = [op(table[:, k]) for table in tables for k in range(3) for op in (np.argmin, np.argmax)]
     return np.unique(np.concatenate([rows, extremes]))
 
 

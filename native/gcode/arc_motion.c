@@ -33,7 +33,9 @@ static bool axis_word_is_harmless(Block *b, const Arc *arc) {
     const int index = V_WORD_I + arc->third, letter = CH_LETTER_I + arc->third;
     if (!b->has[index])
         return true;
-    if (b->word[index] != 0.0) {
+    const bool plane_named = b->has[V_WORD_X + arc->second] || b->has[V_WORD_I + arc->second] ||
+                             !b->has[V_WORD_X + arc->third];
+    if (b->word[index] != 0.0 || !plane_named) { /* X Z I K name the plane of G18, under G17 it is missing */
         const Says says = {.a = letter, .b = b->word[index], .c = b->state->plane};
         report_unless(b, S_DOUBT_PLANE, F_ARC_WRONG_OFFSET, says);
         return false;
@@ -102,19 +104,27 @@ static void report_unknown_start(Block *b) {
     s->unknown_reported = 1;
 }
 
+static bool would_fit(const Block *b, const Arc *arc, Point centre) {
+    return radii_fit(distance(arc->from, centre), distance(arc->to, centre), b->state->unit_mm) != MISFIT;
+}
+
 static void report_misfit(Block *b, const Arc *arc) {
     State *s = b->state;
     if (b->counts->mute)
         return;
     const Point other = other_centre(b, arc);
     s->misfits++;
-    s->misfits_other_centre +=
-        radii_fit(distance(arc->from, other), distance(arc->to, other), s->unit_mm) != MISFIT;
+    const Point centre = arc->centre, from = arc->from;
+    const Point reversed = {2.0 * from.u - centre.u, 2.0 * from.v - centre.v};
+    const Point exchanged = {from.u + (centre.v - from.v), from.v + (centre.u - from.u)};
+    s->misfits_other_centre += would_fit(b, arc, other);
+    s->misfits_reversed += !s->arc_absolute && would_fit(b, arc, reversed);
+    s->misfits_exchanged += !s->arc_absolute && would_fit(b, arc, exchanged);
     if (s->misfits > MOST_MISFITS)
         return;
-    const int centre = s->arc_absolute ? V_G90_1 : V_G91_1;
+    const int mode = s->arc_absolute ? V_G90_1 : V_G91_1;
     report(b, F_ARC_RADIUS_MISMATCH,
-           (Says){arc->from_radius_mm, arc->to_radius_mm, s->unit_mm == 1.0 ? centre : -centre});
+           (Says){arc->from_radius_mm, arc->to_radius_mm, s->unit_mm == 1.0 ? mode : -mode});
 }
 
 static void misfit(Block *b, const Arc *arc) {

@@ -52,16 +52,24 @@ static Taken take_g(Block *b, double value) {
 
 /* --- M-codes -------------------------------------------------------------------------------------------- */
 
-static bool is_unsupported_m(int64_t code) {
-    return code == V_M19 || code == V_M98 || code == V_M99 || (code >= V_M61 && code <= V_M73);
+static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code < V_M70); }
+
+/* Tell whether an M-code jumps, or saves and restores modes: native/gcode/execute.c does that. */
+static bool is_of_program(int64_t code) {
+    return code == V_M98 || code == V_M99 || (code >= V_M70 && code <= V_M73);
+}
+
+/* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
+static bool want_program(Block *b) {
+    if (b->machine->runs_programs)
+        b->counts->program_wanted = 1;
+    else
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_PROGRAM});
+    return b->machine->runs_programs != 0;
 }
 
 /* Return what is in doubt after an M-code that is not read. */
-static int32_t doubt_of_m(int64_t code) {
-    if (code == V_M61)
-        return S_DOUBT_TOOL;
-    return code >= V_M72 ? S_DOUBT_ALL : 0; /* modal state restored, or a subprogram */
-}
+static int32_t doubt_of_m(int64_t code) { return code == V_M61 ? S_DOUBT_TOOL : 0; }
 
 /* Return the modal group of an M-code, 0 for none. */
 static int m_group(int64_t code) {
@@ -85,6 +93,9 @@ static Taken take_m(Block *b, double value) {
     if (is_unsupported_m(code)) {
         report(b, F_UNSUPPORTED_M, (Says){.a = (double)(code * V_TENFOLD)});
         return faulty(doubt_of_m(code));
+    }
+    if (is_of_program(code)) {
+        return want_program(b) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
     }
     const int group = m_group(code);
     bool good = true;
@@ -198,11 +209,16 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             return LEFT_OUT;
         } else if (c == CH_PAREN_OPEN) {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
+        } else if (c == V_PROGRAM_LINE) {
+            if (!want_program(b)) {
+                good = false;
+                *doubt |= S_DOUBT_ALL;
+            }
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
         } else if (c < CH_LETTER_A) {
-            take_dialect_mark(b, c, AT(words->value, k));
+            take_dialect_mark(b, c);
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;

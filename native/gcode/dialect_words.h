@@ -5,7 +5,7 @@
 
 #include "gcode/block.h"
 
-void take_dialect_mark(Block *b, uint8_t c, double value);
+void take_dialect_mark(Block *b, uint8_t c);
 void say_of_word(Block *b, int index);
 int32_t core_code(Block *b, int64_t written, bool *good);
 bool to_core_words(Block *b);

@@ -1,60 +1,382 @@
-/* Expressions and parameters, which are not read but passed over whole. */
+/* Expressions: [#1 + 2 * SIN[30]], as LinuxCNC reads them.
+
+   They are read and worked out in one pass, from the text, each time their line is executed: it takes no longer
+   than a step of a compiled form, and a file of a million expressions needs no compiler. A sign belongs to the
+   value behind it, so -2**2 is 4; operators of one rank go from left to right. */
 
 #include "gcode/expressions.h"
 
-#include "gcode/characters.h"
+#include "gcode/numbers.h"
 
-/* Tell whether a function with its argument stands at i, as in XABS[#1]. */
-bool is_function(Bytes text, int64_t i) {
-    const int64_t start = i;
-    while (i < text.rows && is_letter(AT(text, i)))
-        i++;
-    return i > start + 1 && i < text.rows && AT(text, i) == CH_BRACKET_OPEN;
+enum { MOST_DEPTH = 200 }; /* of values within values */
+static const double PI_REST = 1.2246467991473532e-16; /* pi minus the float that is nearest to it */
+static const double EQUAL = 1e-6;                     /* LinuxCNC takes numbers this near as equal */
+
+/* --- functions ------------------------------------------------------------------------------------------ */
+
+typedef enum { ABS, ACOS, ASIN, ATAN, COS, EXISTS, EXP, FIX, FUP, LN, ROUND, SIN, SQRT, TAN, FUNCTIONS } Function;
+static const char *const FUNCTION[] = {"abs", "acos", "asin", "atan", "cos",   "exists", "exp",
+                                       "fix", "fup",  "ln",   "round", "sin", "sqrt",   "tan"};
+
+/* Return degrees in radians, and what the float leaves over: FIX[10 * SIN[30]] and FIX[10 * COS[60]] are 5. */
+static double radians(double degrees, double *left_over) {
+    const double product = degrees * PI;
+    const double rest = fma(degrees, PI, -product) + degrees * PI_REST;
+    const double quotient = product / 180.0;
+    *left_over = (fma(-quotient, 180.0, product) + rest) / 180.0;
+    return quotient;
 }
 
-/* Return the place behind the bracket expression that opens at i. */
-static int64_t after_bracket(Bytes text, int64_t i, int64_t end) {
-    int64_t depth = 0;
-    for (; i < end; i++) {
-        depth += AT(text, i) == CH_BRACKET_OPEN;
-        if (AT(text, i) == CH_BRACKET_CLOSE && --depth == 0)
-            return i + 1;
+/* Return radians in degrees, rounded once behind the product. */
+static double degrees(double radian) {
+    const double product = radian * 180.0, quotient = product / PI;
+    return quotient + (fma(-quotient, PI, product) - quotient * PI_REST) / PI;
+}
+
+static double sine(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over);
+    return sin(angle) + left_over * cos(angle);
+}
+
+static double cosine(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over);
+    return cos(angle) - left_over * sin(angle);
+}
+
+static double tangent(double degrees) {
+    double left_over;
+    const double angle = radians(degrees, &left_over), t = tan(angle);
+    return t + left_over * (1.0 + t * t);
+}
+
+static double function_of(Evaluation *e, Function function, double x, int64_t place) {
+    switch (function) {
+    case ABS: return fabs(x);
+    case ACOS:
+        return fabs(x) > 1.0 ? wrong(e, F_EXPRESSION_VALUE, PF_ARC_COSINE, x, place) : degrees(acos(x));
+    case ASIN:
+        return fabs(x) > 1.0 ? wrong(e, F_EXPRESSION_VALUE, PF_ARC_SINE, x, place) : degrees(asin(x));
+    case COS: return cosine(x);
+    case EXP: return exp(x);
+    case FIX: return floor(x);
+    case FUP: return ceil(x);
+    case LN: return x <= 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_LOGARITHM, x, place) : log(x);
+    case ROUND: return x < 0.0 ? ceil(x - 0.5) : floor(x + 0.5);
+    case SIN: return sine(x);
+    case SQRT: return x < 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_SQUARE_ROOT, x, place) : sqrt(x);
+    case TAN: return tangent(x);
+    default: return 0.0;
     }
-    return end;
 }
 
-/* Tell whether [, or the /[ of ATAN, stands at i. */
-static bool opens_bracket(Bytes text, int64_t i, int64_t end) {
-    if (AT(text, i) == CH_SLASH && i + 1 < end)
-        return AT(text, i + 1) == CH_BRACKET_OPEN;
-    return AT(text, i) == CH_BRACKET_OPEN;
-}
-
-static bool precedes_value(uint8_t c) { return is_blank(c) || is_sign(c) || c == CH_HASH; }
-
-/* Return the place behind a number, parameter, function or bracket expression that begins at i. */
-int64_t after_value(Bytes text, int64_t i, int64_t end) {
-    while (i < end && precedes_value(AT(text, i)))
-        i++;
-    if (i < end && AT(text, i) == CH_LESS) { /* <name> */
-        while (i < end && AT(text, i) != CH_GREATER)
-            i++;
-        return least(i + 1, end);
+/* Return the place behind a word of letters that stands at i, blanks in it or not; i itself where it does not. */
+int64_t after_word(Bytes text, int64_t i, int64_t end, const char *word) {
+    int64_t at = i;
+    for (; *word; word++, at++) {
+        at = after_blanks(text, at, end);
+        if (at >= end || (AT(text, at) | CH_CASE_BIT) != (uint8_t)*word || !is_letter(AT(text, at)))
+            return i;
     }
-    while (i < end && is_letter(AT(text, i))) /* a function: its name, its argument */
-        i++;
-    while (i < end && (AT(text, i) == CH_POINT || is_digit(AT(text, i))))
-        i++;
-    while (i < end && opens_bracket(text, i, end))
-        i = after_bracket(text, i + (AT(text, i) == CH_SLASH), end);
-    return i;
+    return at;
 }
 
-/* Return the place behind "#1 = value" or a lone parameter. */
-int64_t after_assignment(Bytes text, int64_t i) {
-    const int64_t end = line_end(text, i);
-    i = after_value(text, i, end);
-    while (i < end && is_blank(AT(text, i)))
+/* Return the function whose name stands at i, FUNCTIONS for none, and go to its [. */
+static Function function_at(const Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    for (Function function = ABS; function < FUNCTIONS; function++) {
+        int64_t behind = after_word(text, *i, e->end, FUNCTION[function]);
+        if (behind == *i)
+            continue;
+        behind = after_blanks(text, behind, e->end);
+        if (behind < e->end && is_letter(AT(text, behind)))
+            continue;
+        *i = behind;
+        return function;
+    }
+    return FUNCTIONS;
+}
+
+/* --- operators ------------------------------------------------------------------------------------------ */
+
+typedef enum { CLOSING, POWER, TIMES, OVER, MODULO, PLUS, MINUS, EQ, NE, GT, GE, LT, LE, AND, OR, XOR } Kind;
+typedef struct {
+    const char *word;
+    Kind kind;
+    int rank;
+} Operator;
+enum { LOWEST = 1, ANY = 0 };
+static const Operator WORDS[] = {{"mod", MODULO, 4}, {"eq", EQ, 2}, {"ne", NE, 2},   {"gt", GT, 2}, {"ge", GE, 2},
+                                 {"lt", LT, 2},      {"le", LE, 2}, {"and", AND, 1}, {"or", OR, 1}, {"xor", XOR, 1}};
+enum { WORDS_COUNT = sizeof WORDS / sizeof *WORDS };
+
+/* Return the operator at i, or the closing bracket, and the place behind it. */
+static Operator operator_at(Evaluation *e, int64_t i, int64_t *behind) {
+    static const Operator CLOSES = {"]", CLOSING, ANY};
+    const Bytes text = e->program->text;
+    *behind = i + 1;
+    if (i >= e->end) {
+        wrong(e, F_EXPRESSION, PF_UNCLOSED_BRACKET, 0.0, least(i, e->end - 1));
+        return CLOSES;
+    }
+    switch (AT(text, i)) {
+    case CH_BRACKET_CLOSE: return CLOSES;
+    case CH_PLUS: return (Operator){"+", PLUS, 3};
+    case CH_MINUS: return (Operator){"-", MINUS, 3};
+    case CH_SLASH: return (Operator){"/", OVER, 4};
+    case CH_ASTERISK: {
+        const int64_t second = after_blanks(text, i + 1, e->end);
+        if (second >= e->end || AT(text, second) != CH_ASTERISK)
+            return (Operator){"*", TIMES, 4};
+        *behind = second + 1;
+        return (Operator){"**", POWER, 5};
+    }
+    }
+    for (int k = 0; k < WORDS_COUNT; k++) {
+        *behind = after_word(text, i, e->end, WORDS[k].word);
+        if (*behind > i)
+            return WORDS[k];
+    }
+    wrong(e, F_EXPRESSION, PF_UNKNOWN_OPERATOR, 0.0, i);
+    return CLOSES;
+}
+
+/* Return the positive remainder. */
+static double modulo(double a, double b) {
+    const double rest = fmod(a, b);
+    return rest < 0.0 ? rest + fabs(b) : rest;
+}
+
+static double apply(Evaluation *e, Kind kind, double a, double b, int64_t place) {
+    switch (kind) {
+    case POWER:
+        if (a < 0.0 && floor(b) != b)
+            return wrong(e, F_EXPRESSION_VALUE, PF_POWER, a, place);
+        return pow(a, b);
+    case TIMES: return a * b;
+    case OVER: return b == 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_DIVISION_BY_ZERO, 0.0, place) : a / b;
+    case MODULO: return modulo(a, b);
+    case PLUS: return a + b;
+    case MINUS: return a - b;
+    case EQ: return fabs(a - b) < EQUAL;
+    case NE: return fabs(a - b) >= EQUAL;
+    case GT: return a > b;
+    case GE: return fabs(a - b) < EQUAL || a >= b;
+    case LT: return a < b;
+    case LE: return fabs(a - b) < EQUAL || a <= b;
+    case AND: return a != 0.0 && b != 0.0;
+    case OR: return a != 0.0 || b != 0.0;
+    case XOR: return (a != 0.0) != (b != 0.0);
+    case CLOSING: break;
+    }
+    return 0.0;
+}
+
+/* Work out values and operators of at least a rank. */
+static double operation(Evaluation *e, int64_t *i, int rank) {
+    double left = value_at(e, i);
+    while (e->finding == F_OK) {
+        int64_t behind;
+        *i = after_blanks(e->program->text, *i, e->end);
+        const Operator found = operator_at(e, *i, &behind);
+        if (e->finding != F_OK || found.kind == CLOSING || found.rank < rank)
+            break;
+        const int64_t place = *i;
+        *i = behind;
+        const double right = operation(e, i, found.rank + 1);
+        if (e->finding == F_OK)
+            left = e->dry ? 1.0 : apply(e, found.kind, left, right, place);
+    }
+    return left;
+}
+
+/* Work out the expression whose [ stands at i, and go behind its ]. */
+double bracket_at(Evaluation *e, int64_t *i) {
+    ++*i;
+    const double value = operation(e, i, LOWEST);
+    if (e->finding == F_OK)
+        ++*i; /* the closing bracket */
+    return value;
+}
+
+/* --- values --------------------------------------------------------------------------------------------- */
+
+/* Find the whole number that a value stands for; LinuxCNC lets it be off by 0.0001. */
+bool whole_number(double value, int64_t *number) {
+    static const double SLACK = 0.0001, LARGEST = 1e9;
+    const double below = floor(value), part = value - below;
+    if (!(fabs(value) < LARGEST) || (part > SLACK && part <= 1.0 - SLACK))
+        return false;
+    *number = (int64_t)below + (part > 0.5);
+    return true;
+}
+
+/* Return the number of the parameter whose # stands before i, which goes behind it; 0 where it is none. */
+static int64_t parameter_number(Evaluation *e, int64_t *i) {
+    const int64_t place = *i;
+    const double value = value_at(e, i);
+    int64_t number;
+    if (e->finding != F_OK)
+        return 0;
+    if (e->dry)
+        return 1;
+    const bool exists = whole_number(value, &number) && number >= 1 && number < P_MOST_PARAMETERS;
+    if (!exists || is_of_other_axis(number)) {
+        wrong(e, F_PARAMETER_NUMBER, value, 0.0, place);
+        return 0;
+    }
+    return number;
+}
+
+/* Read the parameter whose # stands at i: its value, or whether there is one. */
+static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
+    const Bytes text = e->program->text;
+    const int64_t place = *i;
+    *i = after_blanks(text, *i + 1, e->end);
+    if (*i < e->end && AT(text, *i) == CH_LESS) {
+        const int64_t name = name_at(e, i);
+        if (name == NO_NAME)
+            return 0.0;
+        if (exists || e->dry)
+            return e->dry || is_name_set(e, name);
+        if (!is_name_set(e, name))
+            return wrong(e, F_PARAMETER_UNDEFINED, 0.0, 0.0, place);
+        return named_parameter(e, name);
+    }
+    if (!exists) {
+        const int64_t number = parameter_number(e, i);
+        return number == 0 || e->dry ? 1.0 : numbered_parameter(e, number);
+    }
+    const double value = value_at(e, i);
+    int64_t number;
+    return whole_number(value, &number) && number >= 1 && number < P_MOST_PARAMETERS;
+}
+
+/* EXISTS[#…], whose [ stands at i. */
+static double exists_at(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const int64_t inside = after_blanks(text, *i + 1, e->end);
+    if (inside >= e->end || AT(text, inside) != CH_HASH)
+        return wrong(e, F_EXPRESSION, PF_NO_PARAMETER, 0.0, inside);
+    *i = inside;
+    const double value = parameter_at(e, i, true);
+    *i = after_blanks(text, *i, e->end);
+    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != CH_BRACKET_CLOSE))
+        return wrong(e, F_EXPRESSION, PF_UNCLOSED_BRACKET, 0.0, least(*i, e->end - 1));
+    ++*i;
+    return value;
+}
+
+/* ATAN[y]/[x] in degrees; i is behind the first bracket. */
+static double arc_tangent(Evaluation *e, int64_t *i, double y) {
+    const Bytes text = e->program->text;
+    const int64_t slash = after_blanks(text, *i, e->end);
+    if (slash >= e->end || AT(text, slash) != CH_SLASH)
+        return wrong(e, F_EXPRESSION, PF_NO_SLASH, 0.0, least(slash, e->end - 1));
+    *i = after_blanks(text, slash + 1, e->end);
+    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+        return wrong(e, F_EXPRESSION, PF_NO_SLASH, 0.0, slash);
+    return degrees(atan2(y, bracket_at(e, i)));
+}
+
+static double call_at(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const int64_t place = *i;
+    const Function function = function_at(e, i);
+    if (function == FUNCTIONS)
+        return wrong(e, F_EXPRESSION, PF_UNKNOWN_FUNCTION, 0.0, place);
+    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+        return wrong(e, F_EXPRESSION, PF_NO_BRACKET, 0.0, place);
+    if (function == EXISTS)
+        return exists_at(e, i);
+    const double argument = bracket_at(e, i);
+    if (e->finding != F_OK)
+        return 0.0;
+    if (function == ATAN)
+        return arc_tangent(e, i, argument);
+    return e->dry ? 1.0 : function_of(e, function, argument, place);
+}
+
+/* Tell whether a value that is no number stands at i: a sign before something else, #, [ or a function. */
+bool begins_value(Bytes text, int64_t i, int64_t end) {
+    while (i < end && (is_blank(AT(text, i)) || is_sign(AT(text, i))))
         i++;
-    return i < end && AT(text, i) == CH_EQUALS ? after_value(text, i + 1, end) : i;
+    if (i >= end)
+        return false;
+    if (AT(text, i) == CH_HASH || AT(text, i) == CH_BRACKET_OPEN)
+        return true;
+    int64_t letters = 0;
+    for (; i < end && (is_letter(AT(text, i)) || is_blank(AT(text, i))); i++)
+        letters += is_letter(AT(text, i));
+    return letters > 1 && i < end && AT(text, i) == CH_BRACKET_OPEN;
+}
+
+/* A value behind its signs. */
+static double unsigned_value(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const uint8_t c = AT(text, *i);
+    if (c == CH_BRACKET_OPEN)
+        return bracket_at(e, i);
+    if (c == CH_HASH)
+        return parameter_at(e, i, false);
+    if (is_letter(c))
+        return call_at(e, i);
+    if (!is_digit(c) && c != CH_POINT)
+        return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, *i);
+    const Number read = number(text, *i);
+    if (read.digits == 0)
+        return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, *i);
+    if (read.finding != F_OK)
+        return wrong(e, read.finding, CH_HASH, 0.0, *i);
+    *i = read.end;
+    return read.value;
+}
+
+/* Work out the value at i: a number, a parameter, a function or a bracket; go behind it. */
+double value_at(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const int64_t place = *i;
+    bool negative = false;
+    for (*i = after_blanks(text, *i, e->end); *i < e->end && is_sign(AT(text, *i));
+         *i = after_blanks(text, *i + 1, e->end))
+        negative ^= AT(text, *i) == CH_MINUS;
+    if (*i >= e->end)
+        return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, least(place, e->end - 1));
+    if (e->depth >= MOST_DEPTH)
+        return wrong(e, F_EXPRESSION, PF_TOO_DEEP, 0.0, *i);
+    e->depth++;
+    const double value = unsigned_value(e, i);
+    e->depth--;
+    if (isnan(value))
+        return wrong(e, F_EXPRESSION_VALUE, PF_NOT_A_NUMBER, 0.0, place);
+    if (isinf(value))
+        return wrong(e, F_EXPRESSION_VALUE, PF_INFINITE, 0.0, place);
+    return negative ? -value : value;
+}
+
+/* Read "#1 = value" or "#<name> = value", whose # stands at i; it is kept until the line has been read. */
+void assignment_at(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const int64_t place = *i;
+    Assignment made = {NO_NAME, 0, 0.0};
+    *i = after_blanks(text, *i + 1, e->end);
+    if (*i < e->end && AT(text, *i) == CH_LESS)
+        made.name = name_at(e, i);
+    else
+        made.number = parameter_number(e, i);
+    *i = after_blanks(text, *i, e->end);
+    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != CH_EQUALS))
+        wrong(e, F_EXPRESSION, PF_NO_EQUALS, 0.0, place);
+    if (e->finding != F_OK)
+        return;
+    if (!e->dry && (made.name == NO_NAME ? is_read_only(made.number) : made.name < N_PREDEFINED)) {
+        wrong(e, F_PARAMETER_READ_ONLY, 0.0, 0.0, place);
+        return;
+    }
+    ++*i;
+    made.value = value_at(e, i);
+    Course *at = e->program->course.at;
+    if (e->finding == F_OK && !e->dry)
+        AT(e->program->assignments, at->assignments++) = made;
 }

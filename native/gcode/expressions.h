@@ -1,12 +1,15 @@
-/* Expressions and parameters, which are not read but passed over whole. */
+/* Expressions: [#1 + 2 * SIN[30]], as LinuxCNC reads them. */
 
 #ifndef GCODE_EXPRESSIONS_H
 #define GCODE_EXPRESSIONS_H
 
-#include "core.h"
+#include "gcode/parameters.h"
 
-bool is_function(Bytes text, int64_t i);
-int64_t after_value(Bytes text, int64_t i, int64_t end);
-int64_t after_assignment(Bytes text, int64_t i);
+int64_t after_word(Bytes text, int64_t i, int64_t end, const char *word);
+bool begins_value(Bytes text, int64_t i, int64_t end);
+double value_at(Evaluation *e, int64_t *i);
+double bracket_at(Evaluation *e, int64_t *i);
+bool whole_number(double value, int64_t *number);
+void assignment_at(Evaluation *e, int64_t *i);
 
 #endif

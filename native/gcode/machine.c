@@ -5,10 +5,12 @@
    A block that was not understood is followed all the same, without further findings, so that the blocks
    after it are judged by their own faults. */
 
-#include "gcode/block.h"
+#include "gcode/machine.h"
+
 #include "gcode/block_words.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
+#include "gcode/offsets.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/rows.h"
@@ -48,7 +50,7 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
     const bool known = s->known_x && s->known_y && s->known_z;
     if (!(named & ALL_AXES) || feed < 0.0 || (feeding && (feed <= 0.0 || !known)))
         return false;
-    const double *base_mm = &CELL(machine->offsets_mm, s->work_offset, 0);
+    const double *base_mm = s->base_mm;
     x = named & X_NAMED ? x * s->unit_mm + (s->absolute ? base_mm[0] : s->x) : s->x;
     y = named & Y_NAMED ? y * s->unit_mm + (s->absolute ? base_mm[1] : s->y) : s->y;
     z = named & Z_NAMED ? z * s->unit_mm + (s->absolute ? base_mm[2] : s->z) : s->z;
@@ -128,12 +130,26 @@ static void home(Block *b, bool any_axis) {
 static void set_home(State *s, double home_mm[3], double home_deg[3]) {
     for (int k = 0; k < V_ROTARY_AXES; k++)
         home_deg[k] = s->rotary_deg[k];
-    home_mm[0] = s->x;
-    home_mm[1] = s->y;
-    home_mm[2] = s->z + length_offset_of(s);
+    tip_position(s, home_mm);
+    home_mm[2] += length_offset_of(s);
 }
 
-/* G4, G28 and G30, G28.1 and G30.1. */
+/* An offset uses the axis words up: report another code that claims them too, and do neither. */
+static void refuse_second_claim(Block *b) {
+    const int32_t special = b->g[V_NON_MODAL];
+    const bool by_length = b->g[V_LENGTH_OFFSET] == V_G43_1 || b->g[V_LENGTH_OFFSET] == V_G43_2;
+    const bool by_special = special >= 0 && special != V_G4 && special != V_G53;
+    if (!names_motion(b) && !(by_length && by_special))
+        return;
+    const int32_t other = names_motion(b) ? b->g[V_MOTION] : special;
+    report(b, F_TWO_AXIS_CODES, (Says){.a = by_length ? b->g[V_LENGTH_OFFSET] : special, .b = other});
+    b->state->doubt |= S_DOUBT_POSITION;
+    b->g[V_NON_MODAL] = b->g[V_LENGTH_OFFSET] = -1;
+    for (int index = 0; index < V_LETTERS; index++)
+        b->used[index] = true;
+}
+
+/* G4, G28 and G30, G28.1 and G30.1, and what sets an offset. */
 static void non_modal(Block *b, bool any_axis) {
     State *s = b->state;
     switch (b->g[V_NON_MODAL]) {
@@ -145,6 +161,7 @@ static void non_modal(Block *b, bool any_axis) {
         break;
     case V_G28_1: set_home(s, s->home_28, s->home_28_deg); break;
     case V_G30_1: set_home(s, s->home_30, s->home_30_deg); break;
+    default: offset_codes(b, any_axis);
     }
 }
 
@@ -184,15 +201,24 @@ static void stop(Block *b) {
 
 /* Execute a block whose words are sorted; return false where there is no room for its rows. */
 static bool execute(Block *b) {
+    const bool any_axis = names_axis(b), sets_offset = takes_axes(b, any_axis);
+    if (sets_offset) {
+        use_axes(b);
+        refuse_second_claim(b);
+        if (offsets_rotary(b))
+            return true;
+    }
     const int32_t special = b->g[V_NON_MODAL];
     apply_settings(b);
     for (int k = 0; k < OTHER_AXES_COUNT; k++)
         b->used[OTHER_AXES[k]] |= b->has[OTHER_AXES[k]] && !is_declared(b->machine, k);
-    const bool homes = special == V_G28 || special == V_G30, any_axis = names_axis(b);
+    const bool homes = special == V_G28 || special == V_G30;
     non_modal(b, any_axis);
+    if (b->g[V_SHIFT_STATE] >= 0)
+        shift_by_code(b);
     motion_mode(b);
     b->state->in_cycles &= is_cycle(b->state->motion);
-    const bool moves = !homes && (any_axis || names_motion(b) || names_centre_alone(b));
+    const bool moves = !homes && !sets_offset && (any_axis || names_motion(b) || names_centre_alone(b));
     if (special == V_G53 && (!moves || b->state->motion == V_MOTION_CANCELLED)) {
         report_unless(b, S_DOUBT_MOTION, F_G53_NEEDS_RAPID_OR_FEED, (Says){0});
         b->state->doubt |= S_DOUBT_POSITION;
@@ -225,6 +251,12 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
     Block block = {.machine = machine, .state = s, .counts = counts, .line = AT(words->line, from)};
     int32_t doubt;
     const BlockKind kind = gather(&block, words, from, to, &doubt);
+    if (counts->program_wanted) { /* as if the block had not begun */
+        *s = state_before;
+        *counts = counts_before;
+        counts->program_wanted = 1;
+        return false;
+    }
     if (kind == LEFT_OUT)
         return true;
     const bool all_axes_in_doubt = (doubt & S_DOUBT_POSITION) == S_DOUBT_POSITION;
@@ -260,10 +292,22 @@ static bool has_room(Machine *machine, int64_t words) {
            counts->events_wanted <= machine->events.rows;
 }
 
-/* Execute blocks from a word on; return the word at which to go on, earlier where room is wanted. */
+/* Execute the block of words `from` to `to`; return false, with nothing done, where more room is wanted, or the
+   whole program, as the block jumps. */
+bool run_block(Machine *machine, const Words *words, int64_t from, int64_t to) {
+    return has_room(machine, to - from) &&
+           (plain_block(machine, words, from, to) || any_block(machine, words, from, to));
+}
+
+/* Execute blocks from a word on; return the word at which to go on, earlier where room is wanted, or the whole
+   program. */
 EXPORT int64_t gcode_run(Machine *machine, Bytes letter, Floats value, Floats extra, Ints32 line,
                          int64_t from) {
     const Words words = {letter, value, extra, line};
+    if (!machine->state.at->offsets_taken)
+        take_offsets(machine);
+    machine->state.at->offsets_taken = 1;
+    machine->counts.at->program_wanted = 0;
     while (from < letter.rows && !machine->state.at->ended) {
         int64_t to = from + 1;
         while (to < letter.rows && AT(line, to) == AT(line, from))

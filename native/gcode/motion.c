@@ -24,9 +24,20 @@ static void note_unknown_start(Block *b) {
 /* Find where a block under G53 leads, the coordinates being the machine's. */
 static void machine_target(const Block *b, double to_mm[3]) {
     const State *s = b->state;
-    to_mm[0] = b->has[V_WORD_X] ? b->word[V_WORD_X] * s->unit_mm : s->x;
-    to_mm[1] = b->has[V_WORD_Y] ? b->word[V_WORD_Y] * s->unit_mm : s->y;
-    to_mm[2] = b->has[V_WORD_Z] ? b->word[V_WORD_Z] * s->unit_mm - length_offset_of(s) : s->z;
+    tip_position(s, to_mm);
+    for (int axis = 0; axis < 3; axis++)
+        if (b->has[V_WORD_X + axis])
+            to_mm[axis] = b->word[V_WORD_X + axis] * s->unit_mm - (axis == 2 ? length_offset_of(s) : 0.0);
+    unrotate(s, to_mm);
+}
+
+/* Forget the axes that a block has moved in machine coordinates; a rotation mixes X and Y. */
+static void forget(Block *b) {
+    State *s = b->state;
+    const bool mixed = s->rotated && (b->has[V_WORD_X] || b->has[V_WORD_Y]);
+    s->known_x &= !(b->has[V_WORD_X] || mixed);
+    s->known_y &= !(b->has[V_WORD_Y] || mixed);
+    s->known_z &= !b->has[V_WORD_Z];
 }
 
 /* G0 and G1, also under G53. */
@@ -52,29 +63,31 @@ static void straight(Block *b, bool by_machine) {
     }
     stand_at(s, to_mm);
     stand_turned(s, b->turn_deg);
-    if (by_machine) {
-        s->known_x &= !b->has[V_WORD_X];
-        s->known_y &= !b->has[V_WORD_Y];
-        s->known_z &= !b->has[V_WORD_Z];
-    } else {
+    if (by_machine)
+        forget(b);
+    else
         learn(b);
-    }
     emit(b->machine, b->line, mm_s, s->motion == V_MOTION_RAPID, by_machine, NO_ARC);
     note_time(b, time_s);
+    if (by_machine)
+        note_staying(b);
 }
 
 /* G28 and G30: by way of the programmed point, then the named axes (or all) to the machine's home. */
 void machine_home(Block *b, bool any_axis) {
     State *s = b->state;
     const bool *has = b->has;
-    const double *home_mm = b->g[V_NON_MODAL] == V_G28 ? s->home_28 : s->home_30;
-    double by_way_mm[3];
+    const double *stored_mm = b->g[V_NON_MODAL] == V_G28 ? s->home_28 : s->home_30;
+    double home_mm[3] = {stored_mm[0], stored_mm[1], stored_mm[2] - length_offset_of(s)}, by_way_mm[3];
+    unrotate(s, home_mm);
     if (!take_turn(b, true))
         return;
     target(b, by_way_mm);
     stand_at(s, by_way_mm);
     stand_turned(s, b->turn_deg);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
     if (has[V_WORD_X] || !any_axis) {
         s->x = home_mm[0];
         s->known_x = 0;
@@ -86,11 +99,13 @@ void machine_home(Block *b, bool any_axis) {
     if (has[V_WORD_X] && has[V_WORD_Y])
         s->known_z = 0; /* the robot goes to HOME: the old height must not come back by itself */
     if (has[V_WORD_Z] || !any_axis) {
-        s->z = home_mm[2] - length_offset_of(s);
+        s->z = home_mm[2];
         s->known_z = 0;
     }
     rotary_home(b, any_axis);
     emit(b->machine, b->line, RAPID_MM_S, true, true, NO_ARC);
+    if (any_axis)
+        note_staying(b);
 }
 
 /* --- the motion of a block ------------------------------------------------------------------------------ */

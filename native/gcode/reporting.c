@@ -8,7 +8,9 @@ void report_at(Block *block, int32_t line, int32_t number, Says says) {
     if (counts->mute)
         return;
     const FoundView found = block->machine->found;
-    const bool warning = number == F_TOOL_UNDECLARED || number == F_H_DIFFERS || number == F_OFFSET_UNKNOWN;
+    const bool warning = number == F_TOOL_UNDECLARED || number == F_H_DIFFERS || number == F_OFFSET_UNKNOWN ||
+                         number == FO_FROM_UNKNOWN || number == FO_AT_START || number == FO_LENGTH_DIFFERS;
+    counts->errors += !warning;
     const int64_t room = warning ? found.rows / 2 : found.rows; /* warnings never crowd out an error */
     if (counts->findings < room)
         AT(found, counts->findings++) = (Found){number, line, says.a, says.b, says.c};

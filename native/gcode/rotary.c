@@ -176,3 +176,13 @@ void note_time(Block *b, double time_s) {
     if (b->machine->rotary_axes)
         AT(b->machine->rows.time_s, b->counts->rows - 1) = time_s;
 }
+
+/* X and Y of a machine move that names other axes do not lead home, also where turned axes have made them
+   unknown: mark them in the row that was written last. */
+void note_staying(Block *b) {
+    if (!b->machine->rotary_axes)
+        return;
+    for (int axis = 0; axis < 2; axis++)
+        if (!b->has[V_WORD_X + axis])
+            CELL(b->machine->rows.known, b->counts->rows - 1, axis) = true;
+}

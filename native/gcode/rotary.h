@@ -56,5 +56,6 @@ bool take_length_code(Block *b, int32_t code);
 void check_turn_feed(Block *b, double length_mm);
 double feed_time_s(const Block *b, double length_mm, int64_t chords);
 void note_time(Block *b, double time_s);
+void note_staying(Block *b);
 
 #endif

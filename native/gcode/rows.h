@@ -3,11 +3,21 @@
 #ifndef GCODE_ROWS_H
 #define GCODE_ROWS_H
 
-#include "gcode/block.h"
+#include "gcode/offsets.h"
 #include "gcode/rotary.h"
 
 enum { NO_ARC = -1 };
 static const double RAPID_MM_S = INFINITY;
+
+/* Write what the rotation of the work offset makes of a row. */
+static inline void emit_rotated(const Rows *rows, int64_t row, const State *s) {
+    double tip_mm[3];
+    tip_position(s, tip_mm);
+    for (int axis = 0; axis < 2; axis++) {
+        CELL(rows->position_mm, row, axis) = tip_mm[axis];
+        CELL(rows->known, row, axis) = s->known_x && s->known_y;
+    }
+}
 
 /* Write the next row: it ends at the state's position. */
 static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool rapid, bool by_machine,
@@ -33,6 +43,8 @@ static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool r
     CELL(rows->known, row, 0) = s->known_x != 0;
     CELL(rows->known, row, 1) = s->known_y != 0;
     CELL(rows->known, row, 2) = s->known_z != 0;
+    if (s->rotated)
+        emit_rotated(rows, row, s);
     if (machine->rotary_axes)
         emit_turn(machine, row);
 }
@@ -43,10 +55,8 @@ static inline void stand_at(State *s, const double position_mm[3]) {
     s->z = position_mm[2];
 }
 
-/* Where the work offset in force has its zero. */
-static inline const double *work_offset_mm(const Block *block) {
-    return &CELL(block->machine->offsets_mm, block->state->work_offset, 0);
-}
+/* Where the programmed numbers have their zero: work offset and shift. */
+static inline const double *work_offset_mm(const Block *block) { return block->state->base_mm; }
 
 /* The tip at programmed coordinates, and the other way round; both may be one array. */
 static inline void tip_of(const Block *block, const double programmed_mm[3], double tip_mm[3]) {

@@ -2,8 +2,10 @@
 
 #include "gcode/settings.h"
 
+#include "gcode/offsets.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
+#include "gcode/tool_lengths.h"
 
 enum { LARGEST_WHOLE = 99999 };
 static const double WHOLE_SLACK = 1e-6;
@@ -58,22 +60,6 @@ static void speed(Block *b, double rpm) {
 }
 
 /* --- tools and their lengths ---------------------------------------------------------------------------- */
-
-/* G43, G49: the machine stands still, so the tip's coordinate moves by the difference. */
-static void set_length_offset(State *s, double length_mm) {
-    const double old = length_offset_of(s), new = isnan(length_mm) ? 0.0 : length_mm;
-    if (new != old) {
-        s->z -= new - old;
-        s->known_z = 0;
-        if (is_turned(s))
-            s->known_x = s->known_y = 0; /* the tip moves along the tool, not along Z */
-    }
-    s->length_offset = length_mm;
-}
-
-static double length_of(const Machine *machine, int32_t tool) {
-    return tool >= 0 && tool < machine->tool_length_mm.rows ? AT(machine->tool_length_mm, tool) : NAN;
-}
 
 static void select_tool(Block *b, double t) {
     b->used[V_WORD_T] = true;
@@ -143,6 +129,10 @@ static void length_offset(Block *b) {
         return;
     if (code == V_G43 || code == V_G43_4 || code == V_G43_5) {
         apply_length(b);
+    } else if (code == V_G43_1) {
+        length_by_words(b);
+    } else if (code == V_G43_2) {
+        length_added(b);
     } else if (code == V_G49 && !(b->machine->lengths_from_table && b->state->tool > 0)) {
         set_length_offset(b->state, NAN);
         b->state->offset_tool = -1;
@@ -214,6 +204,7 @@ static void select_offset(Block *b, int32_t code) {
     s->work_offset = code <= V_G59 ? (code - V_G54) / V_TENFOLD : code - V_G59 + 5;
     if (!AT(b->machine->offset_known, s->work_offset) && s->work_offset > 0)
         report(b, F_OFFSET_UNKNOWN, (Says){.a = code});
+    take_offsets(b->machine);
 }
 
 /* G61, G61.1, and G64 with its tolerance P. */

@@ -1,23 +1,12 @@
 /* Bytes to words: the scanner of G-code text. What goes where in its columns says gcode2krl/gcode/words.py. */
 
+#include "gcode/words.h"
+
 #include "gcode/dialect_text.h"
-#include "gcode/expressions.h"
-#include "gcode/numbers.h"
 #include "gcode/scan_columns.h"
 
-/* Kinds of an item that makes no word: a comment; a line or program number. Other kinds are letters. */
-enum { NOTHING = -1, LINE_NUMBER = 0 };
 /* Instead of a lost letter: the one of the word before in the line has lost its value. */
 enum { LETTER_BEFORE = -1 };
-
-/* What stands at a place: its kind, which goes into the column of letters; a finding and what was found; the
-   letter whose value is lost, 0 = none; the place behind. */
-typedef struct {
-    int kind, finding;
-    double found;
-    int lost;
-    int64_t end;
-} Item;
 
 /* Return the code point of the UTF-8 character at i, the byte itself where it is none. */
 static int character(Bytes text, int64_t i) {
@@ -60,15 +49,19 @@ static Item comment(Bytes text, int64_t i) {
 
 /* --- items ---------------------------------------------------------------------------------------------- */
 
-/* Return the item of a letter with no number behind it; it ends at i. */
-static Item without_number(Bytes text, int64_t i, int letter) {
+/* Return the item of a line that has to be read when it is executed: with an expression or an O-word. */
+static Item whole_line(Bytes text, int64_t i) {
+    return (Item){V_PROGRAM_LINE, F_OK, 0.0, 0, line_end(text, i)};
+}
+
+/* Return the item of a letter at `start` with no number behind it; it ends at i. */
+static Item without_number(Bytes text, int64_t i, int64_t start, int letter) {
     if (letter == CH_LETTER_O)
-        return (Item){V_MARK, F_O_WORD, letter, letter, line_end(text, i)};
+        return whole_line(text, i);
     if (letter == CH_LETTER_N)
         return (Item){V_MARK, F_BAD_LINE_NUMBER, letter, 0, i};
-    if (i < text.rows &&
-        (AT(text, i) == CH_HASH || AT(text, i) == CH_BRACKET_OPEN || is_function(text, i)))
-        return (Item){V_MARK, F_EXPRESSION, letter, letter, after_value(text, i, line_end(text, i))};
+    if (begins_value(text, start + 1, line_end(text, start)))
+        return whole_line(text, i);
     if (i < text.rows && AT(text, i) >= CH_FIRST_FOREIGN)
         return (Item){V_MARK, F_BAD_CHARACTER, character(text, i), letter, i};
     return (Item){V_MARK, F_NO_NUMBER, letter, letter, i};
@@ -82,13 +75,13 @@ static Item program_number(Bytes text, int64_t i, bool may_be_one) {
                        AT(text, i) == CH_SEMICOLON;
     if (may_be_one && alone)
         return (Item){LINE_NUMBER, F_OK, 0.0, 0, i};
-    return (Item){V_MARK, F_O_WORD, CH_LETTER_O, CH_LETTER_O, line_end(text, i)};
+    return whole_line(text, i);
 }
 
 /* Return the item of the letter at i that makes no plain word with the number behind it. */
-static Item odd_word(Bytes text, int64_t i, int letter, const Number *behind, bool first) {
+Item odd_word(Bytes text, int64_t i, int letter, const Number *behind, bool first) {
     if (behind->digits == 0)
-        return without_number(text, behind->end, letter);
+        return without_number(text, behind->end, i, letter);
     if (behind->finding != F_OK)
         return (Item){V_MARK, behind->finding, letter, letter, behind->end};
     if (letter == CH_LETTER_O)
@@ -101,7 +94,7 @@ static Item odd_word(Bytes text, int64_t i, int letter, const Number *behind, bo
 }
 
 /* Return the item that stands at i and is no letter; `first` where the line has no word before. */
-static Item other_item(Bytes text, int64_t i, bool first) {
+Item other_item(Bytes text, int64_t i, bool first) {
     const uint8_t c = AT(text, i);
     if (c == CH_SEMICOLON)
         return (Item){NOTHING, F_OK, 0.0, 0, line_end(text, i)};
@@ -109,10 +102,8 @@ static Item other_item(Bytes text, int64_t i, bool first) {
         return comment(text, i);
     if (c == CH_PERCENT || (c == CH_SLASH && first))
         return (Item){c, F_OK, 0.0, 0, i + 1};
-    if (c == CH_HASH) /* #1 = value: an assignment; what is no assignment is a lone parameter */
-        return (Item){V_MARK, F_EXPRESSION, c, 0, after_assignment(text, i)};
-    if (c == CH_BRACKET_OPEN || c == CH_BRACKET_CLOSE || c == CH_EQUALS)
-        return (Item){V_MARK, F_EXPRESSION, c, LETTER_BEFORE, i + 1};
+    if (c == CH_HASH) /* #1 = value */
+        return whole_line(text, i);
     return (Item){V_MARK, F_BAD_CHARACTER, character(text, i), LETTER_BEFORE, i + 1};
 }
 
@@ -128,6 +119,51 @@ static int lost_letter(const Scan *scan, int lost, int64_t line) {
     return letter >= CH_LETTER_A && letter <= CH_LETTER_Z ? letter : 0;
 }
 
+/* Return what a line is that begins at i: one with an O-word, or a block. */
+static int32_t kind_of_line(Bytes text, int64_t i) {
+    const int64_t end = line_end(text, i);
+    i = after_blanks(text, i, end);
+    if (i < end && AT(text, i) == CH_SLASH)
+        i = after_blanks(text, i + 1, end);
+    if (i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_N)
+        i = after_blanks(text, number(text, i + 1).end, end);
+    return i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_O ? P_KIND_O_WORD : P_KIND_BLOCK;
+}
+
+/* Write the line that begins at `start` as one word; what has been read of it is dropped, but for messages. */
+static void put_line(Scan *scan, int64_t start, int64_t line) {
+    int64_t first_message = scan->messages;
+    for (; scan->words > 0 && AT(scan->line, scan->words - 1) == line; scan->words--) {
+        const uint8_t c = AT(scan->letter, scan->words - 1);
+        scan->marks -= c == V_MARK;
+        first_message -= c == CH_PAREN_OPEN;
+    }
+    if (scan->program_lines < scan->lines.rows)
+        AT(scan->lines, scan->program_lines) =
+            (MarkedLine){.start = start,
+                         .target = -1,
+                         .kind = kind_of_line(scan->text, start),
+                         .first_message = (int32_t)first_message};
+    put(scan, V_PROGRAM_LINE, (double)scan->program_lines++, line);
+}
+
+/* Keep the spans of the message comments from i to the end of the line. */
+static void put_messages(Scan *scan, int64_t i, int64_t end) {
+    for (; i < end; i++) {
+        if (AT(scan->text, i) == CH_SEMICOLON)
+            return;
+        if (AT(scan->text, i) != CH_PAREN_OPEN)
+            continue;
+        const Item item = comment(scan->text, i);
+        if (item.kind == CH_PAREN_OPEN) {
+            CELL(scan->message_span, scan->messages, 0) = i + 1;
+            CELL(scan->message_span, scan->messages, 1) = item.end - 1;
+            scan->messages++;
+        }
+        i = item.end - 1;
+    }
+}
+
 /* Write what an item from `start` on makes; a line has one mark of its characters at most. */
 static void put_item(Scan *scan, const Item *item, int64_t start, int64_t line, bool marked) {
     if (item->kind == V_MARK) {
@@ -141,6 +177,14 @@ static void put_item(Scan *scan, const Item *item, int64_t start, int64_t line, 
     } else if (item->kind > LINE_NUMBER) {
         put(scan, item->kind, 0.0, line);
     }
+}
+
+/* Tell whether a line is to be read when it is executed; in a whole program every odd one, and O1000 alone. */
+static bool belongs_to_program(const Scan *scan, const Item *item, uint8_t c) {
+    if (item->kind == V_PROGRAM_LINE)
+        return true;
+    const bool program_number = item->kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == CH_LETTER_O;
+    return scan->whole_program && (item->kind == V_MARK || program_number);
 }
 
 /* Fill the columns from whole lines of text. */
@@ -187,7 +231,13 @@ EXPORT void gcode_scan(Scan *scan) {
         } else {
             item = other_item(text, i, first);
         }
-        put_item(scan, &item, i, line, marked_line == line);
+        if (belongs_to_program(scan, &item, c)) {
+            put_line(scan, line_start, line);
+            item.end = line_end(text, i);
+            put_messages(scan, i, item.end);
+        } else {
+            put_item(scan, &item, i, line, marked_line == line);
+        }
         if (item.kind == V_MARK)
             marked_line = line;
         first = first && item.kind != V_MARK && item.kind != LINE_NUMBER;

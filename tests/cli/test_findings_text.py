@@ -51,11 +51,11 @@ def test_what_follows_from_an_unread_line_is_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As in a program whose feed is a parameter: the first bad line is the news, not 45 missing feeds."""
-    part = _part(tmp_path, [*HEAD, "S8000 M3", "#1=500", "G0 X100 Y0 Z5", "F#1", "G1 Z-1", "G1 X1 $"])
+    part = _part(tmp_path, [*HEAD, "S8000 M3", "#1=-1", "G0 X100 Y0 Z5", "F[SQRT[#1]]", "G1 Z-1", "G1 X1 $"])
     assert _run(part, "-o", str(tmp_path / "part.src")) == 2
     lines = capsys.readouterr().err.splitlines()
-    assert ":5: error: " in lines[0]
-    assert "[expression]" in lines[0]
+    assert ":7: error: " in lines[0]
+    assert "[expression-value]" in lines[0]
     assert not [line for line in lines if "[no-feed]" in line]
 
 
@@ -102,7 +102,7 @@ def test_a_terminal_is_told_how_to_learn_more(
 
 def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Every kind of bad line 300 times over: at most eight lines of a kind, twenty in all, then counts."""
-    kinds = ["G1 X[1+2]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "o100 sub", "G1 E5", "M98 P1"]
+    kinds = ["G1 X[1+]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "G1 X1 X2", "G1 E5", "M62 P1"]
     part = _part(tmp_path, [f"{kind}" for k in range(30) for kind in kinds for _ in range(k % 3 + 1)])
     assert _run(part, "-o", str(tmp_path / "part.src")) == 2
     lines = capsys.readouterr().err.splitlines()

@@ -18,6 +18,7 @@ AXES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}  # first, second, nor
 
 ACCEPTED_HERE = {
     "g43_unknown_tool": "tool-undeclared",
+    "g43_2_unknown_tool": "tool-undeclared",
     "unknown_tool": "a tool that is only preselected does nothing",
     "unknown_m": "an event; translation refuses it where the cell has no KRL for it",
     "m_too_large": "the same",
@@ -40,10 +41,10 @@ def _name(case):
 
 def _cell(offsets):
     """Return a cell that has nothing but work offsets."""
-    origins = {system: offsets.get(system, (0.0, 0.0, 0.0)) for system in SYSTEMS}
+    origins = {system: [*offsets.get(system, (0.0, 0.0, 0.0)), 0.0][:4] for system in SYSTEMS}
     frames = {
-        system: Frame(x_mm=x, y_mm=y, z_mm=z, a_deg=0.0, b_deg=0.0, c_deg=0.0)
-        for system, (x, y, z) in origins.items()
+        system: Frame(x_mm=x, y_mm=y, z_mm=z, a_deg=a, b_deg=0.0, c_deg=0.0)
+        for system, (x, y, z, a) in origins.items()
     }
     return Cell.model_construct(tool={}, work_offsets=frames)
 
@@ -122,8 +123,16 @@ def _directed(angle, sign):
     return np.where(turned < 1e-6, turned + math.tau, turned)
 
 
+def _rotated_back(points, about):
+    """Return points (k, 3) in the frame of a work offset that is rotated about (x, y) by some degrees."""
+    x, y, angle = *about[:2], math.radians(about[2])
+    back = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    return np.column_stack(((points[:, :2] - [x, y]) @ back + [x, y], points[:, 2]))
+
+
 def _check_arc(points, arc):
     """Check that ``points`` (k + 1, 3), the start and the chord ends, follow ``arc`` of expected.json."""
+    points = _rotated_back(points, arc["about"]) if "about" in arc else points
     first, second, normal = AXES[arc["plane"]]
     radial = points[:, [first, second]] - arc["centre"]
     radius = np.hypot(*radial.T)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl import Gcode2KrlError, load_cell, read_gcode
+from gcode2krl.cell.sections import Machine
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as marks
@@ -138,6 +139,27 @@ def test_a_message_is_kept():
         *('CYCLE800(1,"TC",0)', "ROT Z45", "SCALE X2", "G110 X0", "MCALL CYCLE81(1,2,3)", "GOTOF ENDE"),
         *("IF R1>2 GOTOF A", "R1=5", "X=R1", "X=IC(R1)", "X=5+3", "X=IC(5", "X=SIN(3)", 'T="MILL"', "D2"),
         *("DEF REAL A", "A3=0 B3=0 C3=1", "G147 X1", "G500", "G505", "NONSENSE", "S2=100", "CR", "G58 X1"),
+        *(
+            "TRANS X10",
+            "ATRANS Z5",
+            "G70",
+            "G41",
+            "G26 S5000",
+            "G92 X0",
+            "G20",
+            "G4 S30",
+            "M3 S600 G4 F1 S3",
+            "#1=5",
+        ),
+        *(
+            "X[1+1]",
+            "M98 P1000",
+            "G55 X=IC(5)",
+            "SUPA G0 X=IC(1)",
+            "D1 Z=IC(1)",
+            "O1 call",
+            "G2 X0 Y0 I=IC(3) G54",
+        ),
     ],
 )
 def test_sinumerik_statements_that_are_refused(line):
@@ -223,3 +245,46 @@ def test_a_line_that_no_dialect_reads_names_none(tmp_path):
     with pytest.raises(NotUnderstoodError) as refused:
         read_gcode(part)
     assert not any("--dialect" in issue.remedy for issue in refused.value.issues)
+
+
+@pytest.mark.parametrize("dialect", [name for name in DIALECT_NAMES if name != "linuxcnc"])
+@pytest.mark.parametrize("line", ["#1=5", "G1 X#1", "G1 X[1+1] F100", "O100 sub", "M98 P1000", "M99", "M70"])
+def test_programs_that_compute_or_jump_are_of_one_dialect(dialect, line):
+    """A line that is worked out is read by LinuxCNC's rules: X100 in it would be 100 mm."""
+    unit = "G710" if dialect == "sinumerik" else "G21"
+    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
+    assert (found[0].code, found[0].line) == ("dialect-statement", 3)
+    assert found[0].remedy
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("G4 P1.5", "G4 P500 X1.", "G10 L2 P1 X0.", "G92 X0. Y0.", "G41 D1", "G43.1 Z1.", "G59.1"),
+        *("G95\nG1 X1. F20", "G93\nG1 X1. F20", "G20\nG1 X1. F10", "G82 X1. Z-1. R1. P0.5 F100"),
+        "G83 X1. Z-1. R1. Q2000 F100",
+    ],
+)
+@pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
+def test_what_hangs_on_the_parameters_of_a_fanuc_is_refused(dialect, line):
+    assert errors(f"{HEAD}G99\n{line}\nM30\n", dialect)
+
+
+def test_times_and_angles_have_their_own_increments():
+    inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
+    assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
+    assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
+
+
+def test_a_cell_with_rotary_axes_is_refused_for_sinumerik():
+    machine = Machine(
+        kind="table-head",
+        axes=("C", "A"),
+        signs=(-1, 1),
+        tcpm=False,
+        pivot_mm=150.0,
+        centre_mm=(0.0, 0.0, 0.0),
+    )
+    cell = load_cell().model_copy(update={"machine": machine})
+    with pytest.raises(NotUnderstoodError, match="rotary axes"):
+        read_stream(io.BytesIO(b"G710\nG0 X1 Y1 Z1\nM30\n"), "part.nc", cell, dialect="sinumerik")

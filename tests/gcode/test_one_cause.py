@@ -51,7 +51,15 @@ def test_a_correct_arc_behind_a_refused_block_is_not_blamed(fault):
 
 @pytest.mark.parametrize(
     "fault",
-    ["G1 X#1 Y5", "G1 X[1+1]", "#1=3 G1 X#1", "G87 X5 Y5 Z-5 R1", "G10 L2 P1 X5", "G91 G1 X5,5", "G92 X7"],
+    [
+        "G1 X#0 Y5",
+        "G1 X[1+]",
+        "#1=3 G1 X#<a>",
+        "G87 X5 Y5 Z-5 R1",
+        "G10 L2 P1.5 X5",
+        "G91 G1 X5,5",
+        "G92 X[7+]",
+    ],
 )
 def test_an_arc_from_a_position_in_doubt_is_not_judged(fault):
     found = errors(f"{fault}\nG2 X20 I5 F100\nG0 X20 Y0 Z0\nG90\nM2\n")
@@ -59,7 +67,7 @@ def test_an_arc_from_a_position_in_doubt_is_not_judged(fault):
 
 
 def test_an_arc_is_judged_again_from_a_position_that_is_stated_anew():
-    found = errors("G1 X#1\nG2 X20 I5\nG0 X0 Y0\nG2 X20 I5\nM2\n")
+    found = errors("G1 X#[\nG2 X20 I5\nG90 G17 G94 G21 G91.1 G0 X0 Y0 F9\nG2 X20 I5\nM2\n")
     assert found == [("expression", 3), ("arc-radius-mismatch", 6)]
 
 
@@ -87,15 +95,15 @@ def test_a_missing_motion_code_is_one_finding():
 
 
 def test_an_expression_in_the_unit_or_motion_leaves_all_in_doubt():
-    assert errors("G#1 X5\nX7\nG2 X20 I3\nI7 J7\nM2\n") == [("expression", 3)]
+    assert errors("G[1+] X5\nX7\nG2 X20 I3\nI7 J7\nM2\n") == [("expression", 3)]
 
 
-def test_words_behind_an_expression_are_still_read():
-    assert errors("G1 X#1 Y5 F-3\nM2\n") == [("expression", 3)]
-    assert errors("X[#1*2+[3]] Y#<_name> Z-#5 F100\nA7\nM2\n") == [("expression", 3), ("rotary-axis", 4)]
+def test_plain_blocks_behind_an_expression_are_still_read():
+    assert errors("X[1*2+[3]] Y#<_name> F100\nA7\nM2\n") == [("parameter-undefined", 3), ("rotary-axis", 4)]
+    assert errors("X[1*2\nX#<_name>\nX[2+]\nM2\n") == [("expression", 3), ("expression", 5)]
 
 
-def test_subprogram_words_are_one_finding_a_line_and_leave_all_in_doubt():
+def test_nothing_behind_an_o_word_without_its_end_is_run():
     assert errors("O100 sub\nX1 I1\nG2 X9 I1\nM2\n") == [("o-word", 3)]
 
 
@@ -125,7 +133,7 @@ def test_the_modal_state_that_led_there_is_named(text, named):
         ("G1 X10 (Q) $5", "G1 X10 (Q) ^$5"),
         ("G1 X1 X2", "G1 X1 ^X2"),
         ("N5 G01 G41 X1", "N5 G01 ^G41 X1"),
-        ("G1 X#1", "G1 ^X#1"),
+        ("G1 X[1 / 0]", "G1 X[1 ^/ 0]"),
         ("G1 X10 (never closed", "G1 X10 ^(never closed"),
         ("M3 M04 S1", "M3 ^M04 S1"),
         ("G1 X10 T1.5" + " " * 60 + "F5", "G1 X10 ^T1.5..."),

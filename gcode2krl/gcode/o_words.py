@@ -1,0 +1,289 @@
+"""O-words: which line ends what, and where a program goes on behind each.
+
+An O-line is looked at once a file: its label, its word, and the words (columns of the scanner) to which it
+leads. A line whose label or word makes no sense gets its fault and is reported where it is executed, as in
+LinuxCNC: what a program passes over may be anything.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from gcode2krl.arrays import Ints
+from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import program_tables as tables
+
+Label = str
+"""A number without leading zeros, or a name in small letters and without blanks."""
+
+_BLANKS = rb"[ \t\r]*"
+_WORDS = (
+    *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
+    *("break", "continue", "endwhile", "endrepeat", "return"),
+)
+_WORD = b"|".join(_BLANKS.join(bytes([c]) for c in word.encode()) for word in _WORDS)
+_LINE = re.compile(
+    _BLANKS
+    + rb"(?P<deleted>/)?"
+    + _BLANKS
+    + rb"(?:N[\d. \t\r]*)?O"
+    + _BLANKS
+    + rb"(?:<(?P<name>[^>\n]*)>|(?P<number>\d[\d \t]*)(?:\.[0 \t]*)?|(?P<computed>(?=[#\[])))"
+    + _BLANKS
+    + rb"(?:\([^()\n]*\)"
+    + _BLANKS
+    + rb")*(?P<word>"
+    + _WORD
+    + rb")?",
+    re.IGNORECASE,
+)
+_CALL = re.compile(_BLANKS.join((b"c", b"a", b"l", b"l")), re.IGNORECASE)
+_ALONE = re.compile(rb"[ \t\r\x1a]*(?:[(;].*)?\Z", re.DOTALL)
+_SPACE = re.compile(rb"[ \t\r]")
+
+
+class OLine(NamedTuple):
+    """What an O-line says."""
+
+    label: Label
+    word: str
+    """Small letters; ``program`` for a number that stands alone, empty for what is no O-word."""
+    behind: int
+    """Bytes before its expressions; for a computed label, before the label."""
+    deleted: bool
+
+
+def parsed(line: bytes) -> OLine:
+    """Return what an O-line says, without its expressions."""
+    found = _LINE.match(line)
+    if found is None:
+        return OLine("", "", 0, deleted=False)
+    deleted = found["deleted"] is not None
+    if found["computed"] is not None:
+        word = "call" if _CALL.search(line, found.end("computed")) else ""
+        return OLine("", word, found.end("computed"), deleted)
+    name, number, word_found = found["name"], found["number"], found["word"]
+    label = (
+        _SPACE.sub(b"", name).lower().decode("latin-1")
+        if name is not None
+        else str(int(_SPACE.sub(b"", number)))
+    )
+    if word_found is not None:
+        return OLine(label, _SPACE.sub(b"", word_found).lower().decode(), found.end(), deleted)
+    alone = _ALONE.match(line, found.end()) is not None
+    return OLine(label, "program" if alone and number is not None else "", found.end(), deleted)
+
+
+class Definition(NamedTuple):
+    """Where a subprogram begins."""
+
+    label: Label
+    entry: int
+    """Word of the line behind its first."""
+    is_program: bool
+    """O1000 … M99, which M98 calls; else sub … endsub."""
+
+
+class _Open:
+    """An if, while, do, repeat or sub whose end has not come yet."""
+
+    def __init__(self, label: Label, word: str, row: int) -> None:
+        self.label, self.word, self.row = label, word, row
+        self.branches = [row]
+        self.breaks: list[int] = []
+        self.continues: list[int] = []
+
+
+class Flow:
+    """Fills in the O-lines of one file."""
+
+    def __init__(self, lines: NDArray[Any], word_of_row: Ints, rows_of_labels: Mapping[Label, int]) -> None:
+        """Take the marked lines, the word at which each begins, and the rows of subprograms by label."""
+        self.lines, self.word_of_row = lines, word_of_row
+        self.rows_of_labels = rows_of_labels
+        self.definitions: list[Definition] = []
+        self._open: list[_Open] = []
+        self._labels: list[set[Label]] = [set()]
+
+    def add(self, row: int, line: OLine) -> None:
+        """Take the O-line of a row, in the order of the file."""
+        self.lines["expression"][row] = self.lines["start"][row] + line.behind
+        handler = getattr(self, f"_{line.word}", None) if line.word else None
+        if handler is None:
+            known = line.label or line.word
+            self._fault(row, faults.FAULT_WORD if known else faults.FAULT_LABEL)
+        elif not line.label and line.word != "call":
+            self._fault(row, faults.FAULT_LABEL)
+        else:
+            handler(row, line.label)
+
+    def finish(self) -> None:
+        """Whatever is open at the end of the file has no end."""
+        self._close_all(0)
+
+    # --- what every word does -------------------------------------------------------------------------
+
+    def _set(self, row: int, kind: int, target: int = -1) -> None:
+        self.lines["kind"][row] = kind
+        self.lines["target"][row] = target
+
+    def _fault(self, row: int, fault: int) -> None:
+        self._set(row, tables.KIND_FAULT)
+        self.lines["fault"][row] = fault
+
+    def _word(self, row: int) -> int:
+        return int(self.word_of_row[row])
+
+    def _begin(self, row: int, label: Label, word: str, kind: int) -> None:
+        self._set(row, kind)
+        if label in self._labels[-1]:
+            self._fault(row, faults.FAULT_LABEL_TWICE)
+        self._labels[-1].add(label)
+        self._open.append(_Open(label, word, row))
+
+    def _end(self, row: int, label: Label, *words: str) -> _Open | None:
+        """Return what a line ends; without it the line gets a fault."""
+        if self._open and self._open[-1].label == label and self._open[-1].word in words:
+            return self._open.pop()
+        crossed = any(each.label == label and each.word in words for each in self._open)
+        self._fault(row, faults.FAULT_CROSSED if crossed else faults.FAULT_NO_OPENING)
+        return None
+
+    def _close_all(self, depth: int) -> None:
+        for each in self._open[depth:]:
+            if self.lines["kind"][each.row] != tables.KIND_FAULT:
+                self._fault(each.row, faults.FAULT_NO_CLOSING)
+        del self._open[depth:]
+
+    def _set_jumps(self, rows: list[int], target: int) -> None:
+        for row in rows:
+            self._set(row, tables.KIND_JUMP, target)
+
+    def _enclosing(self, label: Label, *words: str) -> _Open | None:
+        return next((o for o in reversed(self._open) if o.label == label and o.word in words), None)
+
+    # --- branches -------------------------------------------------------------------------------------
+
+    def _if(self, row: int, label: Label) -> None:
+        self._begin(row, label, "if", tables.KIND_IF)
+
+    def _elseif(self, row: int, label: Label) -> None:
+        self._branch(row, label, tables.KIND_ELSEIF)
+
+    def _else(self, row: int, label: Label) -> None:
+        self._branch(row, label, tables.KIND_ELSE)
+
+    def _branch(self, row: int, label: Label, kind: int) -> None:
+        found = self._end(row, label, "if")
+        if found is None:
+            return
+        self._open.append(found)
+        if self.lines["kind"][found.branches[-1]] == tables.KIND_ELSE:
+            self._fault(row, faults.FAULT_NO_OPENING)
+            return
+        self._set(row, kind)
+        self.lines["target"][found.branches[-1]] = self._word(row)
+        found.branches.append(row)
+
+    def _endif(self, row: int, label: Label) -> None:
+        found = self._end(row, label, "if")
+        if found is None:
+            return
+        self._set(row, tables.KIND_ENDIF)
+        self.lines["target"][found.branches[-1]] = self._word(row)
+        self.lines["end"][found.branches] = self._word(row)
+
+    # --- loops ----------------------------------------------------------------------------------------
+
+    def _while(self, row: int, label: Label) -> None:
+        if self._enclosing(label, "do") is None:
+            self._begin(row, label, "while", tables.KIND_WHILE)
+            return
+        found = self._end(row, label, "do")
+        if found is not None:
+            self._set(row, tables.KIND_DO_WHILE, self._word(found.row) + 1)
+            self._set_jumps(found.breaks, self._word(row) + 1)
+            self._set_jumps(found.continues, self._word(row))
+
+    def _do(self, row: int, label: Label) -> None:
+        self._begin(row, label, "do", tables.KIND_NOTHING)
+
+    def _repeat(self, row: int, label: Label) -> None:
+        self._begin(row, label, "repeat", tables.KIND_REPEAT)
+
+    def _endwhile(self, row: int, label: Label) -> None:
+        self._end_loop(row, label, "while")
+
+    def _endrepeat(self, row: int, label: Label) -> None:
+        self._end_loop(row, label, "repeat")
+
+    def _end_loop(self, row: int, label: Label, word: str) -> None:
+        found = self._end(row, label, word)
+        if found is None:
+            return
+        self._set(row, tables.KIND_JUMP, self._word(found.row))
+        self.lines["target"][found.row] = self._word(row) + 1
+        self._set_jumps(found.breaks, self._word(row) + 1)
+        self._set_jumps(found.continues, self._word(found.row))
+
+    def _break(self, row: int, label: Label) -> None:
+        found = self._enclosing(label, "while", "do")
+        self._fault(row, faults.FAULT_NOT_IN_LOOP)  # until the loop ends
+        if found is not None:
+            found.breaks.append(row)
+
+    def _continue(self, row: int, label: Label) -> None:
+        found = self._enclosing(label, "while", "do")
+        self._fault(row, faults.FAULT_NOT_IN_LOOP)
+        if found is not None:
+            found.continues.append(row)
+
+    # --- subprograms ----------------------------------------------------------------------------------
+
+    def _call(self, row: int, label: Label) -> None:
+        self._set(row, tables.KIND_CALL)
+        self.lines["subprogram"][row] = self.rows_of_labels[label] if label else -1
+
+    def _sub(self, row: int, label: Label) -> None:
+        outer = self._sub_at_hand()
+        if outer is not None:
+            self._fault(row, faults.FAULT_NESTED_SUB)
+            self._fault(outer.row, faults.FAULT_NESTED_SUB)
+            return
+        self._set(row, tables.KIND_SUB)
+        self._open.append(_Open(label, "sub", row))
+        self.lines["subprogram"][row] = self.rows_of_labels[label]
+        self._labels.append(set())
+        self.definitions.append(Definition(label, self._word(row) + 1, is_program=False))
+
+    def _sub_at_hand(self) -> _Open | None:
+        return next((each for each in self._open if each.word == "sub"), None)
+
+    def _endsub(self, row: int, label: Label) -> None:
+        found = self._sub_at_hand()
+        if found is None or found.label != label:
+            self._fault(row, faults.FAULT_NOT_IN_SUB)
+            return
+        self._close_all(self._open.index(found) + 1)
+        self._open.pop()
+        self._labels.pop()
+        self._set(row, tables.KIND_ENDSUB)
+        self.lines["target"][found.row] = self._word(row) + 1
+
+    def _return(self, row: int, label: Label) -> None:
+        found = self._sub_at_hand()
+        if found is None or found.label != label:
+            self._fault(row, faults.FAULT_NOT_IN_SUB)
+        else:
+            self._set(row, tables.KIND_RETURN)
+
+    def _program(self, row: int, label: Label) -> None:
+        self._set(row, tables.KIND_PROGRAM_NUMBER)
+        if self._sub_at_hand() is not None:
+            self._fault(row, faults.FAULT_NESTED_SUB)
+            return
+        self._close_all(0)
+        self._labels = [set()]
+        self.definitions.append(Definition(label, self._word(row) + 1, is_program=True))

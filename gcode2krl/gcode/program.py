@@ -1,0 +1,285 @@
+"""A program with parameters, expressions and O-words: it is read whole, and runs in the core.
+
+A plain file never comes here. The first block that computes or jumps ends the reading in pieces: from there
+on the text is scanned as a whole, its O-lines are looked at once (`o_words`), and the core runs it
+(``native/gcode/execute.c``). It comes back for room, and for a subprogram in another file.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.arrays import Ints
+from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
+from gcode2krl.errors import input_error
+from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import program_tables as tables
+from gcode2krl.gcode.machine import MACHINE
+from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
+from gcode2krl.gcode.parameter_names import NAMES
+from gcode2krl.gcode.state import STATE
+from gcode2krl.gcode.subprograms import found_file
+from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
+from gcode2krl.gcode.words import Scanner, Words
+
+MOST_BYTES = 256_000_000
+"""Largest program with parameters or O-words: its text and its words are in memory as a whole."""
+MOST_STEPS = 10_000_000
+"""Lines that a program may run beyond those of its files: a loop that takes more is taken as endless."""
+MOST_ROWS = 20_000_000
+"""Moves that such a program may make; they take 2 GB."""
+_NOTHING_WANTED, _WANTED_BY_NUMBER = -1, -2
+
+_execute = core_function(
+    "gcode_execute", MACHINE, tables.PROGRAM, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT
+)
+_set_names = core_function("gcode_set_names", tables.PROGRAM, returns=None)
+
+
+class HandsOver(NamedTuple):
+    """The interpreter of blocks, and its arrays that tell how far it is."""
+
+    machine: Any
+    state: NDArray[Any]
+    counts: NDArray[Any]
+    found: NDArray[Any]
+
+
+class File(NamedTuple):
+    """One file of a program; lines of all files are numbered one behind the other."""
+
+    name: str
+    first_line: int
+    """Number of its first line among those of all files."""
+    text: bytes
+    start_line: int
+    """Its own number of that line."""
+
+
+class Program:
+    """A whole program; `run` runs it from the line at which the reading in pieces has stopped."""
+
+    def __init__(self, name: str, folders: Sequence[Path], *, block_delete: bool) -> None:
+        """Take the program's name, and the folders in which its subprograms may be."""
+        self.name, self._folders, self._block_delete = name, folders, block_delete
+        self.files: list[File] = []
+        self.messages: list[bytes] = []
+        self.most_decimals = 0
+        self._letter, self._line = np.zeros(0, np.uint8), np.zeros(0, np.int32)
+        self._value, self._lines = np.zeros(0), np.zeros(0, tables.LINE)
+        self._text = b""
+        self._labels: dict[Label, int] = {}
+        self._definitions: dict[Label, list[tuple[int, Definition]]] = {}
+        self._ends: list[int] = []
+        self._looked_for: set[Label] = set()
+        self._at = 0
+        self.course = np.zeros(1, tables.COURSE)
+        self._subprograms = np.zeros(0, tables.SUBPROGRAM)
+        self._program = _empty_program(self.course)
+
+    # --- files ------------------------------------------------------------------------------------------
+
+    def add(self, name: str, text: bytes, start_line: int, messages: int) -> None:
+        """Take a file, or the rest of one from a line on; so many messages have been numbered before."""
+        if len(self._text) + len(text) > MOST_BYTES:
+            raise input_error(
+                "program-size",
+                f"a program with parameters or O-words has more than {MOST_BYTES / 1e6:.0f} MB",
+                "let the post write plain moves",
+                source=name,
+            )
+        first_line = int(self._line[-1]) + 1 if self.files else start_line
+        text = text if text.endswith(b"\n") else text + b"\n"
+        self.files.append(File(name, first_line, text, start_line))
+        scanned, lines = Scanner().scan_whole(text, first_line)
+        self.most_decimals = max(self.most_decimals, scanned.most_decimals)
+        messages += len(self.messages)
+        self.messages += [text[a:b] for a, b in scanned.message_span]
+        last = first_line + text.count(b"\n")
+        self._append(text, scanned, lines, messages, last, is_main=len(self.files) == 1)
+
+    def _append(
+        self, text: bytes, scanned: Words, lines: NDArray[Any], messages: int, last: int, *, is_main: bool
+    ) -> None:
+        letter, value, line = scanned.letter, scanned.value, scanned.line
+        if not is_main:  # the tape marks of another file end nothing
+            kept = letter != ord("%")
+            letter, value, line = letter[kept], value[kept], line[kept]
+        value = value.copy()
+        value[letter == ord("(")] += messages
+        marked = letter == PROGRAM_LINE
+        value[marked] += len(self._lines)
+        lines["start"] += len(self._text)
+        lines["first_message"] += messages
+        end = np.zeros(1, tables.LINE)
+        end["kind"] = tables.KIND_END_OF_FILE
+        rows, words = len(self._lines), len(self._letter)
+        self._lines = np.concatenate((self._lines, lines, end))
+        self._letter = np.concatenate((self._letter, letter, np.array([PROGRAM_LINE], np.uint8)))
+        self._value = np.concatenate((self._value, value, [float(len(self._lines) - 1)]))
+        self._line = np.concatenate((self._line, line, np.array([last], np.int32)))
+        word_of_row = np.zeros(len(self._lines), dtype=np.int64)
+        word_of_row[rows : rows + len(lines)] = words + np.flatnonzero(marked)
+        self._text += text
+        self._ends.append(len(self._letter))
+        self._look_at_o_lines(rows, word_of_row)
+        self._program.text = np.frombuffer(self._text, np.uint8)
+        self._program.lines = self._lines
+        self._count("most_steps", MOST_STEPS + int(self._line[-1]))
+        self._count("most_rows", MOST_ROWS)
+        self._count("main_words", self._ends[0])
+
+    def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
+        flow = Flow(self._lines, word_of_row, _Rows(self._labels))
+        kind = self._lines["kind"][first_row:]
+        for row in (first_row + np.flatnonzero(kind == tables.KIND_O_WORD)).tolist():
+            start = int(self._lines["start"][row])
+            line = parsed(self._text[start : self._text.index(b"\n", start)])
+            if line.deleted and self._block_delete:
+                self._lines["kind"][row] = tables.KIND_NOTHING
+            else:
+                flow.add(row, line)
+        flow.finish()
+        for definition in flow.definitions:
+            self._labels.setdefault(definition.label, len(self._labels))
+            self._definitions.setdefault(definition.label, []).append((len(self.files) - 1, definition))
+        self._tell_subprograms()
+
+    def _tell_subprograms(self) -> None:
+        known = self._subprograms
+        rows = np.zeros(max(16, len(self._labels)), tables.SUBPROGRAM)
+        rows["entry"] = -1
+        rows["number"] = -1
+        rows[: len(known)] = known[: len(rows)]
+        for label, row in self._labels.items():
+            rows["number"][row] = int(label) if label.isdigit() else -1
+        self._subprograms = self._program.subprograms = rows
+        self._count("subprograms", len(self._labels))
+
+    def _count(self, name: str, number: int) -> None:
+        self.course[name] = number
+
+    # --- running ----------------------------------------------------------------------------------------
+
+    def run(self, hands_over: HandsOver, make_room: Callable[[], None]) -> None:
+        """Run the program to its end, or to the first error that it cannot go on behind."""
+        extra = np.full(1, float(LINE_LIMIT))  # every mark that is left is a line too long
+        while not (hands_over.state["ended"][0] or self.course["is_stopped"][0]):
+            self._at = _execute(
+                hands_over.machine, self._program, self._letter, self._value, extra, self._line, self._at
+            )
+            if self.course["wanted"][0] != _NOTHING_WANTED:
+                self._find_subprogram(hands_over)
+            elif self._at < len(self._letter):
+                make_room()
+            else:
+                return
+
+    def _find_subprogram(self, hands_over: HandsOver) -> None:
+        """Make the subprogram that is called ready: its file, else what stands below, as in LinuxCNC."""
+        label = self._wanted_label()
+        word = int(self.course["wanted_word"][0])
+        file = next(k for k, end in enumerate(self._ends) if word < end)
+        self._read_file(label, len(self.messages))
+        found = self._definition(label, file, word)
+        if found is None:
+            self._report_missing(hands_over, word)
+            return
+        self._tell_subprograms()
+        ready = (int(label) if label.isdigit() else -1, found.entry, 1, found.is_program)
+        self._subprograms[self._labels[label]] = ready
+
+    def _wanted_label(self) -> Label:
+        row = int(self.course["wanted"][0])
+        if row == _WANTED_BY_NUMBER:
+            label = str(int(self.course["wanted_number"][0]))
+            self._labels.setdefault(label, len(self._labels))
+            self._tell_subprograms()
+            return label
+        return next(label for label, own in self._labels.items() if own == row)
+
+    def _definition(self, label: Label, file: int, word: int) -> Definition | None:
+        """Return where a subprogram is defined: in its own file, else behind the call in the same file."""
+        known = self._definitions.get(label, [])
+        of_own_file = [d for k, d in known if self.files[k].name != self.name and self._is_own(k, label)]
+        below = [d for k, d in known if k == file and d.entry > word]
+        return next(iter((*of_own_file, *below)), None)
+
+    def _is_own(self, file: int, label: Label) -> bool:
+        return Path(self.files[file].name).stem.lower() == label
+
+    def _read_file(self, label: Label, messages: int) -> None:
+        if label in self._looked_for:
+            return
+        self._looked_for.add(label)
+        path = found_file(label, self._folders, Path(self.name).suffix)
+        if path is not None:
+            self.add(str(path), path.read_bytes(), 1, messages=0)
+
+    def _report_missing(self, hands_over: HandsOver, word: int) -> None:
+        counts, found = hands_over.counts, hands_over.found
+        row = int(counts["findings"][0])
+        if row < len(found):
+            found[row] = (f.SUBPROGRAM_MISSING, int(self._line[word]), 0.0, 0.0, -1.0)
+            counts["findings"] += 1
+        counts["errors"] += 1
+        self.course["is_stopped"] = 1
+
+    # --- places -----------------------------------------------------------------------------------------
+
+    def place(self, line: int) -> tuple[str, int]:
+        """Return the file and the line in it that a line among those of all files is."""
+        file = self._file(line)
+        return file.name, line - file.first_line + file.start_line
+
+    def texts(self, lines: Iterable[int]) -> dict[int, bytes]:
+        """Return lines of the program by their numbers."""
+        own = {id(file): file.text.split(b"\n") for file in {self._file(n) for n in lines}}
+        return {n: own[id(self._file(n))][n - self._file(n).first_line] for n in lines}
+
+    def _file(self, line: int) -> File:
+        return next((file for file in reversed(self.files) if file.first_line <= line), self.files[0])
+
+
+class _Rows(dict[Label, int]):
+    """The row of every label; a new label gets the next."""
+
+    def __init__(self, labels: dict[Label, int]) -> None:
+        super().__init__()
+        self._labels = labels
+
+    def __getitem__(self, label: Label) -> int:
+        return self._labels.setdefault(label, len(self._labels))
+
+
+def _empty_program(course: NDArray[Any]) -> Any:
+    """Return the tables of a program at its start; pages that nothing reaches cost nothing."""
+    frames = np.zeros(tables.FRAMES, tables.FRAME)
+    course["wanted"] = _NOTHING_WANTED
+    course["generation"] = frames["generation"][0] = 1
+    names = np.zeros(tables.MOST_NAMES, tables.NAME)
+    program = tables.PROGRAM(
+        text=np.frombuffer("\n".join(f"<{name}>" for name in NAMES).encode(), np.uint8),
+        lines=np.zeros(0, tables.LINE),
+        subprograms=np.zeros(0, tables.SUBPROGRAM),
+        names=names,
+        name_slots=np.zeros(2 * len(names) + 1, np.int32),
+        pool=np.zeros(32 * len(names), np.uint8),
+        local_value=np.zeros((tables.FRAMES, len(names))),
+        local_generation=np.zeros((tables.FRAMES, len(names)), np.int64),
+        parameters=np.zeros(tables.MOST_PARAMETERS),
+        frames=frames,
+        saved_states=np.zeros(tables.FRAMES, STATE),
+        repeats=np.zeros(tables.MOST_REPEATS, tables.REPEAT),
+        assignments=np.zeros(tables.ROOM_OF_LINE, tables.ASSIGNMENT),
+        course=course,
+        letter=np.zeros(tables.ROOM_OF_LINE, np.uint8),
+        value=np.zeros(tables.ROOM_OF_LINE),
+        line=np.zeros(tables.ROOM_OF_LINE, np.int32),
+        extra=np.zeros(tables.ROOM_OF_LINE),
+    )
+    _set_names(program)
+    return program

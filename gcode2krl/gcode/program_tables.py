@@ -1,0 +1,131 @@
+"""The tables of a program with parameters and O-words, for the core (``native/gcode/execute.c``).
+
+A marked line is one with an expression, a parameter or an O-word: the scanner leaves it as one word
+`vocabulary.PROGRAM_LINE` whose value is its row in `LINE`, and it is read whenever it is executed.
+"""
+
+import numpy as np
+
+from gcode2krl.compiled.core import BYTES, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, ArrayOf, StructOf
+from gcode2krl.gcode.state import STATE
+from gcode2krl.gcode.vocabulary import LINE_LIMIT
+
+MOST_PARAMETERS = 5602
+"""LinuxCNC's parameters are #1 to #5601, and 0 is none."""
+LOCAL_PARAMETERS = 30
+"""#1 to #30 are the arguments of a subprogram; each call has its own."""
+FRAMES = 10
+"""Levels of calls, the main program among them, as in LinuxCNC."""
+MOST_NAMES = 10_000
+"""Different names of parameters in a program."""
+MOST_REPEATS = 256
+"""Repeat loops that may be within each other, over all levels."""
+LONGEST_NAME = 255
+ROOM_OF_LINE = 2 * (LINE_LIMIT + 1)
+"""Words of one line: a byte makes at most two."""
+
+(
+    KIND_BLOCK,
+    KIND_NOTHING,
+    KIND_O_WORD,
+    KIND_SUB,
+    KIND_ENDSUB,
+    KIND_RETURN,
+    KIND_CALL,
+    KIND_IF,
+    KIND_ELSEIF,
+    KIND_ELSE,
+    KIND_ENDIF,
+    KIND_WHILE,
+    KIND_JUMP,
+    KIND_DO_WHILE,
+    KIND_REPEAT,
+    KIND_PROGRAM_NUMBER,
+    KIND_END_OF_FILE,
+    KIND_FAULT,
+) = range(18)
+"""What a marked line is: a block, an O-line that says nothing here, one that has not been looked at, …"""
+
+LINE = np.dtype(
+    [
+        ("start", "i8"),  # byte in the text
+        ("target", "i8"),  # word at which to go on: where a test fails, or a jump leads
+        ("end", "i8"),  # word behind the end of what an elseif or else belongs to
+        ("expression", "i8"),  # byte at which the expressions of an O-line begin
+        ("kind", "i4"),  # KIND_…
+        ("subprogram", "i4"),  # row of SUBPROGRAM: which is called, -1 = its number is computed
+        ("first_message", "i4"),  # number of the first message comment of the line
+        ("fault", "i4"),  # FAULT_… of KIND_FAULT
+    ],
+    align=True,
+)
+SUBPROGRAM = np.dtype(
+    [
+        ("number", "i8"),  # -1 where it has a name
+        ("entry", "i8"),  # word of its first line, -1 = not known
+        ("is_ready", "i4"),  # not 0 once a call may go to the entry
+        ("is_program", "i4"),  # not 0 for O1000 … M99, called by M98
+    ],
+    align=True,
+)
+NAME = np.dtype([("hash", "i8"), ("start", "i4"), ("length", "i4"), ("value", "f8"), ("is_set", "i8")])
+FRAME = np.dtype(
+    [
+        ("return_to", "i8"),  # word behind the call
+        ("times", "i8"),  # further runs of M98 L
+        ("generation", "i8"),  # which names of the frame's row are its own
+        ("entry", "i8"),
+        ("is_program", "i4"),
+        ("main_line", "i4"),  # of the main program's file: the line of the call, 0 = this is that file
+        ("repeats", "i4"),  # loops that were begun before the call
+        ("saved", "i4"),  # M70 or M73 in the frame: 0 = none, 1 = saved, 2 = to be restored on return
+        ("parameters", "f8", LOCAL_PARAMETERS),  # of the caller
+    ],
+    align=True,
+)
+REPEAT = np.dtype([("word", "i8"), ("end", "i8"), ("left", "i8")])
+ASSIGNMENT = np.dtype([("name", "i8"), ("number", "i8"), ("value", "f8")])
+COURSE = np.dtype(
+    [
+        ("steps", "i8"),  # lines executed
+        ("most_steps", "i8"),
+        ("most_rows", "i8"),
+        ("frame", "i8"),  # level of the calls, 0 = main program
+        ("generation", "i8"),
+        ("repeats", "i8"),
+        ("names", "i8"),
+        ("pool", "i8"),  # bytes of names
+        ("assignments", "i8"),
+        ("words", "i8"),  # of the line at hand
+        ("marks", "i8"),
+        ("is_testing", "i8"),  # an elseif is reached by a test that failed
+        ("wanted", "i8"),  # row of the subprogram that has to be found, -1 = none, -2 = it has no row yet
+        ("wanted_number", "i8"),  # its number then
+        ("wanted_word", "i8"),  # where it is called
+        ("main_words", "i8"),  # words of the main program's file, which is the first
+        ("is_stopped", "i8"),  # by an error, or by the end of the file
+        ("return_value", "f8"),
+        ("value_returned", "i8"),
+        ("subprograms", "i8"),
+    ]
+)
+PROGRAM = StructOf(
+    text=BYTES,
+    lines=ArrayOf(LINE, written=True),
+    subprograms=ArrayOf(SUBPROGRAM, written=True),
+    names=ArrayOf(NAME, written=True),
+    name_slots=OUT_INTS32,
+    pool=OUT_BYTES,
+    local_value=OUT_FLOATS,
+    local_generation=OUT_INTS,
+    parameters=OUT_FLOATS,
+    frames=ArrayOf(FRAME, written=True),
+    saved_states=ArrayOf(STATE, written=True),
+    repeats=ArrayOf(REPEAT, written=True),
+    assignments=ArrayOf(ASSIGNMENT, written=True),
+    course=ArrayOf(COURSE, written=True),
+    letter=OUT_BYTES,
+    value=OUT_FLOATS,
+    line=OUT_INTS32,
+    extra=OUT_FLOATS,
+)

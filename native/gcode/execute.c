@@ -1,0 +1,104 @@
+/* A whole program with parameters and O-words: its lines in the order in which it runs them.
+
+   Plain blocks go to the interpreter of blocks as they are; a marked line is read from the text each time. The
+   jumps of O-words have been found by gcode2krl/gcode/o_words.py, as words at which to go on. */
+
+#include "gcode/flow.h"
+#include "gcode/machine.h"
+#include "gcode/program_line.h"
+
+/* Let rows and events of another file say the line of the main program that called it. */
+static void name_caller(const Run *run, int64_t first_row, int64_t first_event) {
+    const int32_t main_line = frame_of(run)->main_line;
+    if (main_line == 0)
+        return;
+    Machine *machine = run->machine;
+    const Counts *counts = machine->counts.at;
+    for (int64_t row = first_row; row < counts->rows; row++)
+        AT(machine->rows.source_line, row) = main_line;
+    for (int64_t k = first_event; k < counts->events; k++)
+        AT(machine->events, k).line = main_line;
+    if (machine->state.at->ended)
+        machine->state.at->end_line = main_line;
+}
+
+/* Execute a block whose words are known; return the word at which to go on. */
+static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
+    Counts *counts = run->machine->counts.at;
+    const bool deletable = AT(words->letter, from) == CH_SLASH;
+    if (deletable && run->machine->block_delete)
+        return next;
+    if (from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
+        const double m = AT(words->value, from + deletable);
+        if (m == V_M98)
+            return call_program(run, words, from + deletable + 1, to, next);
+        if (m == V_M99)
+            return end_program(run, from + deletable + 1 == to, next);
+    }
+    const int64_t first_row = counts->rows, first_event = counts->events;
+    counts->marks = counts->program_wanted = 0;
+    if (!run_block(run->machine, words, from, to))
+        return counts->program_wanted ? stop_with(run, F_O_WORD, PF_FAULT_NOT_FIRST, next) : WAIT;
+    name_caller(run, first_row, first_event);
+    if (counts->rows > run->course->most_rows)
+        return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
+    return next;
+}
+
+/* Execute a block with an expression, a parameter or an assignment. */
+static int64_t computed_block(Run *run, const MarkedLine *marked, int64_t next) {
+    Program *program = run->program;
+    Evaluation e = evaluation_of(run->machine, program, marked->start, run->line, false);
+    read_line(&e, marked->start, marked->first_message);
+    if (e.finding != F_OK) { /* plain blocks behind it are still looked at, O-words are not */
+        report_unless_caused(run, &e, marked->start);
+        run->machine->state.at->doubt |= S_DOUBT_ALL;
+        return next;
+    }
+    const int64_t count = run->course->words;
+    if (count > 0) {
+        const Words words = {{program->letter.at, count, 1},
+                             {program->value.at, count, 1},
+                             {program->extra.at, run->course->marks, 1},
+                             {program->line.at, count, 1}};
+        next = known_block(run, &words, 0, count, next);
+    }
+    if (next != WAIT)
+        assign(program);
+    return next;
+}
+
+static int64_t marked_line(Run *run, int64_t row, int64_t next) {
+    const MarkedLine *marked = &AT(run->program->lines, row);
+    if (is_deleted(run->machine, run->program->text, marked->start))
+        return next;
+    return marked->kind == P_KIND_BLOCK ? computed_block(run, marked, next) : flow(run, marked, next);
+}
+
+/* Execute a program from a word on; return the word at which to go on where room or a subprogram is wanted. */
+EXPORT int64_t gcode_execute(Machine *machine, Program *program, Bytes letter, Floats value, Floats extra,
+                             Ints32 line, int64_t from) {
+    const Words words = {letter, value, extra, line};
+    Course *course = program->course.at;
+    Run run = {.machine = machine, .program = program, .course = course};
+    course->wanted = NOTHING_WANTED;
+    while (from < letter.rows && !machine->state.at->ended && !course->is_stopped) {
+        int64_t to = from + 1;
+        while (to < letter.rows && AT(line, to) == AT(line, from))
+            to++;
+        run.word = from;
+        run.line = AT(line, from);
+        if (course->steps >= course->most_steps) {
+            stop_with(&run, F_TOO_MANY_STEPS, (double)course->steps, from);
+            break;
+        }
+        const int64_t next = AT(letter, from) == V_PROGRAM_LINE
+                                 ? marked_line(&run, (int64_t)AT(value, from), to)
+                                 : known_block(&run, &words, from, to, to);
+        if (next == WAIT)
+            break;
+        course->steps++;
+        from = next;
+    }
+    return from;
+}

@@ -1,0 +1,334 @@
+/* O-words and M98, M99: where a program goes on. */
+
+#include "gcode/flow.h"
+
+#include "gcode/expressions.h"
+#include "gcode/program_line.h"
+#include "gcode/reporting.h"
+#include "gcode/settings.h"
+
+/* --- the end of a program that cannot go on ------------------------------------------------------------- */
+
+/* Report a finding of the line at hand and go no further: what follows may depend on it. */
+int64_t stop_with(Run *run, int finding, double a, int64_t next) {
+    Block block = {.machine = run->machine, .counts = run->machine->counts.at, .line = run->line};
+    report(&block, finding, (Says){.a = a, .c = -1.0});
+    run->course->is_stopped = 1;
+    return next;
+}
+
+static int64_t stop_at_fault(Run *run, int fault, int64_t next) { return stop_with(run, F_O_WORD, fault, next); }
+
+/* Report what is wrong with an expression; behind another error its value may be a consequence. */
+void report_unless_caused(Run *run, const Evaluation *e, int64_t start) {
+    Counts *counts = run->machine->counts.at;
+    if (counts->errors > 0 && e->finding != F_EXPRESSION)
+        counts->consequences++;
+    else
+        report_wrong(run->machine, e, start);
+}
+
+/* The same, and go no further. */
+static int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
+    report_unless_caused(run, e, start);
+    run->course->is_stopped = 1;
+    return next;
+}
+
+/* --- expressions of O-lines ----------------------------------------------------------------------------- */
+
+/* Tell whether nothing but a comment stands from i on; else that is wrong. */
+static bool line_ends(Evaluation *e, int64_t i) {
+    const Bytes text = e->program->text;
+    i = after_blanks(text, i, e->end);
+    if (e->finding == F_OK && i < e->end && AT(text, i) != CH_PAREN_OPEN && AT(text, i) != CH_SEMICOLON)
+        wrong(e, F_EXPRESSION, PF_BEHIND_O_WORD, 0.0, i);
+    return e->finding == F_OK;
+}
+
+/* Work out the bracket at i. */
+static double bracket_value(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    *i = after_blanks(text, *i, e->end);
+    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+        return wrong(e, F_EXPRESSION, PF_NO_BRACKET, 0.0, least(*i, e->end - 1));
+    return value_at(e, i);
+}
+
+/* Find the value of the only bracket of an O-line; without one the program stops. */
+static bool only_value(Run *run, const MarkedLine *marked, double *value) {
+    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
+    int64_t i = marked->expression;
+    *value = bracket_value(&e, &i);
+    if (line_ends(&e, i))
+        return true;
+    stop_wrong(run, &e, marked->start, 0);
+    return false;
+}
+
+/* --- jumps ---------------------------------------------------------------------------------------------- */
+
+/* Go on at a word: repeat loops that it is outside of are over. */
+static int64_t jump(Run *run, int64_t word) {
+    Course *at = run->course;
+    const int32_t base = frame_of(run)->repeats;
+    while (at->repeats > base) {
+        const Repeat *inner = &AT(run->program->repeats, at->repeats - 1);
+        if (word >= inner->word && word < inner->end)
+            break;
+        at->repeats--;
+    }
+    return word;
+}
+
+static int64_t branch(Run *run, const MarkedLine *marked, int64_t next) {
+    double test;
+    if (!only_value(run, marked, &test))
+        return next;
+    run->course->is_testing = test == 0.0;
+    return test != 0.0 ? next : jump(run, marked->target);
+}
+
+/* elseif and else: behind a test that failed they are tried, behind a branch that ran they are passed over. */
+static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
+    if (!run->course->is_testing)
+        return jump(run, marked->end);
+    if (marked->kind == P_KIND_ELSEIF)
+        return branch(run, marked, next);
+    run->course->is_testing = 0;
+    return next;
+}
+
+static int64_t loop(Run *run, const MarkedLine *marked, int64_t next) {
+    double test;
+    if (!only_value(run, marked, &test))
+        return next;
+    const bool leaves = marked->kind == P_KIND_WHILE ? test == 0.0 : test != 0.0;
+    return leaves ? jump(run, marked->target) : next; /* behind endwhile, or back to do */
+}
+
+static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
+    Course *at = run->course;
+    const bool is_inside = at->repeats > frame_of(run)->repeats;
+    if (!is_inside || AT(run->program->repeats, at->repeats - 1).word != run->word) {
+        double count;
+        if (!only_value(run, marked, &count))
+            return next;
+        if (at->repeats >= run->program->repeats.rows)
+            return stop_at_fault(run, PF_FAULT_REPEATS, next);
+        const double whole = floor(lesser(greater(count, 0.0), 1e15) + 0.5);
+        AT(run->program->repeats, at->repeats++) = (Repeat){run->word, marked->target, (int64_t)whole};
+    }
+    Repeat *inner = &AT(run->program->repeats, at->repeats - 1);
+    if (inner->left-- > 0)
+        return next;
+    return jump(run, marked->target);
+}
+
+/* --- calls ---------------------------------------------------------------------------------------------- */
+
+/* Begin the next run of a program that M98 calls several times: its names are new. */
+static int64_t enter(Run *run, Frame *frame) {
+    frame->generation = ++run->course->generation;
+    frame->saved = 0;
+    return frame->entry;
+}
+
+/* Return the line of the main program's file that rows of a subprogram name, 0 = each its own. */
+static int32_t main_line_of(const Run *run, int64_t entry) {
+    if (entry < run->course->main_words)
+        return 0;
+    const int32_t callers = frame_of(run)->main_line;
+    return callers != 0 ? callers : run->line;
+}
+
+/* Call the subprogram of a row; `arguments` are none for M98, which keeps #1 to #30. */
+static int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
+    Course *at = run->course;
+    const Subprogram *subprogram = &AT(run->program->subprograms, row);
+    if (!subprogram->is_ready) {
+        at->wanted = row;
+        at->wanted_word = run->word;
+        return WAIT;
+    }
+    if ((subprogram->is_program != 0) != (arguments == NULL))
+        return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
+    if (at->frame + 1 >= run->program->frames.rows)
+        return stop_with(run, F_CALLS_TOO_DEEP, P_FRAMES - 1, next);
+    assign(run->program);
+    const int32_t main_line = main_line_of(run, subprogram->entry);
+    at->frame++;
+    Frame *frame = frame_of(run);
+    frame->return_to = next;
+    frame->times = times - 1;
+    frame->entry = subprogram->entry;
+    frame->is_program = arguments == NULL;
+    frame->main_line = main_line;
+    frame->repeats = (int32_t)at->repeats;
+    for (int k = 0; arguments != NULL && k < P_LOCAL_PARAMETERS; k++) {
+        frame->parameters[k] = AT(run->program->parameters, k + 1);
+        AT(run->program->parameters, k + 1) = arguments[k];
+    }
+    return enter(run, frame);
+}
+
+/* Find the row of the subprogram with a number; else it is wanted. */
+static int64_t row_of_number(Run *run, int64_t number) {
+    for (int64_t row = 0; row < run->course->subprograms; row++)
+        if (AT(run->program->subprograms, row).number == number)
+            return row;
+    run->course->wanted = WANTED_BY_NUMBER;
+    run->course->wanted_number = number;
+    run->course->wanted_word = run->word;
+    return WANTED_BY_NUMBER;
+}
+
+/* O… call: go behind its computed number, or else to where its arguments begin; return the row. */
+static int64_t called_row(Run *run, Evaluation *e, const MarkedLine *marked, int64_t *i) {
+    *i = marked->expression;
+    if (marked->subprogram >= 0)
+        return marked->subprogram;
+    const double value = value_at(e, i);
+    int64_t number;
+    *i = after_word(run->program->text, *i, e->end, "call");
+    if (e->finding != F_OK)
+        return NOTHING_WANTED;
+    if (whole_number(value, &number) && number >= 0)
+        return row_of_number(run, number);
+    wrong(e, F_O_WORD, PF_FAULT_CALL_NUMBER, 0.0, marked->expression);
+    return NOTHING_WANTED;
+}
+
+static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next) {
+    double arguments[P_LOCAL_PARAMETERS] = {0};
+    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
+    int64_t i, count = 0;
+    const int64_t row = called_row(run, &e, marked, &i);
+    const Bytes text = run->program->text;
+    for (i = after_blanks(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+         i = after_blanks(text, i, e.end)) {
+        if (count == P_LOCAL_PARAMETERS)
+            wrong(&e, F_O_WORD, PF_FAULT_ARGUMENTS, 0.0, i);
+        else
+            arguments[count++] = value_at(&e, &i);
+    }
+    if (!line_ends(&e, i))
+        return stop_wrong(run, &e, marked->start, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, 1, next);
+}
+
+/* M98 P… L…: the words behind M98 are `from` to `to`. */
+int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
+    double p = NAN, l = 1.0;
+    if (run->machine->counts.at->errors > 0) {
+        run->course->is_stopped = 1;
+        return next;
+    }
+    for (int64_t k = from; k < to; k++) {
+        const uint8_t letter = AT(words->letter, k);
+        if (letter == CH_LETTER_P && isnan(p))
+            p = AT(words->value, k);
+        else if (letter == CH_LETTER_L)
+            l = AT(words->value, k);
+        else if (letter != CH_PAREN_OPEN)
+            return stop_at_fault(run, PF_FAULT_M98_WORDS, next);
+    }
+    int64_t number, times;
+    if (!whole_number(p, &number) || number < 0 || !whole_number(l, &times) || times < 0)
+        return stop_at_fault(run, PF_FAULT_M98_WORDS, next);
+    if (times == 0)
+        return next;
+    const int64_t row = row_of_number(run, number);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, times, next);
+}
+
+/* Go back to behind the call. */
+static int64_t leave(Run *run) {
+    Course *at = run->course;
+    const Frame *frame = frame_of(run);
+    at->repeats = frame->repeats;
+    for (int k = 0; !frame->is_program && k < P_LOCAL_PARAMETERS; k++)
+        AT(run->program->parameters, k + 1) = frame->parameters[k];
+    at->frame--;
+    return frame->return_to;
+}
+
+/* M99; `is_alone`: no word stands behind it. */
+int64_t end_program(Run *run, bool is_alone, int64_t next) {
+    Frame *frame = frame_of(run);
+    if (run->course->frame == 0)
+        return stop_at_fault(run, PF_FAULT_M99_IN_MAIN, next);
+    if (!is_alone)
+        return stop_at_fault(run, PF_FAULT_NOT_FIRST, next);
+    if (!frame->is_program)
+        return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
+    if (frame->times-- > 0) {
+        run->course->repeats = frame->repeats;
+        return enter(run, frame);
+    }
+    return leave(run);
+}
+
+/* endsub and return, with a value or without. */
+static int64_t return_from(Run *run, const MarkedLine *marked, int64_t next) {
+    Course *at = run->course;
+    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
+    if (at->frame == 0)
+        return stop_at_fault(run, PF_FAULT_NOT_IN_SUB, next);
+    if (frame_of(run)->is_program)
+        return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
+    const Bytes text = run->program->text;
+    int64_t i = after_blanks(text, marked->expression, e.end);
+    const bool has_value = i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+    const double value = has_value ? value_at(&e, &i) : 0.0;
+    if (!line_ends(&e, i))
+        return stop_wrong(run, &e, marked->start, next);
+    at->return_value = value;
+    at->value_returned = has_value;
+    return leave(run);
+}
+
+/* sub in the course of the program: from now on it can be called. */
+static int64_t define(Run *run, const MarkedLine *marked, int64_t next) {
+    if (run->course->frame > 0)
+        return stop_at_fault(run, PF_FAULT_NESTED_SUB, next);
+    Subprogram *subprogram = &AT(run->program->subprograms, marked->subprogram);
+    if (subprogram->is_ready && subprogram->entry != next)
+        return stop_at_fault(run, PF_FAULT_SUB_TWICE, next);
+    subprogram->entry = next;
+    subprogram->is_ready = 1;
+    subprogram->is_program = 0;
+    return marked->target;
+}
+
+static int64_t end_of_file(Run *run, int64_t next) {
+    if (run->course->frame > 0)
+        return stop_at_fault(run, PF_FAULT_FILE_ENDS, next);
+    run->course->is_stopped = 1;
+    return next;
+}
+
+/* Execute an O-line; return the word at which to go on. */
+int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
+    if (run->machine->counts.at->errors > 0) { /* where to go on may depend on what was wrong */
+        run->course->is_stopped = 1;
+        return next;
+    }
+    switch (marked->kind) {
+    case P_KIND_IF: return branch(run, marked, next);
+    case P_KIND_ELSEIF:
+    case P_KIND_ELSE: return next_branch(run, marked, next);
+    case P_KIND_ENDIF: run->course->is_testing = 0; return next;
+    case P_KIND_WHILE:
+    case P_KIND_DO_WHILE: return loop(run, marked, next);
+    case P_KIND_JUMP: return jump(run, marked->target);
+    case P_KIND_REPEAT: return repeat(run, marked, next);
+    case P_KIND_CALL: return call_subprogram(run, marked, next);
+    case P_KIND_ENDSUB:
+    case P_KIND_RETURN: return return_from(run, marked, next);
+    case P_KIND_SUB: return define(run, marked, next);
+    case P_KIND_END_OF_FILE: return end_of_file(run, next);
+    case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
+    }
+    return next;
+}

@@ -1,0 +1,37 @@
+/* Where the zero of the programmed numbers lies: work offset, its rotation, and the shift of G52 and G92.
+
+   tip = R (programmed + shift) + work offset. The state keeps programmed + shift + work offset, which is the tip
+   as it would be without the rotation R; only rows, machine coordinates and changes of R see the tip itself. */
+
+#ifndef GCODE_OFFSETS_H
+#define GCODE_OFFSETS_H
+
+#include "gcode/block.h"
+
+enum { OFFSET_ROTATION = 3 }; /* column of the work offsets, degrees about Z */
+
+/* Rotate a place about the work offset in force. */
+static inline void rotate(const State *s, double mm[3]) {
+    const double x = mm[0] - s->pivot_mm[0], y = mm[1] - s->pivot_mm[1];
+    mm[0] = s->pivot_mm[0] + (s->rotation_cos * x - s->rotation_sin * y);
+    mm[1] = s->pivot_mm[1] + (s->rotation_sin * x + s->rotation_cos * y);
+}
+
+/* Where the tip stands. */
+static inline void tip_position(const State *s, double tip_mm[3]) {
+    tip_mm[0] = s->x;
+    tip_mm[1] = s->y;
+    tip_mm[2] = s->z;
+    if (s->rotated)
+        rotate(s, tip_mm);
+}
+
+void unrotate(const State *s, double mm[3]);
+void stand_with_tip_at(State *s, const double tip_mm[3]);
+void take_offsets(Machine *machine);
+bool offsets_rotary(Block *b);
+bool takes_axes(const Block *b, bool any_axis);
+void offset_codes(Block *b, bool any_axis);
+void shift_by_code(Block *b);
+
+#endif

@@ -1,0 +1,49 @@
+/* The parameters of a program: numbered and named, its own and those that show the state of the machine. */
+
+#ifndef GCODE_PARAMETERS_H
+#define GCODE_PARAMETERS_H
+
+#include "gcode/characters.h"
+
+/* What an expression is worked out with. `dry`: only its form is looked at. The first thing that is wrong is
+   kept: finding, what it says, and where in the text. */
+typedef struct {
+    Machine *machine;
+    Program *program;
+    int64_t end; /* of the line */
+    int32_t line;
+    bool dry;
+    int finding;
+    double a, b;
+    int64_t place;
+    int depth; /* of values within values */
+} Evaluation;
+
+/* Keep what is wrong, if it is the first; return 0 as the value. */
+static inline double wrong(Evaluation *e, int finding, double a, double b, int64_t place) {
+    if (e->finding == F_OK) {
+        e->finding = finding;
+        e->a = a;
+        e->b = b;
+        e->place = place;
+    }
+    return 0.0;
+}
+
+/* Return the place of the first character from i on that is no blank, at most the line's end. */
+static inline int64_t after_blanks(Bytes text, int64_t i, int64_t end) {
+    while (i < end && is_blank(AT(text, i)))
+        i++;
+    return i;
+}
+
+enum { NO_NAME = -1 };
+double numbered_parameter(const Evaluation *e, int64_t number);
+bool is_read_only(int64_t number);
+bool is_of_other_axis(int64_t number);
+int64_t name_at(Evaluation *e, int64_t *i);
+bool is_name_set(const Evaluation *e, int64_t name);
+double named_parameter(const Evaluation *e, int64_t name);
+void assign(Program *program);
+
+#endif

@@ -1,0 +1,106 @@
+/* A line with an expression, read when it is executed: its words and assignments, with their values. */
+
+#include "gcode/program_line.h"
+
+#include "gcode/reporting.h"
+#include "gcode/words.h"
+
+/* Begin to work out what stands in the line from `start` on; nothing is assigned yet. */
+Evaluation evaluation_of(Machine *machine, Program *program, int64_t start, int32_t line, bool dry) {
+    Course *at = program->course.at;
+    at->assignments = at->words = at->marks = 0;
+    return (Evaluation){.machine = machine,
+                        .program = program,
+                        .end = line_end(program->text, start),
+                        .line = line,
+                        .dry = dry};
+}
+
+static void put(const Evaluation *e, int letter, double value) {
+    Program *p = e->program;
+    const int64_t k = p->course.at->words++;
+    AT(p->letter, k) = (uint8_t)letter;
+    AT(p->value, k) = value;
+    AT(p->line, k) = e->line;
+}
+
+static void put_item(const Evaluation *e, const Item *item, int64_t *message) {
+    Course *at = e->program->course.at;
+    if (item->kind == V_MARK) {
+        AT(e->program->extra, at->marks++) = item->found;
+        put(e, V_MARK, item->finding);
+        if (item->lost > 0)
+            put(e, item->lost + V_UNREAD_NUMBER, 0.0);
+    } else if (item->kind == CH_PAREN_OPEN) {
+        put(e, CH_PAREN_OPEN, (double)(*message)++);
+    } else if (item->kind > LINE_NUMBER) {
+        put(e, item->kind, 0.0);
+    }
+}
+
+/* Read the letter at i and its value; return what it is, where it is no word. */
+static Item letter_at(Evaluation *e, int64_t *i, bool first) {
+    static const Item DONE = {.kind = NOTHING};
+    const Bytes text = e->program->text;
+    const int letter = AT(text, *i) & ~CH_CASE_BIT;
+    const Number behind = number(text, *i + 1);
+    if (letter != CH_LETTER_N && letter != CH_LETTER_O) {
+        if (behind.digits > 0 && behind.finding == F_OK) {
+            put(e, letter, behind.value);
+            *i = behind.end;
+            return DONE;
+        }
+        if (behind.digits == 0 && begins_value(text, *i + 1, e->end)) {
+            ++*i;
+            put(e, letter, value_at(e, i));
+            return DONE;
+        }
+    }
+    const Item item = odd_word(text, *i, letter, &behind, first);
+    *i = item.end;
+    return item;
+}
+
+/* Read the words and assignments of the line from `start` on, with their values; its message comments are
+   numbered from `first_message` on. */
+void read_line(Evaluation *e, int64_t start, int64_t first_message) {
+    const Bytes text = e->program->text;
+    bool first = true;
+    int64_t i = start;
+    if (e->end - start > V_LINE_LIMIT) {
+        wrong(e, F_LINE_TOO_LONG, V_LINE_LIMIT, 0.0, start);
+        return;
+    }
+    while (i < e->end && e->finding == F_OK) {
+        const uint8_t c = AT(text, i);
+        if (is_blank(c) || c == CH_END_OF_TAPE) {
+            i++;
+            continue;
+        }
+        Item item = {.kind = NOTHING};
+        if (c == CH_HASH) {
+            assignment_at(e, &i);
+        } else if (is_letter(c)) {
+            item = letter_at(e, &i, first);
+        } else {
+            item = other_item(text, i, first);
+            i = item.end;
+        }
+        if (item.kind == V_PROGRAM_LINE)
+            wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);
+        put_item(e, &item, &first_message);
+        first = first && c != CH_HASH && item.kind != V_MARK && item.kind != LINE_NUMBER && !is_letter(c);
+    }
+}
+
+/* Tell whether a line begins with / and such lines are left out. */
+bool is_deleted(const Machine *machine, Bytes text, int64_t start) {
+    const int64_t i = after_blanks(text, start, text.rows);
+    return machine->block_delete && i < text.rows && AT(text, i) == CH_SLASH;
+}
+
+/* Report what is wrong with the line from `start` on. */
+void report_wrong(Machine *machine, const Evaluation *e, int64_t start) {
+    Block block = {.machine = machine, .counts = machine->counts.at, .line = e->line};
+    report(&block, e->finding, (Says){e->a, e->b, (double)(e->place - start)});
+}

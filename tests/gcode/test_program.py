@@ -1,0 +1,134 @@
+"""Programs that compute and jump: rows by hand, and findings with their line."""
+
+import io
+
+import pytest
+
+from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl.gcode import read_stream
+
+HEAD = "G21 G90 G17 G94 F500\nG0 X0 Y0 Z0\n"
+
+
+def read(text, head=HEAD, **options):
+    return read_stream(io.BytesIO((head + text + "\nM2\n").encode()), "part.ngc", **options)
+
+
+def ends(text, **options):
+    """Return X of every row behind the head's."""
+    return read(text, **options).position_mm[2:, 0].tolist()
+
+
+def refused(text, **options):
+    """Return code and line of the first error."""
+    with pytest.raises(Gcode2KrlError) as caught:
+        read(text, **options)
+    first = caught.value.issues[0]
+    return first.code, first.line
+
+
+def test_assignments_take_effect_behind_their_line():
+    assert ends("#1=5\n#1=7 #2=#1 G1 X#1\nG1 X#1\nX#2") == [5.0, 7.0, 5.0]
+
+
+def test_functions_of_round_angles_are_not_a_unit_short_behind_fix():
+    assert ends("G0 X[FIX[10*SIN[30]]]\nX[FIX[10*COS[60]]]\nX[FIX[10*TAN[45]]]") == [5.0, 5.0, 10.0]
+
+
+def test_rows_have_the_line_that_made_them():
+    assert read("o1 repeat [2]\nX1\nX2\no1 endrepeat").source_line[2:].tolist() == [4, 5, 4, 5]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("X[1/0]", ("expression-value", 3)),
+        ("X[SQRT[-1]]", ("expression-value", 3)),
+        ("X[LN[0]]", ("expression-value", 3)),
+        ("X[[-8]**0.5]", ("expression-value", 3)),
+        ("X[10**400]", ("expression-value", 3)),
+        ("X[5 MOD 0]", ("expression-value", 3)),
+        ("X[ACOS[1.1]]", ("expression-value", 3)),
+        ("X#<a>", ("parameter-undefined", 3)),
+        ("#<a>=[#<a>+1]", ("parameter-undefined", 3)),
+        ("X#0", ("parameter-number", 3)),
+        ("X#5602", ("parameter-number", 3)),
+        ("X#1.5", ("parameter-number", 3)),
+        ("#5221=3", ("parameter-read-only", 3)),
+        ("#<_x>=3", ("parameter-read-only", 3)),
+        ("X[1+2", ("expression", 3)),
+        ("X[1 2 +]", ("expression", 3)),
+        ("X[FOO[1]]", ("expression", 3)),
+        ("XSIN 30", ("no-number", 3)),
+        ("X[ATAN[1]]", ("expression", 3)),
+        ("X#<a", ("expression", 3)),
+        ("#1", ("expression", 3)),
+        ("X[" + "[" * 300 + "1" + "]" * 300 + "]", ("expression", 3)),
+        ("o1 do\no1 while [1]", ("endless-loop", 4)),
+        ("o1 while\no1 endwhile", ("expression", 3)),
+        ("o1 while [1] X5\no1 endwhile", ("expression", 3)),
+        ("o1 if [1]\nX1", ("o-word", 3)),
+        ("X1\no1 endif", ("o-word", 4)),
+        ("o1 if [1]\no2 while [0]\no1 endif\no2 endwhile", ("o-word", 3)),
+        ("o1 break", ("o-word", 3)),
+        ("o1 foo", ("o-word", 3)),
+        ("X1 o1 call", ("o-word", 3)),
+        ("o<gone> call", ("subprogram-missing", 3)),
+        ("o1 sub\no1 call\no1 endsub\no1 call", ("calls-too-deep", 4)),
+        ("o1 sub\no2 sub\no2 endsub\no1 endsub", ("o-word", 3)),
+        ("o1 sub\no1 endsub\nM98 P1", ("o-word", 5)),
+        ("M98 X1", ("o-word", 3)),
+        ("G1 M98 P1", ("o-word", 3)),
+        ("M99", ("o-word", 3)),
+        ("M98 P77", ("subprogram-missing", 3)),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_line(text, found):
+    assert refused(text) == found
+
+
+def test_a_caret_stands_before_the_culprit():
+    with pytest.raises(Gcode2KrlError) as caught:
+        read("X[1 + 2/[3-3]]")
+    assert caught.value.issues[0].excerpt == "X[1 + 2^/[3-3]]"
+
+
+def test_what_is_passed_over_may_be_anything():
+    assert ends("o1 if [0]\nX[1/0] $ (\no2 foo\no1 endif\nX1") == [1.0]
+
+
+def test_a_subprogram_of_another_file_names_its_caller(tmp_path):
+    (tmp_path / "side.ngc").write_text("o<side> sub\nG0 X#1\no<side> endsub\n")
+    main = tmp_path / "part.nc"
+    main.write_text(HEAD + "o<side> call [7]\no<side> call [8]\nM2\n")
+    toolpath = read_gcode(main)
+    assert toolpath.position_mm[2:, 0].tolist() == [7.0, 8.0]
+    assert toolpath.source_line[2:].tolist() == [3, 4]
+
+
+def test_a_subprogram_is_looked_for_beside_the_program_and_in_named_folders_only(tmp_path):
+    for folder in ("own", "other"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "other" / "side.ngc").write_text("o<side> sub\nG0 X9\no<side> endsub\n")
+    main = tmp_path / "own" / "part.nc"
+    main.write_text(HEAD + "o<side> call\nM2\n")
+    with pytest.raises(Gcode2KrlError):
+        read_gcode(main)
+    assert read_gcode(main, search=[tmp_path / "other"]).position_mm[-1, 0] == 9.0
+    main.write_text(HEAD + "o<../other/side> call\nM2\n")
+    with pytest.raises(Gcode2KrlError):
+        read_gcode(main)
+
+
+def test_little_room_changes_nothing(monkeypatch):
+    from gcode2krl.gcode import read as module
+    from gcode2krl.gcode import text as text_of_files
+
+    text = "#1=0\no1 while [#1 LT 50]\n#1=[#1+1] (MSG, a) M3 M7\nG2 X[#1] Y0 I.5\no1 endwhile"
+    expected = read(text)
+    monkeypatch.setattr(module, "_FIRST_ROWS", 1)
+    monkeypatch.setattr(module, "_FIRST_EVENTS", 0)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", 20)
+    found = read(text)
+    assert found.position_mm.tolist() == expected.position_mm.tolist()
+    assert found.events == expected.events
