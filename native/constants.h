@@ -38,6 +38,8 @@
 #define CH_EQUALS 61
 #define CH_GREATER 62
 #define CH_QUESTION 63
+#define CH_AT_SIGN 64
+#define CH_CARET 94
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
 #define CH_LETTER_F 70
@@ -171,12 +173,12 @@
 #define V_CASE_BIT 32
 #define V_DOLLAR 36
 #define V_EXCLAMATION 33
-#define V_LETTER_A 65
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
 #define V_PROGRAM_LINE 36
 #define V_UNREAD_NUMBER 32
-#define V_LETTERS 26
+#define V_ALPHABET "ABCDEFGHIJKLMNOPQRSTUVWXYZ@^"
+#define V_LETTERS 28
 #define V_WORD_D 3
 #define V_WORD_E 4
 #define V_WORD_F 5
@@ -193,6 +195,8 @@
 #define V_WORD_X 23
 #define V_WORD_Y 24
 #define V_WORD_Z 25
+#define V_WORD_RADIUS 26
+#define V_WORD_ANGLE 27
 #define V_WORD_A 0
 #define V_OTHER_AXES {0, 1, 2, 20, 21, 22}
 #define V_ROTARY_AXES 3
@@ -201,17 +205,12 @@
 #define V_LARGEST_M 9999
 #define V_G0 0
 #define V_G4 40
-#define V_G5 50
-#define V_G7 70
-#define V_G8 80
 #define V_G10 100
 #define V_G20 200
 #define V_G28 280
 #define V_G28_1 281
 #define V_G30 300
 #define V_G30_1 301
-#define V_G33 330
-#define V_G38 380
 #define V_G41 410
 #define V_G43 430
 #define V_G49 490
@@ -224,10 +223,6 @@
 #define V_G54 540
 #define V_G59 590
 #define V_G64 640
-#define V_G70 700
-#define V_G76 760
-#define V_G87 870
-#define V_G88 880
 #define V_G80 800
 #define V_G90 900
 #define V_G90_1 901
@@ -236,7 +231,6 @@
 #define V_G92_1 921
 #define V_G92_2 922
 #define V_G92_3 923
-#define V_G96 960
 #define V_G98 980
 #define V_G99 990
 #define V_M0 0
@@ -345,6 +339,7 @@
 #define D_CODE_REFUSED (-4)
 
 /* gcode2krl.gcode.dialects */
+#define DR_REASON_POLAR 3
 #define DR_REASON_SETTING 13
 #define DR_REASON_JOG 12
 #define DR_REASON_TOOL_NAME 17
@@ -361,7 +356,6 @@
 
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
-#define F_LETTER_A 65
 #define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
@@ -455,6 +449,12 @@
 #define FC_SPINDLE_OFF 213
 #define FC_SPINDLE_DIRECTION 214
 #define FC_TOO_LONG 215
+
+/* gcode2krl.gcode.polar_findings */
+#define FP_PLANE 240
+#define FP_WITH_AXIS 241
+#define FP_G53 242
+#define FP_AT_ZERO 243
 
 /* gcode2krl.gcode.offset_findings */
 #define FO_NO_AXES 220
@@ -797,6 +797,8 @@ typedef struct {
     double spiral_unit_mm;
     int32_t retract;
     int32_t retract_line;
+    int32_t unset_parameter;
+    int32_t unset_line;
     int32_t retract_unnamed_line;
     int8_t in_cycles;
     double cycle_level_mm;
@@ -882,19 +884,21 @@ typedef char State_spiral_end_stands_at_688[offsetof(State, spiral_end) == 688 ?
 typedef char State_spiral_unit_mm_stands_at_696[offsetof(State, spiral_unit_mm) == 696 ? 1 : -1];
 typedef char State_retract_stands_at_704[offsetof(State, retract) == 704 ? 1 : -1];
 typedef char State_retract_line_stands_at_708[offsetof(State, retract_line) == 708 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_712[offsetof(State, retract_unnamed_line) == 712 ? 1 : -1];
-typedef char State_in_cycles_stands_at_716[offsetof(State, in_cycles) == 716 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_720[offsetof(State, cycle_level_mm) == 720 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_728[offsetof(State, cycle_level_known) == 728 ? 1 : -1];
-typedef char State_cycle_r_stands_at_736[offsetof(State, cycle_r) == 736 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_744[offsetof(State, cycle_depth) == 744 ? 1 : -1];
-typedef char State_cycle_q_stands_at_752[offsetof(State, cycle_q) == 752 ? 1 : -1];
-typedef char State_cycle_p_stands_at_760[offsetof(State, cycle_p) == 760 ? 1 : -1];
-typedef char State_cycle_line_stands_at_768[offsetof(State, cycle_line) == 768 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_772[offsetof(State, cycle_plane) == 772 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_776[offsetof(State, cycle_unit_mm) == 776 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_784[offsetof(State, cycle_absolute) == 784 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 792 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_712[offsetof(State, unset_parameter) == 712 ? 1 : -1];
+typedef char State_unset_line_stands_at_716[offsetof(State, unset_line) == 716 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_720[offsetof(State, retract_unnamed_line) == 720 ? 1 : -1];
+typedef char State_in_cycles_stands_at_724[offsetof(State, in_cycles) == 724 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_728[offsetof(State, cycle_level_mm) == 728 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_736[offsetof(State, cycle_level_known) == 736 ? 1 : -1];
+typedef char State_cycle_r_stands_at_744[offsetof(State, cycle_r) == 744 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_752[offsetof(State, cycle_depth) == 752 ? 1 : -1];
+typedef char State_cycle_q_stands_at_760[offsetof(State, cycle_q) == 760 ? 1 : -1];
+typedef char State_cycle_p_stands_at_768[offsetof(State, cycle_p) == 768 ? 1 : -1];
+typedef char State_cycle_line_stands_at_776[offsetof(State, cycle_line) == 776 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_780[offsetof(State, cycle_plane) == 780 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_784[offsetof(State, cycle_unit_mm) == 784 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_792[offsetof(State, cycle_absolute) == 792 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 800 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

@@ -31,6 +31,7 @@ MODULES = {
     "DR": "gcode2krl.gcode.dialects",
     "F": "gcode2krl.gcode.findings",
     "FC": "gcode2krl.gcode.cycle_findings",
+    "FP": "gcode2krl.gcode.polar_findings",
     "FO": "gcode2krl.gcode.offset_findings",
     "S": "gcode2krl.gcode.state",
     "P": "gcode2krl.gcode.program_tables",

@@ -69,6 +69,7 @@ REASONS: Final = (
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
+REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED = range(23, 30)
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
@@ -84,7 +85,7 @@ class Dialect:
     syntax: int = 0
     """Bits of `dialect_marks`: what of its text is no word."""
     runs_programs: bool = False
-    """Parameters, expressions, O-words, M98 and M99 are read."""
+    """What is LinuxCNC's own is read: parameters, expressions, O-words, M98, M99, polar words @ and ^."""
     turns_axes: bool = True
     """Rotary words of a cell with rotary axes are read."""
     own: tuple[float, ...] = ()
@@ -133,7 +134,7 @@ class Dialect:
         return table
 
     def dwell_by_letter(self) -> Floats:
-        """Return seconds of one unit by letter (26,), NaN where it is none of a dwell, -1 for turns."""
+        """Return seconds of one unit by letter (28,), NaN where it is none of a dwell, -1 for turns."""
         table = np.full(v.LETTERS, np.nan)
         for letter, seconds in self.dwell_s.items():
             table[v.index_of(letter)] = seconds

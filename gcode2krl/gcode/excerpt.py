@@ -6,6 +6,7 @@ from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode import offset_findings as of_offsets
+from gcode2krl.gcode import polar_findings as p
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
@@ -53,7 +54,7 @@ _FIXED = {
     f.H_DIFFERS: "H",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
-    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[A-Z]\d*\s*=|#|\[|M\s*0*(?:9[89]|7[0-3])(?!\d)|G\s*0*4(?!\d)",
+    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[@^]|[A-Z]\d*\s*=|#|\[|M\s*0*(?:9[89]|7[0-3])(?!\d)|G\s*0*4(?!\d)",
     of_offsets.WITHOUT_L: r"G\s*10",
     of_offsets.UNKNOWN_L: "L",
     of_offsets.WRONG_SYSTEM: r"P|G\s*10",
@@ -71,6 +72,10 @@ _FIXED = {
     f.TURN_PER_REV: "[ABC]",
     f.TURN_TOO_FAR: "[ABC]",
     c.R_BELOW_DEPTH: "R",
+    p.PLANE: r"[@\^]",
+    p.WITH_AXIS: r"[@\^]",
+    p.G53: r"[@\^]",
+    p.AT_ZERO: r"[@\^]",
     c.REPEATS: "L",
     c.DWELL_NEGATIVE: "P",
     c.PECK_NOT_POSITIVE: "Q",
@@ -115,9 +120,9 @@ def _pattern(number: int, a: float, b: float) -> str:
     if number in _OF_LETTER_A:
         return letter
     if number == of_offsets.FROM_UNKNOWN:
-        return f"[{f.letters_of(b)}]"
+        return f"[{re.escape(f.letters_of(b))}]"
     if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
-        return f"[{f.letters_of(a)}]"
+        return f"[{re.escape(f.letters_of(a))}]"
     if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
     if number == f.NO_POINT:

@@ -10,12 +10,14 @@ import math
 import unicodedata
 from typing import NamedTuple
 
-from gcode2krl.ascii_codes import FIRST_FOREIGN, LETTER_A
+from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
 from gcode2krl.gcode import offset_findings as of_offsets
+from gcode2krl.gcode import polar_findings as of_polar
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.dialects import REASONS
+from gcode2krl.gcode.never_read import NEVER_READ
 from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
 from gcode2krl.units import MM_PER_INCH
 
@@ -412,6 +414,7 @@ FINDINGS: dict[int, Finding] = {
 }
 FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
+FINDINGS |= {number: Finding(*text) for number, text in of_polar.TEXTS.items()}
 
 WITH_COLUMN = {
     *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
@@ -429,27 +432,12 @@ _OF_CHARACTER = {
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
-    v.G5: ("splines and NURBS are not read", "let the post write G1, G2 and G3"),
-    v.G7: ("lathe diameter mode", "this is a milling translator"),
-    v.G8: ("lathe radius mode", "this is a milling translator"),
-    v.G33: ("spindle-synchronised motion needs a geared axis a robot does not have", "mill the thread"),
-    v.G38: ("probing is not a motion this program can make", "probe on the controller"),
     v.G41: (
         f"cutter radius compensation: {_LATER}",
         "let the CAM compensate the radius (computer compensation)",
     ),
     v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
-    v.G70: ("lathe cycle", "this is a milling translator"),
-    v.G76: ("threading cycle of a lathe", "mill the thread"),
-    v.G87: (
-        "back boring orients the spindle and moves the tool off centre through the hole",
-        "let the post write it out, with M19 mapped in [m_code] of the cell",
-    ),
-    v.G88: (
-        "the operator retracts the tool by hand, which a robot's program cannot wait for",
-        "use G86 or G89, or let the post write the cycle out",
-    ),
-    v.G96: ("constant surface speed is for lathes", "program S in rpm"),
+    **NEVER_READ,
 }
 UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
     v.TENFOLD * v.M19: (
@@ -489,7 +477,7 @@ def _listed(letters: str) -> str:
 
 def letters_of(bits: float) -> str:
     """Return the letters whose bits are set, A first."""
-    return "".join(chr(LETTER_A + k) for k in range(v.LETTERS) if int(bits) >> k & 1)
+    return "".join(letter for k, letter in enumerate(v.ALPHABET) if int(bits) >> k & 1)
 
 
 def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0, excerpt: str = "") -> Issue:

@@ -89,6 +89,8 @@ STATE = np.dtype(
         ("spiral_unit_mm", "f8"),
         ("retract", "i4"),  # ten times 98 or 99
         ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
+        ("unset_line", "i4"),  # where, 0 = nowhere
         ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
         ("in_cycles", "i1"),  # a row of cycles has begun and no other motion has ended it
         ("cycle_level_mm", "f8"),  # programmed height along the tool where it began, to which G98 leads back
@@ -214,10 +216,11 @@ _DOUBTS_OF_LETTER = {
     "G": DOUBT_ALL,
     "M": DOUBT_ALL,
     "O": DOUBT_ALL,
+    "@": DOUBT_X | DOUBT_Y,
+    "^": DOUBT_X | DOUBT_Y,
 }
-_ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in _ALPHABET], dtype=np.int32)
-"""What is in doubt after a word whose value cannot be read, by its letter, (26,)."""
+DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in v.ALPHABET], dtype=np.int32)
+"""What is in doubt after a word whose value cannot be read, by its letter, (28,)."""
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5

@@ -4,7 +4,7 @@ Plain module constants: the compiled core takes their values from here. In it a 
 value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import CASE_BIT, DOLLAR, EXCLAMATION, LETTER_A
+from gcode2krl.ascii_codes import CASE_BIT, DOLLAR, EXCLAMATION
 
 LINE_LIMIT = 4096
 """Longest line that is read, in bytes; a part program has none that long."""
@@ -15,12 +15,14 @@ PROGRAM_LINE = DOLLAR
 UNREAD_NUMBER = CASE_BIT
 """Added to a letter whose value cannot be read: the small letter."""
 
-LETTERS = 26
+ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ@^"
+"""Letters of words in the order of arrays by letter; the last two are polar words."""
+LETTERS = 28
 
 
 def index_of(letter: str) -> int:
-    """Return the place of a capital letter in arrays by letter (26,): A is 0."""
-    return ord(letter) - LETTER_A
+    """Return the place of a letter in arrays by letter (28,): A is 0."""
+    return ALPHABET.index(letter)
 
 
 WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T = (
@@ -28,6 +30,7 @@ WORD_D, WORD_E, WORD_F, WORD_H, WORD_L, WORD_P, WORD_Q, WORD_R, WORD_S, WORD_T =
 )
 WORD_I, WORD_J, WORD_K = (index_of(letter) for letter in "IJK")
 WORD_X, WORD_Y, WORD_Z = (index_of(letter) for letter in "XYZ")
+WORD_RADIUS, WORD_ANGLE = index_of("@"), index_of("^")
 WORD_A = index_of("A")
 """The first rotary axis; B and C follow."""
 OTHER_AXES = tuple(index_of(letter) for letter in "ABCUVW")
@@ -42,11 +45,9 @@ LARGEST_M = 9999
 
 G0 = 0
 G4 = 40  # dwell
-G5, G7, G8, G10 = 50, 70, 80, 100  # splines, lathe diameter and radius, offsets
+G10 = 100  # offsets
 G20 = 200  # inch; else mm
 G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
-G33 = 330  # spindle-synchronised motion
-G38 = 380  # probing, G38.2 to G38.5
 G41 = 410  # cutter radius compensation, G41 to G42.1
 G43, G49 = 430, 490  # tool length offset on, off
 G43_1, G43_2 = 431, 432  # given by words, added
@@ -54,12 +55,10 @@ G43_4, G43_5 = 434, 435  # the tip is programmed: with rotary words, with tool v
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
 G64 = 640  # blending; else exact stop
-G70, G76, G87, G88 = 700, 760, 870, 880  # lathe cycles, threading, back boring, boring with a manual retract
 G80 = 800  # ends the motion mode
 G90 = 900  # absolute distances; else incremental
 G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
 G92, G92_1, G92_2, G92_3 = 920, 921, 922, 923  # coordinate shift: set, clear, suspend, restore
-G96 = 960  # constant surface speed
 G98, G99 = 980, 990  # retract of a canned cycle to where it began; to R
 
 M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change

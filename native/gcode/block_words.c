@@ -118,14 +118,22 @@ static Taken take_m(Block *b, double value) {
 
 /* --- all words of a block ------------------------------------------------------------------------------- */
 
+/* Return the place of a word's letter in arrays by letter. */
+static int index_of_letter(int c) {
+    return c == CH_AT_SIGN ? V_WORD_RADIUS : c == CH_CARET ? V_WORD_ANGLE : c - CH_LETTER_A;
+}
+
+/* Tell whether a word's value cannot be read; CH_AT_SIGN is the letter below A. */
+static bool is_unread(uint8_t c) { return c >= CH_AT_SIGN + V_UNREAD_NUMBER; }
+
 static Taken take(Block *b, uint8_t c, double value) {
-    if (c >= CH_SMALL_A) /* a word whose value cannot be read */
-        return faulty(AT(b->machine->doubt_of_letter, c - CH_SMALL_A));
+    if (is_unread(c))
+        return faulty(AT(b->machine->doubt_of_letter, index_of_letter(c - V_UNREAD_NUMBER)));
     if (c == CH_LETTER_G)
         return take_g(b, value);
     if (c == CH_LETTER_M)
         return take_m(b, value);
-    const int index = c - CH_LETTER_A;
+    const int index = index_of_letter(c);
     const bool repeated = b->has[index];
     if (b->next_word)
         say_of_word(b, index);
@@ -217,7 +225,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
-        } else if (c < CH_LETTER_A) {
+        } else if (c < CH_AT_SIGN) {
             take_dialect_mark(b, c);
         } else {
             const Taken taken = take(b, c, AT(words->value, k));

@@ -5,6 +5,7 @@
 #include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/motion.h"
+#include "gcode/polar.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 #include "gcode/settings.h"
@@ -68,6 +69,8 @@ void learn_across(Block *b, const Cycle *c) {
     State *s = b->state;
     int8_t *known[3] = {&s->known_x, &s->known_y, &s->known_z};
     const int across[2] = {c->first, c->second};
+    if (is_polar(b))
+        learn_polar(s, b);
     for (int k = 0; k < 2; k++)
         if (s->absolute && b->has[V_WORD_X + across[k]])
             *known[across[k]] = 1;
@@ -84,7 +87,7 @@ static bool fails(Block *b, int32_t doubt, int32_t number, Says says) {
 static bool may_begin(Block *b, Cycle *c) {
     State *s = b->state;
     const double code = s->motion * V_TENFOLD;
-    if (!b->has[V_WORD_X] && !b->has[V_WORD_Y] && !b->has[V_WORD_Z])
+    if (!b->has[V_WORD_X] && !b->has[V_WORD_Y] && !b->has[V_WORD_Z] && !is_polar(b))
         return fails(b, 0, FC_NO_AXES, (Says){.a = code});
     if (s->feed_mode == V_INVERSE_TIME)
         return fails(b, S_DOUBT_FEED_MODE, FC_INVERSE_TIME, (Says){.a = code, .b = s->feed_mode_line});

@@ -8,6 +8,7 @@
 #include "gcode/cycle_words.h"
 #include "gcode/feed.h"
 #include "gcode/motion.h"
+#include "gcode/polar.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 
@@ -113,6 +114,15 @@ static void hole(Block *b, const Cycle *c) {
     }
 }
 
+/* Stand over the next hole; polar words lead there from the hole before, in G17. */
+static void next_hole(const Block *b, Cycle *c, bool first) {
+    double at_mm[2] = {first ? c->u_from_mm : c->u_mm, first ? c->v_from_mm : c->v_mm};
+    if (is_polar(b))
+        polar_point(b, at_mm);
+    c->u_mm = at_mm[0] + c->u_step_mm;
+    c->v_mm = at_mm[1] + c->v_step_mm;
+}
+
 /* Go to each hole in turn, at the height at which the tool stands before the first. */
 static void holes(Block *b, Cycle *c) {
     double height = c->height;
@@ -121,8 +131,7 @@ static void holes(Block *b, Cycle *c) {
         height = c->r;
     }
     for (int64_t k = 0; k < c->repeats; k++) {
-        c->u_mm = (k == 0 ? c->u_from_mm : c->u_mm) + c->u_step_mm;
-        c->v_mm = (k == 0 ? c->v_from_mm : c->v_mm) + c->v_step_mm;
+        next_hole(b, c, k == 0);
         learn_across(b, c);
         if (k == 0 && height > c->r) {
             go_along(b, c, height, c->height_known, RAPID_MM_S);

@@ -232,6 +232,8 @@ bool to_core_words(Block *b) {
             good = count_axis(b, axis) && good;
             count_centre(b, axis);
         }
+    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && !b->machine->runs_programs)
+        good = refuse_statement(b, DR_REASON_POLAR);
     if (b->harmless)
         good = use_harmless_words(b) && good;
     return good;

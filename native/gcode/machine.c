@@ -11,6 +11,7 @@
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/offsets.h"
+#include "gcode/polar.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/rows.h"
@@ -76,7 +77,7 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
 
 /* Tell whether a block has a word of any axis. */
 static bool names_axis(const Block *b) {
-    bool named = b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
+    bool named = b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z] || is_polar(b);
     for (int k = 0; k < OTHER_AXES_COUNT; k++)
         named = named || b->has[OTHER_AXES[k]];
     return named;

@@ -5,6 +5,7 @@
 #include "gcode/arc_motion.h"
 #include "gcode/cycles.h"
 #include "gcode/feed.h"
+#include "gcode/polar.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
 #include "gcode/settings.h"
@@ -125,7 +126,9 @@ static void check_distance(Block *b) {
 bool move(Block *b) {
     State *s = b->state;
     const int32_t special = b->g[V_NON_MODAL];
-    if (s->doubt & S_DOUBT_MOTION) {
+    if (is_polar(b) && !polar_is_sound(b)) {
+        s->doubt |= S_DOUBT_X | S_DOUBT_Y;
+    } else if (s->doubt & S_DOUBT_MOTION) {
         follow(b);
         s->doubt |= S_DOUBT_Z; /* a cycle may end anywhere along the tool */
     } else if (s->motion == V_MOTION_CANCELLED) {

@@ -78,8 +78,19 @@ bool is_read_only(int64_t number) {
 /* Tell whether a parameter is the position of a rotary or secondary axis, which a program cannot ask for. */
 bool is_of_other_axis(int64_t number) { return number >= POSITION + 3 && number <= LAST_OF_STATE; }
 
+/* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC; the first such place is kept. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
-    return is_read_only(number) ? of_state(e->machine, number) : AT(e->program->parameters, number);
+    if (is_read_only(number))
+        return of_state(e->machine, number);
+    const double value = AT(e->program->parameters, number);
+    if (!isnan(value))
+        return value;
+    State *s = e->machine->state.at;
+    if (s->unset_line == 0) {
+        s->unset_line = e->line;
+        s->unset_parameter = (int32_t)number;
+    }
+    return 0.0;
 }
 
 /* --- names ---------------------------------------------------------------------------------------------- */

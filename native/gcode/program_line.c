@@ -80,7 +80,7 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
         Item item = {.kind = NOTHING};
         if (c == CH_HASH) {
             assignment_at(e, &i);
-        } else if (is_letter(c)) {
+        } else if (begins_word(c)) {
             item = letter_at(e, &i, first);
         } else {
             item = other_item(text, i, first);
@@ -89,7 +89,7 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);
         put_item(e, &item, &first_message);
-        first = first && c != CH_HASH && item.kind != V_MARK && item.kind != LINE_NUMBER && !is_letter(c);
+        first = first && c != CH_HASH && item.kind != V_MARK && item.kind != LINE_NUMBER && !begins_word(c);
     }
 }
 

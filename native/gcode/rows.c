@@ -2,6 +2,8 @@
 
 #include "gcode/rows.h"
 
+#include "gcode/polar.h"
+
 /* Find the tip position that the axis words ask for; axes not named stay. */
 void target(const Block *block, double to_mm[3]) {
     const State *s = block->state;
@@ -12,12 +14,19 @@ void target(const Block *block, double to_mm[3]) {
         if (block->has[V_WORD_X + axis])
             to_mm[axis] = block->word[V_WORD_X + axis] * s->unit_mm + (s->absolute ? base_mm : here_mm)[axis];
     }
+    if (is_polar(block)) {
+        programmed_of(block, to_mm, to_mm);
+        polar_point(block, to_mm);
+        tip_of(block, to_mm, to_mm);
+    }
 }
 
 /* Note which axes have been programmed: in absolute mode always, else if they were known before. */
 void learn(Block *block) {
     State *s = block->state;
     const bool *has = block->has;
+    if (is_polar(block))
+        learn_polar(s, block);
     if (s->absolute) {
         s->known_x |= has[V_WORD_X];
         s->known_y |= has[V_WORD_Y];

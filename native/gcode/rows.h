@@ -7,6 +7,7 @@
 #include "gcode/rotary.h"
 
 enum { NO_ARC = -1 };
+static const double POLAR_ZERO_MM = 1e-9; /* nearer to the zero there is no direction */
 static const double RAPID_MM_S = INFINITY;
 
 /* Write what the rotation of the work offset makes of a row. */

@@ -116,7 +116,7 @@ static int lost_letter(const Scan *scan, int lost, int64_t line) {
     if (scan->words == 0 || AT(scan->line, scan->words - 1) != line)
         return 0;
     const int letter = AT(scan->letter, scan->words - 1);
-    return letter >= CH_LETTER_A && letter <= CH_LETTER_Z ? letter : 0;
+    return (letter >= CH_LETTER_A && letter <= CH_LETTER_Z) || is_polar_sign((uint8_t)letter) ? letter : 0;
 }
 
 /* Return what a line is that begins at i: one with an O-word, or a block. */
@@ -215,13 +215,13 @@ EXPORT void gcode_scan(Scan *scan) {
             }
         }
         Item item;
-        if (is_letter(c)) {
+        if (begins_word(c)) {
             const int letter = c & ~CH_CASE_BIT;
             const Number behind = number(text, i + 1);
             if (behind.digits > 0 && behind.finding == F_OK && letter != CH_LETTER_N &&
                 letter != CH_LETTER_O) {
                 put(scan, letter, behind.value, line);
-                if (letter >= CH_LETTER_X)
+                if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
                     most_decimals = most(most_decimals, behind.decimals);
                 i = behind.end;
                 first = false;

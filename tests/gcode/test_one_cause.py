@@ -168,11 +168,11 @@ def test_a_nul_byte_has_its_line(tmp_path):
 
 
 def test_lines_left_out_by_block_delete_keep_later_findings_right():
-    text = "G21 G0 X0 Y0 Z0\n/ G1 X$ F5\nX5 @\nM2\n"
+    text = "G21 G0 X0 Y0 Z0\n/ G1 X$ F5\nX5 &\nM2\n"
     with pytest.raises(Gcode2KrlError) as caught:
         read_stream(io.BytesIO(text.encode()), "part.nc", block_delete=True)
     (found,) = caught.value.issues
-    assert (found.line, "'@'" in found.message) == (3, True)
+    assert (found.line, "'&'" in found.message) == (3, True)
 
 
 BLOCKS = [
