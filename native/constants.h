@@ -211,7 +211,11 @@
 #define V_G28_1 281
 #define V_G30 300
 #define V_G30_1 301
+#define V_G40 400
 #define V_G41 410
+#define V_G41_1 411
+#define V_G42 420
+#define V_G42_1 421
 #define V_G43 430
 #define V_G49 490
 #define V_G43_1 431
@@ -277,6 +281,7 @@
 #define V_CYCLE_BORE 89
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
+#define V_PLANE_YZ 19
 #define V_INVERSE_TIME 93
 #define V_PER_MINUTE 94
 #define V_PER_REVOLUTION 95
@@ -429,6 +434,22 @@
 #define F_TURN_PER_REV 69
 #define F_TURN_TOO_FAR 70
 #define F_CYCLE_TURNED 71
+#define F_CUTTER_ON 72
+#define F_CUTTER_PLANE 73
+#define F_CUTTER_NO_D 74
+#define F_CUTTER_NO_TOOL 75
+#define F_CUTTER_NO_DIAMETER 76
+#define F_CUTTER_LATHE 77
+#define F_CUTTER_DIFFERS 78
+#define F_CUTTER_ENTRY 79
+#define F_CUTTER_ENTRY_ARC 80
+#define F_CUTTER_EXIT_ARC 81
+#define F_CUTTER_ARC 82
+#define F_CUTTER_CORNER 83
+#define F_CUTTER_SHORT 84
+#define F_CUTTER_ROTATED 85
+#define F_CUTTER_TURNED 86
+#define F_CUTTER_PARAMETER 87
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -475,6 +496,8 @@
 #define FO_ROTATION_WITH_ROTARY 235
 
 /* gcode2krl.gcode.state */
+#define S_CUTTER_ON 1
+#define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
 #define S_DOUBT_Z 4
@@ -795,6 +818,24 @@ typedef struct {
     double spiral_start;
     double spiral_end;
     double spiral_unit_mm;
+    int32_t cutter_mode;
+    int32_t cutter_side;
+    int32_t cutter_code;
+    int32_t cutter_line;
+    double cutter_radius_mm;
+    int8_t cutter_entered;
+    int8_t cutter_failed;
+    double cutter_normal[2];
+    int32_t held_turn;
+    int32_t held_line;
+    double held_from[2];
+    double held_along[2];
+    double held_centre[2];
+    double held_w[2];
+    double held_sweep;
+    int64_t held_rows[2];
+    int64_t cutter_rows_removed;
+    int64_t held_events;
     int32_t retract;
     int32_t retract_line;
     int32_t unset_parameter;
@@ -882,23 +923,41 @@ typedef char State_spiral_line_stands_at_676[offsetof(State, spiral_line) == 676
 typedef char State_spiral_start_stands_at_680[offsetof(State, spiral_start) == 680 ? 1 : -1];
 typedef char State_spiral_end_stands_at_688[offsetof(State, spiral_end) == 688 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_696[offsetof(State, spiral_unit_mm) == 696 ? 1 : -1];
-typedef char State_retract_stands_at_704[offsetof(State, retract) == 704 ? 1 : -1];
-typedef char State_retract_line_stands_at_708[offsetof(State, retract_line) == 708 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_712[offsetof(State, unset_parameter) == 712 ? 1 : -1];
-typedef char State_unset_line_stands_at_716[offsetof(State, unset_line) == 716 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_720[offsetof(State, retract_unnamed_line) == 720 ? 1 : -1];
-typedef char State_in_cycles_stands_at_724[offsetof(State, in_cycles) == 724 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_728[offsetof(State, cycle_level_mm) == 728 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_736[offsetof(State, cycle_level_known) == 736 ? 1 : -1];
-typedef char State_cycle_r_stands_at_744[offsetof(State, cycle_r) == 744 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_752[offsetof(State, cycle_depth) == 752 ? 1 : -1];
-typedef char State_cycle_q_stands_at_760[offsetof(State, cycle_q) == 760 ? 1 : -1];
-typedef char State_cycle_p_stands_at_768[offsetof(State, cycle_p) == 768 ? 1 : -1];
-typedef char State_cycle_line_stands_at_776[offsetof(State, cycle_line) == 776 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_780[offsetof(State, cycle_plane) == 780 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_784[offsetof(State, cycle_unit_mm) == 784 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_792[offsetof(State, cycle_absolute) == 792 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 800 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_704[offsetof(State, cutter_mode) == 704 ? 1 : -1];
+typedef char State_cutter_side_stands_at_708[offsetof(State, cutter_side) == 708 ? 1 : -1];
+typedef char State_cutter_code_stands_at_712[offsetof(State, cutter_code) == 712 ? 1 : -1];
+typedef char State_cutter_line_stands_at_716[offsetof(State, cutter_line) == 716 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_720[offsetof(State, cutter_radius_mm) == 720 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_728[offsetof(State, cutter_entered) == 728 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_729[offsetof(State, cutter_failed) == 729 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_736[offsetof(State, cutter_normal) == 736 ? 1 : -1];
+typedef char State_held_turn_stands_at_752[offsetof(State, held_turn) == 752 ? 1 : -1];
+typedef char State_held_line_stands_at_756[offsetof(State, held_line) == 756 ? 1 : -1];
+typedef char State_held_from_stands_at_760[offsetof(State, held_from) == 760 ? 1 : -1];
+typedef char State_held_along_stands_at_776[offsetof(State, held_along) == 776 ? 1 : -1];
+typedef char State_held_centre_stands_at_792[offsetof(State, held_centre) == 792 ? 1 : -1];
+typedef char State_held_w_stands_at_808[offsetof(State, held_w) == 808 ? 1 : -1];
+typedef char State_held_sweep_stands_at_824[offsetof(State, held_sweep) == 824 ? 1 : -1];
+typedef char State_held_rows_stands_at_832[offsetof(State, held_rows) == 832 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_848[offsetof(State, cutter_rows_removed) == 848 ? 1 : -1];
+typedef char State_held_events_stands_at_856[offsetof(State, held_events) == 856 ? 1 : -1];
+typedef char State_retract_stands_at_864[offsetof(State, retract) == 864 ? 1 : -1];
+typedef char State_retract_line_stands_at_868[offsetof(State, retract_line) == 868 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_872[offsetof(State, unset_parameter) == 872 ? 1 : -1];
+typedef char State_unset_line_stands_at_876[offsetof(State, unset_line) == 876 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_880[offsetof(State, retract_unnamed_line) == 880 ? 1 : -1];
+typedef char State_in_cycles_stands_at_884[offsetof(State, in_cycles) == 884 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_888[offsetof(State, cycle_level_mm) == 888 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_896[offsetof(State, cycle_level_known) == 896 ? 1 : -1];
+typedef char State_cycle_r_stands_at_904[offsetof(State, cycle_r) == 904 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_912[offsetof(State, cycle_depth) == 912 ? 1 : -1];
+typedef char State_cycle_q_stands_at_920[offsetof(State, cycle_q) == 920 ? 1 : -1];
+typedef char State_cycle_p_stands_at_928[offsetof(State, cycle_p) == 928 ? 1 : -1];
+typedef char State_cycle_line_stands_at_936[offsetof(State, cycle_line) == 936 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_940[offsetof(State, cycle_plane) == 940 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_944[offsetof(State, cycle_unit_mm) == 944 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_952[offsetof(State, cycle_absolute) == 952 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 960 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1148,6 +1207,8 @@ typedef struct {
     Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
+    Floats tool_diameter_mm;
+    Floats cutter_diameter_mm;
     int64_t runs_programs;
     Ints32 core_g;
     Floats dwell_by_letter;

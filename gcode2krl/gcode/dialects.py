@@ -244,6 +244,7 @@ _LIST: Final = (
         "grbl",
         "Grbl 1.1: G0, G21 at the start, $ lines",
         syntax=d.DOLLAR_LINES,
+        refused={_LEAD: (41, 41.1, 42, 42.1)},
         start={"motion": v.MOTION_RAPID, "unit_named": 1},
     ),
     Dialect(

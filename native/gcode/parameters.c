@@ -23,6 +23,7 @@ enum {
     TOOL = 5400,
     TOOL_OFFSET = 5401,
     OF_A_SYSTEM_ROTATION = 9,
+    TOOL_DIAMETER = 5410,
     LAST_OF_TOOL = 5413,
     POSITION = 5420,
     LAST_OF_STATE = 5428
@@ -73,6 +74,18 @@ static double of_state(const Machine *machine, int64_t number) {
 bool is_read_only(int64_t number) {
     return (number >= FIRST_OF_STATE && number <= LAST_OF_OFFSETS) || (number >= TOOL && number <= LAST_OF_TOOL) ||
            (number >= POSITION && number <= LAST_OF_STATE);
+}
+
+/* Tell whether a parameter shows the place of the tool while that is beside the programmed one. */
+static bool is_beside(const Machine *machine) { return machine->state.at->cutter_mode != 0; }
+
+/* Tell whether a numbered parameter shows what is not known: the diameter, or a place under compensation. */
+bool is_of_cutter(const Machine *machine, int64_t number) {
+    return number == TOOL_DIAMETER || (number >= POSITION && number <= LAST_OF_STATE && is_beside(machine));
+}
+
+bool is_name_of_cutter(const Machine *machine, int64_t name) {
+    return name >= N_X && name <= N_ABS_Z && is_beside(machine);
 }
 
 /* Tell whether a parameter is the position of a rotary or secondary axis, which a program cannot ask for. */
@@ -177,7 +190,7 @@ static double of_modes(const State *s, int64_t name) {
     switch (name) {
     case N_MOTION_MODE: return s->motion == V_MOTION_CANCELLED ? V_G80 : s->motion * V_TENFOLD;
     case N_PLANE: return s->plane * V_TENFOLD;
-    case N_CCOMP: return 400.0; /* G40 */
+    case N_CCOMP: return s->cutter_mode & S_CUTTER_ON ? s->cutter_code : V_G40;
     case N_METRIC: return s->unit_mm == 1.0;
     case N_IMPERIAL: return s->unit_mm != 1.0;
     case N_ABSOLUTE: return s->absolute != 0;
