@@ -18,7 +18,13 @@ from gcode2krl.gcode import polar_findings as of_polar
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.gcode.never_read import NEVER_READ
-from gcode2krl.gcode.program_faults import EXPRESSION_FAULTS, O_WORD_FAULTS, VALUE_FAULTS
+from gcode2krl.gcode.program_faults import (
+    EXPRESSION_FAULTS,
+    O_WORD_FAULTS,
+    VALUE_FAULTS,
+    VALUE_REMEDIES,
+    VALUE_REMEDY,
+)
 from gcode2krl.units import MM_PER_INCH
 
 
@@ -141,9 +147,7 @@ FINDINGS: dict[int, Finding] = {
     ),
     EXPRESSION: Finding("error", "expression", "{fault}", "{remedy}"),
     O_WORD: Finding("error", "o-word", "{fault}", "{remedy}"),
-    EXPRESSION_VALUE: Finding(
-        "error", "expression-value", "{fault}", "check the parameters that the expression takes"
-    ),
+    EXPRESSION_VALUE: Finding("error", "expression-value", "{fault}", "{remedy}"),
     PARAMETER_UNDEFINED: Finding(
         "error",
         "parameter-undefined",
@@ -559,6 +563,10 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
         f"digital and analogue I/O words: {_LATER}",
         "map an own M-code in [m_code] of the cell",
     ),
+    v.TENFOLD * v.M70: (
+        f"saving and restoring the modes (M70 to M73): {_LATER}",
+        "write the modes themselves behind the subprogram: G90, G21, G17, G94, G54, F",
+    ),
 }
 
 _OF_LETTERS = (UNUSED_WORD, ROTARY_UNKNOWN, VECTOR_AND_ANGLE)
@@ -638,7 +646,7 @@ def _program_fault(number: int, a: float, b: float) -> dict[str, str]:
         fault, remedy = faults.get(int(a), faults[0])
         return {"fault": fault, "remedy": remedy}
     if number == EXPRESSION_VALUE:
-        return {"fault": VALUE_FAULTS[int(a)].format(b=b)}
+        return {"fault": VALUE_FAULTS[int(a)].format(b=b), "remedy": VALUE_REMEDIES.get(int(a), VALUE_REMEDY)}
     return {}
 
 

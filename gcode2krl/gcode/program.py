@@ -5,7 +5,9 @@ on the text is scanned as a whole, its O-lines are looked at once (`o_words`), a
 (``native/gcode/execute.c``). It comes back for room, and for a subprogram in another file.
 """
 
+import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,13 +16,12 @@ from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints
 from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
-from gcode2krl.errors import input_error
+from gcode2krl.errors import Issue, input_error
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
-from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.subprograms import found_file
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
 from gcode2krl.gcode.words import Scanner, Words
@@ -32,6 +33,11 @@ MOST_STEPS = 10_000_000
 MOST_ROWS = 20_000_000
 """Moves that such a program may make; they take 2 GB."""
 _NOTHING_WANTED, _WANTED_BY_NUMBER = -1, -2
+_DEBUG_IS_SHOWN = 5599
+"""A parameter that is 1 at first, as in LinuxCNC."""
+_LINES = re.compile(r"\blines? \d+(?:, \d+)*(?: and \d+)?")
+"""How a message names lines."""
+_NUMBER = re.compile(r"\d+")
 
 _execute = core_function(
     "gcode_execute", MACHINE, tables.PROGRAM, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT
@@ -235,6 +241,26 @@ class Program:
         file = self._file(line)
         return file.name, line - file.first_line + file.start_line
 
+    def placed(self, issue: Issue) -> Issue:
+        """Return a finding with the lines of subprograms in other files named as such.
+
+        It then has no line of its own: that of the main program which led there may be one of many.
+        """
+        message = _LINES.sub(lambda lines: _NUMBER.sub(self._told_number, lines[0]), issue.message)
+        if not self._is_elsewhere(issue.line):
+            return replace(issue, message=message)
+        name, line = self.place(issue.line)
+        return replace(issue, line=0, message=f"{message} (in {Path(name).name} line {line})")
+
+    def _is_elsewhere(self, line: int) -> bool:
+        return len(self.files) > 1 and line >= self.files[1].first_line
+
+    def _told_number(self, number: re.Match[str]) -> str:
+        if not self._is_elsewhere(int(number[0])):
+            return number[0]
+        name, line = self.place(int(number[0]))
+        return f"{line} of {Path(name).name}"
+
     def texts(self, lines: Iterable[int]) -> dict[int, bytes]:
         """Return lines of the program by their numbers."""
         own = {id(file): file.text.split(b"\n") for file in {self._file(n) for n in lines}}
@@ -261,6 +287,8 @@ def _empty_program(course: NDArray[Any]) -> Any:
     course["wanted"] = _NOTHING_WANTED
     course["generation"] = frames["generation"][0] = 1
     names = np.zeros(tables.MOST_NAMES, tables.NAME)
+    parameters = np.full(tables.MOST_PARAMETERS, np.nan)  # none is set
+    parameters[_DEBUG_IS_SHOWN] = 1.0
     program = tables.PROGRAM(
         text=np.frombuffer("\n".join(f"<{name}>" for name in NAMES).encode(), np.uint8),
         lines=np.zeros(0, tables.LINE),
@@ -270,9 +298,8 @@ def _empty_program(course: NDArray[Any]) -> Any:
         pool=np.zeros(32 * len(names), np.uint8),
         local_value=np.zeros((tables.FRAMES, len(names))),
         local_generation=np.zeros((tables.FRAMES, len(names)), np.int64),
-        parameters=np.full(tables.MOST_PARAMETERS, np.nan),  # none is set
+        parameters=parameters,
         frames=frames,
-        saved_states=np.zeros(tables.FRAMES, STATE),
         repeats=np.zeros(tables.MOST_REPEATS, tables.REPEAT),
         assignments=np.zeros(tables.ROOM_OF_LINE, tables.ASSIGNMENT),
         course=course,

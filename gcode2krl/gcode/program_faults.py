@@ -53,7 +53,12 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     POWER,
     NOT_A_NUMBER,
     INFINITE,
-) = range(8)
+    IN_MACHINE_UNIT,
+    OF_TOOL_TABLE,
+    OF_OTHER_AXIS,
+    FEED_OF_TIME,
+    FEED_OF_OTHER_UNIT,
+) = range(13)
 VALUE_FAULTS: dict[int, str] = {
     DIVISION_BY_ZERO: "division by zero",
     SQUARE_ROOT: "the square root of {b:g} does not exist",
@@ -63,7 +68,21 @@ VALUE_FAULTS: dict[int, str] = {
     POWER: "{b:g} is negative and cannot be raised to a power that is not whole",
     NOT_A_NUMBER: "the result is not a number",
     INFINITE: "the result is larger than any number",
+    IN_MACHINE_UNIT: "#{b:.0f} is a length in the unit of the machine, which G20 does not tell",
+    OF_TOOL_TABLE: "#{b:.0f} comes from the tool table of the control",
+    OF_OTHER_AXIS: "#{b:.0f} belongs to a rotary or secondary axis, and is not kept here",
+    FEED_OF_TIME: "#<_feed> under G93 is no feed, but what the move before made of it",
+    FEED_OF_OTHER_UNIT: "#<_feed> was programmed in another unit, before G20 or G21",
 }
+VALUE_REMEDY = "check the parameters that the expression takes"
+VALUE_REMEDIES: dict[int, str] = {
+    IN_MACHINE_UNIT: "read it under G21, where it is in mm; or write the number itself",
+    OF_TOOL_TABLE: "write the number itself",
+    OF_OTHER_AXIS: "write the number itself",
+    FEED_OF_TIME: "keep the number in a parameter of its own, #1 = 5 and F#1",
+    FEED_OF_OTHER_UNIT: "program F behind G20 or G21, in a line of its own",
+}
+"""Remedies of values that are known on the control and not here."""
 
 (
     FAULT_LABEL,
@@ -84,8 +103,7 @@ VALUE_FAULTS: dict[int, str] = {
     FAULT_ARGUMENTS,
     FAULT_REPEATS,
     FAULT_NOT_FIRST,
-    FAULT_MODES,
-) = range(19)
+) = range(18)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -111,9 +129,8 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_CALL_NUMBER: ("the computed number of the subprogram is not whole", "check the expression"),
     FAULT_ARGUMENTS: ("a call takes at most 30 arguments", "pass the others in parameters"),
     FAULT_NOT_FIRST: (
-        "an O-word, M98, M99 or M70 to M73 stands behind other words",
+        "an O-word, M98 or M99 stands behind other words",
         "write it on a line of its own",
     ),
-    FAULT_MODES: ("no M70 or M73 before this M72 has saved the modes", "write M70 before it"),
     FAULT_REPEATS: ("more than 256 repeat loops are within each other", "write it otherwise"),
 }

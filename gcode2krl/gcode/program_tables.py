@@ -7,7 +7,6 @@ A marked line is one with an expression, a parameter or an O-word: the scanner l
 import numpy as np
 
 from gcode2krl.compiled.core import BYTES, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, ArrayOf, StructOf
-from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.vocabulary import LINE_LIMIT
 
 MOST_PARAMETERS = 5602
@@ -78,7 +77,6 @@ FRAME = np.dtype(
         ("is_program", "i4"),
         ("main_line", "i4"),  # of the main program's file: the line of the call, 0 = this is that file
         ("repeats", "i4"),  # loops that were begun before the call
-        ("saved", "i4"),  # M70 or M73 in the frame: 0 = none, 1 = saved, 2 = to be restored on return
         ("parameters", "f8", LOCAL_PARAMETERS),  # of the caller
     ],
     align=True,
@@ -120,7 +118,6 @@ PROGRAM = StructOf(
     local_generation=OUT_INTS,
     parameters=OUT_FLOATS,
     frames=ArrayOf(FRAME, written=True),
-    saved_states=ArrayOf(STATE, written=True),
     repeats=ArrayOf(REPEAT, written=True),
     assignments=ArrayOf(ASSIGNMENT, written=True),
     course=ArrayOf(COURSE, written=True),

@@ -375,7 +375,8 @@ class _Interpreter:
 
     def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
-        found = found_issues(self.found, self.counts[0], self.state[0], self.texts)
+        known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
+        found = [self._placed(issue) for issue in known]
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
         whole = program_issues(
@@ -385,7 +386,11 @@ class _Interpreter:
             most_decimals=self.most_decimals,
             head=head,
         )
-        return self._toolpath((*found, *whole), cell)
+        return self._toolpath((*found, *map(self._placed, whole)), cell)
+
+    def _placed(self, issue: Issue) -> Issue:
+        """Return a finding whose lines are named with their file, where that is not the main program's."""
+        return issue if self.program is None else self.program.placed(issue)
 
     def _toolpath(self, issues: tuple[Issue, ...], cell: "Cell | None") -> Toolpath:
         rows = self._count("rows")

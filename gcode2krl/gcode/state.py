@@ -30,6 +30,7 @@ STATE = np.dtype(
         ("motion", "i4"),  # MOTION_…
         ("feed_mode", "i4"),  # INVERSE_TIME, PER_MINUTE or PER_REVOLUTION
         ("feed", "f8"),  # mm/min, mm/rev; 0 = none yet
+        ("feed_of_other_unit", "f8"),  # the feed when G20 or G21 last changed the unit
         ("rpm", "f8"),
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
         ("tool", "i4"),

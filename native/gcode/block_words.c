@@ -52,12 +52,10 @@ static Taken take_g(Block *b, double value) {
 
 /* --- M-codes -------------------------------------------------------------------------------------------- */
 
-static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code < V_M70); }
+static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code <= V_M73); }
 
-/* Tell whether an M-code jumps, or saves and restores modes: native/gcode/execute.c does that. */
-static bool is_of_program(int64_t code) {
-    return code == V_M98 || code == V_M99 || (code >= V_M70 && code <= V_M73);
-}
+/* Tell whether an M-code jumps: native/gcode/execute.c does that. */
+static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
 
 /* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
 static bool want_program(Block *b) {

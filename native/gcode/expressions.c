@@ -222,7 +222,7 @@ static int64_t parameter_number(Evaluation *e, int64_t *i) {
     if (e->dry)
         return 1;
     const bool exists = whole_number(value, &number) && number >= 1 && number < P_MOST_PARAMETERS;
-    if (!exists || is_of_other_axis(number)) {
+    if (!exists) {
         wrong(e, F_PARAMETER_NUMBER, value, 0.0, place);
         return 0;
     }
@@ -244,7 +244,8 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
             return wrong(e, F_PARAMETER_UNDEFINED, 0.0, 0.0, place);
         if (is_name_of_cutter(e->machine, name))
             return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
-        return named_parameter(e, name);
+        const int fault = fault_of_name(e->machine, name);
+        return fault == KNOWN ? named_parameter(e, name) : wrong(e, F_EXPRESSION_VALUE, fault, 0.0, place);
     }
     if (!exists) {
         const int64_t number = parameter_number(e, i);
@@ -252,7 +253,9 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
             return 1.0;
         if (is_of_cutter(e->machine, number))
             return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
-        return numbered_parameter(e, number);
+        const int fault = fault_of_number(e->machine, number);
+        return fault == KNOWN ? numbered_parameter(e, number)
+                              : wrong(e, F_EXPRESSION_VALUE, fault, (double)number, place);
     }
     const double value = value_at(e, i);
     int64_t number;

@@ -130,7 +130,6 @@ static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
 /* Begin the next run of a program that M98 calls several times: its names are new. */
 static int64_t enter(Run *run, Frame *frame) {
     frame->generation = ++run->course->generation;
-    frame->saved = 0;
     return frame->entry;
 }
 

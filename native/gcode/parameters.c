@@ -6,6 +6,7 @@
 #include "gcode/parameters.h"
 
 #include "gcode/block.h"
+#include "gcode/offsets.h"
 
 /* --- numbered ------------------------------------------------------------------------------------------- */
 
@@ -63,8 +64,6 @@ static double of_state(const Machine *machine, int64_t number) {
         return of_work_offset(machine, number);
     if (number == TOOL)
         return s->tool;
-    if (number == TOOL_OFFSET + 2)
-        return isnan(s->length_offset) ? 0.0 : s->length_offset / s->unit_mm;
     if (number >= POSITION && number < POSITION + 3)
         return programmed(machine, (int)(number - POSITION));
     return 0.0;
@@ -88,8 +87,46 @@ bool is_name_of_cutter(const Machine *machine, int64_t name) {
     return name >= N_X && name <= N_ABS_Z && is_beside(machine);
 }
 
-/* Tell whether a parameter is the position of a rotary or secondary axis, which a program cannot ask for. */
-bool is_of_other_axis(int64_t number) { return number >= POSITION + 3 && number <= LAST_OF_STATE; }
+/* Tell whether a parameter is of a rotary or secondary axis. */
+static bool is_of_other_axis(const Machine *machine, int64_t number) {
+    enum { AXES = 9, LINEAR_AXES = 3 };
+    const int64_t firsts[] = {HOME_28, HOME_30, SHIFT};
+    if (number >= POSITION)
+        return number >= POSITION + LINEAR_AXES && number <= LAST_OF_STATE;
+    if (machine->rotary_axes == 0) /* none has moved: all of them are 0 */
+        return false;
+    for (int k = 0; k < 3; k++)
+        if (number >= firsts[k] + LINEAR_AXES && number < firsts[k] + AXES)
+            return true;
+    const int64_t axis = (number - FIRST_SYSTEM) % OF_A_SYSTEM;
+    return number >= FIRST_SYSTEM && number <= LAST_OF_OFFSETS && axis >= LINEAR_AXES && axis < AXES;
+}
+
+/* Tell whether a parameter is a length in the unit of the machine, whatever unit is in force. */
+static bool is_in_machine_unit(int64_t number) {
+    if (number < HOME_28 || number > LAST_OF_OFFSETS || number == SHIFT_ON || number == SYSTEM)
+        return false;
+    return number < FIRST_SYSTEM || (number - FIRST_SYSTEM) % OF_A_SYSTEM != OF_A_SYSTEM_ROTATION;
+}
+
+/* Return why the value of a parameter cannot be told: a number of VALUE_FAULTS, KNOWN = it can. */
+int fault_of_number(const Machine *machine, int64_t number) {
+    if (is_of_other_axis(machine, number))
+        return PF_OF_OTHER_AXIS;
+    if (number >= TOOL_OFFSET && number <= LAST_OF_TOOL)
+        return PF_OF_TOOL_TABLE;
+    return machine->state.at->unit_mm != 1.0 && is_in_machine_unit(number) ? PF_IN_MACHINE_UNIT : KNOWN;
+}
+
+/* The same for a name; its row is given. */
+int fault_of_name(const Machine *machine, int64_t name) {
+    const State *s = machine->state.at;
+    if (name != N_FEED)
+        return KNOWN;
+    if (s->feed_mode == V_INVERSE_TIME)
+        return PF_FEED_OF_TIME;
+    return s->feed != 0.0 && s->feed == s->feed_of_other_unit ? PF_FEED_OF_OTHER_UNIT : KNOWN;
+}
 
 /* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC; the first such place is kept. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
@@ -212,20 +249,22 @@ static double of_modes(const State *s, int64_t name) {
 
 static double of_machine(const Machine *machine, int64_t name) {
     const State *s = machine->state.at;
+    double tip_mm[3];
+    tip_position(s, tip_mm);
     switch (name) {
     case N_SPINDLE_ON: return s->direction != 0;
     case N_SPINDLE_CW: return s->direction > 0;
     case N_MIST: return s->mist;
     case N_FLOOD: return s->flood;
-    case N_FEED: return s->feed_mode == V_INVERSE_TIME ? s->feed : s->feed / s->unit_mm;
+    case N_FEED: return s->feed / s->unit_mm;
     case N_RPM: return fabs(s->rpm);
     case N_CURRENT_TOOL: return s->tool;
     case N_SELECTED_TOOL: return s->selected_tool < 0 ? 0.0 : s->selected_tool;
     case N_X:
     case N_Y:
     case N_Z: return programmed(machine, (int)(name - N_X));
-    case N_ABS_X: return s->x / s->unit_mm;
-    case N_ABS_Y: return s->y / s->unit_mm;
+    case N_ABS_X: return tip_mm[0] / s->unit_mm;
+    case N_ABS_Y: return tip_mm[1] / s->unit_mm;
     case N_ABS_Z: return (s->z + length_offset_of(s)) / s->unit_mm;
     }
     return 0.0;

@@ -40,7 +40,9 @@ static inline int64_t after_blanks(Bytes text, int64_t i, int64_t end) {
 enum { NO_NAME = -1 };
 double numbered_parameter(const Evaluation *e, int64_t number);
 bool is_read_only(int64_t number);
-bool is_of_other_axis(int64_t number);
+enum { KNOWN = -1 };
+int fault_of_number(const Machine *machine, int64_t number);
+int fault_of_name(const Machine *machine, int64_t name);
 bool is_of_cutter(const Machine *machine, int64_t number);
 bool is_name_of_cutter(const Machine *machine, int64_t name);
 int64_t name_at(Evaluation *e, int64_t *i);

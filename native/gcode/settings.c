@@ -193,7 +193,10 @@ static void plane_and_unit(Block *b) {
         s->doubt &= ~S_DOUBT_PLANE;
     }
     if (b->g[V_UNIT] >= 0) {
-        s->unit_mm = b->g[V_UNIT] == V_G20 ? U_MM_PER_INCH : 1.0;
+        const double unit_mm = b->g[V_UNIT] == V_G20 ? U_MM_PER_INCH : 1.0;
+        if (unit_mm != s->unit_mm)
+            s->feed_of_other_unit = s->feed;
+        s->unit_mm = unit_mm;
         s->unit_named = 1;
         s->doubt &= ~S_DOUBT_UNIT;
     }

@@ -119,6 +119,53 @@ def test_a_subprogram_of_another_file_names_its_caller(tmp_path):
     assert toolpath.source_line[2:].tolist() == [3, 4]
 
 
+def test_a_finding_in_a_subprogram_names_its_file_and_the_line_in_it(tmp_path):
+    (tmp_path / "side.ngc").write_text("o<side> sub\n(behind)\nG0 X[1/0]\no<side> endsub\n")
+    main = tmp_path / "part.nc"
+    main.write_text(HEAD + "o<side> call [7]\nM2\n")
+    with pytest.raises(Gcode2KrlError) as caught:
+        read_gcode(main)
+    first = caught.value.issues[0]
+    assert (first.line, first.message) == (0, "division by zero (in side.ngc line 3)")
+    assert first.excerpt == "G0 X[1^/0]"
+
+
+def test_a_finding_names_the_line_of_another_file_that_led_to_it(tmp_path):
+    (tmp_path / "side.ngc").write_text("o<side> sub\nG93\no<side> endsub\n")
+    main = tmp_path / "part.nc"
+    main.write_text(HEAD + "o<side> call\nG1 X5\nM2\n")
+    with pytest.raises(Gcode2KrlError) as caught:
+        read_gcode(main)
+    first = caught.value.issues[0]
+    assert first.line == 4
+    assert first.message == "feed move without F under G93 of line 2 of side.ngc"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G20\nX#5221",
+        "G20\nX#5161",
+        "X#5403",
+        "X#5423",
+        "G20\nF#<_feed>",
+        "G93 G1 X1 F2\nX2 F#<_feed>",
+    ],
+)
+def test_a_number_that_only_the_control_knows_is_refused(text):
+    assert refused(text) == ("expression-value", 2 + len(text.splitlines()))
+
+
+def test_the_place_in_machine_coordinates_is_rotated():
+    text = "G10 L2 P1 X5 Y6 R90\nG0 X10 Y20\nG53 X#<_abs_x> Y#<_abs_y>"
+    x, y, _ = read(text).position_mm[-1]
+    assert (x, y) == pytest.approx((-15.0, 16.0))
+
+
+def test_saved_modes_are_refused_for_what_they_are():
+    assert refused("#1=1\nM70") == ("unsupported-m", 4)
+
+
 def test_a_subprogram_is_looked_for_beside_the_program_and_in_named_folders_only(tmp_path):
     for folder in ("own", "other"):
         (tmp_path / folder).mkdir()

@@ -22,7 +22,7 @@ MM_PER_INCH = 25.4
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 PLANES = {"CANON_PLANE_XY": "xy", "CANON_PLANE_XZ": "zx", "CANON_PLANE_YZ": "yz"}
 AXES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}
-CALL = re.compile(r"^\s*\d+ N[\s\d.]*([A-Z][A-Z0-9_]*)\((.*)\)$")
+CALL = re.compile(r"^\s*\d+ N([\s\d.]*?)\s*([A-Z][A-Z0-9_]*)\((.*)\)$")
 TOOL_SIZE = re.compile(r"([ZD])([-+]?\d*\.?\d+)")
 COMPENSATED = re.compile(rb"G4[12]", re.IGNORECASE)
 UNFINISHED = "File ended with no percent sign"
@@ -38,6 +38,10 @@ class Interpreter:
         self.binary.write_bytes(binary.read_bytes().replace(b"%.4f", b"%.9f"))
         self.binary.chmod(0o755)
         (folder / "tool.tbl").write_text(_tool_table_in_inches(), encoding="ascii")
+        for subprogram in (HERE / "programs_macro").glob("*.ngc"):
+            shutil.copy(subprogram, folder)
+        self.lines: list[int] = []
+        """The line number N of each call of the last run, 0 where there is none."""
 
     def run(self, program: bytes, parameters: str, block_delete: bool) -> tuple[list[Call], str]:
         """Return the canonical calls up to the program end, and the error message ('' = none)."""
@@ -54,13 +58,16 @@ class Interpreter:
             timeout=30,
         )
         calls = []
+        self.lines = []
         for line in done.stdout.splitlines():
             match = CALL.match(line)
             if not match:
                 sys.exit(f"cannot read what rs274 printed: {line}")
-            if match[1] == "PROGRAM_END":
+            if match[2] == "PROGRAM_END":
                 break
-            calls.append((match[1], re.split(r",\s*|\s+", match[2])))
+            calls.append((match[2], re.split(r",\s*|\s+", match[3])))
+            number = re.match(r"\d+", match[1])
+            self.lines.append(int(number[0]) if number else 0)
         messages = [line for line in done.stderr.splitlines() if line != "executing"]
         return calls, messages[0] if done.returncode and messages else ""
 
@@ -221,6 +228,36 @@ def _program(rs274: Interpreter, file: Path, offsets: dict, block_delete: bool) 
     }
 
 
+def _macro(rs274: Interpreter, file: Path) -> dict:
+    """Return the moves of a program that computes or jumps; its lines get numbers, which the moves repeat.
+
+    A move of a subprogram in another file has no line.
+    """
+    calls, message = rs274.run(_numbered(file.read_bytes()), "", False)
+    if message:
+        sys.exit(f"{file.name}: {message}")
+    canon = Canon()
+    for (name, args), line in zip(calls, rs274.lines, strict=True):
+        count = len(canon.moves)
+        canon.take(name, args)
+        for move in canon.moves[count:]:
+            move["line"] = line or None
+    return {
+        "file": f"{file.parent.name}/{file.name}",
+        "block_delete": False,
+        "start_dwell_s": canon.start_dwell_s,
+        "moves": canon.moves,
+    }
+
+
+def _numbered(program: bytes) -> bytes:
+    """Return a program with N and its number before each plain line."""
+    return b"\n".join(
+        line if not line.strip() or line.lstrip()[:1] in b"%/(;NnOo" else b"N%d %s" % (number, line)
+        for number, line in enumerate(program.split(b"\n"), start=1)
+    )
+
+
 def _error(rs274: Interpreter, file: Path) -> dict:
     """Return where and why rs274 refuses a program: the shortest beginning of the file that it refuses."""
     for line, beginning in enumerate(_prefixes(file.read_bytes()), start=1):
@@ -241,14 +278,14 @@ def _programs(rs274: Interpreter) -> list[dict]:
         for file in sorted((HERE / folder).glob("*.nc")):
             for block_delete in (False, True) if _has_deletable_lines(file) else (False,):
                 found.append(_program(rs274, file, shifts, block_delete))
-    return found
+    return found + [_macro(rs274, file) for file in sorted((HERE / "programs_macro").glob("*.nc"))]
 
 
 def _check(programs: list[dict]) -> None:
     for program in programs:
         for move in program["moves"]:
             numbers = [*move["end"], move.get("feed_mm_s", 0.0)]
-            if not move["line"] or not all(map(math.isfinite, numbers)):
+            if move["line"] == 0 or not all(map(math.isfinite, numbers)):
                 sys.exit(f"{program['file']}: cannot use {move}")
 
 

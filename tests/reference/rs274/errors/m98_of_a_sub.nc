@@ -1,0 +1,6 @@
+G21 G90 G17 G94 F500
+G0 X0 Y0 Z0
+o1 sub
+o1 endsub
+M98 P1
+M2

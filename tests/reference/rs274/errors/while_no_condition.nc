@@ -1,0 +1,5 @@
+G21 G90 G17 G94 F500
+G0 X0 Y0 Z0
+o1 while
+o1 endwhile
+M2

@@ -1,0 +1,12 @@
+G21 G90 G0 X[SIN[30]*10] Y[COS[60]*10] Z[TAN[45]]
+X[ASIN[0.5]] Y[ACOS[0.5]] Z[ATAN[1]/[1]]
+X[ATAN[1]/[-1]] Y[ATAN[-1]/[-1]] Z[ATAN[0]/[-1]]
+X[ABS[-3.5]] Y[SQRT[2]] Z[EXP[1]]
+X[LN[10]] Y[FIX[2.8]] Z[FIX[-2.8]]
+X[FUP[2.2]] Y[FUP[-2.2]] Z[ROUND[2.5]]
+X[ROUND[-2.5]] Y[ROUND[2.4]] Z[ROUND[-2.6]]
+X[FIX[10*SIN[30]]] Y[FIX[10*COS[60]]] Z[FIX[TAN[45]*10]]
+XSIN[30] Y-COS[0] ZSQRT[SQRT[16]]
+X[SIN[ATAN[3]/[4]]*5] Y[ABS[SIN[-90]]] Z[2 * FIX[3.9] + 1]
+x[sIn[90]] y [ c o s [ 0 ] ] z[ROUND [ 1.5 ]]
+M2
