@@ -16,6 +16,27 @@ from fuzz_common import Try, main_of, mutated
 ROOT = Path(__file__).resolve().parents[1]
 HEAD = b"G21 G17 G90 G94 F500\nT1 M6\nS1000 M3\nG0 X0 Y0 Z5\nG1 Z1\n"
 LINES = (
+    b"$H",
+    b"$32=1",
+    b":1234 (HEAD)",
+    b"/2 G1 X1. F100",
+    b"G4 P1500",
+    b"G4 X1.5 S3",
+    b"G65 P9010 A1.",
+    b"G54.1 P3 G5.1 Q1",
+    b"G83 X5. Z-5. R1. Q2000 P500 K3 F100",
+    b"X=IC(5) Y=AC(-2.5) F=500",
+    b"G3 X10 Y0 I=AC(5) J-1 TURN=2",
+    b"G2 X20 Y0 CR=5",
+    b'MSG("A (b) ; c")',
+    b'WORKPIECE(,"",,"BOX",112,0,-20)',
+    b"CYCLE832(0.01,_FINISH,1)",
+    b"TRANS X10 Y=5",
+    b"G0 SUPA Z0 D0",
+    b'T="MILL" D1 M6',
+    b"START: GOTOF ENDE",
+    b"R1=5 X=R1",
+    b"%_N_PART_MPF",
     b"N10 G21 G90 G17 G94 (MSG, hello) (a comment)",
     b"O1234",
     b"G43 H1 Z20.",
@@ -110,7 +131,8 @@ def prepare(place: Path) -> Try:
     from gcode2krl import load_cell
     from gcode2krl.cell.sections import Machine
     from gcode2krl.errors import NotUnderstoodError, input_error
-    from gcode2krl.gcode import read
+    from gcode2krl.gcode import read, text
+    from gcode2krl.gcode.dialects import DIALECTS
 
     files = (*ROOT.glob("examples/*.nc"), *ROOT.glob("tests/golden/programs/*.nc"))
     sound = [file.read_bytes()[:8000] for file in sorted(files)]
@@ -118,10 +140,12 @@ def prepare(place: Path) -> Try:
     cells = (None, load_cell(), load_cell().model_copy(update={"machine": machine}))
 
     def attempt(rng: np.random.Generator, _: Path) -> str:
-        read._PIECE_BYTES = int(rng.choice((300, 5000, 1_000_000)))
+        text._PIECE_BYTES = int(rng.choice((300, 5000, 1_000_000)))
         read._FIRST_ROWS, read._FIRST_EVENTS = int(rng.choice((1, 20, 8192))), int(rng.choice((0, 17, 256)))
         stream, cell = io.BytesIO(damaged(rng, sound)), cells[int(rng.integers(len(cells)))]
         options = OPTIONS[int(rng.integers(len(OPTIONS)))]
+        if rng.integers(2):
+            options = {**options, "dialect": str(rng.choice(list(DIALECTS)))}
         try:
             toolpath = read.read_stream(stream, "part.nc", cell, **options)
         except NotUnderstoodError as error:

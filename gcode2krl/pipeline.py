@@ -44,6 +44,7 @@ def predict(
     simplify_mm: float | None = None,
     chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
     block_delete: bool = False,
+    dialect: str = gcode.DEFAULT_DIALECT,
     forces: bool = True,
     effects: "Sequence[str | Applied]" = (),
     effect_folders: Sequence[str | Path] = (),
@@ -73,8 +74,10 @@ def predict(
     ['force_meas_x_N', 'force_meas_y_N']
     """
     cell = cell if cell is not None else load_cell()
-    toolpath = gcode.read_gcode(part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete)
-    settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
+    toolpath = gcode.read_gcode(
+        part, cell, dialect=dialect, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete
+    )
+    settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete, "dialect": dialect}
     prediction = predict_toolpath(
         toolpath,
         cell,

@@ -15,6 +15,7 @@
 #define CH_SPACE 32
 #define CH_END_OF_TAPE 26
 #define CH_EXCLAMATION 33
+#define CH_QUOTE 34
 #define CH_HASH 35
 #define CH_DOLLAR 36
 #define CH_PERCENT 37
@@ -31,10 +32,12 @@
 #define CH_DIGIT_1 49
 #define CH_DIGIT_6 54
 #define CH_DIGIT_9 57
+#define CH_COLON 58
 #define CH_SEMICOLON 59
 #define CH_LESS 60
 #define CH_EQUALS 61
 #define CH_GREATER 62
+#define CH_QUESTION 63
 #define CH_AT_SIGN 64
 #define CH_CARET 94
 #define CH_LETTER_A 65
@@ -42,6 +45,7 @@
 #define CH_LETTER_F 70
 #define CH_LETTER_G 71
 #define CH_LETTER_I 73
+#define CH_LETTER_J 74
 #define CH_LETTER_K 75
 #define CH_LETTER_L 76
 #define CH_LETTER_M 77
@@ -64,6 +68,7 @@
 #define CH_SMALL_Z 122
 #define CH_BRACE_OPEN 123
 #define CH_BRACE_CLOSE 125
+#define CH_TILDE 126
 #define CH_CASE_BIT 32
 #define CH_FIRST_FOREIGN 128
 
@@ -305,6 +310,55 @@
 #define V_M_OVERRIDE 9
 #define V_M_CODES 4
 
+/* gcode2krl.gcode.dialect_marks */
+#define D_AMPERSAND 38
+#define D_GREATER 62
+#define D_LESS 60
+#define D_POINT 46
+#define D_SKIP_LEVEL 1
+#define D_HEAD_LINES 2
+#define D_DOLLAR_LINES 4
+#define D_STATEMENTS 8
+#define D_POINTS 16
+#define D_NEXT_ABSOLUTE 60
+#define D_NEXT_INCREMENTAL 62
+#define D_NEXT_POINTLESS 46
+#define D_SKIPPED 38
+#define D_HARMLESS 0
+#define D_REFUSED 1
+#define D_RADIUS 2
+#define D_TURNS 3
+#define D_MESSAGE 4
+#define D_CODE 5
+#define D_ENDS 6
+#define D_WHOLE_LINE 7
+#define D_KIND_STEP 16
+#define D_AS_WRITTEN 0
+#define D_POINT_REQUIRED 1
+#define D_THOUSANDTHS 2
+#define D_CALCULATOR 3
+#define D_MOST_CODES 9999
+#define D_CODE_UNKNOWN (-1)
+#define D_CODE_HARMLESS (-2)
+#define D_CODE_EXACT (-3)
+#define D_CODE_REFUSED (-4)
+
+/* gcode2krl.gcode.dialects */
+#define DR_REASON_POLAR 3
+#define DR_REASON_SETTING 13
+#define DR_REASON_JOG 12
+#define DR_REASON_TOOL_NAME 17
+#define DR_REASON_VALUES 10
+#define DR_REASON_EDGE 22
+#define DR_REASON_FLOW 9
+#define DR_REASON_BESIDE 21
+#define DR_REASON_VECTORS 11
+#define DR_REASON_PROGRAM 23
+#define DR_REASON_STILL 27
+#define DR_REASON_TWICE 28
+#define DR_REASON_MOVED 29
+#define DR_DEFAULT "linuxcnc"
+
 /* gcode2krl.gcode.findings */
 #define F_FIRST_FOREIGN 128
 #define F_VALUE_REMEDY "check the parameters that the expression takes"
@@ -361,38 +415,42 @@
 #define F_BAD_LINE_NUMBER 49
 #define F_UNKNOWN_START 50
 #define F_ARC_TOO_LONG 51
-#define F_EXPRESSION_VALUE 52
-#define F_PARAMETER_UNDEFINED 53
-#define F_PARAMETER_NUMBER 54
-#define F_PARAMETER_READ_ONLY 55
-#define F_SUBPROGRAM_MISSING 56
-#define F_CALLS_TOO_DEEP 57
-#define F_TOO_MANY_STEPS 58
-#define F_TOO_MANY_ROWS 59
-#define F_NO_MACHINE 60
-#define F_ROTARY_UNKNOWN 61
-#define F_VECTOR_ZERO 62
-#define F_VECTOR_AND_ANGLE 63
-#define F_VECTOR_ARC 64
-#define F_TURN_PER_REV 65
-#define F_TURN_TOO_FAR 66
-#define F_CYCLE_TURNED 67
-#define F_CUTTER_ON 68
-#define F_CUTTER_PLANE 69
-#define F_CUTTER_NO_D 70
-#define F_CUTTER_NO_TOOL 71
-#define F_CUTTER_NO_DIAMETER 72
-#define F_CUTTER_LATHE 73
-#define F_CUTTER_DIFFERS 74
-#define F_CUTTER_ENTRY 75
-#define F_CUTTER_ENTRY_ARC 76
-#define F_CUTTER_EXIT_ARC 77
-#define F_CUTTER_ARC 78
-#define F_CUTTER_CORNER 79
-#define F_CUTTER_SHORT 80
-#define F_CUTTER_ROTATED 81
-#define F_CUTTER_TURNED 82
-#define F_CUTTER_PARAMETER 83
+#define F_DIALECT_CODE 52
+#define F_DIALECT_STATEMENT 53
+#define F_NO_POINT 54
+#define F_COUNTED_FROM_UNKNOWN 55
+#define F_EXPRESSION_VALUE 56
+#define F_PARAMETER_UNDEFINED 57
+#define F_PARAMETER_NUMBER 58
+#define F_PARAMETER_READ_ONLY 59
+#define F_SUBPROGRAM_MISSING 60
+#define F_CALLS_TOO_DEEP 61
+#define F_TOO_MANY_STEPS 62
+#define F_TOO_MANY_ROWS 63
+#define F_NO_MACHINE 64
+#define F_ROTARY_UNKNOWN 65
+#define F_VECTOR_ZERO 66
+#define F_VECTOR_AND_ANGLE 67
+#define F_VECTOR_ARC 68
+#define F_TURN_PER_REV 69
+#define F_TURN_TOO_FAR 70
+#define F_CYCLE_TURNED 71
+#define F_CUTTER_ON 72
+#define F_CUTTER_PLANE 73
+#define F_CUTTER_NO_D 74
+#define F_CUTTER_NO_TOOL 75
+#define F_CUTTER_NO_DIAMETER 76
+#define F_CUTTER_LATHE 77
+#define F_CUTTER_DIFFERS 78
+#define F_CUTTER_ENTRY 79
+#define F_CUTTER_ENTRY_ARC 80
+#define F_CUTTER_EXIT_ARC 81
+#define F_CUTTER_ARC 82
+#define F_CUTTER_CORNER 83
+#define F_CUTTER_SHORT 84
+#define F_CUTTER_ROTATED 85
+#define F_CUTTER_TURNED 86
+#define F_CUTTER_PARAMETER 87
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -462,6 +520,8 @@
 #define S_NOTE_LOCAL 4
 #define S_NOTE_SHIFT 5
 #define S_NOTE_TABLE 6
+#define S_NOTE_CODE 7
+#define S_NOTE_STATEMENT 8
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -752,9 +812,9 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[7];
-    int32_t note_line[7];
-    int32_t note_word[7];
+    int32_t note_count[9];
+    int32_t note_line[9];
+    int32_t note_word[9];
     double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
@@ -859,53 +919,53 @@ typedef char State_distance_line_stands_at_472[offsetof(State, distance_line) ==
 typedef char State_feed_mode_line_stands_at_476[offsetof(State, feed_mode_line) == 476 ? 1 : -1];
 typedef char State_rotary_refused_stands_at_480[offsetof(State, rotary_refused) == 480 ? 1 : -1];
 typedef char State_note_count_stands_at_484[offsetof(State, note_count) == 484 ? 1 : -1];
-typedef char State_note_line_stands_at_512[offsetof(State, note_line) == 512 ? 1 : -1];
-typedef char State_note_word_stands_at_540[offsetof(State, note_word) == 540 ? 1 : -1];
-typedef char State_moved_mm_stands_at_568[offsetof(State, moved_mm) == 568 ? 1 : -1];
-typedef char State_misfits_stands_at_640[offsetof(State, misfits) == 640 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_644[offsetof(State, misfits_other_centre) == 644 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_648[offsetof(State, misfits_reversed) == 648 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_652[offsetof(State, misfits_exchanged) == 652 ? 1 : -1];
-typedef char State_spirals_stands_at_656[offsetof(State, spirals) == 656 ? 1 : -1];
-typedef char State_spiral_line_stands_at_660[offsetof(State, spiral_line) == 660 ? 1 : -1];
-typedef char State_spiral_start_stands_at_664[offsetof(State, spiral_start) == 664 ? 1 : -1];
-typedef char State_spiral_end_stands_at_672[offsetof(State, spiral_end) == 672 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_680[offsetof(State, spiral_unit_mm) == 680 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_688[offsetof(State, cutter_mode) == 688 ? 1 : -1];
-typedef char State_cutter_side_stands_at_692[offsetof(State, cutter_side) == 692 ? 1 : -1];
-typedef char State_cutter_code_stands_at_696[offsetof(State, cutter_code) == 696 ? 1 : -1];
-typedef char State_cutter_line_stands_at_700[offsetof(State, cutter_line) == 700 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_704[offsetof(State, cutter_radius_mm) == 704 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_712[offsetof(State, cutter_entered) == 712 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_713[offsetof(State, cutter_failed) == 713 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_720[offsetof(State, cutter_normal) == 720 ? 1 : -1];
-typedef char State_held_turn_stands_at_736[offsetof(State, held_turn) == 736 ? 1 : -1];
-typedef char State_held_line_stands_at_740[offsetof(State, held_line) == 740 ? 1 : -1];
-typedef char State_held_from_stands_at_744[offsetof(State, held_from) == 744 ? 1 : -1];
-typedef char State_held_along_stands_at_760[offsetof(State, held_along) == 760 ? 1 : -1];
-typedef char State_held_centre_stands_at_776[offsetof(State, held_centre) == 776 ? 1 : -1];
-typedef char State_held_w_stands_at_792[offsetof(State, held_w) == 792 ? 1 : -1];
-typedef char State_held_sweep_stands_at_808[offsetof(State, held_sweep) == 808 ? 1 : -1];
-typedef char State_held_rows_stands_at_816[offsetof(State, held_rows) == 816 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_832[offsetof(State, cutter_rows_removed) == 832 ? 1 : -1];
-typedef char State_held_events_stands_at_840[offsetof(State, held_events) == 840 ? 1 : -1];
-typedef char State_retract_stands_at_848[offsetof(State, retract) == 848 ? 1 : -1];
-typedef char State_retract_line_stands_at_852[offsetof(State, retract_line) == 852 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_856[offsetof(State, unset_parameter) == 856 ? 1 : -1];
-typedef char State_unset_line_stands_at_860[offsetof(State, unset_line) == 860 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_864[offsetof(State, retract_unnamed_line) == 864 ? 1 : -1];
-typedef char State_in_cycles_stands_at_868[offsetof(State, in_cycles) == 868 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_872[offsetof(State, cycle_level_mm) == 872 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_880[offsetof(State, cycle_level_known) == 880 ? 1 : -1];
-typedef char State_cycle_r_stands_at_888[offsetof(State, cycle_r) == 888 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_896[offsetof(State, cycle_depth) == 896 ? 1 : -1];
-typedef char State_cycle_q_stands_at_904[offsetof(State, cycle_q) == 904 ? 1 : -1];
-typedef char State_cycle_p_stands_at_912[offsetof(State, cycle_p) == 912 ? 1 : -1];
-typedef char State_cycle_line_stands_at_920[offsetof(State, cycle_line) == 920 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_924[offsetof(State, cycle_plane) == 924 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_928[offsetof(State, cycle_unit_mm) == 928 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_936[offsetof(State, cycle_absolute) == 936 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 944 ? 1 : -1];
+typedef char State_note_line_stands_at_520[offsetof(State, note_line) == 520 ? 1 : -1];
+typedef char State_note_word_stands_at_556[offsetof(State, note_word) == 556 ? 1 : -1];
+typedef char State_moved_mm_stands_at_592[offsetof(State, moved_mm) == 592 ? 1 : -1];
+typedef char State_misfits_stands_at_664[offsetof(State, misfits) == 664 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_668[offsetof(State, misfits_other_centre) == 668 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_672[offsetof(State, misfits_reversed) == 672 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_676[offsetof(State, misfits_exchanged) == 676 ? 1 : -1];
+typedef char State_spirals_stands_at_680[offsetof(State, spirals) == 680 ? 1 : -1];
+typedef char State_spiral_line_stands_at_684[offsetof(State, spiral_line) == 684 ? 1 : -1];
+typedef char State_spiral_start_stands_at_688[offsetof(State, spiral_start) == 688 ? 1 : -1];
+typedef char State_spiral_end_stands_at_696[offsetof(State, spiral_end) == 696 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_704[offsetof(State, spiral_unit_mm) == 704 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_712[offsetof(State, cutter_mode) == 712 ? 1 : -1];
+typedef char State_cutter_side_stands_at_716[offsetof(State, cutter_side) == 716 ? 1 : -1];
+typedef char State_cutter_code_stands_at_720[offsetof(State, cutter_code) == 720 ? 1 : -1];
+typedef char State_cutter_line_stands_at_724[offsetof(State, cutter_line) == 724 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_728[offsetof(State, cutter_radius_mm) == 728 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_736[offsetof(State, cutter_entered) == 736 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_737[offsetof(State, cutter_failed) == 737 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_744[offsetof(State, cutter_normal) == 744 ? 1 : -1];
+typedef char State_held_turn_stands_at_760[offsetof(State, held_turn) == 760 ? 1 : -1];
+typedef char State_held_line_stands_at_764[offsetof(State, held_line) == 764 ? 1 : -1];
+typedef char State_held_from_stands_at_768[offsetof(State, held_from) == 768 ? 1 : -1];
+typedef char State_held_along_stands_at_784[offsetof(State, held_along) == 784 ? 1 : -1];
+typedef char State_held_centre_stands_at_800[offsetof(State, held_centre) == 800 ? 1 : -1];
+typedef char State_held_w_stands_at_816[offsetof(State, held_w) == 816 ? 1 : -1];
+typedef char State_held_sweep_stands_at_832[offsetof(State, held_sweep) == 832 ? 1 : -1];
+typedef char State_held_rows_stands_at_840[offsetof(State, held_rows) == 840 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_856[offsetof(State, cutter_rows_removed) == 856 ? 1 : -1];
+typedef char State_held_events_stands_at_864[offsetof(State, held_events) == 864 ? 1 : -1];
+typedef char State_retract_stands_at_872[offsetof(State, retract) == 872 ? 1 : -1];
+typedef char State_retract_line_stands_at_876[offsetof(State, retract_line) == 876 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_880[offsetof(State, unset_parameter) == 880 ? 1 : -1];
+typedef char State_unset_line_stands_at_884[offsetof(State, unset_line) == 884 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_888[offsetof(State, retract_unnamed_line) == 888 ? 1 : -1];
+typedef char State_in_cycles_stands_at_892[offsetof(State, in_cycles) == 892 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_896[offsetof(State, cycle_level_mm) == 896 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_904[offsetof(State, cycle_level_known) == 904 ? 1 : -1];
+typedef char State_cycle_r_stands_at_912[offsetof(State, cycle_r) == 912 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_920[offsetof(State, cycle_depth) == 920 ? 1 : -1];
+typedef char State_cycle_q_stands_at_928[offsetof(State, cycle_q) == 928 ? 1 : -1];
+typedef char State_cycle_p_stands_at_936[offsetof(State, cycle_p) == 936 ? 1 : -1];
+typedef char State_cycle_line_stands_at_944[offsetof(State, cycle_line) == 944 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_948[offsetof(State, cycle_plane) == 948 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_952[offsetof(State, cycle_unit_mm) == 952 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_960[offsetof(State, cycle_absolute) == 960 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 968 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1106,6 +1166,9 @@ VIEW(CourseView, Course);
 
 typedef struct {
     Bytes text;
+    Bytes statement_names;
+    Ints32 statement_kinds;
+    int64_t syntax;
     Bytes letter;
     Floats value;
     Ints32 line;
@@ -1152,6 +1215,15 @@ typedef struct {
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
+    int64_t runs_programs;
+    Ints32 core_g;
+    Floats dwell_by_letter;
+    int64_t points;
+    int64_t length_by_d;
+    double cycle_dwell_s;
+    int64_t repeats_by_k;
+    int64_t end_m;
+    int64_t whole_dwell_letter;
     Ints32 group_of_g;
     Ints32 doubt_of_g;
     Ints32 doubt_of_group;

@@ -27,6 +27,8 @@ MODULES = {
     "W": "gcode2krl.krl_words",
     "U": "gcode2krl.units",
     "V": "gcode2krl.gcode.vocabulary",
+    "D": "gcode2krl.gcode.dialect_marks",
+    "DR": "gcode2krl.gcode.dialects",
     "F": "gcode2krl.gcode.findings",
     "FC": "gcode2krl.gcode.cycle_findings",
     "FP": "gcode2krl.gcode.polar_findings",

@@ -107,7 +107,7 @@ def test_every_room_is_in_the_table():
 def test_what_does_not_exist_is_found():
     assert place_of("gcode/reader.py") is None
     assert place_of("gcode/read.py") == PACKAGE / "gcode" / "read.py"
-    assert {"read_gcode", "_Interpreter.feed", "_PIECE_BYTES"} <= names_in(PACKAGE / "gcode" / "read.py")
+    assert {"read_gcode", "_Interpreter.feed", "_MOST_ISSUES"} <= names_in(PACKAGE / "gcode" / "read.py")
     assert "move" in names_in(ROOT / "native" / "gcode" / "motion.c")
     assert "moves" not in names_in(ROOT / "native" / "gcode" / "motion.c")
     assert resolved("gcode2krl.gap.diagnosis.diagnose")

@@ -32,6 +32,8 @@ NOT_CODES = {
     "steps-post",
     "system-out",
     "stiffness-map",
+    "fanuc-calculator",
+    "fanuc-increments",
     "utf-8",
     "utf-8-sig",
     # reasons of the online session's states, which its log explains

@@ -11,6 +11,7 @@ from gcode2krl.batch.parts import find_parts
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.compiled.threads import usable_cores
 from gcode2krl.errors import Gcode2KrlError, Issue, NotUnderstoodError
+from gcode2krl.files.program_names import likely_text_bytes
 from gcode2krl.pipeline import predict
 from gcode2krl.prediction import Prediction
 
@@ -103,6 +104,6 @@ def died(failure: str, source: str) -> NotUnderstoodError:
 
 def _size_bytes(file: Path) -> int:
     try:
-        return file.stat().st_size
+        return likely_text_bytes(file)
     except OSError:  # reading it reports it
         return 0

@@ -7,10 +7,9 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from gcode2krl.errors import Gcode2KrlError, Issue, NotUnderstoodError, input_error
+from gcode2krl.files.program_names import ENDINGS, PACKED_ENDING, is_program_file
 from gcode2krl.files.toml_guard import NotTomlError, read_bounded_toml
 
-ENDINGS = frozenset([".nc", ".ngc", ".ncc", ".cnc", ".tap", ".gcode", ".gc", ".mpf", ".eia"])
-"""Files of a folder that are G-code; any other file has to be named."""
 _SIGN_OF_LIST = "@"
 _FORMAT = "see docs/batch.md for the format"
 _KEYS = ("path", "cell", "job")
@@ -35,7 +34,7 @@ class Part:
 def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None = None) -> list[Part]:
     """Return the parts that words name, sorted by their keys.
 
-    A word is a folder (all files in it with one of `ENDINGS`, however deep), a pattern such as
+    A word is a folder (all files in it with an ending of programs, however deep), a pattern such as
     ``a/**/*.nc``, a file, ``@parts.txt`` with a word a line, or a TOML file with a cell for each folder.
     ``cell`` and ``job`` serve those that have none of their own. Raises `NotUnderstoodError` where a word
     names nothing, or two parts have one key.
@@ -75,11 +74,16 @@ def _of_word(word: str, beside: Path, cell: Path | None, job: Path | None, sever
 
 
 def _of_folder(folder: Path, cell: Path | None, job: Path | None, several: bool) -> Iterator[Part]:
-    files = [file for file in folder.rglob("*") if file.suffix.lower() in ENDINGS and file.is_file()]
+    files = [file for file in folder.rglob("*") if is_program_file(file.name) and file.is_file()]
     if not files:
         sentence = "no G-code in this folder"
         endings = " ".join(sorted(ENDINGS))
-        raise input_error("file-unreadable", sentence, f"files end in {endings}", source=str(folder))
+        raise input_error(
+            "file-unreadable",
+            sentence,
+            f"files end in {endings}, or in these with {PACKED_ENDING}",
+            source=str(folder),
+        )
     name = folder.resolve().name
     for file in files:
         below = file.relative_to(folder).as_posix()

@@ -1,17 +1,18 @@
 """Where the program of each part goes, and which names a controller would not tell apart."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from gcode2krl.batch.parts import Part
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.files.program_names import program_stem
 from gcode2krl.krl import suggested_name
 from gcode2krl.krl.names import name_problem
 
 
 def program_name(part: Part, taken: Sequence[str]) -> str:
     """Return the name of a part's program: the file's, or one made from it that a controller takes."""
-    stem = PurePosixPath(part.key).stem
+    stem = program_stem(part.key)
     return suggested_name(stem, taken) if name_problem(stem, taken) else stem
 
 

@@ -12,6 +12,7 @@ from gcode2krl.batch.places import alike, program_name, refuse_collisions
 from gcode2krl.batch.work import Task
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.files.program_names import likely_text_bytes
 from gcode2krl.result import cell_of, sha256_of
 from gcode2krl.translation import Order
 from gcode2krl.translation.inputs import cell_files, files_of_job, read_cell_under_job
@@ -78,7 +79,7 @@ def _read_cell(part: Part) -> _Cell:
 def _planned(part: Part, cell: _Cell, order: Order, page: str) -> Planned:
     own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
     try:
-        size_bytes, sha256 = part.file.stat().st_size, sha256_of(part.file)
+        size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
     key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 else ""

@@ -8,6 +8,7 @@ import click
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.record_head import heading
 from gcode2krl.compiled.threads import THREADS_VARIABLE
+from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.translation import inputs as reading
 from gcode2krl.translation.inputs import (
     STANDARD,
@@ -78,9 +79,21 @@ def common_options(function: Any) -> Any:
     return function
 
 
+def dialect_option(function: Any) -> Any:
+    """Add the option that names the dialect of the G-code."""
+    return click.option(
+        "--dialect",
+        type=click.Choice(DIALECT_NAMES),
+        default=DIALECT_NAMES[0],
+        show_default=True,
+        help="What the post wrote the G-code for.",
+    )(function)
+
+
 def gcode_options(function: Any) -> Any:
     """Add the options that say how G-code is read."""
     for option in (
+        dialect_option,
         click.option("--block-delete", is_flag=True, help="Skip lines that begin with /."),
         click.option(
             "--chord-tolerance",
@@ -146,12 +159,13 @@ def read_part(
     console: Console,
     chord_tolerance_mm: float,
     block_delete: bool,
+    dialect: str = DIALECT_NAMES[0],
 ) -> "Toolpath":
     """Read the G-code of a command with a bar on the terminal, see `translation.inputs.read_part`."""
     standard = StandardInput() if part == STANDARD else None
     console.heading.reads(part)
     with console.stages() as begin:
-        toolpath = reading.read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard)
+        toolpath = reading.read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect)
     if standard is not None:
         console.heading.inputs[part] = standard.as_input()
     return toolpath

@@ -74,6 +74,7 @@ def simulate_command(
     verbose: bool,
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
+    dialect: str,
     block_delete: bool,
     plot: str | None,
     **options: Any,
@@ -89,7 +90,9 @@ def simulate_command(
     cell = read_cell(cell_path)
     settings = _changed(cell.online, options)
     world_values = _world_values(options)
-    prediction = _predicted(part, cell, settings, console, tolerance_mm, chord_tolerance_mm, block_delete)
+    prediction = _predicted(
+        part, cell, settings, console, tolerance_mm, chord_tolerance_mm, block_delete, dialect
+    )
     from gcode2krl.online.judge import judged as judge
     from gcode2krl.online.outcome import as_json as outcome_json
     from gcode2krl.online.outcome import findings, simulate_all
@@ -211,6 +214,7 @@ def _predicted(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     block_delete: bool,
+    dialect: str,
 ) -> "Prediction":
     """Predict a part at the cycle of the settings; a prediction's folder is loaded unchanged."""
     from gcode2krl.prediction import Prediction
@@ -226,7 +230,7 @@ def _predicted(
     from gcode2krl.pipeline import predict_toolpath
 
     try:
-        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect)
         with console.stages() as begin:
             return predict_toolpath(
                 toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance_mm, begin=begin

@@ -76,6 +76,7 @@ def command(
     verbose: bool,
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
+    dialect: str,
     block_delete: bool,
     simplify_mm: float | None,
     job_path: str | None,
@@ -106,12 +107,16 @@ def command(
         )
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
-        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.stages() as begin:
-            settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete}
+            settings = {
+                "chord_tolerance_mm": chord_tolerance_mm,
+                "block_delete": block_delete,
+                "dialect": dialect,
+            }
             prediction = predict_toolpath(
                 toolpath,
                 cell,

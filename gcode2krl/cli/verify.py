@@ -37,6 +37,7 @@ def command(
     verbose: bool,
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
+    dialect: str,
     block_delete: bool,
     simplify_mm: float | None,
     compensate: Literal["offline"] | None,
@@ -57,7 +58,7 @@ def command(
         cell = read_cell(cell_path)
         with console.stages() as begin:
             toolpath = read_from_line(
-                part, cell, chord_tolerance_mm, block_delete, tolerance_mm, from_line, begin
+                part, cell, chord_tolerance_mm, block_delete, tolerance_mm, from_line, begin, dialect=dialect
             )
         prediction = None
         if compensate == "offline":

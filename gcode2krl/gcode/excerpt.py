@@ -19,6 +19,7 @@ _OF_LETTER_A = {
     f.ROTARY_WORD,
     f.BAD_INTEGER,
     f.ARC_WRONG_OFFSET,
+    f.COUNTED_FROM_UNKNOWN,
     of_offsets.TOOL_ACROSS,
 }
 _FIXED = {
@@ -57,6 +58,7 @@ _FIXED = {
     f.CUTTER_DIFFERS: r"D|G\s*4[12]",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
+    f.DIALECT_STATEMENT: r"\$|[A-Z_]{2,}|[@^]|[A-Z]\d*\s*=|#|\[|M\s*0*(?:9[89]|7[0-3])(?!\d)|G\s*0*4(?!\d)",
     of_offsets.WITHOUT_L: r"G\s*10",
     of_offsets.UNKNOWN_L: "L",
     of_offsets.WRONG_SYSTEM: r"P|G\s*10",
@@ -131,7 +133,9 @@ def _pattern(number: int, a: float, b: float) -> str:
         return _word("G", a)
     if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
-    if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):
+    if number == f.NO_POINT:
+        return letter + r"\s*[-+]?\d+(?![\d.])"
+    if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES, f.DIALECT_CODE):
         return _word("G", b)
     if number in (f.UNSUPPORTED_M, f.SAME_GROUP_M):
         return _word("M", a if number == f.UNSUPPORTED_M else b)

@@ -16,6 +16,7 @@ from gcode2krl.gcode import cycle_findings as of_cycles
 from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import polar_findings as of_polar
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.gcode.never_read import NEVER_READ
 from gcode2krl.gcode.program_faults import (
     EXPRESSION_FAULTS,
@@ -89,6 +90,10 @@ class Finding(NamedTuple):
     BAD_LINE_NUMBER,
     UNKNOWN_START,
     ARC_TOO_LONG,
+    DIALECT_CODE,
+    DIALECT_STATEMENT,
+    NO_POINT,
+    COUNTED_FROM_UNKNOWN,
     EXPRESSION_VALUE,
     PARAMETER_UNDEFINED,
     PARAMETER_NUMBER,
@@ -121,7 +126,7 @@ class Finding(NamedTuple):
     CUTTER_ROTATED,
     CUTTER_TURNED,
     CUTTER_PARAMETER,
-) = range(84)
+) = range(88)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -363,6 +368,21 @@ FINDINGS: dict[int, Finding] = {
         "feed move from a position that has not been programmed{state}; arcs after it cannot fit",
         "program X, Y and Z with G0 (and G90) first",
     ),
+    DIALECT_CODE: Finding("error", "dialect-code", "G{h}: {reason}", "{remedy}"),
+    DIALECT_STATEMENT: Finding("error", "dialect-statement", "this statement: {reason}", "{remedy}"),
+    NO_POINT: Finding(
+        "error",
+        "decimal-point",
+        "{word}{b:g} has no decimal point: on a Fanuc it is {b:g} or a thousandth of it, by a parameter",
+        "write {word}{b:g}. in the post, or say --dialect fanuc-calculator ({b:g}) or fanuc-increments "
+        "(1/1000)",
+    ),
+    COUNTED_FROM_UNKNOWN: Finding(
+        "error",
+        "undefined-position",
+        "{word} counts from a position that has not been programmed",
+        "program {word} with G0 and G90 first",
+    ),
     CUTTER_ON: Finding(
         "error",
         "cutter-on",
@@ -585,6 +605,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     if number in (UNSUPPORTED_G, UNSUPPORTED_M):
         reasons = UNSUPPORTED_G_REASONS if number == UNSUPPORTED_G else UNSUPPORTED_M_REASONS
         reason, remedy = _nearest_below(reasons, int(a))
+    if number in (DIALECT_CODE, DIALECT_STATEMENT):
+        reason, remedy = REASONS[int(a)]
     character = int(a) if number == BAD_CHARACTER else 0
     values = {
         "a": a,

@@ -1,5 +1,6 @@
 """What the interpreter found, as Issues: causes first, equal arcs together, consequences counted."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -13,9 +14,17 @@ from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import quote
 from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.slips import slip
-from gcode2krl.gcode.state import NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_ROTARY
+from gcode2krl.gcode.state import (
+    NOTE_CENTRE,
+    NOTE_CODE,
+    NOTE_HOME,
+    NOTE_OVERRIDE,
+    NOTE_ROTARY,
+    NOTE_STATEMENT,
+)
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
+_STATEMENT = re.compile(r"\$\S*|[A-Z_]{3,}\w*")
 Record = Any
 """A numpy record; numpy does not type its fields."""
 
@@ -41,6 +50,16 @@ _NOTES = {
         "override-switch",
         "M{number} switches overrides, which have no meaning on this robot; not read ({blocks})",
         "nothing to do; the override stands on the robot's panel",
+    ),
+    NOTE_CODE: (
+        "dialect-harmless",
+        "G{tenth:g}, and the like, set something that this robot does not have; not read ({blocks})",
+        "nothing to do",
+    ),
+    NOTE_STATEMENT: (
+        "dialect-harmless",
+        "{statement}, and the like, set something that this robot does not have; not read ({blocks})",
+        "nothing to do",
     ),
 }
 
@@ -163,7 +182,15 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         count, line, word = (int(state[name][which]) for name in ("note_count", "note_line", "note_word"))
         if not count:
             continue
-        values = {"word": chr(word) if word < FIRST_FOREIGN else "", "home": word // TENFOLD, "number": word}
+        first = texts.get(line, b"").decode("latin-1")
+        statement = next(iter(_STATEMENT.findall(first)[:1]), "a statement")
+        values = {
+            "tenth": word / TENFOLD,
+            "statement": statement,
+            "word": chr(word) if word < FIRST_FOREIGN else "",
+            "home": word // TENFOLD,
+            "number": word,
+        }
         blocks = "in one block" if count == 1 else f"in {count} blocks"
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
 

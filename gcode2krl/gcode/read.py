@@ -18,7 +18,9 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
+from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
+from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
 from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
@@ -36,8 +38,8 @@ from gcode2krl.gcode.state import (
     WORK_OFFSETS,
     initial_state,
 )
+from gcode2krl.gcode.text import pieces
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
-from gcode2krl.gcode.vocabulary import LINE_LIMIT
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
@@ -45,7 +47,6 @@ if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
 
 CHORD_TOLERANCE_MM = 0.01
-_PIECE_BYTES = 1_000_000
 _ROOM = 1.25
 """Room for rows is made for the estimated lines of the file, from its first piece, times this."""
 _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
@@ -53,7 +54,6 @@ _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 Progress = Callable[[int], None]
 
@@ -62,7 +62,7 @@ def read_gcode(
     path: str | Path,
     cell: "Cell | None" = None,
     *,
-    dialect: str = "linuxcnc",
+    dialect: str = DEFAULT,
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
@@ -75,7 +75,7 @@ def read_gcode(
     ----------
     path : the file, UTF-8 or Latin-1, any line ends.
     cell : gives tool lengths and work offsets; without it (and without ``tools``) every length is 0.
-    dialect : only ``linuxcnc`` so far.
+    dialect : ``linuxcnc``, ``fanuc``, ``fanuc-calculator``, ``fanuc-increments``, ``grbl`` or ``sinumerik``.
     tools : a LinuxCNC ``tool.tbl`` in mm, used instead of the cell's tools.
     chord_tolerance_mm : largest distance between an arc and the chords that replace it.
     block_delete : skip lines that begin with ``/``.
@@ -102,23 +102,29 @@ def read_gcode(
     (14, 20.0)
     """
     name = str(path)
+
+    def read(as_dialect: str, hear: Progress | None) -> Toolpath:
+        try:
+            with Path(path).open("rb") as stream:
+                return read_stream(
+                    stream,
+                    name,
+                    cell,
+                    dialect=as_dialect,
+                    tools=tools,
+                    chord_tolerance_mm=chord_tolerance_mm,
+                    block_delete=block_delete,
+                    folders=(Path(path).parent, *map(Path, search)),
+                    progress=hear,
+                )
+        except OSError as error:
+            what = f"cannot read: {error.strerror}"
+            raise input_error("file-unreadable", what, "check the path", source=name) from None
+
     try:
-        with Path(path).open("rb") as stream:
-            return read_stream(
-                stream,
-                name,
-                cell,
-                dialect=dialect,
-                tools=tools,
-                chord_tolerance_mm=chord_tolerance_mm,
-                block_delete=block_delete,
-                folders=(Path(path).parent, *map(Path, search)),
-                progress=progress,
-            )
-    except OSError as error:
-        raise input_error(
-            "file-unreadable", f"cannot read: {error.strerror}", "check the path", source=name
-        ) from None
+        return read(dialect, progress)
+    except NotUnderstoodError as error:
+        raise with_other_dialects(error, dialect, lambda other: read(other, None)) from None
 
 
 def read_stream(
@@ -126,7 +132,7 @@ def read_stream(
     name: str,
     cell: "Cell | None" = None,
     *,
-    dialect: str = "linuxcnc",
+    dialect: str = DEFAULT,
     tools: str | Path | None = None,
     chord_tolerance_mm: float = CHORD_TOLERANCE_MM,
     block_delete: bool = False,
@@ -137,8 +143,14 @@ def read_stream(
 
     ``folders`` are all in which a file of a subprogram may be.
     """
-    if dialect != "linuxcnc":
-        raise input_error("dialect-unknown", f"dialect {dialect!r}; allowed: linuxcnc", source=name)
+    spoken = dialect_of(dialect, name)
+    if cell is not None and cell.machine is not None and not spoken.turns_axes:
+        raise input_error(
+            "option-value",
+            f"the cell declares rotary axes in [machine], which are not read in dialect {dialect}",
+            "let the post write for LinuxCNC with G43.4, or use a cell without [machine] for three axes",
+            source=name,
+        )
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -146,10 +158,11 @@ def read_stream(
     of_cell = tool_table.tools_from_cell(cell)
     stated = tool_table.tools_from_table(tools) if tools is not None else of_cell
     offsets, offset_known = _work_offsets(cell)
-    from_table = cell is not None and cell.program.tool_length == "from_table"
+    from_table = spoken.length_by_d or (cell is not None and cell.program.tool_length == "from_table")
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
     interpreter = _Interpreter(
         name,
+        spoken,
         offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=stated.length_mm,
@@ -163,10 +176,12 @@ def read_stream(
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    scanned = _scanned(_pieces(stream, name))
+    scanned = _scanned(pieces(stream, name), spoken)
     for first_line, text, words in scanned:
         if not interpreter.ended:
-            head = head or text[:4000]
+            if not head:
+                head = text[:4000]
+                refuse_other_languages(head, name)
             stopped_at = interpreter.feed(words, text, first_line, size)
             if stopped_at is not None:
                 rest = text[_start_of_line(text, stopped_at - first_line) :]
@@ -195,13 +210,14 @@ def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
 
 
 def _scanned(
-    pieces: Iterator[tuple[int, bytes]],
+    whole_lines: Iterator[tuple[int, bytes]],
+    spoken: Dialect,
 ) -> Iterator[tuple[int, bytes, Words]]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
-    scanners = cycle((Scanner(), Scanner()))  # one's words are read while the other writes
+    scanners = cycle((Scanner(spoken), Scanner(spoken)))  # one's words are read while the other writes
 
     def scan_next() -> tuple[int, bytes, Words] | None:
-        piece = next(pieces, None)
+        piece = next(whole_lines, None)
         return None if piece is None else (*piece, next(scanners).scan(piece[1], piece[0]))
 
     with ThreadPoolExecutor(1) as pool:
@@ -247,78 +263,14 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
     return offsets, known
 
 
-def _pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
-    """Yield (first line, whole lines) with bounded memory, whatever the file holds."""
-    line, rest, first = 1, b"", True
-    while True:
-        block = stream.read(_PIECE_BYTES)
-        if first:
-            first = False
-            block = block.removeprefix(_BYTE_ORDER_MARK)
-            if len(block) < _PIECE_BYTES and not block.strip():
-                raise input_error("empty", "the file is empty", "export the program again", source=name)
-            _reject_binary(block, name)
-            _reject_lone_returns(block, name)
-        at_end = not block
-        text = rest + (block if not at_end or not rest else b"\n")
-        end = text.rfind(b"\n") + 1
-        if len(text) - end > LINE_LIMIT:
-            place = line + text.count(b"\n")
-            raise input_error(
-                "line-too-long",
-                f"the line is longer than {LINE_LIMIT} characters",
-                "is this a G-code file?",
-                line=place,
-                source=name,
-            )
-        if end:
-            whole = text[:end]
-            yield line, whole
-            line += _line_count(whole)
-        rest = text[end:]
-        if not block:
-            return
-
-
-def _line_count(text: bytes) -> int:
-    """Return the number of line ends; for lines as short as these `bytes.count` takes five times as long."""
-    return int(np.count_nonzero(np.frombuffer(text, np.uint8) == NEWLINE))
-
-
-def _reject_binary(block: bytes, name: str) -> None:
-    place = block[:65536].find(b"\x00")
-    if place >= 0 and block[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        what = "this file is text in UTF-16, two bytes a character"
-        raise input_error("binary-file", what, "save it as UTF-8 or ASCII", line=1, source=name)
-    if place >= 0:
-        remedy = (
-            "unpack or export the program as text"
-            if block[:2] == b"\x1f\x8b"
-            else "export the program as text"
-        )
-        line = 1 + block.count(b"\n", 0, place)
-        what = f"this is not a text file: byte {place + 1} is NUL"
-        raise input_error("binary-file", what, remedy, line=line, source=name)
-
-
-def _reject_lone_returns(block: bytes, name: str) -> None:
-    """Refuse line ends of one CR: the whole program would be one block."""
-    if b"\n" not in block and block.rstrip().count(b"\r"):
-        raise input_error(
-            "line-ends",
-            "the lines end in CR alone, so the whole file is one line",
-            "save the program with line ends LF or CRLF",
-            line=1,
-            source=name,
-        )
-
-
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(self, name: str, **settings: Any) -> None:
+    def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
         self.name = name
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
+        for key, value in spoken.start.items():
+            self.state[key] = value
         self.columns = Columns(_FIRST_ROWS, with_rotary=settings["rotary_axes"] != 0)
         self.chord_tolerance_mm = settings["chord_tolerance_mm"]
         self.counts["rows"] = 1  # the start point
@@ -330,6 +282,7 @@ class _Interpreter:
             rows=self.columns.views(),
             events=self.events,
             found=self.found,
+            **spoken.settings(),
             group_of_g=GROUP_OF_G,
             doubt_of_g=DOUBT_OF_G,
             doubt_of_group=DOUBT_OF_GROUP,
@@ -497,4 +450,4 @@ class _Interpreter:
 
 def _decode(span: bytes) -> str:
     text = span.decode("utf-8", errors="replace").strip()
-    return text[3:].lstrip(" ,").strip()
+    return text[3:].lstrip(" ,").removeprefix('("').strip()

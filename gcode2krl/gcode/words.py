@@ -17,6 +17,7 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.compiled.core import (
     BYTES,
     INT,
+    INTS32,
     OUT_BYTES,
     OUT_FLOATS,
     OUT_INTS,
@@ -25,6 +26,7 @@ from gcode2krl.compiled.core import (
     StructOf,
     core_function,
 )
+from gcode2krl.gcode.dialects import DEFAULT, DIALECTS, Dialect
 from gcode2krl.gcode.program_tables import LINE
 from gcode2krl.gcode.vocabulary import PROGRAM_LINE
 
@@ -32,6 +34,9 @@ _MOST_EXTRAS = 1024
 """Marks of a piece that keep what was found: only the first findings are ever shown."""
 SCAN = StructOf(
     text=BYTES,
+    statement_names=BYTES,
+    statement_kinds=INTS32,
+    syntax=INT,
     letter=OUT_BYTES,
     value=OUT_FLOATS,
     line=OUT_INTS32,
@@ -65,7 +70,9 @@ class Words(NamedTuple):
 class Scanner:
     """Scans pieces of text; the words of a piece are overwritten by those of the next."""
 
-    def __init__(self) -> None:
+    def __init__(self, dialect: Dialect = DIALECTS[DEFAULT]) -> None:
+        """Take the dialect of the text."""
+        self._syntax, (self._names, self._kinds) = dialect.syntax_bits(), dialect.names()
         self._lines = np.zeros(0, LINE)
         self._reserve(0)
 
@@ -87,6 +94,9 @@ class Scanner:
         span = np.empty((text.count(b"("), 2), dtype=np.int64)
         done: Any = SCAN(
             text=np.frombuffer(text, np.uint8),
+            statement_names=self._names,
+            statement_kinds=self._kinds,
+            syntax=self._syntax,
             letter=self._letter,
             value=self._value,
             line=self._line,

@@ -15,6 +15,7 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files import Staging, refuse_inputs
+from gcode2krl.files.program_names import program_stem
 from gcode2krl.files.stored import Stored, Texts, store
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout, compose
@@ -342,7 +343,7 @@ def program_file(
     if name is not None:
         _require_name(name, taken)
     if place.is_dir() and place.suffix.lower() != w.SOURCE_SUFFIX:
-        return _file_in(place, name, Path(_last_step(source)).stem, taken)
+        return _file_in(place, name, program_stem(_last_step(source)), taken)
     if place.suffix.lower() != w.SOURCE_SUFFIX:
         sentence = f"the output {place.name!r} does not end in .src and is no folder"
         raise input_error("option-value", sentence, "name it part.src, or create the folder first")

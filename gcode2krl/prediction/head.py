@@ -8,6 +8,7 @@ from typing import Any
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.files import Content
+from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.result import cell_of, record_of, sha256_of
 
 CHORD_MM = 0.01
@@ -42,7 +43,12 @@ def head_of(
 
 def _options(inputs: Mapping[str, Any], cell: Cell) -> dict[str, Any]:
     """Return the settings that differ from their defaults."""
-    defaults = {"dt_s": cell.controller.cycle_s, "chord_tolerance_mm": CHORD_MM, "block_delete": False}
+    defaults = {
+        "dt_s": cell.controller.cycle_s,
+        "chord_tolerance_mm": CHORD_MM,
+        "block_delete": False,
+        "dialect": DIALECT_NAMES[0],
+    }
     return {
         key: value for key, value in inputs.items() if key not in _NOT_OPTIONS and value != defaults.get(key)
     }

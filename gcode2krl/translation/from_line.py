@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gcode2krl.errors import input_error
+from gcode2krl.files.program_names import DIALECT_NAMES, program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.inputs import STANDARD, StandardInput, read_part
 
@@ -30,10 +31,10 @@ def restart_name(
     from gcode2krl.krl_words import LONGEST_NAME
 
     externals, suffix = cell.program.externals, f"_from{from_line}"
-    whole = f"{Path(part).stem}{suffix}"
+    whole = f"{program_stem(part)}{suffix}"
     if not name_problem(whole, externals):
         return whole
-    stem = suggested_name(Path(part).stem, externals)[: LONGEST_NAME - len(suffix)]
+    stem = suggested_name(program_stem(part), externals)[: LONGEST_NAME - len(suffix)]
     return suggested_name(f"{stem}{suffix}", externals)
 
 
@@ -63,9 +64,10 @@ def read_from_line(
     from_line: int | None,
     begin: Begin = unseen,
     standard: StandardInput | None = None,
+    dialect: str = DIALECT_NAMES[0],
 ) -> "Toolpath":
     """Read G-code, from a line on where one is named; see `inputs.read_part`."""
-    toolpath = read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard)
+    toolpath = read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect)
     if from_line is None:
         return toolpath
     from gcode2krl.restart import restarted

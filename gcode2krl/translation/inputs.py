@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
+from gcode2krl.files.program_names import DIALECT_NAMES, PACKED_ENDING
 from gcode2krl.progress import Begin, unseen
 
 if TYPE_CHECKING:
@@ -54,11 +55,13 @@ def read_part(
     block_delete: bool,
     begin: Begin = unseen,
     standard: StandardInput | None = None,
+    dialect: str = DIALECT_NAMES[0],
 ) -> "Toolpath":
     """Read G-code from a file, or from standard input (which may be given, to ask it for its hash)."""
     from gcode2krl.gcode import read_gcode, read_stream
 
-    size = Path(part).stat().st_size if part != STANDARD and Path(part).is_file() else 0
+    whole = part != STANDARD and Path(part).is_file() and not part.lower().endswith(PACKED_ENDING)
+    size = Path(part).stat().st_size if whole else 0
     read, progress = 0, begin("reading")
 
     def advance(amount: int) -> None:
@@ -68,12 +71,18 @@ def read_part(
 
     if part != STANDARD:
         return read_gcode(
-            part, cell, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete, progress=advance
+            part,
+            cell,
+            dialect=dialect,
+            chord_tolerance_mm=chord_tolerance_mm,
+            block_delete=block_delete,
+            progress=advance,
         )
     return read_stream(
         cast(BinaryIO, standard or StandardInput()),
         "stdin",
         cell,
+        dialect=dialect,
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         progress=advance,

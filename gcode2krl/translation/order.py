@@ -4,6 +4,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
+from gcode2krl.files.program_names import DIALECT_NAMES
+
 _NOT_OPTIONS = frozenset({"part", "output", "cell_path"})
 """Fields that a record names elsewhere."""
 
@@ -25,6 +27,7 @@ class Order:
     tolerance_mm: float | None = None
     chord_tolerance_mm: float = 0.01
     block_delete: bool = False
+    dialect: str = DIALECT_NAMES[0]
     allow: tuple[str, ...] = ()
     strict: bool = False
     no_guard: bool = False

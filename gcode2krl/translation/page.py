@@ -1,5 +1,7 @@
 """The page beside a program: written with it, or of a program that was refused."""
 
+import gzip
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from gcode2krl.tables import Toolpath
 
 _LARGEST_TEXT = 400_000_000
+_GZIP = b"\x1f\x8b"
 
 
 def require_report(report: str | Path | None, inputs: list[Path]) -> None:
@@ -102,8 +105,13 @@ def text_of(part: str | None) -> str | None:
     try:
         if Path(part).stat().st_size > _LARGEST_TEXT:
             return None
-        content = Path(part).read_bytes()
-    except OSError:
+        with Path(part).open("rb") as stream:
+            packed = stream.read(len(_GZIP)) == _GZIP
+        with gzip.open(part) if packed else Path(part).open("rb") as stream:
+            content = stream.read(_LARGEST_TEXT + 1)
+    except (OSError, EOFError, zlib.error):
+        return None
+    if len(content) > _LARGEST_TEXT:
         return None
     return None if b"\0" in content else content.decode("utf-8-sig", "replace")
 

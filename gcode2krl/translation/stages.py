@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from gcode2krl.errors import Gcode2KrlError, Issue
+from gcode2krl.files.program_names import DIALECT_NAMES, program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.attempt import Attempt
 from gcode2krl.translation.checks import outputs_of, place_of, refuse_early, refuse_online
@@ -128,6 +129,7 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
         order.from_line,
         begin,
         known.standard,
+        order.dialect,
     )
     known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job))
 
@@ -180,7 +182,7 @@ def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
 
     name = ready.name
     if ready.place is None and name is None and str(order.part) != STANDARD:
-        name = suggested_name(Path(order.part).stem, ready.cell.program.externals)
+        name = suggested_name(program_stem(order.part), ready.cell.program.externals)
     return write_krl(
         _done(known.forecast),
         ready.place,
@@ -232,6 +234,7 @@ def _header_words(order: Order, cell: "Cell") -> str:
         "simplify": order.simplify_mm,
         "chord_tolerance": order.chord_tolerance_mm,
         "block_delete": order.block_delete,
+        "dialect": order.dialect if order.dialect != DIALECT_NAMES[0] else None,
         "job": Path(order.job_path).name if order.job_path is not None else None,
         "spin": cell.frames.spin,
         "compensate": order.compensate,

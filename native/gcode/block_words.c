@@ -2,6 +2,7 @@
 
 #include "gcode/block_words.h"
 
+#include "gcode/dialect_words.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 
@@ -21,8 +22,13 @@ static inline Taken faulty(int32_t doubt) { return (Taken){false, doubt}; }
 
 static Taken take_g(Block *b, double value) {
     const double tenfold = value * V_TENFOLD;
-    const int64_t code = (int64_t)rint(tenfold);
-    const bool outside = code < 0 || code > V_LARGEST_G || fabs(tenfold - (double)code) > CODE_SLACK;
+    const int64_t written = (int64_t)rint(tenfold);
+    bool read = true;
+    const bool no_code = written < 0 || written > D_MOST_CODES || fabs(tenfold - (double)written) > CODE_SLACK;
+    const int32_t code = no_code ? D_CODE_UNKNOWN : core_code(b, written, &read);
+    if (code < D_CODE_UNKNOWN)
+        return read ? UNDERSTOOD : faulty(S_DOUBT_MOTION | S_DOUBT_POSITION);
+    const bool outside = code < 0;
     const int32_t group = outside ? S_UNKNOWN_GROUP : AT(b->machine->group_of_g, code);
     if (group == S_UNKNOWN_GROUP) {
         report(b, F_UNKNOWN_G, (Says){.a = tenfold});
@@ -51,6 +57,15 @@ static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_
 /* Tell whether an M-code jumps: native/gcode/execute.c does that. */
 static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
 
+/* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
+static bool want_program(Block *b) {
+    if (b->machine->runs_programs)
+        b->counts->program_wanted = 1;
+    else
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_PROGRAM});
+    return b->machine->runs_programs != 0;
+}
+
 /* Return what is in doubt after an M-code that is not read. */
 static int32_t doubt_of_m(int64_t code) { return code == V_M61 ? S_DOUBT_TOOL : 0; }
 
@@ -68,8 +83,8 @@ static int m_group(int64_t code) {
 }
 
 static Taken take_m(Block *b, double value) {
-    const int64_t code = (int64_t)rint(value);
-    if (fabs(value - (double)code) > CODE_SLACK || code < 0 || code > V_LARGEST_M) {
+    const int64_t written = (int64_t)rint(value), code = written == b->machine->end_m ? V_M30 : written;
+    if (fabs(value - (double)written) > CODE_SLACK || code < 0 || code > V_LARGEST_M) {
         report(b, F_BAD_M, (Says){.a = value});
         return WITHOUT_DOUBT;
     }
@@ -78,8 +93,7 @@ static Taken take_m(Block *b, double value) {
         return faulty(doubt_of_m(code));
     }
     if (is_of_program(code)) {
-        b->counts->program_wanted = 1;
-        return WITHOUT_DOUBT;
+        return want_program(b) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
     }
     const int group = m_group(code);
     bool good = true;
@@ -119,6 +133,8 @@ static Taken take(Block *b, uint8_t c, double value) {
         return take_m(b, value);
     const int index = index_of_letter(c);
     const bool repeated = b->has[index];
+    if (b->next_word)
+        say_of_word(b, index);
     b->has[index] = true;
     b->word[index] = value;
     if (!repeated)
@@ -200,10 +216,15 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == CH_PAREN_OPEN) {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
         } else if (c == V_PROGRAM_LINE) {
-            b->counts->program_wanted = 1;
+            if (!want_program(b)) {
+                good = false;
+                *doubt |= S_DOUBT_ALL;
+            }
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
+        } else if (c < CH_AT_SIGN) {
+            take_dialect_mark(b, c);
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;
@@ -215,6 +236,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
         good = false;
     }
+    if (good && !to_core_words(b))
+        good = false;
     if (!rotary_is_harmless(b))
         good = false;
     if (!used && good)

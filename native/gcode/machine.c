@@ -267,7 +267,11 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
         doubt &= ~S_DOUBT_MOTION; /* beside a code nobody knows the motion mode is named */
     counts->mute = kind == FAULTY;
     s->doubt |= doubt;
+    const int8_t stops_exactly = s->exact_stop;
+    s->exact_stop |= block.exact_once;
     const bool done = execute(&block);
+    if (block.exact_once && block.g[V_PATH_CONTROL] < 0)
+        s->exact_stop = stops_exactly;
     counts->mute = 0;
     if (!done) { /* an arc or a cycle needs more room than there is: as if the block had not begun */
         const int64_t rows_wanted = counts->rows_wanted, events_wanted = counts->events_wanted;

@@ -2,6 +2,9 @@
 
 #include "gcode/words.h"
 
+#include "gcode/dialect_text.h"
+#include "gcode/scan_columns.h"
+
 /* Instead of a lost letter: the one of the word before in the line has lost its value. */
 enum { LETTER_BEFORE = -1 };
 
@@ -106,21 +109,6 @@ Item other_item(Bytes text, int64_t i, bool first) {
 
 /* --- the columns ---------------------------------------------------------------------------------------- */
 
-static inline void put(Scan *scan, int letter, double value, int64_t line) {
-    AT(scan->letter, scan->words) = (uint8_t)letter;
-    AT(scan->value, scan->words) = value;
-    AT(scan->line, scan->words) = (int32_t)line;
-    scan->words++;
-}
-
-/* Write a mark, and what was found while there is room. */
-static void put_mark(Scan *scan, int finding, double found, int64_t line) {
-    if (scan->marks < scan->extra.rows)
-        AT(scan->extra, scan->marks) = found;
-    put(scan, V_MARK, finding, line);
-    scan->marks++;
-}
-
 /* Return the letter whose value is lost, that of the word before for LETTER_BEFORE; 0 = none. */
 static int lost_letter(const Scan *scan, int lost, int64_t line) {
     if (lost != LETTER_BEFORE)
@@ -185,10 +173,7 @@ static void put_item(Scan *scan, const Item *item, int64_t start, int64_t line, 
         if (lost > 0)
             put(scan, lost + V_UNREAD_NUMBER, 0.0, line);
     } else if (item->kind == CH_PAREN_OPEN) {
-        put(scan, item->kind, (double)scan->messages, line);
-        CELL(scan->message_span, scan->messages, 0) = start + 1;
-        CELL(scan->message_span, scan->messages, 1) = item->end - 1;
-        scan->messages++;
+        put_message(scan, start + 1, item->end - 1, line);
     } else if (item->kind > LINE_NUMBER) {
         put(scan, item->kind, 0.0, line);
     }
@@ -220,6 +205,14 @@ EXPORT void gcode_scan(Scan *scan) {
         if (is_blank(c) || c == CH_END_OF_TAPE) {
             i++;
             continue;
+        }
+        if (scan->syntax != 0) {
+            const int64_t words = scan->words, behind = dialect_item(scan, i, line, first);
+            if (behind > i) {
+                first = first && (scan->words == words || AT(scan->letter, words) == CH_SLASH);
+                i = behind;
+                continue;
+            }
         }
         Item item;
         if (begins_word(c)) {

@@ -21,10 +21,10 @@ _NO_GCODE = {"line-too-long", "undefined-position"}
 _FIVE_AXES = Machine(kind="head-head", axes=("C", "A"), signs=(1, 1), tcpm=True)
 
 
-def _found(text: str, machine: Machine | None = None) -> set[str]:
+def _found(text: str, machine: Machine | None, dialect: str) -> set[str]:
     cell = load_cell().model_copy(update={"machine": machine})
     try:
-        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", cell)
+        toolpath = read_stream(io.BytesIO(f"{text}\nM30\n".encode()), "part.nc", cell, dialect=dialect)
     except Gcode2KrlError as error:
         return {issue.code for issue in error.issues}
     return {issue.code for issue in toolpath.issues}
@@ -39,5 +39,7 @@ def _texts(example: str) -> list[str]:
 @pytest.mark.parametrize("code", sorted({finding.code for finding in FINDINGS.values()} - _NO_GCODE))
 def test_the_example_of_a_code_causes_it(code: str) -> None:
     example = all_codes()[code].example
+    example, _, dialect = example.partition(", with --dialect ")
+    spoken = dialect or "linuxcnc"
     machines = (None, _FIVE_AXES)
-    assert any(code in _found(text, made) for text in _texts(example) for made in machines), example
+    assert any(code in _found(text, made, spoken) for text in _texts(example) for made in machines), example

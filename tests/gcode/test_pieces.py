@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gcode import read, read_stream
+from gcode2krl.gcode import text as text_of_files
 from tests.conftest import EXAMPLES
 
 LONG_ARC = "G21 G17 G90\nS1000 M3\nG0 X0 Y0 Z0\nG1 Z-1 F600\nG2 X0 Y0 I50 J0 P40\nG4 P0.5\nG1 X1\nM5\nM30\n"
@@ -22,7 +23,7 @@ def columns(text, name="part.nc"):
 @pytest.mark.parametrize("text", [*(p.read_bytes() for p in EXAMPLES), LONG_ARC.encode()])
 def test_same_table(monkeypatch, text, piece_bytes, buffer_rows):
     whole = columns(text)
-    monkeypatch.setattr(read, "_PIECE_BYTES", piece_bytes)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", piece_bytes)
     monkeypatch.setattr(read, "_FIRST_ROWS", buffer_rows)
     for name, column in columns(text).items():
         if isinstance(column, np.ndarray):
@@ -50,13 +51,13 @@ def test_a_line_may_have_more_messages_than_there_is_room_for_events():
 
 @pytest.mark.parametrize("piece_bytes", [30, 10**6])
 def test_lines_behind_the_end_are_noticed_in_a_later_piece(monkeypatch, piece_bytes):
-    monkeypatch.setattr(read, "_PIECE_BYTES", piece_bytes)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", piece_bytes)
     text = "G21\nG0 X0 Y0 Z5\nM30\n" + "\n" * 100 + "%\nG0 X1\n"
     (found,) = [i for i in read_stream(io.BytesIO(text.encode()), "part.nc").issues if i.code == "after-end"]
     assert found.line == 105
 
 
 def test_blank_lines_longer_than_a_piece_are_not_an_empty_file(monkeypatch):
-    monkeypatch.setattr(read, "_PIECE_BYTES", 16)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", 16)
     toolpath = read_stream(io.BytesIO(b"\n" * 50 + b"G21 G0 X1 Y2 Z3\nM30\n"), "part.nc")
     assert toolpath.source_line[-1] == 51

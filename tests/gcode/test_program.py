@@ -182,12 +182,13 @@ def test_a_subprogram_is_looked_for_beside_the_program_and_in_named_folders_only
 
 def test_little_room_changes_nothing(monkeypatch):
     from gcode2krl.gcode import read as module
+    from gcode2krl.gcode import text as text_of_files
 
     text = "#1=0\no1 while [#1 LT 50]\n#1=[#1+1] (MSG, a) M3 M7\nG2 X[#1] Y0 I.5\no1 endwhile"
     expected = read(text)
     monkeypatch.setattr(module, "_FIRST_ROWS", 1)
     monkeypatch.setattr(module, "_FIRST_EVENTS", 0)
-    monkeypatch.setattr(module, "_PIECE_BYTES", 20)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", 20)
     found = read(text)
     assert found.position_mm.tolist() == expected.position_mm.tolist()
     assert found.events == expected.events

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import Gcode2KrlError, read_gcode
-from gcode2krl.gcode import read as reading
 from gcode2krl.gcode import read_stream
+from gcode2krl.gcode import text as text_of_files
 
 
 def read(text, cell=None, **options):
@@ -117,7 +117,7 @@ def test_long_files_are_read_in_pieces_with_the_same_result(monkeypatch):
         + "M2\n"
     )
     whole = read(text)
-    monkeypatch.setattr(reading, "_PIECE_BYTES", 5000)
+    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", 5000)
     pieces = read(text)
     np.testing.assert_array_equal(pieces.position_mm, whole.position_mm)
     np.testing.assert_array_equal(pieces.source_line, whole.source_line)

@@ -1,0 +1,301 @@
+"""Dialects as tables of differences from LinuxCNC's RS274/NGC, which the core speaks.
+
+A dialect is no interpreter of its own. Its G numbers are replaced by those of the core, its statements become
+words (``CR=5`` is R5), its words the core's (G4 X2. is a dwell of 2 s); what the core has no meaning for is
+refused with a reason, and what says nothing to a robot is noted once. The tables say what is commonly
+documented of Fanuc milling, Grbl 1.1 and Sinumerik 840D sl / 828D; none has been checked on a control. Where
+what a control does depends on its parameters, or is in doubt, the block is refused.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.arrays import Floats, Ints32
+from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.files.program_names import DIALECT_NAMES
+from gcode2krl.gcode import dialect_marks as d
+from gcode2krl.gcode import vocabulary as v
+
+_CAM = "let the CAM post write G0, G1, G2 and G3 in the part's frame"
+REASONS: Final = (
+    ("tilted working plane", f"{_CAM}: output without 3+2 cycles"),
+    ("rotated coordinates", _CAM),
+    ("scaling or mirroring", _CAM),
+    ("polar coordinates", _CAM),
+    ("fine boring and back boring move the tool sideways in the hole", "mill the hole, or bore with G85"),
+    ("probing or a skip signal is not a motion this program can make", "probe on the controller"),
+    ("threading needs a spindle geared to the motion", "mill the thread"),
+    ("the further work offsets are not in the cell", "use G54 to G59"),
+    ("a cycle of the control", "let the post write the cycle out in G0 and G1"),
+    ("jumps, loops and subprograms of this control are not read", "let the post write the program out"),
+    ("variables and calculations of this control are not read", "let the post write plain numbers"),
+    ("tool vectors and orientations are not read in this dialect", "export for three axes"),
+    ("moves the machine by hand", "remove the line"),
+    ("a setting of the machine", "remove the line; the robot's settings are in the cell"),
+    ("the arc by its opening angle", "let the post write I and J, or CR="),
+    ("smooth approach and retract", "let the post write them as G1, G2 and G3"),
+    ("splines are not read", "let the post write G1, G2 and G3"),
+    ("a tool by its name", "let the post write the tool's number, as in [tool.N] of the cell"),
+    ("return from the reference point", "write G0 to the point"),
+    ("a point of the machine", "remove the line: the robot goes to HOME by itself"),
+    (
+        "an offset of the zero in the program",
+        "let the post write final coordinates, or state the zero in [work_offsets] of the cell",
+    ),
+    ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
+    ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
+    (
+        "variables, jumps and subprograms are read in the dialect linuxcnc alone",
+        "let the post write the program out in plain numbers",
+    ),
+    (
+        "it sets offsets by this control's own numbers",
+        "remove the block; state them in [work_offsets] and [tool.N] of the cell",
+    ),
+    ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
+    ("how this control leads in and out is not known", "let the post write the path of the tool's centre"),
+    (
+        "the spindle stands still, so its turns take no time",
+        "start the spindle, or write G4 F in seconds",
+    ),
+    ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
+    ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
+)
+"""What is refused in a dialect: reason and remedy, by their number."""
+_TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
+_VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
+_HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
+REASON_POLAR = _POLAR
+REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED = range(23, 30)
+REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
+REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What a dialect has beside, and other than, LinuxCNC's."""
+
+    name: str
+    title: str
+    syntax: int = 0
+    """Bits of `dialect_marks`: what of its text is no word."""
+    runs_programs: bool = False
+    """What is LinuxCNC's own is read: parameters, expressions, O-words, M98, M99, polar words @ and ^."""
+    turns_axes: bool = True
+    """Rotary words of a cell with rotary axes are read."""
+    own: tuple[float, ...] = ()
+    """The only G numbers that are those of the core; empty: all that it does not read otherwise."""
+    same: Mapping[int, int] = field(default_factory=dict)
+    """G numbers that are others of the core: 710 is 21."""
+    exact: tuple[float, ...] = ()
+    """G numbers of an exact stop in their block alone."""
+    harmless: tuple[float, ...] = ()
+    """G numbers that say nothing to this robot."""
+    refused: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    """Number of the reason: G numbers that are refused for it."""
+    dwell_s: Mapping[str, float] = field(default_factory=lambda: {"P": 1.0})
+    """Letters of a dwell in G4: seconds of one unit."""
+    dwell_turns: str = ""
+    """Letter of a dwell in turns of the spindle."""
+    points: int = d.AS_WRITTEN
+    statements: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    """Kind of `dialect_marks`, with its value: names."""
+    end_m: int = -1
+    """M number that ends the program beside M2 and M30."""
+    repeats_by_k: bool = False
+    """K of a drilling cycle is the number of holes, as L is in LinuxCNC."""
+    length_by_d: bool = False
+    """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
+    start: Mapping[str, float] = field(default_factory=dict)
+    """State at the start, where it is stated by the control."""
+
+    def syntax_bits(self) -> int:
+        """Return the bits of what of its text is no plain word."""
+        return self.syntax | (0 if self.points == d.AS_WRITTEN else d.POINTS)
+
+    def core_g(self) -> Ints32:
+        """Return the core's G number by that of the dialect, both ten times, (10000,); below 0: none."""
+        table = np.full(d.MOST_CODES + 1, d.CODE_UNKNOWN, np.int32)
+        own = np.array([_tenfold(code) for code in self.own]) if self.own else np.arange(v.LARGEST_G + 1)
+        table[own] = own
+        for special, codes in ((d.CODE_HARMLESS, self.harmless), (d.CODE_EXACT, self.exact)):
+            for code in codes:
+                table[_tenfold(code)] = special
+        for reason, codes in self.refused.items():
+            for code in codes:
+                table[_tenfold(code)] = d.CODE_REFUSED - reason
+        for code, other in self.same.items():
+            table[_tenfold(code)] = _tenfold(other)
+        return table
+
+    def dwell_by_letter(self) -> Floats:
+        """Return seconds of one unit by letter (28,), NaN where it is none of a dwell, -1 for turns."""
+        table = np.full(v.LETTERS, np.nan)
+        for letter, seconds in self.dwell_s.items():
+            table[v.index_of(letter)] = seconds
+        if self.dwell_turns:
+            table[v.index_of(self.dwell_turns)] = -1.0
+        return table
+
+    def names(self) -> tuple[NDArray[np.uint8], Ints32]:
+        """Return the names of the statements, each with a line end behind it, and their kinds."""
+        pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
+        text = "".join(f"{name}\n" for name, _ in pairs).encode()
+        return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
+
+    def settings(self) -> dict[str, Any]:
+        """Return what the interpreter is given."""
+        return {
+            "runs_programs": int(self.runs_programs),
+            "core_g": self.core_g(),
+            "dwell_by_letter": self.dwell_by_letter(),
+            "points": self.points,
+            "length_by_d": int(self.length_by_d),
+            "cycle_dwell_s": self.dwell_s.get("P", 1.0),
+            "repeats_by_k": int(self.repeats_by_k),
+            "end_m": self.end_m,
+            "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
+        }
+
+
+def _tenfold(code: float) -> int:
+    return round(code * v.TENFOLD)
+
+
+def _kind(kind: int, value: int = 0) -> int:
+    return kind + d.KIND_STEP * value
+
+
+_FANUC_REFUSED = {
+    _TILTED: (53.1, 53.6, 54.2, 68.2, 68.3, 68.4),
+    _ROTATED: (68,),
+    _SCALED: (51, 51.1),
+    _POLAR: (12.1, 112, 16),
+    _BORING: (76, 87),
+    _PROBING: (31, 37),
+    _THREAD: (33,),
+    _OFFSETS: (54.1,),
+    _FLOW: (65, 66, 66.1),
+    _SPLINE: (6.2, 5.2),
+    _RETURN: (29,),
+    _HOME: (27,),
+    _SETTING: (22,),
+    _NUMBERS: (10, 11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
+    _LEAD: (41, 41.1, 42, 42.1),
+    _CYCLE: (70, 71, 72, 75, 77, 78, 79),
+}
+_FANUC: dict[str, Any] = {
+    "syntax": d.SKIP_LEVEL | d.HEAD_LINES,
+    "same": {63: 64, 62: 64},
+    "exact": (9,),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1),
+    "refused": _FANUC_REFUSED,
+    "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
+    "repeats_by_k": True,
+}
+_SINUMERIK_STATEMENTS = {
+    _kind(d.RADIUS): ("CR",),
+    _kind(d.TURNS): ("TURN",),
+    _kind(d.MESSAGE): ("MSG",),
+    _kind(d.CODE, v.G53 // v.TENFOLD): ("SUPA",),
+    _kind(d.ENDS): ("RET",),
+    _kind(d.HARMLESS): (
+        *("ADIS", "ADISPOS", "COMPCAD", "COMPCURV", "COMPON", "COMPOF", "COMPSURF", "CYCLE832", "WORKPIECE"),
+        *("FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "STOPRE", "FIFOCTRL", "STARTFIFO", "STOPFIFO"),
+        *("DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "UPATH", "SPATH"),
+        *("ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORISOF", "ORISON", "ORIRESET"),
+        *("TRAORI", "TRAFOOF", "CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2", "KONT"),
+        *("NORM", "DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
+        *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
+    ),
+    _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
+    _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
+    _kind(d.REFUSED, _SHIFT): ("TRANS", "ATRANS"),
+    _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
+    _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
+    _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
+    _kind(d.REFUSED, _CYCLE): (
+        *("MCALL", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
+        *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
+        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84"),
+        *("CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
+    ),
+    _kind(d.REFUSED, _FLOW): (
+        *("GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
+        *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
+        *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
+    ),
+    _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
+    _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
+    _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
+    _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
+}
+_LIST: Final = (
+    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True),
+    Dialect("fanuc", "Fanuc milling; a number without a point is refused", **_FANUC, points=d.POINT_REQUIRED),
+    Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC, points=d.CALCULATOR),
+    Dialect("fanuc-increments", "Fanuc milling; X100 is 0.1 mm", **_FANUC, points=d.THOUSANDTHS),
+    Dialect(
+        "grbl",
+        "Grbl 1.1: G0, G21 at the start, $ lines",
+        syntax=d.DOLLAR_LINES,
+        refused={_LEAD: (41, 41.1, 42, 42.1)},
+        start={"motion": v.MOTION_RAPID, "unit_named": 1},
+    ),
+    Dialect(
+        "sinumerik",
+        "Sinumerik 840D sl, as CAM posts write it",
+        syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
+        turns_axes=False,
+        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
+        same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
+        exact=(9,),
+        harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
+        refused={
+            _OFFSETS: (500, *range(505, 600)),
+            _THREAD: (33, 34, 35, 331, 332, 63),
+            _POLAR: (110, 111, 112),
+            _SMOOTH: (140, 141, 142, 143, 147, 148, 247, 248, 340, 341, 347, 348),
+            _HOME: (74, 75),
+            _SHIFT: (58, 59),
+            _SETTING: (25, 26),
+            _INCHES: (70,),
+            _LEAD: (41, 42),
+        },
+        dwell_s={"F": 1.0},
+        dwell_turns="S",
+        statements=_SINUMERIK_STATEMENTS,
+        end_m=17,
+        length_by_d=True,
+    ),
+)
+DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _LIST}
+"""The dialects by their names, the default first."""
+DEFAULT: Final = DIALECT_NAMES[0]
+_NOT_READ: Final = {
+    "heidenhain": (
+        "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code",
+        "export the part again with a post for LinuxCNC, Fanuc or Sinumerik",
+    ),
+}
+
+
+def dialect_of(name: str, source: str) -> Dialect:
+    """Return a dialect by its name; raises `NotUnderstoodError` where it is none that is read."""
+    if name in DIALECTS:
+        return DIALECTS[name]
+    if name in _NOT_READ:
+        raise not_read(name, source)
+    allowed = ", ".join(DIALECTS)
+    raise input_error("dialect-unknown", f"dialect {name!r}; allowed: {allowed}", source=source)
+
+
+def not_read(name: str, source: str) -> NotUnderstoodError:
+    """Return the refusal of a language that is no G-code."""
+    what, remedy = _NOT_READ[name]
+    return input_error("dialect-unknown", what, remedy, source=source)

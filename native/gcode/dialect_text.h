@@ -1,0 +1,11 @@
+/* What a dialect writes beside plain words; see gcode2krl/gcode/dialects.py. */
+
+#ifndef GCODE_DIALECT_TEXT_H
+#define GCODE_DIALECT_TEXT_H
+
+#include "constants.h"
+#include "core.h"
+
+int64_t dialect_item(Scan *scan, int64_t i, int64_t line, bool first);
+
+#endif

@@ -1,0 +1,240 @@
+/* The words of a dialect's block become those of the core: tables in gcode2krl/gcode/dialects.py. */
+
+#include "gcode/dialect_words.h"
+
+#include "gcode/cycles.h"
+#include "gcode/reporting.h"
+#include "gcode/rows.h"
+
+static const double LEAST = 0.001, LEAST_INCH = 0.0001, TURNS = -1.0;
+
+static bool refuse(Block *b, int reason, double code) {
+    report(b, F_DIALECT_CODE, (Says){.a = reason, .b = code});
+    return false;
+}
+
+static bool refuse_statement(Block *b, int reason) {
+    report(b, F_DIALECT_STATEMENT, (Says){.a = reason});
+    return false;
+}
+
+static bool in_inches(const Block *b) {
+    return b->g[V_UNIT] >= 0 ? b->g[V_UNIT] == V_G20 : b->state->unit_mm != 1.0;
+}
+
+static bool in_cycle(const Block *b) {
+    const bool named = b->g[V_MOTION] >= 0;
+    return b->g[V_NON_MODAL] != V_G4 && is_cycle(named ? b->g[V_MOTION] / V_TENFOLD : b->state->motion);
+}
+
+/* Take what the scanner has marked: the next word, or something that says nothing. */
+void take_dialect_mark(Block *b, uint8_t c) {
+    if (c == D_SKIPPED)
+        note(b, S_NOTE_STATEMENT, 0);
+    else
+        b->next_word = c;
+}
+
+/* Keep what has been said of the word of a letter before it. */
+void say_of_word(Block *b, int index) {
+    if (b->next_word == D_NEXT_POINTLESS)
+        b->pointless |= 1 << index;
+    else if (b->next_word == D_NEXT_ABSOLUTE)
+        b->absolute |= 1 << index;
+    else
+        b->incremental |= 1 << index;
+    b->next_word = 0;
+}
+
+/* Return the core's code for a G number, both ten times; below 0 where it has none. */
+int32_t core_code(Block *b, int64_t written, bool *good) {
+    const int32_t code = written < b->machine->core_g.rows ? AT(b->machine->core_g, written) : D_CODE_UNKNOWN;
+    *good = true;
+    if (code == D_CODE_HARMLESS) {
+        note(b, S_NOTE_CODE, (int32_t)written);
+        b->harmless = (int32_t)written;
+    } else if (code == D_CODE_EXACT) {
+        b->exact_once = true;
+    } else if (code <= D_CODE_REFUSED) {
+        *good = refuse(b, D_CODE_REFUSED - code, (double)written);
+    }
+    return code;
+}
+
+/* --- numbers without a point ---------------------------------------------------------------------------- */
+
+/* Tell whether a word of a block is a length, an angle, a time, or a feed other than in mm/min. */
+static bool goes_by_point(const Block *b, int index) {
+    if (b->harmless && (index == V_WORD_P || index == V_WORD_Q || index == V_WORD_R))
+        return false;
+    const int32_t mode = b->g[V_FEED_MODE] >= 0 ? b->g[V_FEED_MODE] / V_TENFOLD : b->state->feed_mode;
+    return index != V_WORD_F || mode != V_PER_MINUTE || in_inches(b);
+}
+
+/* Tell whether it hangs on the control's parameters what a number without a point is, whatever the others are. */
+static bool is_unsure(const Block *b, int index) {
+    const int32_t length = b->g[V_LENGTH_OFFSET] >= 0 ? b->g[V_LENGTH_OFFSET] : b->state->length_code;
+    const bool in_vector = length == V_G43_5 && index >= V_WORD_I && index <= V_WORD_K;
+    return index == V_WORD_F || (index == V_WORD_Q && in_cycle(b)) || in_vector;
+}
+
+/* Return the least increment of a word: of an angle and a time it is the same in inches. */
+static double increment(const Block *b, int index) {
+    const bool length = index >= V_WORD_A + V_ROTARY_AXES && b->g[V_NON_MODAL] != V_G4;
+    return length && in_inches(b) ? LEAST_INCH : LEAST;
+}
+
+static bool read_pointless(Block *b) {
+    for (int index = 0; index < V_LETTERS; index++) {
+        if (!(b->pointless & 1 << index) || !goes_by_point(b, index))
+            continue;
+        if (b->machine->points == D_POINT_REQUIRED || is_unsure(b, index)) {
+            report(b, F_NO_POINT, (Says){.a = index + CH_LETTER_A, .b = b->word[index]});
+            return false;
+        }
+        if (b->machine->points == D_THOUSANDTHS)
+            b->word[index] *= increment(b, index);
+    }
+    return true;
+}
+
+/* --- dwells and lengths --------------------------------------------------------------------------------- */
+
+static bool is_whole(double value) { return value == rint(value); }
+
+/* G4 gets its seconds as P, whatever its letter and unit are. */
+static bool read_dwell(Block *b) {
+    int letter = -1, letters = 0;
+    for (int index = 0; index < V_LETTERS; index++)
+        if (b->has[index] && !isnan(AT(b->machine->dwell_by_letter, index))) {
+            letter = index;
+            letters++;
+        }
+    if (letters == 0)
+        return true;
+    const double unit_s = AT(b->machine->dwell_by_letter, letter), value = b->word[letter];
+    if (letters > 1 || (letter == b->machine->whole_dwell_letter && !is_whole(value)))
+        return refuse_statement(b, DR_REASON_TWICE);
+    if (unit_s == TURNS && !(b->state->rpm > 0.0))
+        return refuse_statement(b, DR_REASON_STILL);
+    b->has[letter] = false;
+    b->has[V_WORD_P] = true;
+    b->word[V_WORD_P] = unit_s == TURNS ? value * U_S_PER_MIN / b->state->rpm : value * unit_s;
+    return true;
+}
+
+/* D0 ends the tool's length and D1 begins it. */
+static bool read_edge(Block *b) {
+    const int d = CH_LETTER_A + 3 - CH_LETTER_A;
+    if (!b->has[d])
+        return true;
+    b->has[d] = false;
+    if (b->word[d] != 0.0 && b->word[d] != 1.0)
+        return refuse_statement(b, DR_REASON_EDGE);
+    b->g[V_LENGTH_OFFSET] = b->word[d] == 0.0 ? V_G49 : V_G43;
+    return true;
+}
+
+/* Dwells and repeats of a drilling cycle. */
+static bool read_cycle(Block *b) {
+    if (!in_cycle(b))
+        return true;
+    if (b->has[V_WORD_P] && b->machine->whole_dwell_letter == V_WORD_P && !is_whole(b->word[V_WORD_P]))
+        return refuse_statement(b, DR_REASON_TWICE);
+    b->word[V_WORD_P] *= b->machine->cycle_dwell_s;
+    if (!b->machine->repeats_by_k || !b->has[V_WORD_K])
+        return true;
+    b->has[V_WORD_K] = false;
+    b->pointless &= ~(1 << V_WORD_K); /* a count */
+    b->has[V_WORD_L] = true;
+    b->word[V_WORD_L] = b->word[V_WORD_K];
+    return true;
+}
+
+/* --- coordinates that say for themselves how they count ------------------------------------------------- */
+
+static bool is_absolute_here(const Block *b) {
+    return b->g[V_DISTANCE] >= 0 ? b->g[V_DISTANCE] == V_G90 : b->state->absolute != 0;
+}
+
+/* X=IC(5) under G90 and X=AC(5) under G91 become what the mode in force says. */
+static bool count_axis(Block *b, int axis) {
+    const State *s = b->state;
+    const int index = V_WORD_X + axis;
+    const double here_mm[3] = {s->x, s->y, s->z};
+    const bool known[3] = {s->known_x != 0, s->known_y != 0, s->known_z != 0};
+    const double unit_mm = in_inches(b) ? U_MM_PER_INCH : 1.0;
+    double programmed_mm[3];
+    programmed_of(b, here_mm, programmed_mm);
+    const double from_base = programmed_mm[axis] / unit_mm;
+    const bool absolute = is_absolute_here(b), differs = absolute ? b->incremental & 1 << index : b->absolute & 1 << index;
+    if (!differs)
+        return true;
+    if (!known[axis]) {
+        report_unless(b, S_DOUBT_X << axis, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + CH_LETTER_A});
+        return false;
+    }
+    b->word[index] += absolute ? from_base : -from_base;
+    return true;
+}
+
+/* I=AC(5) is a centre in the coordinates of the part. */
+static void count_centre(Block *b, int axis) {
+    const State *s = b->state;
+    const double here_mm[3] = {s->x, s->y, s->z};
+    const int index = V_WORD_I + axis;
+    double programmed_mm[3];
+    programmed_of(b, here_mm, programmed_mm);
+    if (b->absolute & 1 << index)
+        b->word[index] -= programmed_mm[axis] / (in_inches(b) ? U_MM_PER_INCH : 1.0);
+}
+
+/* Tell whether a block changes what its coordinates are counted from: zero, tool, or both for this block. */
+static bool moves_zero(const Block *b) {
+    if (b->g[V_WORK_OFFSET] >= 0 || b->g[V_LENGTH_OFFSET] >= 0 || b->g[V_NON_MODAL] >= 0)
+        return true;
+    for (int k = 0; k < V_M_CODES; k++)
+        if (b->m_codes[k] == V_M6)
+            return true;
+    return false;
+}
+
+/* --- all ------------------------------------------------------------------------------------------------ */
+
+static bool names_axis(const Block *b) {
+    return b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
+}
+
+/* Codes that say nothing keep their own words; beside axis words nobody knows whose they are. */
+static bool use_harmless_words(Block *b) {
+    static const int OWN[] = {V_WORD_P, V_WORD_Q, V_WORD_R, V_WORD_I, V_WORD_J, V_WORD_K, V_WORD_H};
+    if (names_axis(b) && b->g[V_MOTION] < 0 && b->g[V_NON_MODAL] < 0)
+        return refuse(b, DR_REASON_BESIDE, b->harmless);
+    if (!names_axis(b))
+        for (size_t k = 0; k < sizeof OWN / sizeof *OWN; k++)
+            b->used[OWN[k]] |= b->has[OWN[k]];
+    return true;
+}
+
+/* Make the words of a block those of the core; return false, with a finding, where that cannot be. */
+bool to_core_words(Block *b) {
+    bool good = read_cycle(b);
+    if (b->pointless)
+        good = read_pointless(b) && good;
+    if (b->g[V_NON_MODAL] == V_G4)
+        good = read_dwell(b) && good;
+    if (b->machine->length_by_d)
+        good = read_edge(b) && good;
+    if ((b->incremental | b->absolute) && moves_zero(b))
+        good = refuse_statement(b, DR_REASON_MOVED);
+    else if (b->incremental | b->absolute)
+        for (int axis = 0; axis < 3; axis++) {
+            good = count_axis(b, axis) && good;
+            count_centre(b, axis);
+        }
+    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && !b->machine->runs_programs)
+        good = refuse_statement(b, DR_REASON_POLAR);
+    if (b->harmless)
+        good = use_harmless_words(b) && good;
+    return good;
+}

@@ -1,0 +1,13 @@
+/* The words of a dialect's block become those of the core. */
+
+#ifndef GCODE_DIALECT_WORDS_H
+#define GCODE_DIALECT_WORDS_H
+
+#include "gcode/block.h"
+
+void take_dialect_mark(Block *b, uint8_t c);
+void say_of_word(Block *b, int index);
+int32_t core_code(Block *b, int64_t written, bool *good);
+bool to_core_words(Block *b);
+
+#endif

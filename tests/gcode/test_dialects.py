@@ -1,0 +1,292 @@
+"""Dialects: the same motion as plain G-code says it, and nothing that is read otherwise than it is meant."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gcode2krl import Gcode2KrlError, load_cell, read_gcode
+from gcode2krl.cell.sections import Machine
+from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.files.program_names import DIALECT_NAMES
+from gcode2krl.gcode import dialect_marks as marks
+from gcode2krl.gcode import read_stream
+from gcode2krl.gcode.dialects import DIALECTS, REASONS
+
+HEAD = "G21 G90 G17\nG0 X0. Y0. Z5.\n"
+SIEMENS = "G710 G90 G17\nG0 X0 Y0 Z5\n"
+
+
+def read(text, dialect="linuxcnc"):
+    return read_stream(io.BytesIO(text.encode()), "part.nc", dialect=dialect)
+
+
+def errors(text, dialect="linuxcnc"):
+    try:
+        read(text, dialect)
+    except Gcode2KrlError as error:
+        return [issue for issue in error.issues if issue.severity == "error"]
+    return []
+
+
+def same(text, dialect, plain):
+    """Assert that a program of a dialect moves as a plain one does."""
+    found, wanted = read(text, dialect), read(plain)
+    np.testing.assert_allclose(found.position_mm, wanted.position_mm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.dwell_s, wanted.dwell_s, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found.rapid, wanted.rapid)
+    np.testing.assert_array_equal(found.exact_stop, wanted.exact_stop)
+    np.testing.assert_array_equal(found.machine, wanted.machine)
+    np.testing.assert_allclose(found.feed_mm_s, wanted.feed_mm_s, rtol=1e-12)
+
+
+def test_the_names_are_those_of_the_tables():
+    assert tuple(DIALECTS) == DIALECT_NAMES
+
+
+@pytest.mark.parametrize("name", DIALECT_NAMES)
+def test_a_table_is_whole(name):
+    dialect = DIALECTS[name]
+    table = dialect.core_g()
+    assert table.shape == (marks.MOST_CODES + 1,)
+    assert table.min() >= marks.CODE_REFUSED - len(REASONS) + 1
+    text, kinds = dialect.names()
+    assert bytes(text).count(b"\n") == len(kinds)
+    assert all(
+        kind // marks.KIND_STEP < len(REASONS) for kind in kinds if kind % marks.KIND_STEP == marks.REFUSED
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("G4 P1500\nG1 X10. F100\n", "G4 P1.5\nG1 X10 F100\n"),
+        ("G4 X2.\nG1 X10. F100.\n", "G4 P2\nG1 X10 F100\n"),
+        ("G4 U0.5\nG1 X1. F100\n", "G4 P0.5\nG1 X1 F100\n"),
+        ("G1 G9 X1. F100\nX2.\n", "G61 G1 X1 F100\nG64 X2\n"),
+        ("G63\nG1 X1. F100\n", "G64\nG1 X1 F100\n"),
+        ("G15 G69 G50.1 G40 G80\nG5.1 Q1\nG1 X1. F100\nG5.1 Q0\n", "G1 X1 F100\n"),
+        ("/2 G1 X1. F100\n", "G1 X1 F100\n"),
+        (":1234\nG1 X1. F100\n", "G1 X1 F100\n"),
+        ("G1 X0 Y-0 Z1. F100\n", "G1 X0 Y0 Z1 F100\n"),
+        ("G99 G82 X5. Z-5. R1. P500 F100\nX8.\nG80\n", "G99 G82 X5 Z-5 R1 P0.5 F100\nX8\nG80\n"),
+        (
+            "G81 X5. Z-5. R1. F100\nG91 X2. Z-6. R-4. K3\nG80\n",
+            "G81 X5 Z-5 R1 F100\nG91 X2 Z-6 R-4 L3\nG80\n",
+        ),
+        ("G2 X10. Y0 R5. F100\n", "G2 X10 Y0 R5 F100\n"),
+    ],
+)
+def test_fanuc(text, plain):
+    same(f"%\nO0001 (PART)\n{HEAD}{text}M30\n%\n", "fanuc", f"{HEAD}{plain}M30\n")
+
+
+def test_a_number_without_a_point_is_never_guessed():
+    text = HEAD + "G1 X100 F500\nM30\n"
+    (issue,) = errors(text, "fanuc")
+    assert (issue.code, issue.line) == ("decimal-point", 3)
+    assert read(text, "fanuc-calculator").position_mm[-1, 0] == 100.0
+    assert read(text, "fanuc-increments").position_mm[-1, 0] == pytest.approx(0.1, abs=1e-12)
+    inch = "G20 G90\nG0 X0 Y0 Z1.\nG1 X10000 F10.\nM30\n"
+    assert read(inch, "fanuc-increments").position_mm[-1, 0] == pytest.approx(25.4, abs=1e-9)
+    assert errors("G20 G90\nG0 X0 Y0 Z1.\nG1 X1. F10\nM30\n", "fanuc")[0].code == "decimal-point"
+
+
+def test_grbl_starts_in_mm_with_g0():
+    same("$H\n$X\nZ5\nX1 Y1\nG1 Z-1F100\nM2\n", "grbl", "G21\nG0 Z5\nX1 Y1\nG1 Z-1 F100\nM2\n")
+    assert not [i for i in read("$H\nX1 Y1 Z1\nM2\n", "grbl").issues if i.severity == "warning"]
+
+
+@pytest.mark.parametrize("line", ["$J=G91 X10", "$32=1", "$100=250"])
+def test_grbl_settings_and_jogs_are_refused(line):
+    assert [i.code for i in errors(f"G21\n{line}\nG0 X1\nM2\n", "grbl")] == ["dialect-statement"]
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("X=5 Y=-2.5\n", "X5 Y-2.5\n"),
+        ("G0 X10 Y10\nX=IC(5) Y=IC(-1)\nX=AC(3)\n", "G0 X10 Y10\nX15 Y9\nX3\n"),
+        ("G0 X10\nG91 X=AC(4) Y2\nX1\n", "G0 X10\nX4 Y2\nX5\n"),
+        ("G1 F=500 X10\nG2 X20 Y0 CR=5\n", "G1 F500 X10\nG2 X20 Y0 R5\n"),
+        ("G1 F500 X10\nG3 X0 Y0 CR=-5.5\n", "G1 F500 X10\nG3 X0 Y0 R-5.5\n"),
+        ("G1 F500 X10\nG3 X0 Y0 I=AC(5) J=AC(0)\n", "G1 F500 X10\nG3 X0 Y0 I-5 J0\n"),
+        ("G1 F500 X10\nG3 X10 Y0 Z1 I-5 J0 TURN=2\n", "G1 F500 X10\nG3 X10 Y0 Z1 I-5 J0 P3\n"),
+        ("G4 F1.5\nG0 X1\n", "G4 P1.5\nG0 X1\n"),
+        ("S1=600 M1=3\nG4 S30\nG0 X1\n", "S600 M3\nG4 P3\nG0 X1\n"),
+        ("G0 SUPA Z0 D0\n", "G53 G0 Z0\n"),
+        ("G60 G1 X1 F100\nG641 ADIS=0.1\nX2\n", "G61 G1 X1 F100\nG64 X2\n"),
+        ('MSG("A ; (b)")\nCYCLE832(0.01,_FINISH,1)\nCOMPCAD SOFT FFWON\nTRAORI\nG0 X1\nTRAFOOF\n', "G0 X1\n"),
+        ('WORKPIECE(,"",,"BOX",112,0,-20,-80,0,0,100,100)\nSTOPRE\nG0 X1\n', "G0 X1\n"),
+        ("/3 N10 G0 X1\n", "G0 X1\n"),
+        ("START:\nG0 X1\n", "G0 X1\n"),
+    ],
+)
+def test_sinumerik(text, plain):
+    same(f"%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\n{SIEMENS}{text}M17\n", "sinumerik", f"{HEAD}{plain}M30\n")
+
+
+def test_a_message_is_kept():
+    events = read(f'{SIEMENS}N10 MSG("Pocket (1); rough")\nG0 X1\nM30\n', "sinumerik").events
+    assert events[0].values == {"m": -1, "text": "Pocket (1); rough", "line": 3}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *('CYCLE800(1,"TC",0)', "ROT Z45", "SCALE X2", "G110 X0", "MCALL CYCLE81(1,2,3)", "GOTOF ENDE"),
+        *("IF R1>2 GOTOF A", "R1=5", "X=R1", "X=IC(R1)", "X=5+3", "X=IC(5", "X=SIN(3)", 'T="MILL"', "D2"),
+        *("DEF REAL A", "A3=0 B3=0 C3=1", "G147 X1", "G500", "G505", "NONSENSE", "S2=100", "CR", "G58 X1"),
+        *(
+            "TRANS X10",
+            "ATRANS Z5",
+            "G70",
+            "G41",
+            "G26 S5000",
+            "G92 X0",
+            "G20",
+            "G4 S30",
+            "M3 S600 G4 F1 S3",
+            "#1=5",
+        ),
+        *(
+            "X[1+1]",
+            "M98 P1000",
+            "G55 X=IC(5)",
+            "SUPA G0 X=IC(1)",
+            "D1 Z=IC(1)",
+            "O1 call",
+            "G2 X0 Y0 I=IC(3) G54",
+        ),
+    ],
+)
+def test_sinumerik_statements_that_are_refused(line):
+    found = errors(f"{SIEMENS}{line}\nG0 X1\nM30\n", "sinumerik")
+    assert found[0].line == 3
+    assert found[0].remedy
+
+
+def test_a_word_that_counts_needs_a_known_position():
+    assert errors("G710 G90\nG0 X=IC(5)\nM30\n", "sinumerik")[0].code == "undefined-position"
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.integers(-9999, 9999), st.integers(-9999, 9999), st.booleans()), min_size=1, max_size=8
+    )
+)
+def test_counted_words_are_the_points_they_lead_to(steps):
+    siemens, x, y = SIEMENS, 0.0, 0.0
+    plain = HEAD
+    for dx, dy, counted in steps:
+        if counted:
+            siemens += f"X=IC({dx / 1000}) Y=IC({dy / 1000})\n"
+            x, y = x + dx / 1000, y + dy / 1000
+        else:
+            siemens += f"G91 X=AC({dx / 1000}) Y=AC({dy / 1000}) G90\n".replace(" G90", "") + "G90\n"
+            x, y = dx / 1000, dy / 1000
+        plain += f"X{x:.6f} Y{y:.6f}\n"
+    np.testing.assert_allclose(
+        read(siemens + "M30\n", "sinumerik").position_mm, read(plain + "M30\n").position_mm, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("dialect", DIALECT_NAMES)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 BEGIN PGM PART MM\n1 BLK FORM 0.1 Z X+0 Y+0 Z-20\n2 L X+10 Y+0 R0 FMAX\n",
+        "BEGIN PGM 12 INCH\n",
+        "10 TOOL CALL 1 Z S5000\n11 L X+10 Y-5 R0 FMAX M3\n",
+    ],
+)
+def test_conversational_programs_are_one_clear_sentence(dialect, text):
+    with pytest.raises(NotUnderstoodError) as refused:
+        read(text, dialect)
+    (issue,) = refused.value.issues
+    assert "Heidenhain" in issue.message
+    assert "export" in issue.remedy
+
+
+def test_heidenhain_as_a_dialect_says_the_same():
+    with pytest.raises(NotUnderstoodError, match="Heidenhain"):
+        read("G21\n", "heidenhain")
+    with pytest.raises(NotUnderstoodError, match="fanuc-calculator"):
+        read("G21\n", "okuma")
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("$H\nG21\nG0 X1 Y1 Z1\nM2\n", ["grbl"]),
+        ('G710 G90\nMSG("A")\nG0 X=1 Y1 Z1\nM30\n', ["sinumerik"]),
+        ("G21\nG50.1\nG0 X1. Y1. Z1.\nM30\n", ["fanuc", "fanuc-calculator", "fanuc-increments"]),
+    ],
+)
+def test_a_refusal_names_the_dialects_that_read_the_program(tmp_path, text, names):
+    part = tmp_path / "part.nc"
+    part.write_text(text)
+    with pytest.raises(NotUnderstoodError) as refused:
+        read_gcode(part)
+    last = refused.value.issues[-1]
+    assert last.code == "other-dialect"
+    assert [word for word in last.message.replace(";", "").split() if word in DIALECT_NAMES][:-1] == names
+    assert any(f"--dialect {names[0]} reads this" in issue.remedy for issue in refused.value.issues)
+    for name in names:
+        read_gcode(part, dialect=name)
+
+
+def test_a_line_that_no_dialect_reads_names_none(tmp_path):
+    part = tmp_path / "part.nc"
+    part.write_text("G21\nG0 X1. Y1. Z1.\nG999 X1.\nM30\n")
+    with pytest.raises(NotUnderstoodError) as refused:
+        read_gcode(part)
+    assert not any("--dialect" in issue.remedy for issue in refused.value.issues)
+
+
+@pytest.mark.parametrize("dialect", [name for name in DIALECT_NAMES if name != "linuxcnc"])
+@pytest.mark.parametrize(
+    "line", ["#1=5", "G1 X#1", "G1 X[1+1] F100", "O100 sub", "M98 P1000", "M99", "M70", "G1 @5. ^30. F100"]
+)
+def test_programs_that_compute_or_jump_are_of_one_dialect(dialect, line):
+    """A line that is worked out is read by LinuxCNC's rules: X100 in it would be 100 mm."""
+    unit = "G710" if dialect == "sinumerik" else "G21"
+    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
+    assert (found[0].code, found[0].line) == ("dialect-statement", 3)
+    assert found[0].remedy
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("G4 P1.5", "G4 P500 X1.", "G10 L2 P1 X0.", "G92 X0. Y0.", "G41 D1", "G43.1 Z1.", "G59.1"),
+        *("G95\nG1 X1. F20", "G93\nG1 X1. F20", "G20\nG1 X1. F10", "G82 X1. Z-1. R1. P0.5 F100"),
+        "G83 X1. Z-1. R1. Q2000 F100",
+    ],
+)
+@pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
+def test_what_hangs_on_the_parameters_of_a_fanuc_is_refused(dialect, line):
+    assert errors(f"{HEAD}G99\n{line}\nM30\n", dialect)
+
+
+def test_times_and_angles_have_their_own_increments():
+    inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
+    assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
+    assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
+
+
+def test_a_cell_with_rotary_axes_is_refused_for_sinumerik():
+    machine = Machine(
+        kind="table-head",
+        axes=("C", "A"),
+        signs=(-1, 1),
+        tcpm=False,
+        pivot_mm=150.0,
+        centre_mm=(0.0, 0.0, 0.0),
+    )
+    cell = load_cell().model_copy(update={"machine": machine})
+    with pytest.raises(NotUnderstoodError, match="rotary axes"):
+        read_stream(io.BytesIO(b"G710\nG0 X1 Y1 Z1\nM30\n"), "part.nc", cell, dialect="sinumerik")
