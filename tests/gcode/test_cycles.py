@@ -275,14 +275,13 @@ def test_room_is_made_for_rows_and_events_of_a_block(rows, monkeypatch):
     assert whole.events == again.events
 
 
-@pytest.mark.parametrize("code", [73, 74, 81, 82, 83, 84, 85, 86, 89])
+@pytest.mark.parametrize("code", [73, 81, 82, 83, 84, 85, 86, 89])
 @pytest.mark.parametrize("retract", ["G98", "G99"])
 def test_as_many_rows_as_were_reserved_at_most(code, retract, monkeypatch):
     """With room for no row more than a block asks for; the checked core stops at the first one beside it."""
     monkeypatch.setattr(read, "_FIRST_ROWS", 1)
     monkeypatch.setattr(read, "_FIRST_EVENTS", 0)
-    spindle = "M4" if code == 74 else "M3"
-    words = "Q.5" if code in (73, 83) else "P.1" if code in (74, 82, 84, 86, 89) else ""
-    head = f"G21 G90 G17 G94 F500 S100 {spindle}\nG0 X0 Y0 Z10\n"
+    words = "Q.5" if code in (73, 83) else "P.1" if code in (82, 84, 86, 89) else ""
+    head = "G21 G90 G17 G94 F500 S100 M3\nG0 X0 Y0 Z10\n"
     few, many = (len(toolpath(f"{retract} G{code} X1 Z-1 R2 {words} L{n}", head)) for n in (1, 999))
     assert many - few >= 998 * 3
