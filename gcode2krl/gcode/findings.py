@@ -170,7 +170,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "subprogram-missing",
         "the subprogram is neither in this program nor a file",
-        "put its file (label.ngc) beside the program, or name its folder with --search",
+        "put its file (label.ngc) beside the program",
     ),
     CALLS_TOO_DEEP: Finding(
         "error",
