@@ -176,6 +176,8 @@ REPORTED = (
 """Found by independent checks."""
 
 FURTHER = (
+    Mistake("G92 at the start", r"G92", {9: "@N55 G92 X0. Y0.\nN60 G0 X-10. Y-10."}, severity="warning"),
+    Mistake("G10 sets an offset", r"G10", {5: "@N15 G10 L2 P1 X0. Y0. Z-20.\nN20 G54"}, severity="warning"),
     Mistake("F in mm/s", r"(?i)chip|feed|F", {13: "@N100 Y70. F20.", 12: "@", 15: "@"}, severity="warning"),
     Mistake(
         "F with a zero too many",

@@ -206,7 +206,11 @@
 #define V_G28_1 281
 #define V_G30 300
 #define V_G30_1 301
+#define V_G40 400
 #define V_G41 410
+#define V_G41_1 411
+#define V_G42 420
+#define V_G42_1 421
 #define V_G43 430
 #define V_G49 490
 #define V_G43_1 431
@@ -272,6 +276,7 @@
 #define V_CYCLE_BORE 89
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
+#define V_PLANE_YZ 19
 #define V_INVERSE_TIME 93
 #define V_PER_MINUTE 94
 #define V_PER_REVOLUTION 95
@@ -371,6 +376,22 @@
 #define F_TURN_PER_REV 65
 #define F_TURN_TOO_FAR 66
 #define F_CYCLE_TURNED 67
+#define F_CUTTER_ON 68
+#define F_CUTTER_PLANE 69
+#define F_CUTTER_NO_D 70
+#define F_CUTTER_NO_TOOL 71
+#define F_CUTTER_NO_DIAMETER 72
+#define F_CUTTER_LATHE 73
+#define F_CUTTER_DIFFERS 74
+#define F_CUTTER_ENTRY 75
+#define F_CUTTER_ENTRY_ARC 76
+#define F_CUTTER_EXIT_ARC 77
+#define F_CUTTER_ARC 78
+#define F_CUTTER_CORNER 79
+#define F_CUTTER_SHORT 80
+#define F_CUTTER_ROTATED 81
+#define F_CUTTER_TURNED 82
+#define F_CUTTER_PARAMETER 83
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -417,6 +438,8 @@
 #define FO_ROTATION_WITH_ROTARY 235
 
 /* gcode2krl.gcode.state */
+#define S_CUTTER_ON 1
+#define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
 #define S_DOUBT_Y 2
 #define S_DOUBT_Z 4
@@ -735,8 +758,28 @@ typedef struct {
     double spiral_start;
     double spiral_end;
     double spiral_unit_mm;
+    int32_t cutter_mode;
+    int32_t cutter_side;
+    int32_t cutter_code;
+    int32_t cutter_line;
+    double cutter_radius_mm;
+    int8_t cutter_entered;
+    int8_t cutter_failed;
+    double cutter_normal[2];
+    int32_t held_turn;
+    int32_t held_line;
+    double held_from[2];
+    double held_along[2];
+    double held_centre[2];
+    double held_w[2];
+    double held_sweep;
+    int64_t held_rows[2];
+    int64_t cutter_rows_removed;
+    int64_t held_events;
     int32_t retract;
     int32_t retract_line;
+    int32_t unset_parameter;
+    int32_t unset_line;
     int32_t retract_unnamed_line;
     int8_t in_cycles;
     double cycle_level_mm;
@@ -820,21 +863,41 @@ typedef char State_spiral_line_stands_at_652[offsetof(State, spiral_line) == 652
 typedef char State_spiral_start_stands_at_656[offsetof(State, spiral_start) == 656 ? 1 : -1];
 typedef char State_spiral_end_stands_at_664[offsetof(State, spiral_end) == 664 ? 1 : -1];
 typedef char State_spiral_unit_mm_stands_at_672[offsetof(State, spiral_unit_mm) == 672 ? 1 : -1];
-typedef char State_retract_stands_at_680[offsetof(State, retract) == 680 ? 1 : -1];
-typedef char State_retract_line_stands_at_684[offsetof(State, retract_line) == 684 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_688[offsetof(State, retract_unnamed_line) == 688 ? 1 : -1];
-typedef char State_in_cycles_stands_at_692[offsetof(State, in_cycles) == 692 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_696[offsetof(State, cycle_level_mm) == 696 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_704[offsetof(State, cycle_level_known) == 704 ? 1 : -1];
-typedef char State_cycle_r_stands_at_712[offsetof(State, cycle_r) == 712 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_720[offsetof(State, cycle_depth) == 720 ? 1 : -1];
-typedef char State_cycle_q_stands_at_728[offsetof(State, cycle_q) == 728 ? 1 : -1];
-typedef char State_cycle_p_stands_at_736[offsetof(State, cycle_p) == 736 ? 1 : -1];
-typedef char State_cycle_line_stands_at_744[offsetof(State, cycle_line) == 744 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_748[offsetof(State, cycle_plane) == 748 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_752[offsetof(State, cycle_unit_mm) == 752 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_760[offsetof(State, cycle_absolute) == 760 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 768 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_680[offsetof(State, cutter_mode) == 680 ? 1 : -1];
+typedef char State_cutter_side_stands_at_684[offsetof(State, cutter_side) == 684 ? 1 : -1];
+typedef char State_cutter_code_stands_at_688[offsetof(State, cutter_code) == 688 ? 1 : -1];
+typedef char State_cutter_line_stands_at_692[offsetof(State, cutter_line) == 692 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_696[offsetof(State, cutter_radius_mm) == 696 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_704[offsetof(State, cutter_entered) == 704 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_705[offsetof(State, cutter_failed) == 705 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_712[offsetof(State, cutter_normal) == 712 ? 1 : -1];
+typedef char State_held_turn_stands_at_728[offsetof(State, held_turn) == 728 ? 1 : -1];
+typedef char State_held_line_stands_at_732[offsetof(State, held_line) == 732 ? 1 : -1];
+typedef char State_held_from_stands_at_736[offsetof(State, held_from) == 736 ? 1 : -1];
+typedef char State_held_along_stands_at_752[offsetof(State, held_along) == 752 ? 1 : -1];
+typedef char State_held_centre_stands_at_768[offsetof(State, held_centre) == 768 ? 1 : -1];
+typedef char State_held_w_stands_at_784[offsetof(State, held_w) == 784 ? 1 : -1];
+typedef char State_held_sweep_stands_at_800[offsetof(State, held_sweep) == 800 ? 1 : -1];
+typedef char State_held_rows_stands_at_808[offsetof(State, held_rows) == 808 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_824[offsetof(State, cutter_rows_removed) == 824 ? 1 : -1];
+typedef char State_held_events_stands_at_832[offsetof(State, held_events) == 832 ? 1 : -1];
+typedef char State_retract_stands_at_840[offsetof(State, retract) == 840 ? 1 : -1];
+typedef char State_retract_line_stands_at_844[offsetof(State, retract_line) == 844 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_848[offsetof(State, unset_parameter) == 848 ? 1 : -1];
+typedef char State_unset_line_stands_at_852[offsetof(State, unset_line) == 852 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_856[offsetof(State, retract_unnamed_line) == 856 ? 1 : -1];
+typedef char State_in_cycles_stands_at_860[offsetof(State, in_cycles) == 860 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_864[offsetof(State, cycle_level_mm) == 864 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_872[offsetof(State, cycle_level_known) == 872 ? 1 : -1];
+typedef char State_cycle_r_stands_at_880[offsetof(State, cycle_r) == 880 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_888[offsetof(State, cycle_depth) == 888 ? 1 : -1];
+typedef char State_cycle_q_stands_at_896[offsetof(State, cycle_q) == 896 ? 1 : -1];
+typedef char State_cycle_p_stands_at_904[offsetof(State, cycle_p) == 904 ? 1 : -1];
+typedef char State_cycle_line_stands_at_912[offsetof(State, cycle_line) == 912 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_916[offsetof(State, cycle_plane) == 916 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_920[offsetof(State, cycle_unit_mm) == 920 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_928[offsetof(State, cycle_absolute) == 928 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 936 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1081,6 +1144,8 @@ typedef struct {
     Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
+    Floats tool_diameter_mm;
+    Floats cutter_diameter_mm;
     Ints32 group_of_g;
     Ints32 doubt_of_g;
     Ints32 doubt_of_group;

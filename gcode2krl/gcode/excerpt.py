@@ -51,6 +51,10 @@ _FIXED = {
     f.G53_INCREMENTAL: r"G\s*53",
     f.DWELL_WITH_ARC: r"G\s*0*4(?![\d.])",
     f.H_DIFFERS: "H",
+    f.CUTTER_EXIT_ARC: r"G\s*0*[23](?![\d.])|[XYZ]",
+    f.CUTTER_LATHE: "L",
+    f.CUTTER_NO_DIAMETER: r"D|G\s*4[12]",
+    f.CUTTER_DIFFERS: r"D|G\s*4[12]",
     f.TOO_MANY_M: r"M(?=[^M]*$)",
     f.BAD_M: "M",
     of_offsets.WITHOUT_L: r"G\s*10",
@@ -121,6 +125,10 @@ def _pattern(number: int, a: float, b: float) -> str:
         return f"[{re.escape(f.letters_of(b))}]"
     if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
         return f"[{re.escape(f.letters_of(a))}]"
+    if number == f.CUTTER_ON:
+        return _word("M" if a < 0 else "G", abs(a))
+    if number in (f.CUTTER_PLANE, f.CUTTER_NO_D, f.CUTTER_NO_TOOL):
+        return _word("G", a)
     if number in (f.UNKNOWN_G, f.UNSUPPORTED_G, f.NO_MACHINE, of_offsets.NO_AXES):
         return _word("G", a)
     if number in (f.SAME_GROUP_G, f.TWO_AXIS_CODES):

@@ -99,7 +99,23 @@ class Finding(NamedTuple):
     TURN_PER_REV,
     TURN_TOO_FAR,
     CYCLE_TURNED,
-) = range(68)
+    CUTTER_ON,
+    CUTTER_PLANE,
+    CUTTER_NO_D,
+    CUTTER_NO_TOOL,
+    CUTTER_NO_DIAMETER,
+    CUTTER_LATHE,
+    CUTTER_DIFFERS,
+    CUTTER_ENTRY,
+    CUTTER_ENTRY_ARC,
+    CUTTER_EXIT_ARC,
+    CUTTER_ARC,
+    CUTTER_CORNER,
+    CUTTER_SHORT,
+    CUTTER_ROTATED,
+    CUTTER_TURNED,
+    CUTTER_PARAMETER,
+) = range(84)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -343,6 +359,104 @@ FINDINGS: dict[int, Finding] = {
         "feed move from a position that has not been programmed{state}; arcs after it cannot fit",
         "program X, Y and Z with G0 (and G90) first",
     ),
+    CUTTER_ON: Finding(
+        "error",
+        "cutter-on",
+        "{code} while cutter compensation is on (G{h} of line {c:.0f})",
+        "write G40 and a straight move before it",
+    ),
+    CUTTER_PLANE: Finding(
+        "error",
+        "cutter-plane",
+        "G{g} in the plane of G19",
+        "cutter compensation works in G17 and G18",
+    ),
+    CUTTER_NO_D: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} without D",
+        "give the diameter of the cutter, G{g} D6.0; G41 and G42 take that of a tool",
+    ),
+    CUTTER_NO_TOOL: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} without D, and no tool is in the spindle",
+        "program T and M6 first, or name the tool by D",
+    ),
+    CUTTER_NO_DIAMETER: Finding(
+        "error",
+        "cutter-diameter",
+        "G{g} takes the diameter of tool {b:.0f}, which is not declared",
+        "add [tool.{b:.0f}] with diameter_mm to the cell, or a D to its line of the tool table",
+    ),
+    CUTTER_LATHE: Finding(
+        "error",
+        "cutter-lathe",
+        "L names the orientation of a lathe tool",
+        "remove L: this is a milling translator",
+    ),
+    CUTTER_DIFFERS: Finding(
+        "warning",
+        "cutter-differs",
+        "G{g} compensates for a diameter of {b:.4f} mm, the tool in the spindle has {c:.4f} mm in the cell: "
+        "the cut contour is {half:.4f} mm off the programmed one",
+        "nothing to do where wear is meant, or for a path of the centre; else use the D of the tool",
+    ),
+    CUTTER_ENTRY: Finding(
+        "error",
+        "cutter-entry",
+        "the entry move of cutter compensation is {a:.4f} mm long in its plane, not more than the radius "
+        "{b:.4f} mm of the tool",
+        "begin farther away from the contour; move along the tool before G41 or G42",
+    ),
+    CUTTER_ENTRY_ARC: Finding(
+        "error",
+        "cutter-entry",
+        "the entry arc of cutter compensation is too short for the radius {b:.4f} mm of the tool",
+        "begin with a straight move, or with a longer arc",
+    ),
+    CUTTER_EXIT_ARC: Finding(
+        "error",
+        "cutter-exit-arc",
+        "an arc as the first move after G40",
+        "leave cutter compensation with a straight move",
+    ),
+    CUTTER_ARC: Finding(
+        "error",
+        "cutter-arc",
+        "the arc of radius {a:.4f} mm is too small for the radius {b:.4f} mm of the tool inside it",
+        "use a smaller tool, or a larger radius",
+    ),
+    CUTTER_CORNER: Finding(
+        "error",
+        "cutter-gouge",
+        "the tool of radius {b:.4f} mm cannot reach the inside corner where this block begins",
+        "use a smaller tool, or round the corner with a larger radius",
+    ),
+    CUTTER_SHORT: Finding(
+        "error",
+        "cutter-gouge",
+        "the move of line {a:.0f} is too short for the tool of radius {b:.4f} mm between its inside corners",
+        "use a smaller tool, or leave the detail out",
+    ),
+    CUTTER_ROTATED: Finding(
+        "error",
+        "cutter-frame",
+        "G{g} under a rotated work offset (G10 L2 R, or rotation_deg of the cell)",
+        "rotate the part's frame in the cell instead, or let the CAM compensate the radius",
+    ),
+    CUTTER_TURNED: Finding(
+        "error",
+        "cutter-frame",
+        "cutter compensation (G{g}) with rotary axes that are turned or move, or with tool vectors",
+        "turn to zero before G41 or G42, or let the CAM compensate the radius",
+    ),
+    CUTTER_PARAMETER: Finding(
+        "error",
+        "cutter-parameter",
+        "the diameter of the tool, or its place under cutter compensation, is not read from a parameter",
+        "write the number into the program, or read the place before G41 or G42",
+    ),
     NO_MACHINE: Finding(
         "error",
         "machine-missing",
@@ -398,7 +512,7 @@ FINDINGS |= {number: Finding(*text) for number, text in of_polar.TEXTS.items()}
 
 WITH_COLUMN = {
     *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
-    *(SUBPROGRAM_MISSING, CALLS_TOO_DEEP),
+    *(SUBPROGRAM_MISSING, CALLS_TOO_DEEP, CUTTER_PARAMETER),
 }
 """Findings whose third number is the column of the culprit, -1 = not told."""
 _OF_CHARACTER = {
@@ -412,10 +526,6 @@ _OF_CHARACTER = {
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
 UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
-    v.G41: (
-        f"cutter radius compensation: {_LATER}",
-        "let the CAM compensate the radius (computer compensation)",
-    ),
     v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     **NEVER_READ,
 }
@@ -480,6 +590,8 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "g": f"{a / v.TENFOLD:g}",
         "h": f"{b / v.TENFOLD:g}",
         "difference": abs(a - b),
+        "half": abs(c - b) / 2.0,
+        "code": f"{'M' if a < 0 else 'G'}{abs(a) / v.TENFOLD:g}",
         "decimals": decimals_needed(MM_PER_INCH if c < 0 else 1.0),
         "letter": chr(int(b)) if number in of_cycles.TEXTS and 0 < b < FIRST_FOREIGN else "",
         "state": _state(number, line, a, b, c),

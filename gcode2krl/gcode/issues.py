@@ -119,6 +119,8 @@ def program_issues(
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
     yield from zero_issues(state)
+    if state["unset_line"]:
+        yield _unset(int(state["unset_line"]), int(state["unset_parameter"]))
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
     if not state["ended"]:
@@ -164,6 +166,16 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         values = {"word": chr(word) if word < FIRST_FOREIGN else "", "home": word // TENFOLD, "number": word}
         blocks = "in one block" if count == 1 else f"in {count} blocks"
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
+
+
+def _unset(line: int, number: int) -> Issue:
+    return Issue(
+        "warning",
+        "parameter-unset",
+        line,
+        f"#{number} is read before anything sets it; it counts as 0, as in LinuxCNC",
+        f"set it at the beginning of the program: #{number} = …",
+    )
 
 
 def _retract_unnamed(line: int) -> Issue:

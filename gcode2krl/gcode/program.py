@@ -270,7 +270,7 @@ def _empty_program(course: NDArray[Any]) -> Any:
         pool=np.zeros(32 * len(names), np.uint8),
         local_value=np.zeros((tables.FRAMES, len(names))),
         local_generation=np.zeros((tables.FRAMES, len(names)), np.int64),
-        parameters=np.zeros(tables.MOST_PARAMETERS),
+        parameters=np.full(tables.MOST_PARAMETERS, np.nan),  # none is set
         frames=frames,
         saved_states=np.zeros(tables.FRAMES, STATE),
         repeats=np.zeros(tables.MOST_REPEATS, tables.REPEAT),

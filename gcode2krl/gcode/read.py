@@ -143,9 +143,8 @@ def read_stream(
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
         )
-    lengths = (
-        tool_table.lengths_from_table(tools) if tools is not None else tool_table.lengths_from_cell(cell)
-    )
+    of_cell = tool_table.tools_from_cell(cell)
+    stated = tool_table.tools_from_table(tools) if tools is not None else of_cell
     offsets, offset_known = _work_offsets(cell)
     from_table = cell is not None and cell.program.tool_length == "from_table"
     doubts = list(chord_tolerance_issues(chord_tolerance_mm, name))
@@ -153,7 +152,9 @@ def read_stream(
         name,
         offsets=offsets,
         offset_known=offset_known,
-        tool_length_mm=lengths,
+        tool_length_mm=stated.length_mm,
+        tool_diameter_mm=stated.diameter_mm,
+        cutter_diameter_mm=of_cell.diameter_mm,
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,

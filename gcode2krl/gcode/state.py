@@ -87,8 +87,28 @@ STATE = np.dtype(
         ("spiral_start", "f8"),
         ("spiral_end", "f8"),
         ("spiral_unit_mm", "f8"),
+        ("cutter_mode", "i4"),  # bits, CUTTER_…: what plain blocks must not pass by
+        ("cutter_side", "i4"),  # 1 = tool left of the path (G41), -1 = right; a negative diameter swaps them
+        ("cutter_code", "i4"),  # ten times the number of the G-code in force
+        ("cutter_line", "i4"),  # where it stands
+        ("cutter_radius_mm", "f8"),
+        ("cutter_entered", "i1"),  # the entry move has been made
+        ("cutter_failed", "i1"),  # a corner has been reported: further ones are consequences
+        ("cutter_normal", "f8", 2),  # in the plane, from the programmed point (x, y, z) to the tool
+        ("held_turn", "i4"),  # the element before this one: 1 = arc ccw, -1 = arc cw, 0 = line
+        ("held_line", "i4"),  # its line in the file
+        ("held_from", "f8", 2),  # where the tool begins it
+        ("held_along", "f8", 2),  # direction of a line that may not become shorter than nothing
+        ("held_centre", "f8", 2),
+        ("held_w", "f8", 2),  # along the tool, at its start and end
+        ("held_sweep", "f8"),  # rad of an arc before its end is moved, above 0
+        ("held_rows", "i8", 2),  # its first row, and the one behind its last
+        ("cutter_rows_removed", "i8"),  # rows of held arcs that have been taken away again, in all
+        ("held_events", "i8"),  # events before it
         ("retract", "i4"),  # ten times 98 or 99
         ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
+        ("unset_line", "i4"),  # where, 0 = nowhere
         ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
         ("in_cycles", "i1"),  # a row of cycles has begun and no other motion has ended it
         ("cycle_level_mm", "f8"),  # programmed height along the tool where it began, to which G98 leads back
@@ -105,6 +125,8 @@ STATE = np.dtype(
     align=True,  # as C lays it out
 )
 
+CUTTER_ON, CUTTER_BESIDE = 1, 2
+"""Cutter compensation is on; G40 has left the tool beside the programmed point, until a straight move."""
 DOUBT_X, DOUBT_Y, DOUBT_Z, DOUBT_MOTION, DOUBT_FEED, DOUBT_UNIT = (1 << k for k in range(6))
 DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SPEED = (
     1 << k for k in range(6, 12)
@@ -141,7 +163,7 @@ _GROUPS: dict[int, tuple[float, ...]] = {
     v.CENTRE: (90.1, 91.1),
     v.FEED_MODE: (93, 94, 95),
     v.UNIT: (20, 21),
-    v.RADIUS_COMPENSATION: (40,),
+    v.RADIUS_COMPENSATION: (40, 41, 41.1, 42, 42.1),
     v.LENGTH_OFFSET: (43, 43.1, 43.2, 43.4, 43.5, 49),
     v.RETRACT: (98, 99),
     v.WORK_OFFSET: (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3),
@@ -151,7 +173,7 @@ _GROUPS: dict[int, tuple[float, ...]] = {
 }
 """Modal group: the G-codes in it that are read."""
 _UNSUPPORTED = (
-    *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 33, 33.1, 38.2, 38.3, 38.4, 38.5, 41, 41.1, 42, 42.1),
+    *(5, 5.1, 5.2, 5.3, 6, 6.1, 6.2, 6.3, 7, 8, 33, 33.1, 38.2, 38.3, 38.4, 38.5),
     *(70, 71, 71.1, 71.2, 72, 72.1, 72.2, 76, 87, 88, 96),
 )
 """G-codes of this and other dialects that are known and not read."""
@@ -172,7 +194,6 @@ GROUP_OF_G = _group_table()
 _DOUBTS: dict[int, tuple[float, ...]] = {
     DOUBT_X: (7, 8),
     DOUBT_SPEED: (96,),
-    0: (41, 41.1, 42, 42.1),
 }
 """What is in doubt: after which G-codes that are not read."""
 

@@ -1,8 +1,8 @@
-"""Tool lengths for G43: from a LinuxCNC ``tool.tbl`` in mm, or from the cell."""
+"""Tool lengths for G43 and diameters for G41: from a LinuxCNC ``tool.tbl`` in mm, or from the cell."""
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,21 @@ _WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)", re.IGNORECASE)
 _LARGEST_TOOL = 99999
 
 
-def lengths_from_table(path: str | Path) -> Floats:
-    """Return length by tool number (t,) in mm from a ``tool.tbl``; NaN where a tool is not declared."""
+class Tools(NamedTuple):
+    """What a program asks of tools, by tool number (t,) in mm; NaN where it is not stated."""
+
+    length_mm: Floats
+    diameter_mm: Floats
+
+
+def tools_from_table(path: str | Path) -> Tools:
+    """Return lengths (0 without Z) and diameters from a ``tool.tbl``."""
     try:
         text = Path(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(path)) from None
     lengths: dict[int, float] = {}
+    diameters: dict[int, float] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         words = {letter.upper(): float(value) for letter, value in _WORD.findall(line.split(";")[0])}
         if not words:
@@ -33,14 +41,17 @@ def lengths_from_table(path: str | Path) -> Floats:
                 "tool-table", "no tool number T", "each line is T… P… Z… D…", line=number, source=str(path)
             )
         lengths[int(tool)] = words.get("Z", 0.0)
-    return _by_number(lengths)
+        if "D" in words:
+            diameters[int(tool)] = words["D"]
+    return Tools(_by_number(lengths), _by_number(diameters))
 
 
-def lengths_from_cell(cell: "Cell | None") -> Floats:
-    """Return length by tool number (t,) in mm from a cell; NaN where a tool is not declared."""
+def tools_from_cell(cell: "Cell | None") -> Tools:
+    """Return lengths and diameters from a cell."""
     tools = cell.tool if cell is not None else {}
-    return _by_number(
-        {number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None}
+    return Tools(
+        _by_number({number: tool.length_mm for number, tool in tools.items() if tool.length_mm is not None}),
+        _by_number({number: tool.diameter_mm for number, tool in tools.items()}),
     )
 
 

@@ -48,7 +48,7 @@ G4 = 40  # dwell
 G10 = 100  # offsets
 G20 = 200  # inch; else mm
 G28, G28_1, G30, G30_1 = 280, 281, 300, 301  # go to, and set, the two homes
-G41 = 410  # cutter radius compensation, G41 to G42.1
+G40, G41, G41_1, G42, G42_1 = 400, 410, 411, 420, 421  # cutter radius compensation off, left, right
 G43, G49 = 430, 490  # tool length offset on, off
 G43_1, G43_2 = 431, 432  # given by words, added
 G43_4, G43_5 = 434, 435  # the tip is programmed: with rotary words, with tool vectors I J K
@@ -79,8 +79,8 @@ MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1,
 FIRST_CYCLE, CYCLE_CHIP, CYCLE_TAP_LEFT, CYCLE_DRILL, CYCLE_DWELL, CYCLE_PECK = 73, 73, 74, 81, 82, 83
 CYCLE_TAP, CYCLE_REAM, CYCLE_BORE_STOP, CYCLE_BORE = 84, 85, 86, 89
 """Canned cycles among the motion modes; no other mode has a number as large as the first."""
-PLANE_XY, PLANE_ZX = 17, 18
-"""Planes of the state: the G number; 19 is Y Z."""
+PLANE_XY, PLANE_ZX, PLANE_YZ = 17, 18, 19
+"""Planes of the state: the G number."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
 """Feed modes of the state: the G number."""
 TURN_MACHINE, TURN_TIP, TURN_VECTOR = range(3)

@@ -13,6 +13,7 @@ STRICTER_HERE = frozenset(
         "unit-doubtful",
         "cut-off",
         "offset-from-unknown",
+        "parameter-unset",
         "tool-length-differs",
     }
 )

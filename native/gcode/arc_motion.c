@@ -2,6 +2,7 @@
 
 #include "gcode/arc_motion.h"
 
+#include "gcode/compensate.h"
 #include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
@@ -152,10 +153,10 @@ static void note_spiral(Block *b, const Arc *arc) {
 /* --- the chords ---------------------------------------------------------------------------------------- */
 
 /* Write the rows of an arc; the last ends exactly where the block says. */
-static void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
+void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
     State *s = b->state;
     const double from_deg[3] = {s->rotary_deg[0], s->rotary_deg[1], s->rotary_deg[2]};
-    const double time_s = feed_time_s(b, INFINITY, chords);
+    const double time_s = compensates(s) ? NAN : feed_time_s(b, INFINITY, chords);
     double at_mm[3];
     for (int64_t k = 1; k <= chords; k++) {
         const double part = (double)k / (double)chords;
@@ -196,12 +197,19 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
     if (fit != FITS)
         note_spiral(b, arc);
     learn(b);
+    if (compensates(b->state))
+        return compensated_arc(b, arc, turns, mm_s);
     emit_chords(b, arc, angle, sweep, count, mm_s);
     return true;
 }
 
 /* Carry out G2 or G3; return false where there is no room for its rows. */
 bool arc_move(Block *b, Arc *arc) {
+    if (b->state->cutter_mode & S_CUTTER_BESIDE) {
+        report_unless(b, S_DOUBT_POSITION, F_CUTTER_EXIT_ARC, (Says){0});
+        b->state->cutter_mode &= ~S_CUTTER_BESIDE;
+        return true;
+    }
     if (!take_turn(b, false) || !axis_word_is_harmless(b, arc))
         return true;
     if (!(b->has[V_WORD_R] ? centre_by_radius(b, arc) : centre_by_words(b, arc)))

@@ -17,5 +17,6 @@ typedef struct {
 
 Arc arc_of(const Block *block);
 bool arc_move(Block *block, Arc *arc);
+void emit_chords(Block *block, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s);
 
 #endif

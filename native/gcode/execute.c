@@ -35,11 +35,12 @@ static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t t
         if (m == V_M99)
             return end_program(run, from + deletable + 1 == to, next);
     }
-    const int64_t first_row = counts->rows, first_event = counts->events;
+    const State *s = run->machine->state.at;
+    const int64_t first_row = counts->rows + s->cutter_rows_removed, first_event = counts->events;
     counts->marks = counts->program_wanted = 0;
     if (!run_block(run->machine, words, from, to))
         return counts->program_wanted ? stop_with(run, F_O_WORD, PF_FAULT_NOT_FIRST, next) : WAIT;
-    name_caller(run, first_row, first_event);
+    name_caller(run, first_row - s->cutter_rows_removed, first_event);
     if (counts->rows > run->course->most_rows)
         return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
     return next;

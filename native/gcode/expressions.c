@@ -242,11 +242,17 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
             return e->dry || is_name_set(e, name);
         if (!is_name_set(e, name))
             return wrong(e, F_PARAMETER_UNDEFINED, 0.0, 0.0, place);
+        if (is_name_of_cutter(e->machine, name))
+            return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
         return named_parameter(e, name);
     }
     if (!exists) {
         const int64_t number = parameter_number(e, i);
-        return number == 0 || e->dry ? 1.0 : numbered_parameter(e, number);
+        if (number == 0 || e->dry)
+            return 1.0;
+        if (is_of_cutter(e->machine, number))
+            return wrong(e, F_CUTTER_PARAMETER, 0.0, 0.0, place);
+        return numbered_parameter(e, number);
     }
     const double value = value_at(e, i);
     int64_t number;

@@ -8,6 +8,7 @@
 #include "gcode/machine.h"
 
 #include "gcode/block_words.h"
+#include "gcode/compensate.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/offsets.h"
@@ -30,8 +31,8 @@ enum { X_NAMED = 1, Y_NAMED = 2, Z_NAMED = 4, F_NAMED = 8, ALL_AXES = X_NAMED | 
 static inline bool plain_block(Machine *machine, const Words *words, int64_t from, int64_t to) {
     State *s = machine->state.at;
     const bool feeding = s->motion == V_MOTION_LINE;
-    if ((!feeding && s->motion != V_MOTION_RAPID) || s->feed_mode != V_PER_MINUTE || s->doubt |
-            s->rotary_unknown)
+    if ((!feeding && s->motion != V_MOTION_RAPID) || s->feed_mode != V_PER_MINUTE ||
+        s->doubt | s->rotary_unknown | s->cutter_mode)
         return false;
     double x = 0.0, y = 0.0, z = 0.0, feed = s->feed;
     int named = 0;
@@ -194,6 +195,7 @@ static void stop(Block *b) {
             continue;
         event(b, S_EVENT_M, m == V_M60 ? V_M0 : m, NAN);
         if (m == V_M2 || m == V_M30) {
+            end_compensation(b);
             b->state->ended = 1;
             b->state->end_line = b->line;
         }

@@ -3,6 +3,8 @@
 #include "gcode/motion.h"
 
 #include "gcode/arc_motion.h"
+#include "gcode/compensate.h"
+#include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/polar.h"
@@ -41,12 +43,12 @@ static void forget(Block *b) {
     s->known_z &= !b->has[V_WORD_Z];
 }
 
-/* G0 and G1, also under G53. */
-static void straight(Block *b, bool by_machine) {
+/* G0 and G1, also under G53; return false where there is no room for the rows. */
+static bool straight(Block *b, bool by_machine) {
     State *s = b->state;
     double to_mm[3], mm_s = RAPID_MM_S, time_s = NAN;
     if (!take_turn(b, by_machine))
-        return;
+        return true;
     if (by_machine)
         machine_target(b, to_mm);
     else
@@ -62,6 +64,13 @@ static void straight(Block *b, bool by_machine) {
         if (finding != F_OK)
             report_speed(b, finding);
     }
+    s->cutter_mode &= ~S_CUTTER_BESIDE;
+    if (compensates(s)) {
+        learn(b);
+        const bool done = compensated_line(b, to_mm, mm_s);
+        stand_at(s, to_mm);
+        return done;
+    }
     stand_at(s, to_mm);
     stand_turned(s, b->turn_deg);
     if (by_machine)
@@ -72,6 +81,7 @@ static void straight(Block *b, bool by_machine) {
     note_time(b, time_s);
     if (by_machine)
         note_staying(b);
+    return true;
 }
 
 /* G28 and G30: by way of the programmed point, then the named axes (or all) to the machine's home. */
@@ -144,8 +154,19 @@ bool move(Block *b) {
     } else if (special == V_G4 && s->motion > V_MOTION_LINE) {
         report(b, F_DWELL_WITH_ARC, (Says){0});
         follow(b);
+    } else if (special == V_G53 && compensates(s)) {
+        refuse_under_compensation(b, V_G53);
+        s->doubt |= S_DOUBT_POSITION;
+    } else if (s->cutter_mode & S_CUTTER_ON && rotary_words(b)) {
+        report(b, F_CUTTER_TURNED, (Says){.a = s->cutter_code});
+        s->doubt |= S_DOUBT_POSITION;
     } else if (s->motion <= V_MOTION_LINE) {
-        straight(b, special == V_G53);
+        if (!straight(b, special == V_G53))
+            return false;
+    } else if (is_cycle(s->motion) && s->cutter_mode & S_CUTTER_ON) {
+        refuse_under_compensation(b, s->motion * V_TENFOLD);
+        follow(b);
+        s->doubt |= S_DOUBT_Z;
     } else if (is_cycle(s->motion)) {
         if (!cycle_move(b))
             return false;

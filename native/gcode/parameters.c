@@ -23,6 +23,7 @@ enum {
     TOOL = 5400,
     TOOL_OFFSET = 5401,
     OF_A_SYSTEM_ROTATION = 9,
+    TOOL_DIAMETER = 5410,
     LAST_OF_TOOL = 5413,
     POSITION = 5420,
     LAST_OF_STATE = 5428
@@ -75,11 +76,34 @@ bool is_read_only(int64_t number) {
            (number >= POSITION && number <= LAST_OF_STATE);
 }
 
+/* Tell whether a parameter shows the place of the tool while that is beside the programmed one. */
+static bool is_beside(const Machine *machine) { return machine->state.at->cutter_mode != 0; }
+
+/* Tell whether a numbered parameter shows what is not known: the diameter, or a place under compensation. */
+bool is_of_cutter(const Machine *machine, int64_t number) {
+    return number == TOOL_DIAMETER || (number >= POSITION && number <= LAST_OF_STATE && is_beside(machine));
+}
+
+bool is_name_of_cutter(const Machine *machine, int64_t name) {
+    return name >= N_X && name <= N_ABS_Z && is_beside(machine);
+}
+
 /* Tell whether a parameter is the position of a rotary or secondary axis, which a program cannot ask for. */
 bool is_of_other_axis(int64_t number) { return number >= POSITION + 3 && number <= LAST_OF_STATE; }
 
+/* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC; the first such place is kept. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
-    return is_read_only(number) ? of_state(e->machine, number) : AT(e->program->parameters, number);
+    if (is_read_only(number))
+        return of_state(e->machine, number);
+    const double value = AT(e->program->parameters, number);
+    if (!isnan(value))
+        return value;
+    State *s = e->machine->state.at;
+    if (s->unset_line == 0) {
+        s->unset_line = e->line;
+        s->unset_parameter = (int32_t)number;
+    }
+    return 0.0;
 }
 
 /* --- names ---------------------------------------------------------------------------------------------- */
@@ -166,7 +190,7 @@ static double of_modes(const State *s, int64_t name) {
     switch (name) {
     case N_MOTION_MODE: return s->motion == V_MOTION_CANCELLED ? V_G80 : s->motion * V_TENFOLD;
     case N_PLANE: return s->plane * V_TENFOLD;
-    case N_CCOMP: return 400.0; /* G40 */
+    case N_CCOMP: return s->cutter_mode & S_CUTTER_ON ? s->cutter_code : V_G40;
     case N_METRIC: return s->unit_mm == 1.0;
     case N_IMPERIAL: return s->unit_mm != 1.0;
     case N_ABSOLUTE: return s->absolute != 0;

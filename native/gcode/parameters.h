@@ -41,6 +41,8 @@ enum { NO_NAME = -1 };
 double numbered_parameter(const Evaluation *e, int64_t number);
 bool is_read_only(int64_t number);
 bool is_of_other_axis(int64_t number);
+bool is_of_cutter(const Machine *machine, int64_t number);
+bool is_name_of_cutter(const Machine *machine, int64_t name);
 int64_t name_at(Evaluation *e, int64_t *i);
 bool is_name_set(const Evaluation *e, int64_t name);
 double named_parameter(const Evaluation *e, int64_t name);

@@ -9,7 +9,8 @@ void report_at(Block *block, int32_t line, int32_t number, Says says) {
         return;
     const FoundView found = block->machine->found;
     const bool warning = number == F_TOOL_UNDECLARED || number == F_H_DIFFERS || number == F_OFFSET_UNKNOWN ||
-                         number == FO_FROM_UNKNOWN || number == FO_AT_START || number == FO_LENGTH_DIFFERS;
+                         number == FO_FROM_UNKNOWN || number == FO_AT_START || number == FO_LENGTH_DIFFERS ||
+                         number == F_CUTTER_DIFFERS;
     counts->errors += !warning;
     const int64_t room = warning ? found.rows / 2 : found.rows; /* warnings never crowd out an error */
     if (counts->findings < room)

@@ -19,7 +19,7 @@ static void rotary_target(const Block *b, bool by_machine, double to_deg[V_ROTAR
 }
 
 /* Return the bits of the declared rotary letters that the block names. */
-static int32_t rotary_words(const Block *b) {
+int32_t rotary_words(const Block *b) {
     int32_t bits = 0;
     for (int k = 0; k < V_ROTARY_AXES; k++)
         bits |= (is_declared(b->machine, k) && b->has[V_WORD_A + k]) << k;

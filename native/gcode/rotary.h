@@ -35,6 +35,14 @@ static inline void emit_turn(Machine *machine, int64_t row) {
     AT(rows->time_s, row) = NAN;
 }
 
+/* Write the rotary columns of a row again, as those of another one. */
+static inline void copy_turn(const Rows *rows, int64_t from, int64_t to) {
+    for (int k = 0; k < V_ROTARY_AXES; k++)
+        CELL(rows->turn, to, k) = CELL(rows->turn, from, k);
+    AT(rows->turn_mode, to) = AT(rows->turn_mode, from);
+    AT(rows->time_s, to) = AT(rows->time_s, from);
+}
+
 static inline void stand_turned(State *s, const double turn_deg[V_ROTARY_AXES]) {
     for (int k = 0; k < V_ROTARY_AXES; k++)
         s->rotary_deg[k] = turn_deg[k];
@@ -47,6 +55,7 @@ static inline void stand_turned_between(State *s, const double from_deg[V_ROTARY
         s->rotary_deg[k] = part < 1.0 ? from_deg[k] + (to_deg[k] - from_deg[k]) * part : to_deg[k];
 }
 
+int32_t rotary_words(const Block *b);
 bool take_turn(Block *b, bool by_machine);
 void follow_rotary(Block *b);
 void rotary_home(Block *b, bool any_axis);

@@ -50,6 +50,29 @@ static inline void emit(Machine *machine, int32_t line, double feed_mm_s, bool r
         emit_turn(machine, row);
 }
 
+/* Write the columns of a row again, as another one. */
+static inline void copy_row(const Machine *machine, int64_t from, int64_t to) {
+    const Rows *rows = &machine->rows;
+    for (int axis = 0; axis < 3; axis++) {
+        CELL(rows->position_mm, to, axis) = CELL(rows->position_mm, from, axis);
+        CELL(rows->known, to, axis) = CELL(rows->known, from, axis);
+    }
+    AT(rows->feed_mm_s, to) = AT(rows->feed_mm_s, from);
+    AT(rows->spindle_rad_s, to) = AT(rows->spindle_rad_s, from);
+    AT(rows->tolerance_mm, to) = AT(rows->tolerance_mm, from);
+    AT(rows->dwell_s, to) = AT(rows->dwell_s, from);
+    AT(rows->length_offset_mm, to) = AT(rows->length_offset_mm, from);
+    AT(rows->length_offset_tool, to) = AT(rows->length_offset_tool, from);
+    AT(rows->tool, to) = AT(rows->tool, from);
+    AT(rows->source_line, to) = AT(rows->source_line, from);
+    AT(rows->arc, to) = AT(rows->arc, from);
+    AT(rows->rapid, to) = AT(rows->rapid, from);
+    AT(rows->exact_stop, to) = AT(rows->exact_stop, from);
+    AT(rows->machine, to) = AT(rows->machine, from);
+    if (machine->rotary_axes)
+        copy_turn(rows, from, to);
+}
+
 static inline void stand_at(State *s, const double position_mm[3]) {
     s->x = position_mm[0];
     s->y = position_mm[1];

@@ -2,6 +2,7 @@
 
 #include "gcode/settings.h"
 
+#include "gcode/cutter_settings.h"
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
@@ -251,8 +252,10 @@ void apply_settings(Block *b) {
         speed(b, b->word[V_WORD_S]);
     if (b->has[V_WORD_T])
         select_tool(b, b->word[V_WORD_T]);
+    refuse_before_compensation(b);
     m_codes(b);
     plane_and_unit(b);
+    cutter_compensation(b);
     length_offset(b);
     if (b->g[V_WORK_OFFSET] >= 0)
         select_offset(b, b->g[V_WORK_OFFSET]);

@@ -35,6 +35,19 @@ def test_functions_of_round_angles_are_not_a_unit_short_behind_fix():
     assert ends("G0 X[FIX[10*SIN[30]]]\nX[FIX[10*COS[60]]]\nX[FIX[10*TAN[45]]]") == [5.0, 5.0, 10.0]
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [("#3=5\nG1 X#3 Y#100", 1), ("#3=[2*#4]", 0), ("#3=1\n#3=[#3+1]\nG1 X#3", None)],
+)
+def test_a_parameter_that_nothing_has_set_is_told_once(text, line):
+    issues = [
+        issue
+        for issue in read(text + "\nG1 Y#100" * (line is not None)).issues
+        if issue.code == "parameter-unset"
+    ]
+    assert [issue.line for issue in issues] == ([] if line is None else [line + 1 + HEAD.count("\n")])
+
+
 def test_rows_have_the_line_that_made_them():
     assert read("o1 repeat [2]\nX1\nX2\no1 endrepeat").source_line[2:].tolist() == [4, 5, 4, 5]
 

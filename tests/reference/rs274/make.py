@@ -23,7 +23,8 @@ SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 PLANES = {"CANON_PLANE_XY": "xy", "CANON_PLANE_XZ": "zx", "CANON_PLANE_YZ": "yz"}
 AXES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}
 CALL = re.compile(r"^\s*\d+ N[\s\d.]*([A-Z][A-Z0-9_]*)\((.*)\)$")
-TOOL_LENGTH = re.compile(r"Z([-+]?\d*\.?\d+)")
+TOOL_SIZE = re.compile(r"([ZD])([-+]?\d*\.?\d+)")
+COMPENSATED = re.compile(rb"G4[12]", re.IGNORECASE)
 UNFINISHED = "File ended with no percent sign"
 Call = tuple[str, list[str]]
 
@@ -167,9 +168,9 @@ def _rounded(value: float) -> float:
 
 
 def _tool_table_in_inches() -> str:
-    """Return ``tool.tbl`` with Z in inches: stand-alone rs274 takes its files to be in inches."""
+    """Return ``tool.tbl`` with Z and D in inches: stand-alone rs274 takes its files to be in inches."""
     text = (HERE / "tool.tbl").read_text(encoding="ascii")
-    return TOOL_LENGTH.sub(lambda match: f"Z{float(match[1]) / MM_PER_INCH:.12f}", text)
+    return TOOL_SIZE.sub(lambda match: f"{match[1]}{float(match[2]) / MM_PER_INCH:.12f}", text)
 
 
 def _parameters(offsets: dict[str, list[float]]) -> str:
@@ -195,8 +196,10 @@ def _canon(calls: list[Call]) -> Canon:
 
 
 def _prefixes(program: bytes) -> list[bytes]:
+    """Return the beginnings of a program; under cutter compensation M2 brings out the last move."""
     lines = program.splitlines(keepends=True)
-    return [b"".join(lines[:count]) for count in range(1, len(lines) + 1)]
+    end = b"\nM2\n" if COMPENSATED.search(program) else b""
+    return [b"".join(lines[:count]) + end for count in range(1, len(lines) + 1)]
 
 
 def _program(rs274: Interpreter, file: Path, offsets: dict, block_delete: bool) -> dict:

@@ -1,0 +1,130 @@
+/* G40 to G42.1: side and radius of cutter compensation, and what is refused while it is on. */
+
+#include "gcode/cutter_settings.h"
+
+#include "gcode/compensate.h"
+#include "gcode/reporting.h"
+#include "gcode/rotary.h"
+#include "gcode/settings.h"
+
+/* From this difference on the diameter is not that of the tool in the spindle. */
+static const double OTHER_DIAMETER_MM = 1e-6;
+
+/* Refuse a code, ten times its number, that must not stand while compensation is on; an M-code is below 0. */
+void refuse_under_compensation(Block *b, int32_t code) {
+    const State *s = b->state;
+    report(b, F_CUTTER_ON, (Says){.a = code, .b = s->cutter_code, .c = s->cutter_line});
+}
+
+/* --- what is refused ------------------------------------------------------------------------------------ */
+
+/* Refuse what comes before G40 in the order of execution: a tool change, another plane. */
+void refuse_before_compensation(Block *b) {
+    State *s = b->state;
+    const int32_t plane = b->g[V_PLANE];
+    if (!(s->cutter_mode & S_CUTTER_ON))
+        return;
+    for (int k = 0; k < V_M_CODES; k++)
+        if (b->m_codes[k] == V_M6)
+            refuse_under_compensation(b, -V_M6 * V_TENFOLD);
+    if (plane >= 0 && plane / V_TENFOLD != s->plane) {
+        refuse_under_compensation(b, plane);
+        s->cutter_mode = 0;
+    }
+}
+
+/* Refuse what comes behind G40: everything that moves or measures the coordinates anew. */
+static void refuse_behind_compensation(Block *b) {
+    static const int32_t GROUPS[] = {V_LENGTH_OFFSET, V_WORK_OFFSET, V_PATH_CONTROL, V_RETRACT, V_NON_MODAL,
+                                     V_SHIFT_STATE};
+    if (!(b->state->cutter_mode & S_CUTTER_ON))
+        return;
+    for (size_t k = 0; k < sizeof GROUPS / sizeof *GROUPS; k++) {
+        const int32_t code = b->g[GROUPS[k]];
+        if (code >= 0 && code != V_G4 && code != V_G53) /* G53 where it moves */
+            refuse_under_compensation(b, code);
+    }
+}
+
+/* --- the diameter --------------------------------------------------------------------------------------- */
+
+static double of_tool(Floats diameter_mm, int32_t tool) {
+    return tool >= 0 && tool < diameter_mm.rows ? AT(diameter_mm, tool) : NAN;
+}
+
+/* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
+static double tool_diameter(Block *b, int32_t code) {
+    const State *s = b->state;
+    int32_t tool = s->tool;
+    if (b->has[V_WORD_D]) {
+        tool = whole(b->word[V_WORD_D]);
+        if (tool == NOT_WHOLE) {
+            report(b, F_BAD_INTEGER, (Says){.a = V_WORD_D + CH_LETTER_A});
+            return NAN;
+        }
+        if (tool == 0)
+            tool = s->tool;
+    }
+    const double diameter_mm = of_tool(b->machine->tool_diameter_mm, tool);
+    if (tool == 0)
+        report_unless(b, S_DOUBT_TOOL, F_CUTTER_NO_TOOL, (Says){.a = code});
+    else if (isnan(diameter_mm))
+        report_unless(b, S_DOUBT_TOOL, F_CUTTER_NO_DIAMETER, (Says){.a = code, .b = tool});
+    return tool == 0 ? NAN : diameter_mm;
+}
+
+static double diameter(Block *b, int32_t code) {
+    if (code == V_G41 || code == V_G42)
+        return tool_diameter(b, code);
+    if (b->has[V_WORD_D])
+        return b->word[V_WORD_D] * b->state->unit_mm;
+    report(b, F_CUTTER_NO_D, (Says){.a = code});
+    return NAN;
+}
+
+/* Warn where the diameter is not that with which the tool in the spindle cuts. */
+static void compare_with_tool(Block *b, int32_t code, double diameter_mm) {
+    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, b->state->tool);
+    if (fabs(diameter_mm - in_cell_mm) > OTHER_DIAMETER_MM)
+        report(b, F_CUTTER_DIFFERS, (Says){.a = code, .b = diameter_mm, .c = in_cell_mm});
+}
+
+/* --- on and off ----------------------------------------------------------------------------------------- */
+
+/* Turn compensation on; after a fault by a radius of 0, so that what follows is judged by its own faults. */
+static void turn_on(Block *b, int32_t code) {
+    State *s = b->state;
+    if (s->plane == V_PLANE_YZ)
+        report_unless(b, S_DOUBT_PLANE, F_CUTTER_PLANE, (Says){.a = code});
+    if (s->rotated)
+        report(b, F_CUTTER_ROTATED, (Says){.a = code});
+    if (is_turned(s) || s->length_code == V_G43_5)
+        report(b, F_CUTTER_TURNED, (Says){.a = code});
+    if (b->has[V_WORD_L])
+        report(b, F_CUTTER_LATHE, (Says){0});
+    const double diameter_mm = diameter(b, code);
+    s->cutter_mode |= S_CUTTER_ON;
+    s->cutter_code = code;
+    s->cutter_line = b->line;
+    s->cutter_side = (code < V_G42 ? 1 : -1) * (diameter_mm < 0.0 ? -1 : 1);
+    s->cutter_radius_mm = isnan(diameter_mm) || s->plane == V_PLANE_YZ ? 0.0 : 0.5 * fabs(diameter_mm);
+    s->cutter_entered = s->cutter_failed = 0;
+    if (!isnan(diameter_mm))
+        compare_with_tool(b, code, diameter_mm);
+}
+
+/* Carry out G40, G41, G42, G41.1 or G42.1 of a block, and refuse what must not stand beside or under them. */
+void cutter_compensation(Block *b) {
+    const int32_t code = b->g[V_RADIUS_COMPENSATION];
+    if (code == V_G40) {
+        end_compensation(b);
+    } else if (code >= 0) {
+        b->used[V_WORD_D] |= b->has[V_WORD_D];
+        b->used[V_WORD_L] |= b->has[V_WORD_L];
+        if (b->state->cutter_mode & S_CUTTER_ON)
+            refuse_under_compensation(b, code);
+        else
+            turn_on(b, code);
+    }
+    refuse_behind_compensation(b);
+}

@@ -1,0 +1,17 @@
+; line to arc, arc to line and arc to arc; inside, outside and tangent
+G21 G17 G90
+T2 M6
+F400 G0 X-10 Y0 Z0
+G41 D2 G1 X0 Y0
+X10
+G3 X20 Y10 J10
+G1 Y20
+G2 X30 Y30 I10
+G3 X40 Y30 I5
+G2 X60 Y30 I10
+G1 X60 Y10
+G2 X40 Y10 I-10
+G3 X30 Y0 I-5 J-5
+G1 X20 Y-20
+G40 X0
+M2

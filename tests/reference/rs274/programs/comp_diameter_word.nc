@@ -1,0 +1,19 @@
+; G41.1 and G42.1 with the diameter in D, negative ones, under G20 too
+G21 G17 G90
+T1 M6
+F500 G0 X0 Y0 Z0
+G41.1 D5 G1 X10
+Y20
+G40 X0
+G42.1 D-5 G1 X10 Y0
+Y20
+G40 X0
+G20
+G41.1 D0.25 G1 X1 Y0
+Y1
+G40 X0
+G42.1 D.125
+G1 Y-1
+X2
+G40 G0 X3
+M2

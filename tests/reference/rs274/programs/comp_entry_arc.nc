@@ -1,0 +1,18 @@
+; an arc as the entry move, by I J and by R, inside and outside
+G21 G17 G90
+T2 M6
+F500 G0 X0 Y0 Z0
+G41 D2
+G3 X10 Y10 J10
+G1 Y30
+G40 X0
+G0 X0 Y0
+G42 D2
+G3 X10 Y10 R10
+G1 Y30
+G40 X0
+G41 D2 G2 X20 Y50 R20
+G2 X40 Y30 J-20
+G40
+G1 X0 Y0
+M2

@@ -1,0 +1,15 @@
+; full circles, inside by tangent arcs and outside by a line
+G21 G17 G90
+T1 M6
+F500 G0 X0 Y0 Z0
+G41 D1 G1 X10 Y-10
+G3 X20 Y0 J10
+G3 I-20
+G3 X10 Y10 I-10
+G40 G1 X0 Y0
+G0 X60 Y-20
+G42 G1 X60 Y0
+G3 X60 Y0 I20
+G1 Y20
+G40 G0 X0
+M2

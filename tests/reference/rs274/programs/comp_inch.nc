@@ -1,0 +1,12 @@
+; everything in inches
+G20 G17 G90
+T1 M6
+F20 G0 X0 Y0 Z0
+G42 D1
+G1 X1 Y0
+X1 Y-1
+G3 X1.5 Y-1.5 I.5
+G1 X2.5 Y-.5
+X3
+G40 X4 Y4
+M2

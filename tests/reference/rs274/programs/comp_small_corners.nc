@@ -1,0 +1,17 @@
+; bends below and above 0.05 rad, both ways, and straight on
+G21 G17 G90
+T1 M6
+F500 G0 X0 Y0 Z0
+G41 G1 X20
+X40 Y0
+X60 Y0.8
+X80 Y0.8
+X100 Y2.2
+X120 Y2.2
+X140 Y1.6
+X160 Y0
+G3 X180 Y20 I0 J20
+G2 X200 Y40.506249 I20 J0.5
+G1 X220
+G40 Y80
+M2
