@@ -117,3 +117,14 @@ def test_what_is_never_read_says_why(code, words):
     assert (issue.code, issue.line) == ("unsupported-g", 4)
     assert words in issue.message
     assert issue.remedy
+
+
+def test_polar_words_take_expressions():
+    table = toolpath("#1=10\nG0 @[#1] ^[3*#1]\n@#1 ^-[#1]")
+    plain = toolpath("G0 @10 ^30\n@10 ^-10")
+    np.testing.assert_array_equal(table.position_mm, plain.position_mm)
+
+
+@pytest.mark.parametrize("block", ["G1 @[2] X1", "G1 @[1+1] Y[1]"])
+def test_expressions_beside_an_axis_are_refused(block):
+    assert found(block) == [("polar-and-axis", 4, f"G1 ^{block[3:]}")]
