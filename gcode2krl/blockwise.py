@@ -105,19 +105,20 @@ def _seen_along(
     gathered, waiting = Gathered[Motion](course.count), np.zeros(0, dtype=np.int32)
     angles = np.empty((2, course.count if keeps and judges_joints else 0, 6))
     solved = 0
-    for motion, ends in ahead(course.blocks()):
-        acceleration.take(motion, line[motion.move])
-        watch.take(motion)
-        if follower is not None and share is not None:
-            q, qd = follower.take(motion, ends)
-            waiting = np.concatenate([waiting, motion.move])
-            robot.raise_shares(share, qd, waiting[: len(qd)], cell)
-            waiting = waiting[len(qd) :]
+    with ahead(course.blocks()) as blocks:
+        for motion, ends in blocks:
+            acceleration.take(motion, line[motion.move])
+            watch.take(motion)
+            if follower is not None and share is not None:
+                q, qd = follower.take(motion, ends)
+                waiting = np.concatenate([waiting, motion.move])
+                robot.raise_shares(share, qd, waiting[: len(qd)], cell)
+                waiting = waiting[len(qd) :]
+                if keeps:
+                    angles[:, solved : solved + len(q)] = q, qd
+                    solved += len(q)
             if keeps:
-                angles[:, solved : solved + len(q)] = q, qd
-                solved += len(q)
-        if keeps:
-            gathered.take(motion)
+                gathered.take(motion)
     kept = Kept(gathered.table(), *(angles if judges_joints else (None, None))) if keeps else None
     return _Seen(share[chain.move] if share is not None else None, acceleration, watch, kept)
 
@@ -213,8 +214,11 @@ class Loads:
             raise ValueError("there are no forces")
         return self._done((motion, q_rad, qd_rad_s, ends), self._milling.take(motion, ends))
 
-    def along(self, samples: Iterator[Samples]) -> Iterator[Block]:
-        """Yield the blocks of `take`: while one is judged the next is cut, and the one behind it prepared."""
+    def along(self, samples: Iterator[Samples]) -> Generator[Block, None, None]:
+        """Yield the blocks of `take`: while one is judged the next is cut, and the one behind it prepared.
+
+        Whoever takes them closes this generator, whatever happens between: it has threads (`threads.ahead`).
+        """
         milling = self._milling
         if milling is None:
             return
@@ -224,11 +228,13 @@ class Loads:
                 yield block, milling.approached(block[0], block[3])
 
         def touched() -> Generator[tuple[Samples, cutting.Contact], None, None]:
-            for block, approach in ahead(approached()):
-                yield block, milling.touched(approach)
+            with ahead(approached()) as blocks:
+                for block, approach in blocks:
+                    yield block, milling.touched(approach)
 
-        for block, contact in ahead(touched()):
-            yield self._done(block, milling.loaded(contact))
+        with ahead(touched()) as blocks:
+            for block, contact in blocks:
+                yield self._done(block, milling.loaded(contact))
 
     def _done(self, samples: Samples, forces: Forces) -> Block:
         motion, q_rad, qd_rad_s, _ = samples

@@ -4,6 +4,7 @@ import hashlib
 import io
 import itertools
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -176,10 +177,11 @@ def forecast_toolpath(
     if forces:
         tell = begin("material, forces, deflection")
         loads = Loads(toolpath, cell, planned.outlook, course.dt_s, has_peaks=False)
-        for block in loads.along(blocks_with_joints(course, cell)):
-            figures.take(block.forces, block.deflection)
-            samples.take(block.motion, block.line, block.forces, block.deflection)
-            tell(loads.count, course.count)
+        with closing(loads.along(blocks_with_joints(course, cell))) as blocks:
+            for block in blocks:
+                figures.take(block.forces, block.deflection)
+                samples.take(block.motion, block.line, block.forces, block.deflection)
+                tell(loads.count, course.count)
         outcome = loads.outcome()
     known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
     found = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
@@ -227,11 +229,12 @@ def forces_and_deflection(
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
     all_forces, all_bent = Gathered[Forces](len(motion)), Gathered[Deflection](len(motion))
-    for done in loads.along(blocks_with(joints, motion)):
-        all_forces.take(done.forces)
-        if done.deflection is not None:
-            all_bent.take(done.deflection)
-        tell(loads.count, len(motion))
+    with closing(loads.along(blocks_with(joints, motion))) as blocks:
+        for done in blocks:
+            all_forces.take(done.forces)
+            if done.deflection is not None:
+                all_bent.take(done.deflection)
+            tell(loads.count, len(motion))
     outcome = loads.outcome()
     forces: Forces | None = None
     deflection: Deflection | None = None

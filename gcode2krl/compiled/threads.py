@@ -2,9 +2,9 @@
 
 import multiprocessing
 import os
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from typing import Any, TypeVar
 
 Task = TypeVar("Task")
@@ -41,17 +41,25 @@ def in_threads(
         return list(pool.map(work, tasks))
 
 
-def ahead(items: Generator[Result, None, None], threads: int | None = None) -> Generator[Result, None, None]:
-    """Yield items, the next one of which is made in a thread while one is worked on.
+@contextmanager
+def ahead(items: Generator[Result, None, None], threads: int | None = None) -> Iterator[Iterator[Result]]:
+    """Give items, the next of which is made in a thread while one is worked on, and close them at the end.
 
-    What making one raises is raised here. The thread ends with the last item, or with this generator: one
-    that is being made then is waited for.
+    What making one raises is raised where it is due. At the end of the context the item that is being made is
+    waited for. This is no generator with a thread of its own: one that is left behind, as by an exception, is
+    closed by the garbage collector, which may run where Python itself starts or ends a thread and holds the
+    lock that ending this thread takes, so that the process stands still for ever.
     """
-    if (threads or cores()) < 2:
-        yield from items
-        return
-    with closing(items), ThreadPoolExecutor(1) as maker:
+    with closing(items):
+        if (threads or cores()) < 2:
+            yield items
+            return
+        with ThreadPoolExecutor(1) as maker:
+            yield _made_ahead(items, maker)
+
+
+def _made_ahead(items: Iterator[Result], maker: ThreadPoolExecutor) -> Iterator[Result]:
+    coming = maker.submit(next, items, _END)
+    while (item := coming.result()) is not _END:
         coming = maker.submit(next, items, _END)
-        while (item := coming.result()) is not _END:
-            coming = maker.submit(next, items, _END)
-            yield item
+        yield item

@@ -2,8 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
+from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
@@ -173,10 +173,25 @@ def read_stream(
         lengths_from_table=from_table,
         **_rotary_settings(cell),
     )
-    size = _size_of(stream)
+    with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
+        head, diameters = _interpreted(interpreter, scanned, name, _size_of(stream), folders, progress)
+    toolpath = interpreter.finish(head, cell)
+    if cell is not None:
+        doubts += other_tools(diameters, toolpath, cell)
+    return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
+
+
+def _interpreted(
+    interpreter: "_Interpreter",
+    scanned: Iterator[tuple[int, bytes, Words]],
+    name: str,
+    size: int,
+    folders: Sequence[Path],
+    progress: Progress | None,
+) -> tuple[bytes, list[NamedDiameter]]:
+    """Interpret a program; return how its text begins, and the diameters that its comments name."""
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    scanned = _scanned(pieces(stream, name), spoken)
     for first_line, text, words in scanned:
         if not interpreter.ended:
             if not head:
@@ -195,10 +210,7 @@ def read_stream(
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    toolpath = interpreter.finish(head, cell)
-    if cell is not None:
-        doubts += other_tools(diameters, toolpath, cell)
-    return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
+    return head, diameters
 
 
 def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
@@ -212,20 +224,11 @@ def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
 def _scanned(
     whole_lines: Iterator[tuple[int, bytes]],
     spoken: Dialect,
-) -> Iterator[tuple[int, bytes, Words]]:
-    """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
+) -> Generator[tuple[int, bytes, Words], None, None]:
+    """Yield (first line, text, its words), which hold until the next but one is made."""
     scanners = cycle((Scanner(spoken), Scanner(spoken)))  # one's words are read while the other writes
-
-    def scan_next() -> tuple[int, bytes, Words] | None:
-        piece = next(whole_lines, None)
-        return None if piece is None else (*piece, next(scanners).scan(piece[1], piece[0]))
-
-    with ThreadPoolExecutor(1) as pool:
-        scanned = scan_next()
-        while scanned is not None:
-            ahead = pool.submit(scan_next)
-            yield scanned
-            scanned = ahead.result()
+    for (first_line, text), scanner in zip(whole_lines, scanners, strict=False):
+        yield first_line, text, scanner.scan(text, first_line)
 
 
 def _start_of_line(text: bytes, line: int) -> int:

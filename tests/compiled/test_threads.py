@@ -7,7 +7,9 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
+from gcode2krl import read_gcode
 from gcode2krl.compiled.threads import THREADS_VARIABLE, ahead, cores, in_threads
+from gcode2krl.errors import NotUnderstoodError
 
 
 def test_results_come_in_the_order_of_the_tasks():
@@ -63,8 +65,9 @@ def counted(most, closed=None):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_what_is_made_ahead_comes_in_order(threads):
-    assert list(ahead(counted(5), threads)) == [0, 1, 2, 3, 4]
-    assert list(ahead(counted(0), threads)) == []
+    for count in (5, 0):
+        with ahead(counted(count), threads) as items:
+            assert list(items) == list(range(count))
 
 
 def test_the_next_item_is_made_while_one_is_worked_on():
@@ -75,9 +78,10 @@ def test_the_next_item_is_made_while_one_is_worked_on():
         together.wait()
         yield 1
 
-    for item in ahead(items(), 2):
-        if item == 0:
-            together.wait()
+    with ahead(items(), 2) as made:
+        for item in made:
+            if item == 0:
+                together.wait()
 
 
 def test_an_error_while_making_an_item_comes_where_it_is_due():
@@ -85,21 +89,37 @@ def test_an_error_while_making_an_item_comes_where_it_is_due():
         yield 0
         raise KeyError(1)
 
-    made = ahead(items(), 2)
-    assert next(made) == 0
-    with pytest.raises(KeyError):
-        next(made)
+    with ahead(items(), 2) as made:
+        assert next(made) == 0
+        with pytest.raises(KeyError):
+            next(made)
 
 
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_no_thread_is_left_where_the_work_on_an_item_fails(error):
+def test_no_thread_is_left_where_the_work_on_an_item_fails(error, threads):
     before, closed = threading.active_count(), threading.Event()
+
+    def twice():
+        with ahead(counted(9, closed), threads) as items:
+            yield from items
+
+    def work_that_fails():
+        with ahead(twice(), threads) as items:
+            for _ in items:
+                raise error
+
     with pytest.raises(error):
-        work_that_fails(ahead(ahead(counted(9, closed), 2), 2), error)
+        work_that_fails()
     assert closed.is_set()
     assert threading.active_count() == before
 
 
-def work_that_fails(items, error):
-    for _ in items:
-        raise error
+def test_a_refused_program_leaves_no_thread_to_the_garbage_collector(tmp_path):
+    """One that waits for a thread may do so where Python holds the lock that the thread's end takes."""
+    (tmp_path / "part.nc").write_text("BEGIN PGM 1 MM\nL X+10\n")
+    before = threading.active_count()
+    with pytest.raises(NotUnderstoodError) as refused:
+        read_gcode(tmp_path / "part.nc")
+    assert threading.active_count() == before
+    del refused
