@@ -8,6 +8,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import pytest
+
 import gcode2krl
 from tests.conftest import ROOT
 
@@ -39,6 +41,7 @@ def test_a_dependency_is_imported_or_has_a_reason():
     assert unused == with_reason
 
 
+@pytest.mark.slow
 def test_a_3mf_is_read_with_lxml_and_networkx(tmp_path):
     """What those two are there for; STL and PLY need neither."""
     vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in POINTS)

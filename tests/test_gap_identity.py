@@ -215,9 +215,9 @@ def test_one_case_through_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "2 cases, 2 already there" in capsys.readouterr().err
     assert identity.main(["compare", str(a), str(b)]) == 0
     assert "2 of 2 files are identical\ncpu_s: " in capsys.readouterr().out
-    words = ["time", str(ROOT), str(ROOT), str(folder), "--cases", "1", "--rounds", "2"]
+    words = ["time", str(ROOT), str(ROOT), str(folder), "--cases", "1", "--rounds", "1"]
     assert identity.main(words) == 0
-    assert "2 of 2 outputs identical" in capsys.readouterr().out
+    assert "1 of 1 outputs identical" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -64,6 +64,7 @@ def test_a_program_stays_in_its_air(name):
     assert point[:, 2].max() < 0.26 * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("form", ["src", "nc"])
 def test_both_forms_are_written_verified_and_translate(run, tmp_path, name, form):

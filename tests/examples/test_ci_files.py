@@ -123,6 +123,7 @@ def matches(text):
     return found
 
 
+@pytest.mark.slow
 def test_the_problem_matcher_finds_what_a_batch_prints(repository):
     done = Workflow(repository).run("Translate")
     assert "::add-matcher::.github/problem-matcher.json" in done.stdout
@@ -160,6 +161,7 @@ def test_lines_of_the_problem_matcher(line, expected):
     assert matches(line) == ([expected] if expected else [])
 
 
+@pytest.mark.slow
 def test_the_gitlab_job(repository):
     job = read("gitlab-ci.yml")["robot-programs"]
     assert job["before_script"] == [INSTALL]
@@ -182,6 +184,7 @@ def test_the_gitlab_job(repository):
     assert all((repository.folder / path).is_dir() for path in kept)
 
 
+@pytest.mark.slow
 def test_the_pre_commit_hook(repository):
     """The hook as it is stated, with the gcode2krl of this checkout in place of an installed one."""
     needs("pre-commit")

@@ -202,6 +202,7 @@ BLOCKS = [
 ]
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.sampled_from(BLOCKS), max_size=12))
 def test_doubt_never_hides_that_a_program_is_not_understood(blocks):

@@ -82,6 +82,7 @@ def test_turning_lines_give_the_limits_of_orientation(text, cell, law):
     assert found.turning_rms_mm < 0.01
 
 
+@pytest.mark.slow
 def test_turning_lines_that_never_reach_their_speed_leave_it_open(text, cell):
     trace = turning_trace(text, cell, Controller(), vel_ori=200.0, acc_ori=100.0)
     found = identify_controller(trace, controller_test_targets(cell), cell)
@@ -160,6 +161,7 @@ def test_program_elsewhere_and_slower(run, tmp_path):
 # --- recovery -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("k_cycles", "cdis_mm", "law"),
     [(14, 5.0, "averages"), (8, 2.3, "trapezoid"), (20, 11.0, "averages"), (11, 7.5, "trapezoid")],

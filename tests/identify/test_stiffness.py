@@ -162,6 +162,7 @@ def test_another_robot_and_another_stiffness(monkeypatch):
     assert list(ratios(result, truth).values()) == pytest.approx(np.ones(24), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated_mm", [0.0, make.MEAN_NOISE_MM])
 def test_intervals_cover_as_often_as_they_say(rows, cell, stated_mm):
     draws = 40

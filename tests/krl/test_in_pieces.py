@@ -64,6 +64,7 @@ def contents(folder):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request, way):
     (tmp_path / "part.nc").write_text(OTHER.get(way, PART), encoding="ascii")

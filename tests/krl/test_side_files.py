@@ -21,6 +21,7 @@ def statements(text):
     return [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((";", "&"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [".src", ".dat"])
 def test_every_deleted_statement_is_noticed(make, kind):
     made = make()

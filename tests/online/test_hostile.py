@@ -102,6 +102,7 @@ def test_a_clock_that_lies(cell, device, settings, far):
         assert session.phase in (Phase.HELD, Phase.CLOSED)
 
 
+@pytest.mark.slow
 def test_everything_that_a_wild_controller_can_say(cell, device, settings):
     """Sometimes a number of a telegram is any value that can be parsed, in every phase."""
     rng = np.random.default_rng(7)

@@ -95,6 +95,7 @@ class TestPath:
         programmed = figure.axes[0].lines[0]
         assert np.nanmax(programmed.get_xdata()) == 100.0
 
+    @pytest.mark.slow
     def test_long_is_coloured_by_depth_with_nothing_lost(self, long):
         figure = path_figure(*long)
         draw(figure)
@@ -109,6 +110,7 @@ class TestPath:
         assert depth.get_array().min() == pytest.approx(z_mm.min())
         assert side.get_ylabel() == "Z (mm)"
 
+    @pytest.mark.slow
     def test_many_moves_show_speed_pass_by_pass(self):
         levels = [[x, y, z] for z in (-5.0, -10.0) for y in range(30) for x in (0, 40)[:: 1 - 2 * (y % 2)]]
         points = np.repeat(np.array(levels, dtype=float), 40, axis=0)
@@ -148,6 +150,7 @@ class TestPath:
         shown = corners_apart(np.arange(100.0), corner, move, 5.0)
         assert np.flatnonzero(shown).tolist() == [10, 11]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("rows", [1, 2])
     def test_tiny(self, rows):
         motion = motion_from(DOG_LEG[1 : 1 + rows], np.full(rows, 1), np.zeros(rows, dtype=bool))

@@ -112,6 +112,7 @@ def test_no_pass_hides_a_worse_one(circles):
         assert np.allclose(axes.images[-1].get_array().compressed(), worst)
 
 
+@pytest.mark.slow
 def test_passes_beside_each_other_are_one_picture():
     motion = motion_of(targets_of(DOG_LEG))
     figure = coloured_path_figure(toolpath_of(DOG_LEG), motion, np.ones(len(motion)), "force (N)", "Force")
@@ -120,6 +121,7 @@ def test_passes_beside_each_other_are_one_picture():
     assert "worst force (N)  1: 1 at line 11,  2: 1 at line 12,  3: 1 at line 13" in texts(figure)
 
 
+@pytest.mark.slow
 def test_an_outlier_does_not_darken_the_path(circles):
     toolpath, motion, _ = circles
     values = np.full(len(motion), 1.0)
@@ -129,6 +131,7 @@ def test_an_outlier_does_not_darken_the_path(circles):
     assert any("1: 100 at line 12" in words for words in texts(figure))
 
 
+@pytest.mark.slow
 def test_a_move_to_the_tool_changer_does_not_shrink_the_part(circles):
     toolpath, motion, _ = circles
     position = motion.position_mm.copy()
@@ -141,6 +144,7 @@ def test_a_move_to_the_tool_changer_does_not_shrink_the_part(circles):
     assert (left, right) == pytest.approx((30.0, 70.0), abs=1.0)
 
 
+@pytest.mark.slow
 def test_all_in_air_is_pale():
     motion = motion_of(targets_of(DOG_LEG))
     draw(coloured_path_figure(toolpath_of(DOG_LEG), motion, np.zeros(len(motion)), "force (N)", "Force"))

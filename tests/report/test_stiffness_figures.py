@@ -123,6 +123,7 @@ def test_command_writes_figures_and_tables(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["issues"][0]["code"] == "output-unwritable"
 
 
+@pytest.mark.slow
 def test_figures_of_nothing_and_of_little(tmp_path):
     from gcode2krl.report.figures import save_figures
 

@@ -136,6 +136,7 @@ def test_names_of_any_bytes():
     assert unquote(uri("\ud800.nc")) == "?.nc"
 
 
+@pytest.mark.slow
 def test_no_more_than_a_server_takes(validator):
     issues = [ERROR | {"line": line} for line in range(1, MOST_RESULTS + 11)]
     run = run_of([record("a.nc", 1, [*issues, NOTE])], validator=None)

@@ -134,6 +134,7 @@ def test_a_damaged_zip_is_one_line(tmp_path, hanging):
     refusal(tmp_path / "b.zip")
 
 
+@pytest.mark.slow
 def test_a_bomb_is_read_no_further_than_the_limit(tmp_path):
     bomb = zipped(tmp_path / "bomb.zip", **{"KRC/R1/System/$config.dat": b" " * (200 * archive.MOST_BYTES)})
     assert bomb.stat().st_size < archive.MOST_BYTES
