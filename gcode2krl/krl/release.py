@@ -15,6 +15,7 @@ STRICTER_HERE = frozenset(
         "offset-from-unknown",
         "parameter-unset",
         "tool-length-differs",
+        "tool-not-changed",
     }
 )
 """Warnings of reading and predicting that are errors in a program for a robot."""
