@@ -608,6 +608,7 @@
 #define PF_FAULT_ARGUMENTS 15
 #define PF_FAULT_REPEATS 16
 #define PF_FAULT_NOT_FIRST 17
+#define PF_FAULT_BEHIND 18
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0

@@ -103,7 +103,8 @@ VALUE_REMEDIES: dict[int, str] = {
     FAULT_ARGUMENTS,
     FAULT_REPEATS,
     FAULT_NOT_FIRST,
-) = range(18)
+    FAULT_BEHIND,
+) = range(19)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -113,6 +114,10 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     ),
     FAULT_NO_OPENING: ("this O-word has no beginning", "check the label: both ends have the same"),
     FAULT_NO_CLOSING: ("this O-word has no end", "add its end with the same label"),
+    FAULT_BEHIND: (
+        "nothing but a comment may stand behind this O-word",
+        "check how the word is spelt; write other things on a line of their own",
+    ),
     FAULT_CROSSED: ("this ends something that was begun outside of what is open here", "nest them"),
     FAULT_LABEL_TWICE: ("the label is used twice", "give each if, while, do and repeat a label of its own"),
     FAULT_NESTED_SUB: ("a subprogram is defined within another", "define it on its own"),
