@@ -202,3 +202,10 @@ def test_a_loop_is_its_turns_written_out(moves, turns):
 def test_the_branch_that_is_taken_is_the_program(first, second, taken):
     text = f"{HEAD}o1 if [{int(taken)} EQ 1]\n{said(first)}o1 else\n{said(second)}o1 endif\nM2\n"
     alike(read(text), read(HEAD + said(first if taken else second) + "M2\n"))
+
+
+@few
+@given(motions(), st.sampled_from(("G41.1", "G42.1")))
+def test_a_contour_under_compensation_by_nothing_is_the_contour(moves, code):
+    head, body, end = f"{HEAD}G0 X-150 Y-120\n", f"G1 X0 Y0\n{said(moves)}G40\n", "G1 X200 Y200\nM2\n"
+    alike(read(f"{head}{code} D0\n{body}{end}"), read(head + body + end), mm=1e-6)
