@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+import fuzz_gcode_beside as beside
+import gcode_rules as rules
+from gcode_beside_rs274 import Beside, by_us, difference
+from gcode_draws import drawn, slipped
+
+from gcode2krl.errors import Issue
+
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "benchmarks"))
-
-import fuzz_gcode_beside as beside  # noqa: E402  # a script's folder is on its path, a test's is not
-import gcode_rules as rules  # noqa: E402
-from gcode_beside_rs274 import Beside, by_us, difference  # noqa: E402
-from gcode_draws import drawn, slipped  # noqa: E402
-
-from gcode2krl.errors import Issue  # noqa: E402
-
 with_rs274 = pytest.mark.skipif(shutil.which("rs274") is None, reason="no rs274")
 
 
