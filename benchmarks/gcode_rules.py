@@ -16,6 +16,8 @@ _BY_G = {
     ("G87", "G88"): "G87, G88 | read",
     ("G43.4", "G43.5"): "G43.4, G43.5 | unknown",
 }
+_LENGTH_IN_INCHES = "`G20 G43 H2`, then `G21`, then `G49`"
+_LENGTH_FORGOTTEN = "M6 behind a change of length that no move has followed"
 _TWO_SIGNS = "two signs before a number"
 _HERE = (
     ("rotary-axis", "", "A, B, C (U, V, W) with the value 0, no rotary axes declared"),
@@ -70,6 +72,30 @@ def why_refused_there(message: str) -> str:
     return next((row for pattern, row in _THERE if re.search(pattern, message)), "")
 
 
+def why_z_differs(program: bytes, difference: str) -> str:
+    """Return the words of the row by which ``rs274`` loses a tool length: only Z may differ, '' if none."""
+    points = re.findall(r"\[(-?[\d.e-]+), (-?[\d.e-]+), (-?[\d.e-]+)\]", difference)
+    if len(points) != 2 or any(abs(float(points[0][k]) - float(points[1][k])) > 1e-5 for k in (0, 1)):
+        return ""
+    lines = program.decode("latin-1").upper().splitlines()
+    changes = [bool(re.search(r"G\s*4[39]|G\s*10\s*L", line)) for line in lines]
+    if any(changes) and any(re.search(r"G\s*20(?!\d)", line) for line in lines):
+        return _LENGTH_IN_INCHES
+    waits = False
+    for line, changed in zip(lines, changes, strict=True):
+        if waits and re.search(r"M\s*0*6(?!\d)", line):
+            return _LENGTH_FORGOTTEN
+        waits = changed or (waits and not re.search(r"[XYZ]\s*[-+.\d#\[]", line))
+    return ""
+
+
 def rows() -> tuple[str, ...]:
     """Return the words of all rows that a rule names."""
-    return (_TWO_SIGNS, *_BY_G.values(), *(row for *_, row in _HERE), *(row for _, row in _THERE))
+    return (
+        _TWO_SIGNS,
+        _LENGTH_IN_INCHES,
+        _LENGTH_FORGOTTEN,
+        *_BY_G.values(),
+        *(row for *_, row in _HERE),
+        *(row for _, row in _THERE),
+    )

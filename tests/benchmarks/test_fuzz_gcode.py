@@ -87,6 +87,26 @@ def test_a_program_moves_alike_and_a_difference_is_seen(tmp_path):
 
 
 @with_rs274
+@pytest.mark.parametrize(
+    ("text", "z_mm", "row"),
+    [
+        ("G20\nG43 H2\nG0 X0 Y0 Z1\nG21\nG49\nG0 X5\nM2\n", 25.4 + 25.5, "`G20 G43 H2`"),
+        ("G21\nT1 M6\nG43\nG0 X0 Y0 Z5\nG43 H2\nT2 M6\nG0 X1\nM2\n", 5.0 + 10.0 - 25.5, "M6 behind a change"),
+    ],
+)
+def test_where_rs274_loses_a_length_this_reader_does_not(tmp_path, text, z_mm, row):
+    """The tip moves by the change of length, as the machine stands still; the tools of tool.tbl."""
+    read, toolpath = by_us(text.encode())
+    assert read.refused == ""
+    assert toolpath.position_mm[-1, 2] == pytest.approx(z_mm)
+    theirs = Beside(tmp_path).read(text.encode())
+    off = difference(toolpath, theirs.moves)
+    assert theirs.moves[-1]["end"][2] != pytest.approx(z_mm)
+    assert rules.why_z_differs(text.encode(), off).startswith(row)
+    assert not rules.why_z_differs(b"G21\nG0 Z5\nM2\n", off)
+
+
+@with_rs274
 def test_a_refusal_of_one_alone_is_a_fault_unless_a_row_explains_it(tmp_path, monkeypatch):
     other, tally = Beside(tmp_path), beside.Tally()
     monkeypatch.setattr(beside, "SLIPS", 1.0)
