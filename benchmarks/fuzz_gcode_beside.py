@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from gcode_beside_rs274 import ENDLESS, Beside, Read, by_us, difference
+from gcode_beside_rs274 import ENDLESS, Beside, Read, by_us, difference, is_known
 from gcode_draws import drawn, slipped
-from gcode_rules import why_refused_here, why_refused_there, why_z_differs
+from gcode_rules import why_refused_here, why_refused_there, why_unknown, why_z_differs
 
 SLIPS = 0.6
 """Share of the programs that have a slip: a few of them show what no valid program shows."""
@@ -71,7 +71,8 @@ def one(rng: np.random.Generator, number: int, other: Beside | None, tally: Tall
         tally.kinds["both read"] += 1
         tally.moves += len(theirs.moves)
         off = difference(toolpath, theirs.moves)
-        row = why_z_differs(program, off) if off else ""
+        known = not off or is_known(toolpath, theirs.moves)
+        row = why_z_differs(program, off) or why_unknown(program, known) if off else ""
         if row:
             tally.explained[row] += 1
         elif off:

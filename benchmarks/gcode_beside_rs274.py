@@ -147,6 +147,16 @@ def difference(toolpath: Toolpath, moves: list[dict[str, Any]]) -> str:
     return ""
 
 
+def is_known(toolpath: Toolpath, moves: list[dict[str, Any]]) -> bool:
+    """Tell whether X and Y are known at the first move that ends elsewhere."""
+    arc = toolpath.arc[1:]
+    rows = np.flatnonzero(np.append((arc[:-1] < 0) | (arc[:-1] != arc[1:]), True)) + 1
+    for row, move in zip(rows.tolist(), moves, strict=False):
+        if not float(np.abs(toolpath.position_mm[row] - move["end"]).max()) <= POSITION_MM:
+            return bool(toolpath.known[row, :2].all())
+    return True
+
+
 def _spiral(move: dict[str, Any]) -> float:
     """Return the share by which the radii of an arc differ: under G93 its length goes by one, or by both."""
     if move["kind"] != "arc":
@@ -179,8 +189,9 @@ def _arc_difference(points: np.ndarray, move: dict[str, Any]) -> str:
     radius = np.hypot(*radial.T)
     sign = math.copysign(1.0, move["rotation"])
     turned = np.mod(sign * np.diff(np.arctan2(radial[:, 1], radial[:, 0])), math.tau)
-    whole = math.remainder(math.fsum(turned), math.tau)
-    turns = (math.fsum(turned) - (whole if whole > 1e-6 else whole + math.tau)) / math.tau + 1.0
+    closed = math.hypot(*(radial[-1] - radial[0])) < POSITION_MM
+    once = math.tau if closed else math.fmod(math.fsum(turned), math.tau)
+    turns = (math.fsum(turned) - once) / math.tau + 1.0
     chord_mm = float((radius.max() * (1.0 - np.cos(turned / 2.0))).max())
     low, high = sorted((radius[0], radius[-1]))
     if radius.min() < low - POSITION_MM or radius.max() > high + POSITION_MM:

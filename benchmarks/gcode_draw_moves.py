@@ -149,10 +149,10 @@ class Moves(Words):
         elif kind == 3 and not self.length:
             self.set_unit(not self.inches)
         elif kind == 4:
-            self.block(
-                self.one_of(("G61", "G61.1", "G64", "G64 P0.05", "G64 P.02 Q0.01", "G97", "G40", "G17 G90"))
-            )
-            if "G17" in self.lines[-1].upper():
+            codes = ("G61", "G61.1", "G64", "G64 P0.05", "G64 P.02 Q0.01", "G97", "G40", "G17 G90")
+            code = self.one_of(codes)
+            self.block(code)
+            if code == codes[-1]:
                 self.plane, self.absolute = 17, True
         else:
             self.block(

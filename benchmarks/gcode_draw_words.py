@@ -46,7 +46,9 @@ class Words:
             text = f"N{len(self.lines) * 5 + 5} {text}"
         if self.chance(0.05):
             text += self.one_of([" (a comment)", " ; tail", "(x1)", "\t"])
-        self.lines.append(text)
+        if self.chance(0.03):
+            text = f"/{text}"
+        self.lines += [text] if self.chance(0.97) else [text, ""]
 
     def feed_word(self) -> str:
         """Return F where the feed mode wants one in each block, or by chance."""

@@ -10,6 +10,8 @@ import numpy as np
 from gcode_draw_moves import AXES, Moves
 
 TOOLS = (1, 2, 7)
+STATE = ("#5420", "#5421", "#5422", "#<_x>", "#<_z>", "#<_absolute>", "#<_metric>", "#<_line>")
+"""Parameters that show where the tool stands, and modes."""
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 LETTERS = "ABCDFGHIJKLMNOPQRSTXYZ"
 
@@ -69,6 +71,7 @@ class Draw(Moves):
         elif kind == 4:
             self.block("G52", *xyz)
         elif kind == 5 and self.plane == 17:
+            self.block("G92.1")
             self.block("G10", "L2", f"P{system}", self.word("R", float(self.rng.integers(-180, 181))))
             self.offset_rotated = True
         else:
@@ -145,7 +148,7 @@ class Draw(Moves):
         if kind == 0:
             return self.number(self.size(-9, 9))
         if kind == 1:
-            return self.one_of(("#11", "#12", "#<side>", "#[5 + 6]"))
+            return self.one_of(("#11", "#12", "#<side>", "#[5 + 6]", *STATE))
         one, other = self.expression(depth + 1), self.expression(depth + 1)
         if kind == 2:
             return f"{self.one_of(('SIN', 'cos', 'ABS', 'FIX', 'ROUND', 'FUP'))}[{one}]"
@@ -160,7 +163,8 @@ class Draw(Moves):
         self.lines += [f"#11 = {self.number(self.size(-9, 9))} #12 = [2 ** 3 - 1]", "#<side> = [#11 / 4]"]
         for _ in range(int(self.rng.integers(1, 4))):
             self.lines.append(f"#{self.one_of((11, 12))} = [{self.expression()}]")
-            self.block(self.one_of(("G0", "G0 Z[-#11 * 2]")), f"X[{self.expression()}]", "Y#12")
+            code = self.one_of(("G0", "G0 Z[-#11 * 2]", "G[0]", "G0 (c) Z1 2.5"))
+            self.block(code, f"X[{self.expression()}]", self.one_of(("Y#12", "Y-#12", "Y[ATAN[#11]/[2]]")))
         self.here = {}
 
     def program_call(self) -> None:

@@ -18,6 +18,7 @@ _BY_G = {
 }
 _LENGTH_IN_INCHES = "`G20 G43 H2`, then `G21`, then `G49`"
 _LENGTH_FORGOTTEN = "M6 behind a change of length that no move has followed"
+_TURNED = "G10 L2 R of the work offset in force"
 _TWO_SIGNS = "two signs before a number"
 _HERE = (
     ("rotary-axis", "", "A, B, C (U, V, W) with the value 0, no rotary axes declared"),
@@ -26,6 +27,7 @@ _HERE = (
     ("too-far", "", "a coordinate beyond 1000 m"),
     ("arc-too-long", "", "a coordinate beyond 1000 m"),
     ("g10-words", "", "G10 L1, L10, L11 without Z and R"),
+    ("expression-value", "has turned the zero", _TURNED),
     ("parameter-undefined", "", "`#<a> = [#<a> + 1]` where"),
     ("parameter-read-only", "", "setting `#5161` to `#5390`"),
     ("expression-value", "length in the unit of the machine", "lengths of `#5161` to `#5390`"),
@@ -87,6 +89,13 @@ def why_z_differs(program: bytes, difference: str) -> str:
             return _LENGTH_FORGOTTEN
         waits = changed or (waits and not re.search(r"[XYZ]\s*[-+.\d#\[]", line))
     return ""
+
+
+def why_unknown(program: bytes, is_known: bool) -> str:
+    """Return the words of the row by which a place is unknown where ``rs274`` has another, '' if it is known."""
+    text = program.decode("latin-1").upper()
+    turned = re.search(r"G\s*10[^\n]*L\s*2[^\n]*R", text)
+    return _TURNED if not is_known and turned and re.search(r"G\s*(52|92)", text) else ""
 
 
 def rows() -> tuple[str, ...]:

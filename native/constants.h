@@ -589,6 +589,7 @@
 #define PF_OF_OTHER_AXIS 10
 #define PF_FEED_OF_TIME 11
 #define PF_FEED_OF_OTHER_UNIT 12
+#define PF_TURNED_UNDER_SHIFT 13
 #define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
@@ -785,6 +786,7 @@ typedef struct {
     double base_mm[3];
     double shift_mm[3];
     double shift_kept_mm[3];
+    int8_t turned_under_shift;
     int32_t shift_line;
     double pivot_mm[2];
     double rotation_cos;
@@ -893,7 +895,8 @@ typedef char State_work_offset_stands_at_128[offsetof(State, work_offset) == 128
 typedef char State_base_mm_stands_at_136[offsetof(State, base_mm) == 136 ? 1 : -1];
 typedef char State_shift_mm_stands_at_160[offsetof(State, shift_mm) == 160 ? 1 : -1];
 typedef char State_shift_kept_mm_stands_at_184[offsetof(State, shift_kept_mm) == 184 ? 1 : -1];
-typedef char State_shift_line_stands_at_208[offsetof(State, shift_line) == 208 ? 1 : -1];
+typedef char State_turned_under_shift_stands_at_208[offsetof(State, turned_under_shift) == 208 ? 1 : -1];
+typedef char State_shift_line_stands_at_212[offsetof(State, shift_line) == 212 ? 1 : -1];
 typedef char State_pivot_mm_stands_at_216[offsetof(State, pivot_mm) == 216 ? 1 : -1];
 typedef char State_rotation_cos_stands_at_232[offsetof(State, rotation_cos) == 232 ? 1 : -1];
 typedef char State_rotation_sin_stands_at_240[offsetof(State, rotation_sin) == 240 ? 1 : -1];

@@ -45,6 +45,7 @@ STATE = np.dtype(
         ("base_mm", "f8", 3),  # zero of the programmed numbers: work offset plus shift, before its rotation
         ("shift_mm", "f8", 3),  # by G52 and G92, in force
         ("shift_kept_mm", "f8", 3),  # what G92.3 restores
+        ("turned_under_shift", "i1"),  # by G10: until X and Y are programmed, controls differ about the place
         ("shift_line", "i4"),  # where the shift was set last, 0 = nowhere
         ("pivot_mm", "f8", 2),  # about which the work offset in force is rotated
         ("rotation_cos", "f8"),

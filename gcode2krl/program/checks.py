@@ -87,7 +87,9 @@ def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
     line = int(toolpath.source_line[lost])
     if toolpath.machine[lost]:
         return f"{name} is unknown since the machine move (G28, G30, G53) in line {line}"
-    return f"{name} is unknown since the tool length changed before line {line}"
+    if name == "Z":
+        return f"{name} is unknown since the tool length changed before line {line}"
+    return f"{name} is unknown since the zero was turned, or the tool's length tilted, before line {line}"
 
 
 def axes_nowhere(toolpath: Toolpath) -> str:

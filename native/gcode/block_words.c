@@ -213,6 +213,7 @@ static void begin_without_codes(Block *b) {
 /* Sort the words of a block that has none yet; `doubt` gets the bits of what is in doubt after it. */
 BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t *doubt) {
     bool good = true, used = false;
+    int slashes = 0;
     *doubt = 0;
     begin_without_codes(b);
     for (int64_t k = from; k < to; k++) {
@@ -221,6 +222,10 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             if (b->machine->block_delete) {
                 pass_marks(b, words, from, to);
                 return LEFT_OUT;
+            }
+            if (slashes++ > 0) { /* the second may be a slip for a digit or a letter */
+                report(b, F_BAD_CHARACTER, (Says){.a = CH_SLASH});
+                good = false;
             }
         } else if (c == CH_PERCENT) {
             tape_mark(b, words, k, to, to - from == 1);
