@@ -92,7 +92,7 @@ def why_z_differs(program: bytes, difference: str) -> str:
 
 
 def why_unknown(program: bytes, is_known: bool) -> str:
-    """Return the words of the row by which a place is unknown where ``rs274`` has another, '' if it is known."""
+    """Return the words of the row by which a place is unknown and ``rs274`` has another, '' if none."""
     text = program.decode("latin-1").upper()
     turned = re.search(r"G\s*10[^\n]*L\s*2[^\n]*R", text)
     return _TURNED if not is_known and turned and re.search(r"G\s*(52|92)", text) else ""
