@@ -1,4 +1,4 @@
-"""Random valid programs and slips of them, read by this reader and by LinuxCNC's interpreter."""
+"""Random programs, slips and blocks, read by this reader and by LinuxCNC's interpreter."""
 
 import shutil
 import tempfile
@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 from gcode_beside_rs274 import ENDLESS, Beside, Read, by_us, difference, is_known
+from gcode_draw_blocks import blocks
 from gcode_draws import drawn, slipped
-from gcode_rules import why_refused_here, why_refused_there, why_unknown, why_z_differs
+from gcode_rules import why_lost, why_refused_here, why_refused_there, why_unknown
 
-SLIPS = 0.6
-"""Share of the programs that have a slip: a few of them show what no valid program shows."""
+VALID, SLIPS = 0.35, 0.45
+"""Shares of the programs that are valid, and that have a slip; the others are of random blocks."""
 MOST_SHOWN = 10
 
 
@@ -57,11 +58,11 @@ def _told(counts: Counter[str]) -> str:
 
 def one(rng: np.random.Generator, number: int, other: Beside | None, tally: Tally) -> None:
     """Draw a program, and read it."""
-    program, has_slip = drawn(rng), bool(rng.random() < SLIPS)
-    if has_slip:
-        program = slipped(rng, program)
+    program, share = drawn(rng), float(rng.random())
+    if share >= VALID:
+        program = slipped(rng, program) if share < VALID + SLIPS else blocks(rng)
     ours, toolpath = by_us(program)
-    if ours.refused and not has_slip:
+    if ours.refused and share < VALID:
         tally.fault(number, f"valid, refused here: {ours.refused}", program)
     if other is None:
         tally.kinds["refused" if toolpath is None else "read"] += 1
@@ -72,7 +73,7 @@ def one(rng: np.random.Generator, number: int, other: Beside | None, tally: Tall
         tally.moves += len(theirs.moves)
         off = difference(toolpath, theirs.moves)
         known = not off or is_known(toolpath, theirs.moves)
-        row = why_z_differs(program, off) or why_unknown(program, known) if off else ""
+        row = why_lost(program, off) or why_unknown(program, known) if off else ""
         if row:
             tally.explained[row] += 1
         elif off:

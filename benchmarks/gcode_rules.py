@@ -17,7 +17,7 @@ _BY_G = {
     ("G43.4", "G43.5"): "G43.4, G43.5 | unknown",
 }
 _LENGTH_IN_INCHES = "`G20 G43 H2`, then `G21`, then `G49`"
-_LENGTH_FORGOTTEN = "M6 behind a change of length that no move has followed"
+_FORGOTTEN = "M6 behind a change of length, or of the rotation"
 _TURNED = "G10 L2 R of the work offset in force"
 _TWO_SIGNS = "two signs before a number"
 _HERE = (
@@ -40,6 +40,9 @@ _HERE = (
     ("o-word", "was begun outside", "O-words that end in the wrong order"),
     ("o-word", "no end", "O-words that end in the wrong order"),
     ("o-word", "M99 in the main program", "M99 in the main program"),
+    ("cutter-on", "", "G10, G92.1 to G92.3 under G41, G42"),
+    ("cutter-frame", "", "G41, G42 under a rotated work offset"),
+    ("cycle-modes-changed", "", "a change of plane or unit within a row of cycles"),
     ("cutter-diameter", "", "G41, G42 with a tool that has no diameter, or without a tool"),
     ("polar", "", "`^` alone at the zero"),
     ("cycle", "", "R or the depth of a cycle kept from before"),
@@ -74,21 +77,35 @@ def why_refused_there(message: str) -> str:
     return next((row for pattern, row in _THERE if re.search(pattern, message)), "")
 
 
-def why_z_differs(program: bytes, difference: str) -> str:
-    """Return the words of the row by which ``rs274`` loses a tool length: only Z may differ, '' if none."""
+def why_lost(program: bytes, difference: str) -> str:
+    """Return the words of the row by which ``rs274`` loses a tool length or a rotation, '' if none."""
     points = re.findall(r"\[(-?[\d.e-]+), (-?[\d.e-]+), (-?[\d.e-]+)\]", difference)
-    if len(points) != 2 or any(abs(float(points[0][k]) - float(points[1][k])) > 1e-5 for k in (0, 1)):
+    if len(points) != 2:
         return ""
+    off = [abs(float(one) - float(other)) > 1e-5 for one, other in zip(*points, strict=True)]
     lines = program.decode("latin-1").upper().splitlines()
-    changes = [bool(re.search(r"G\s*4[39]|G\s*10\s*L", line)) for line in lines]
-    if any(changes) and any(re.search(r"G\s*20(?!\d)", line) for line in lines):
-        return _LENGTH_IN_INCHES
+    if not (off[0] or off[1]):
+        changed = [bool(re.search(r"G\s*4[39]|G\s*10\s*L", line)) for line in lines]
+        if any(changed) and any(re.search(r"G\s*20(?!\d)", line) for line in lines):
+            return _LENGTH_IN_INCHES
+    else:
+        turns = [bool(re.search(r"G\s*10.*L\s*2.*R", line)) for line in lines]
+        changed = [
+            turn or bool(re.search(r"G\s*5[4-9]", line)) for turn, line in zip(turns, lines, strict=True)
+        ]
+        if off[2] or not any(turns):
+            return ""
+    return _FORGOTTEN if _m6_follows(lines, changed) else ""
+
+
+def _m6_follows(lines: list[str], changed: list[bool]) -> bool:
+    """Tell whether M6 comes behind a change and before any move."""
     waits = False
-    for line, changed in zip(lines, changes, strict=True):
+    for line, changes in zip(lines, changed, strict=True):
         if waits and re.search(r"M\s*0*6(?!\d)", line):
-            return _LENGTH_FORGOTTEN
-        waits = changed or (waits and not re.search(r"[XYZ]\s*[-+.\d#\[]", line))
-    return ""
+            return True
+        waits = changes or (waits and not re.search(r"[XYZ]\s*[-+.\d#\[]", line))
+    return False
 
 
 def why_unknown(program: bytes, is_known: bool) -> str:
@@ -103,7 +120,7 @@ def rows() -> tuple[str, ...]:
     return (
         _TWO_SIGNS,
         _LENGTH_IN_INCHES,
-        _LENGTH_FORGOTTEN,
+        _FORGOTTEN,
         *_BY_G.values(),
         *(row for *_, row in _HERE),
         *(row for _, row in _THERE),

@@ -102,13 +102,26 @@ def test_where_rs274_loses_a_length_this_reader_does_not(tmp_path, text, z_mm, r
     theirs = Beside(tmp_path).read(text.encode())
     off = difference(toolpath, theirs.moves)
     assert theirs.moves[-1]["end"][2] != pytest.approx(z_mm)
-    assert rules.why_z_differs(text.encode(), off).startswith(row)
-    assert not rules.why_z_differs(b"G21\nG0 Z5\nM2\n", off)
+    assert rules.why_lost(text.encode(), off).startswith(row)
+    assert not rules.why_lost(b"G21\nG0 Z5\nM2\n", off)
+
+
+@with_rs274
+def test_where_rs274_loses_a_rotation_at_m6_the_tip_stands_still(tmp_path):
+    text = b"G21 G90\nG0 X10 Y5 Z0\nG10 L2 P1 R30\nT2 M6\nG0 Z1\nM2\n"
+    _, toolpath = by_us(text)
+    np.testing.assert_allclose(toolpath.position_mm[-1], [10, 5, 1], atol=1e-9)
+    off = difference(toolpath, Beside(tmp_path).read(text).moves)
+    assert rules.why_lost(text, off).startswith("M6 behind")
+    moved = text.replace(b"R30\n", b"R30\nG0 X1 Y2\n")
+    assert difference(by_us(moved)[1], Beside(tmp_path).read(moved).moves) == ""
+    assert not rules.why_lost(moved, off)
 
 
 @with_rs274
 def test_a_refusal_of_one_alone_is_a_fault_unless_a_row_explains_it(tmp_path, monkeypatch):
     other, tally = Beside(tmp_path), beside.Tally()
+    monkeypatch.setattr(beside, "VALID", 0.0)
     monkeypatch.setattr(beside, "SLIPS", 1.0)
     for text, faults in (
         (b"G21\nG0 X1 B5\nM2\n", 0),
