@@ -6,9 +6,9 @@
 
 The checked core ends the process at the first index outside an array, and at what is undefined in C. With
 --minutes random valid programs, one-letter slips of them, and random blocks are read beside LinuxCNC's
-rs274 (Debian package linuxcnc-uspace): both must accept them, or a row of docs/gcode.md must say why one does not, and both
-must move alike. Without rs274 the valid programs must be read, and no slip may end otherwise than in a table
-or in findings.
+rs274 (Debian package linuxcnc-uspace): both must accept them, or a row of docs/gcode.md must say why one does
+not, and both must move alike. Without rs274 the valid programs must be read, and nothing may end otherwise
+than in a table or in findings.
 """
 
 import argparse
