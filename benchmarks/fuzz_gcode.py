@@ -2,14 +2,21 @@
 
     python native/build.py --checked
     GCODE2KRL_CORE=checked python benchmarks/fuzz_gcode.py --count 100000 --seed 1
+    python benchmarks/fuzz_gcode.py --minutes 10 --seed 1
 
-The checked core ends the process at the first index outside an array, and at what is undefined in C.
+The checked core ends the process at the first index outside an array, and at what is undefined in C. With
+--minutes random valid programs, one-letter slips of them, and random blocks are read beside LinuxCNC's
+rs274 (Debian package linuxcnc-uspace): both must accept them, or a row of docs/gcode.md must say why one does
+not, and both must move alike. Without rs274 the valid programs must be read, and nothing may end otherwise
+than in a table or in findings.
 """
 
+import argparse
 import io
 import sys
 from pathlib import Path
 
+import fuzz_gcode_beside
 import numpy as np
 from fuzz_common import Try, main_of, mutated
 
@@ -213,7 +220,22 @@ def with_line(rng: np.random.Generator, data: bytes) -> bytes:
     return b"\n".join(lines)
 
 
-main = main_of("programs", prepare, __doc__, 20_000)
+damaged_main = main_of("programs", prepare, __doc__, 20_000)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run so many damaged programs, or for so many minutes beside rs274."""
+    words = sys.argv[1:] if argv is None else argv
+    if not any(word.partition("=")[0] == "--minutes" for word in words):
+        return damaged_main(argv)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--minutes", type=float, required=True)
+    parser.add_argument("--seed", type=int, default=1)
+    chosen = parser.parse_args(words)
+    return fuzz_gcode_beside.run(chosen.minutes * 60.0, chosen.seed)
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -10,6 +10,7 @@ the figures are printed.
     python benchmarks/throughput.py --scaling                     also 10^4, 10^5 and 10^6 lines
     python benchmarks/throughput.py --scaling 10000000            up to 10^7 (needs minutes)
     python benchmarks/throughput.py --parts 2,8                   several parts at once, a thread each
+    python benchmarks/throughput.py --kinds                       also arcs, a macro program, five axes
 """
 
 import argparse
@@ -31,6 +32,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from throughput_kinds import Kind, write_kinds
+
 import gcode2krl
 
 # This process stays small (no numpy): Linux counts the parent's pages at the start of a child as its own.
@@ -43,6 +46,7 @@ PYGCODE_LINES = 20_000
 WARM_UP_LINES = 2_000
 CYCLE_S = 0.012
 SMALLEST_SCALE = 10_000
+KIND_LINES = 200_000
 HAS_MOTION = "plan_motion" in gcode2krl.__all__
 
 READ = "from gcode2krl import read_gcode; read_gcode({part!r})"
@@ -400,6 +404,33 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
     print_stages(part, lines, folder)
 
 
+def kind_work(kind: Kind, arguments: argparse.Namespace, folder: Path) -> tuple[list[Work], list[str]]:
+    """Return reading a program of a kind, the peers that can read it, and a word on each that is missing."""
+    code = (READ_FIVE_AXES if kind.cell else READ).format(part=str(kind.part))
+    table, words = [Work("read into a Toolpath", [sys.executable, "-c", code])], []
+    binary = shutil.which("rs274")
+    if "rs274" in arguments.peers and binary is not None:
+        table.insert(0, Work(YARDSTICK, rs274_command(binary, kind.part, "/dev/null")))
+    if kind.is_plain:
+        found, words = peers(arguments.peers, kind.part, count_lines(kind.part))
+        table += found
+    return table, words
+
+
+def print_kinds(arguments: argparse.Namespace, folder: Path) -> None:
+    """Time programs that are no raster."""
+    lines = min(arguments.lines, KIND_LINES)
+    for kind in write_kinds(folder, lines, with_rotary_words(make_raster(folder, lines))):
+        table, words = kind_work(kind, arguments, folder)
+        for _ in range(arguments.repeats):
+            for work in table:
+                work.repeat(folder)
+        print(f"\n{kind.name}, {kind.part.stat().st_size / 1e6:.1f} MB")
+        print_table(table)
+        for word in words:
+            print(f"  {word}")
+
+
 def print_scaling(largest: int, repeats: int, folder: Path) -> None:
     """Print best time and peak memory over size, and the cost of each further line."""
     print("\ngrowth: best s, us and bytes for each line more than in the row above")
@@ -469,6 +500,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--repeats", type=int, default=3, help="rounds (default: 3)")
     parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
     parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")
+    parser.add_argument("--kinds", action="store_true", help="also arcs, a macro program, five axes")
     parser.add_argument("--stages-of", help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -485,6 +517,8 @@ def main() -> None:
         compare(arguments, folder)
         if arguments.parts:
             print_parts(arguments.parts, make_raster(folder, arguments.lines), arguments.repeats, folder)
+        if arguments.kinds:
+            print_kinds(arguments, folder)
         if arguments.scaling:
             print_scaling(arguments.scaling, arguments.repeats, folder)
 

@@ -30,7 +30,9 @@ class Issue:
 
     ``line`` is the 1-based line of the input file, 0 where the whole file is meant. ``code`` is a stable
     kebab-case word, used by ``--allow CODE:LINE`` and explained in ``codes.toml``. ``excerpt`` quotes the
-    input, with a caret before the culprit. ``key`` is the dotted key of the cell file that is meant, if any.
+    input, with a caret before the culprit; ``column`` is the 1-based place of the caret in its line, in
+    characters, 0 where it is not known for certain. ``key`` is the dotted key of the cell file that is meant,
+    if any. A finding in a subprogram of another file has its ``file``, the ``file_line`` in it, and no line.
 
     >>> from gcode2krl import predict
     >>> issue = predict("part.nc").issues[0]
@@ -47,6 +49,9 @@ class Issue:
     remedy: str = ""
     excerpt: str = ""
     key: str = ""
+    column: int = 0
+    file: str = ""
+    file_line: int = 0
 
     def __repr__(self) -> str:
         place = f", line {self.line}" if self.line > 0 else ""

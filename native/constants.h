@@ -227,6 +227,8 @@
 #define V_G54 540
 #define V_G59 590
 #define V_G64 640
+#define V_G70 700
+#define V_G71 710
 #define V_G80 800
 #define V_G90 900
 #define V_G90_1 901
@@ -587,6 +589,7 @@
 #define PF_OF_OTHER_AXIS 10
 #define PF_FEED_OF_TIME 11
 #define PF_FEED_OF_OTHER_UNIT 12
+#define PF_TURNED_UNDER_SHIFT 13
 #define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
@@ -606,6 +609,7 @@
 #define PF_FAULT_ARGUMENTS 15
 #define PF_FAULT_REPEATS 16
 #define PF_FAULT_NOT_FIRST 17
+#define PF_FAULT_BEHIND 18
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -765,6 +769,7 @@ typedef struct {
     int8_t arc_absolute;
     int32_t plane;
     int32_t motion;
+    int32_t motion_beside_cycles;
     int32_t feed_mode;
     double feed;
     double feed_of_other_unit;
@@ -772,6 +777,7 @@ typedef struct {
     int32_t direction;
     int32_t tool;
     int32_t selected_tool;
+    int32_t selected_line;
     double length_offset;
     int32_t offset_tool;
     int8_t exact_stop;
@@ -780,6 +786,7 @@ typedef struct {
     double base_mm[3];
     double shift_mm[3];
     double shift_kept_mm[3];
+    int8_t turned_under_shift;
     int32_t shift_line;
     double pivot_mm[2];
     double rotation_cos;
@@ -871,101 +878,104 @@ typedef char State_absolute_stands_at_40[offsetof(State, absolute) == 40 ? 1 : -
 typedef char State_arc_absolute_stands_at_41[offsetof(State, arc_absolute) == 41 ? 1 : -1];
 typedef char State_plane_stands_at_44[offsetof(State, plane) == 44 ? 1 : -1];
 typedef char State_motion_stands_at_48[offsetof(State, motion) == 48 ? 1 : -1];
-typedef char State_feed_mode_stands_at_52[offsetof(State, feed_mode) == 52 ? 1 : -1];
-typedef char State_feed_stands_at_56[offsetof(State, feed) == 56 ? 1 : -1];
-typedef char State_feed_of_other_unit_stands_at_64[offsetof(State, feed_of_other_unit) == 64 ? 1 : -1];
-typedef char State_rpm_stands_at_72[offsetof(State, rpm) == 72 ? 1 : -1];
-typedef char State_direction_stands_at_80[offsetof(State, direction) == 80 ? 1 : -1];
-typedef char State_tool_stands_at_84[offsetof(State, tool) == 84 ? 1 : -1];
-typedef char State_selected_tool_stands_at_88[offsetof(State, selected_tool) == 88 ? 1 : -1];
-typedef char State_length_offset_stands_at_96[offsetof(State, length_offset) == 96 ? 1 : -1];
-typedef char State_offset_tool_stands_at_104[offsetof(State, offset_tool) == 104 ? 1 : -1];
-typedef char State_exact_stop_stands_at_108[offsetof(State, exact_stop) == 108 ? 1 : -1];
-typedef char State_tolerance_stands_at_112[offsetof(State, tolerance) == 112 ? 1 : -1];
-typedef char State_work_offset_stands_at_120[offsetof(State, work_offset) == 120 ? 1 : -1];
-typedef char State_base_mm_stands_at_128[offsetof(State, base_mm) == 128 ? 1 : -1];
-typedef char State_shift_mm_stands_at_152[offsetof(State, shift_mm) == 152 ? 1 : -1];
-typedef char State_shift_kept_mm_stands_at_176[offsetof(State, shift_kept_mm) == 176 ? 1 : -1];
-typedef char State_shift_line_stands_at_200[offsetof(State, shift_line) == 200 ? 1 : -1];
-typedef char State_pivot_mm_stands_at_208[offsetof(State, pivot_mm) == 208 ? 1 : -1];
-typedef char State_rotation_cos_stands_at_224[offsetof(State, rotation_cos) == 224 ? 1 : -1];
-typedef char State_rotation_sin_stands_at_232[offsetof(State, rotation_sin) == 232 ? 1 : -1];
-typedef char State_rotated_stands_at_240[offsetof(State, rotated) == 240 ? 1 : -1];
-typedef char State_offsets_taken_stands_at_241[offsetof(State, offsets_taken) == 241 ? 1 : -1];
-typedef char State_home_28_stands_at_248[offsetof(State, home_28) == 248 ? 1 : -1];
-typedef char State_home_30_stands_at_272[offsetof(State, home_30) == 272 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_296[offsetof(State, rotary_deg) == 296 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_320[offsetof(State, rotary_unknown) == 320 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_328[offsetof(State, home_28_deg) == 328 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_352[offsetof(State, home_30_deg) == 352 ? 1 : -1];
-typedef char State_tool_vector_stands_at_376[offsetof(State, tool_vector) == 376 ? 1 : -1];
-typedef char State_has_vector_stands_at_400[offsetof(State, has_vector) == 400 ? 1 : -1];
-typedef char State_length_code_stands_at_404[offsetof(State, length_code) == 404 ? 1 : -1];
-typedef char State_feed_word_stands_at_408[offsetof(State, feed_word) == 408 ? 1 : -1];
-typedef char State_arcs_stands_at_416[offsetof(State, arcs) == 416 ? 1 : -1];
-typedef char State_mist_stands_at_420[offsetof(State, mist) == 420 ? 1 : -1];
-typedef char State_flood_stands_at_421[offsetof(State, flood) == 421 ? 1 : -1];
-typedef char State_ended_stands_at_422[offsetof(State, ended) == 422 ? 1 : -1];
-typedef char State_end_line_stands_at_424[offsetof(State, end_line) == 424 ? 1 : -1];
-typedef char State_tape_marks_stands_at_428[offsetof(State, tape_marks) == 428 ? 1 : -1];
-typedef char State_unit_named_stands_at_432[offsetof(State, unit_named) == 432 ? 1 : -1];
-typedef char State_blocks_stands_at_440[offsetof(State, blocks) == 440 ? 1 : -1];
-typedef char State_largest_mm_stands_at_448[offsetof(State, largest_mm) == 448 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_456[offsetof(State, unknown_feed_line) == 456 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_460[offsetof(State, unknown_reported) == 460 ? 1 : -1];
-typedef char State_doubt_stands_at_464[offsetof(State, doubt) == 464 ? 1 : -1];
-typedef char State_motion_line_stands_at_468[offsetof(State, motion_line) == 468 ? 1 : -1];
-typedef char State_distance_line_stands_at_472[offsetof(State, distance_line) == 472 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_476[offsetof(State, feed_mode_line) == 476 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_480[offsetof(State, rotary_refused) == 480 ? 1 : -1];
-typedef char State_note_count_stands_at_484[offsetof(State, note_count) == 484 ? 1 : -1];
-typedef char State_note_line_stands_at_520[offsetof(State, note_line) == 520 ? 1 : -1];
-typedef char State_note_word_stands_at_556[offsetof(State, note_word) == 556 ? 1 : -1];
-typedef char State_moved_mm_stands_at_592[offsetof(State, moved_mm) == 592 ? 1 : -1];
-typedef char State_misfits_stands_at_664[offsetof(State, misfits) == 664 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_668[offsetof(State, misfits_other_centre) == 668 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_672[offsetof(State, misfits_reversed) == 672 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_676[offsetof(State, misfits_exchanged) == 676 ? 1 : -1];
-typedef char State_spirals_stands_at_680[offsetof(State, spirals) == 680 ? 1 : -1];
-typedef char State_spiral_line_stands_at_684[offsetof(State, spiral_line) == 684 ? 1 : -1];
-typedef char State_spiral_start_stands_at_688[offsetof(State, spiral_start) == 688 ? 1 : -1];
-typedef char State_spiral_end_stands_at_696[offsetof(State, spiral_end) == 696 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_704[offsetof(State, spiral_unit_mm) == 704 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_712[offsetof(State, cutter_mode) == 712 ? 1 : -1];
-typedef char State_cutter_side_stands_at_716[offsetof(State, cutter_side) == 716 ? 1 : -1];
-typedef char State_cutter_code_stands_at_720[offsetof(State, cutter_code) == 720 ? 1 : -1];
-typedef char State_cutter_line_stands_at_724[offsetof(State, cutter_line) == 724 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_728[offsetof(State, cutter_radius_mm) == 728 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_736[offsetof(State, cutter_entered) == 736 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_737[offsetof(State, cutter_failed) == 737 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_744[offsetof(State, cutter_normal) == 744 ? 1 : -1];
-typedef char State_held_turn_stands_at_760[offsetof(State, held_turn) == 760 ? 1 : -1];
-typedef char State_held_line_stands_at_764[offsetof(State, held_line) == 764 ? 1 : -1];
-typedef char State_held_from_stands_at_768[offsetof(State, held_from) == 768 ? 1 : -1];
-typedef char State_held_along_stands_at_784[offsetof(State, held_along) == 784 ? 1 : -1];
-typedef char State_held_centre_stands_at_800[offsetof(State, held_centre) == 800 ? 1 : -1];
-typedef char State_held_w_stands_at_816[offsetof(State, held_w) == 816 ? 1 : -1];
-typedef char State_held_sweep_stands_at_832[offsetof(State, held_sweep) == 832 ? 1 : -1];
-typedef char State_held_rows_stands_at_840[offsetof(State, held_rows) == 840 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_856[offsetof(State, cutter_rows_removed) == 856 ? 1 : -1];
-typedef char State_held_events_stands_at_864[offsetof(State, held_events) == 864 ? 1 : -1];
-typedef char State_retract_stands_at_872[offsetof(State, retract) == 872 ? 1 : -1];
-typedef char State_retract_line_stands_at_876[offsetof(State, retract_line) == 876 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_880[offsetof(State, unset_parameter) == 880 ? 1 : -1];
-typedef char State_unset_line_stands_at_884[offsetof(State, unset_line) == 884 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_888[offsetof(State, retract_unnamed_line) == 888 ? 1 : -1];
-typedef char State_in_cycles_stands_at_892[offsetof(State, in_cycles) == 892 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_896[offsetof(State, cycle_level_mm) == 896 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_904[offsetof(State, cycle_level_known) == 904 ? 1 : -1];
-typedef char State_cycle_r_stands_at_912[offsetof(State, cycle_r) == 912 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_920[offsetof(State, cycle_depth) == 920 ? 1 : -1];
-typedef char State_cycle_q_stands_at_928[offsetof(State, cycle_q) == 928 ? 1 : -1];
-typedef char State_cycle_p_stands_at_936[offsetof(State, cycle_p) == 936 ? 1 : -1];
-typedef char State_cycle_line_stands_at_944[offsetof(State, cycle_line) == 944 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_948[offsetof(State, cycle_plane) == 948 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_952[offsetof(State, cycle_unit_mm) == 952 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_960[offsetof(State, cycle_absolute) == 960 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 968 ? 1 : -1];
+typedef char State_motion_beside_cycles_stands_at_52[offsetof(State, motion_beside_cycles) == 52 ? 1 : -1];
+typedef char State_feed_mode_stands_at_56[offsetof(State, feed_mode) == 56 ? 1 : -1];
+typedef char State_feed_stands_at_64[offsetof(State, feed) == 64 ? 1 : -1];
+typedef char State_feed_of_other_unit_stands_at_72[offsetof(State, feed_of_other_unit) == 72 ? 1 : -1];
+typedef char State_rpm_stands_at_80[offsetof(State, rpm) == 80 ? 1 : -1];
+typedef char State_direction_stands_at_88[offsetof(State, direction) == 88 ? 1 : -1];
+typedef char State_tool_stands_at_92[offsetof(State, tool) == 92 ? 1 : -1];
+typedef char State_selected_tool_stands_at_96[offsetof(State, selected_tool) == 96 ? 1 : -1];
+typedef char State_selected_line_stands_at_100[offsetof(State, selected_line) == 100 ? 1 : -1];
+typedef char State_length_offset_stands_at_104[offsetof(State, length_offset) == 104 ? 1 : -1];
+typedef char State_offset_tool_stands_at_112[offsetof(State, offset_tool) == 112 ? 1 : -1];
+typedef char State_exact_stop_stands_at_116[offsetof(State, exact_stop) == 116 ? 1 : -1];
+typedef char State_tolerance_stands_at_120[offsetof(State, tolerance) == 120 ? 1 : -1];
+typedef char State_work_offset_stands_at_128[offsetof(State, work_offset) == 128 ? 1 : -1];
+typedef char State_base_mm_stands_at_136[offsetof(State, base_mm) == 136 ? 1 : -1];
+typedef char State_shift_mm_stands_at_160[offsetof(State, shift_mm) == 160 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_184[offsetof(State, shift_kept_mm) == 184 ? 1 : -1];
+typedef char State_turned_under_shift_stands_at_208[offsetof(State, turned_under_shift) == 208 ? 1 : -1];
+typedef char State_shift_line_stands_at_212[offsetof(State, shift_line) == 212 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_216[offsetof(State, pivot_mm) == 216 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_232[offsetof(State, rotation_cos) == 232 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_240[offsetof(State, rotation_sin) == 240 ? 1 : -1];
+typedef char State_rotated_stands_at_248[offsetof(State, rotated) == 248 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_249[offsetof(State, offsets_taken) == 249 ? 1 : -1];
+typedef char State_home_28_stands_at_256[offsetof(State, home_28) == 256 ? 1 : -1];
+typedef char State_home_30_stands_at_280[offsetof(State, home_30) == 280 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_304[offsetof(State, rotary_deg) == 304 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_328[offsetof(State, rotary_unknown) == 328 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_336[offsetof(State, home_28_deg) == 336 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_360[offsetof(State, home_30_deg) == 360 ? 1 : -1];
+typedef char State_tool_vector_stands_at_384[offsetof(State, tool_vector) == 384 ? 1 : -1];
+typedef char State_has_vector_stands_at_408[offsetof(State, has_vector) == 408 ? 1 : -1];
+typedef char State_length_code_stands_at_412[offsetof(State, length_code) == 412 ? 1 : -1];
+typedef char State_feed_word_stands_at_416[offsetof(State, feed_word) == 416 ? 1 : -1];
+typedef char State_arcs_stands_at_424[offsetof(State, arcs) == 424 ? 1 : -1];
+typedef char State_mist_stands_at_428[offsetof(State, mist) == 428 ? 1 : -1];
+typedef char State_flood_stands_at_429[offsetof(State, flood) == 429 ? 1 : -1];
+typedef char State_ended_stands_at_430[offsetof(State, ended) == 430 ? 1 : -1];
+typedef char State_end_line_stands_at_432[offsetof(State, end_line) == 432 ? 1 : -1];
+typedef char State_tape_marks_stands_at_436[offsetof(State, tape_marks) == 436 ? 1 : -1];
+typedef char State_unit_named_stands_at_440[offsetof(State, unit_named) == 440 ? 1 : -1];
+typedef char State_blocks_stands_at_448[offsetof(State, blocks) == 448 ? 1 : -1];
+typedef char State_largest_mm_stands_at_456[offsetof(State, largest_mm) == 456 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_464[offsetof(State, unknown_feed_line) == 464 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_468[offsetof(State, unknown_reported) == 468 ? 1 : -1];
+typedef char State_doubt_stands_at_472[offsetof(State, doubt) == 472 ? 1 : -1];
+typedef char State_motion_line_stands_at_476[offsetof(State, motion_line) == 476 ? 1 : -1];
+typedef char State_distance_line_stands_at_480[offsetof(State, distance_line) == 480 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_484[offsetof(State, feed_mode_line) == 484 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_488[offsetof(State, rotary_refused) == 488 ? 1 : -1];
+typedef char State_note_count_stands_at_492[offsetof(State, note_count) == 492 ? 1 : -1];
+typedef char State_note_line_stands_at_528[offsetof(State, note_line) == 528 ? 1 : -1];
+typedef char State_note_word_stands_at_564[offsetof(State, note_word) == 564 ? 1 : -1];
+typedef char State_moved_mm_stands_at_600[offsetof(State, moved_mm) == 600 ? 1 : -1];
+typedef char State_misfits_stands_at_672[offsetof(State, misfits) == 672 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_676[offsetof(State, misfits_other_centre) == 676 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_680[offsetof(State, misfits_reversed) == 680 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_684[offsetof(State, misfits_exchanged) == 684 ? 1 : -1];
+typedef char State_spirals_stands_at_688[offsetof(State, spirals) == 688 ? 1 : -1];
+typedef char State_spiral_line_stands_at_692[offsetof(State, spiral_line) == 692 ? 1 : -1];
+typedef char State_spiral_start_stands_at_696[offsetof(State, spiral_start) == 696 ? 1 : -1];
+typedef char State_spiral_end_stands_at_704[offsetof(State, spiral_end) == 704 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_712[offsetof(State, spiral_unit_mm) == 712 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_720[offsetof(State, cutter_mode) == 720 ? 1 : -1];
+typedef char State_cutter_side_stands_at_724[offsetof(State, cutter_side) == 724 ? 1 : -1];
+typedef char State_cutter_code_stands_at_728[offsetof(State, cutter_code) == 728 ? 1 : -1];
+typedef char State_cutter_line_stands_at_732[offsetof(State, cutter_line) == 732 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_736[offsetof(State, cutter_radius_mm) == 736 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_744[offsetof(State, cutter_entered) == 744 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_745[offsetof(State, cutter_failed) == 745 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_752[offsetof(State, cutter_normal) == 752 ? 1 : -1];
+typedef char State_held_turn_stands_at_768[offsetof(State, held_turn) == 768 ? 1 : -1];
+typedef char State_held_line_stands_at_772[offsetof(State, held_line) == 772 ? 1 : -1];
+typedef char State_held_from_stands_at_776[offsetof(State, held_from) == 776 ? 1 : -1];
+typedef char State_held_along_stands_at_792[offsetof(State, held_along) == 792 ? 1 : -1];
+typedef char State_held_centre_stands_at_808[offsetof(State, held_centre) == 808 ? 1 : -1];
+typedef char State_held_w_stands_at_824[offsetof(State, held_w) == 824 ? 1 : -1];
+typedef char State_held_sweep_stands_at_840[offsetof(State, held_sweep) == 840 ? 1 : -1];
+typedef char State_held_rows_stands_at_848[offsetof(State, held_rows) == 848 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_864[offsetof(State, cutter_rows_removed) == 864 ? 1 : -1];
+typedef char State_held_events_stands_at_872[offsetof(State, held_events) == 872 ? 1 : -1];
+typedef char State_retract_stands_at_880[offsetof(State, retract) == 880 ? 1 : -1];
+typedef char State_retract_line_stands_at_884[offsetof(State, retract_line) == 884 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_888[offsetof(State, unset_parameter) == 888 ? 1 : -1];
+typedef char State_unset_line_stands_at_892[offsetof(State, unset_line) == 892 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_896[offsetof(State, retract_unnamed_line) == 896 ? 1 : -1];
+typedef char State_in_cycles_stands_at_900[offsetof(State, in_cycles) == 900 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_904[offsetof(State, cycle_level_mm) == 904 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_912[offsetof(State, cycle_level_known) == 912 ? 1 : -1];
+typedef char State_cycle_r_stands_at_920[offsetof(State, cycle_r) == 920 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_928[offsetof(State, cycle_depth) == 928 ? 1 : -1];
+typedef char State_cycle_q_stands_at_936[offsetof(State, cycle_q) == 936 ? 1 : -1];
+typedef char State_cycle_p_stands_at_944[offsetof(State, cycle_p) == 944 ? 1 : -1];
+typedef char State_cycle_line_stands_at_952[offsetof(State, cycle_line) == 952 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_956[offsetof(State, cycle_plane) == 956 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_960[offsetof(State, cycle_unit_mm) == 960 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_968[offsetof(State, cycle_absolute) == 968 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 976 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1222,6 +1232,8 @@ typedef struct {
     int64_t length_by_d;
     double cycle_dwell_s;
     int64_t repeats_by_k;
+    int64_t g80_keeps_motion;
+    int64_t idle_letters;
     int64_t end_m;
     int64_t whole_dwell_letter;
     Ints32 group_of_g;

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @click.option(
     "--allow",
     multiple=True,
-    metavar="CODE[:LINE]",
+    metavar="CODE[:[FILE:]LINE]",
     help="Allow one finding, or all of a code; may be repeated.",
 )
 @click.option("--strict", is_flag=True, help="Warnings refuse the program too.")

@@ -64,6 +64,7 @@ REASONS: Final = (
     ),
     ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
     ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
+    ("not known to this control", "write G20 for inches, G21 for mm"),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -71,7 +72,7 @@ _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
-_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED = range(23, 30)
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
@@ -109,6 +110,10 @@ class Dialect:
     """M number that ends the program beside M2 and M30."""
     repeats_by_k: bool = False
     """K of a drilling cycle is the number of holes, as L is in LinuxCNC."""
+    g80_keeps_motion: bool = False
+    """G80 ends a cycle alone: of G0 to G3, a group of their own, the last is in force again."""
+    idle_letters: str = ""
+    """Letters that say nothing to what is read of this control: D, which G41 and G42 alone use."""
     length_by_d: bool = False
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
     start: Mapping[str, float] = field(default_factory=dict)
@@ -158,6 +163,8 @@ class Dialect:
             "length_by_d": int(self.length_by_d),
             "cycle_dwell_s": self.dwell_s.get("P", 1.0),
             "repeats_by_k": int(self.repeats_by_k),
+            "g80_keeps_motion": int(self.g80_keeps_motion),
+            "idle_letters": sum(1 << v.index_of(letter) for letter in self.idle_letters),
             "end_m": self.end_m,
             "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
         }
@@ -193,10 +200,12 @@ _FANUC: dict[str, Any] = {
     "syntax": d.SKIP_LEVEL | d.HEAD_LINES,
     "same": {63: 64, 62: 64},
     "exact": (9,),
-    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1, 103, 187),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
+    "g80_keeps_motion": True,
+    "idle_letters": "D",
 }
 _SINUMERIK_STATEMENTS = {
     _kind(d.RADIUS): ("CR",),
@@ -244,7 +253,7 @@ _LIST: Final = (
         "grbl",
         "Grbl 1.1: G0, G21 at the start, $ lines",
         syntax=d.DOLLAR_LINES,
-        refused={_LEAD: (41, 41.1, 42, 42.1)},
+        refused={_LEAD: (41, 41.1, 42, 42.1), _NO_UNIT: (70, 71)},
         start={"motion": v.MOTION_RAPID, "unit_named": 1},
     ),
     Dialect(

@@ -10,6 +10,7 @@ from gcode2krl.gcode import polar_findings as p
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
+_ANY_WORD = r"[^\s/]"
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _FEED_WORD = r"G\s*0*[123](?![\d.])|[XYZIJK]"
 _ARC_WORD = r"[IJKR]|G\s*0*[23](?![\d.])"
@@ -89,28 +90,45 @@ _FIXED = {
 
 def quote(block: bytes, number: int, a: float, b: float, c: float = -1.0) -> str:
     """Return the block with a caret before what finding ``number`` is about: ``G1 X10 ^I5``."""
-    text = block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
-    told = number in f.WITH_COLUMN and c >= 0
-    at = min(int(c), len(text)) if told else _place(text, number, a, b)
+    text = _text(block)
+    at, _ = _place(text, number, a, b, c)
     start = max(0, at - _BEFORE)
     stop = min(len(text), at + _AFTER)
     before, after = (_printable(part) for part in (text[start:at].lstrip(), text[at:stop].rstrip()))
     return ("..." if start else "") + before + "^" + after + ("..." if stop < len(text) else "")
 
 
+def column(block: bytes, number: int, a: float, b: float, c: float = -1.0) -> int:
+    """Return the 1-based place of the caret, in characters; 0 where it may be another word's."""
+    at, is_certain = _place(_text(block), number, a, b, c)
+    return len(block[:at].decode("utf-8", "replace")) + 1 if is_certain else 0
+
+
+def _text(block: bytes) -> str:
+    return block.decode("latin-1").expandtabs(1).rstrip("\r\n\x1a ")
+
+
 def _printable(text: str) -> str:
     return "".join(c if 32 <= ord(c) < 127 else "?" for c in text)
 
 
-def _place(text: str, number: int, a: float, b: float) -> int:
-    """Return the column of the culprit, the first word where it cannot be told."""
+def _place(text: str, number: int, a: float, b: float, c: float) -> tuple[int, bool]:
+    """Return the place of the culprit, the first word where it cannot be told; and whether it is certain.
+
+    It is where it has been told, or where only one word of the block can be meant.
+    """
+    if number in f.WITH_COLUMN and c >= 0:
+        return min(int(c), len(text)), True
     code = text.upper() if len(text.upper()) == len(text) else text
     if number not in (f.COMMENT_OPEN, f.COMMENT_NESTED):
         code = _COMMENT.sub(lambda comment: " " * len(comment[0]), code)
-    found = re.search(_pattern(number, a, b), code) or re.search(r"[^\s/]", code)
-    if found and "culprit" in found.re.groupindex:
-        return found.start("culprit")
-    return found.start() if found else 0
+    pattern = re.compile(_pattern(number, a, b))
+    group = "culprit" if "culprit" in pattern.groupindex else 0
+    places = [found.start(group) for found in pattern.finditer(code)]
+    if places:
+        return places[0], len(places) == 1 and pattern.pattern != _ANY_WORD
+    first = re.search(_ANY_WORD, code)
+    return (first.start() if first else 0), False
 
 
 def _pattern(number: int, a: float, b: float) -> str:
@@ -139,7 +157,7 @@ def _pattern(number: int, a: float, b: float) -> str:
         return _word("G", b)
     if number in (f.UNSUPPORTED_M, f.SAME_GROUP_M):
         return _word("M", a if number == f.UNSUPPORTED_M else b)
-    return _FIXED.get(number, r"[^\s/]")
+    return _FIXED.get(number, _ANY_WORD)
 
 
 def _word(letter: str, tenfold: float) -> str:

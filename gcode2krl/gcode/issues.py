@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import findings as f
-from gcode2krl.gcode.excerpt import quote
+from gcode2krl.gcode.excerpt import column, quote
 from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.slips import slip
 from gcode2krl.gcode.state import (
@@ -25,6 +25,7 @@ from gcode2krl.gcode.state import (
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
 _STATEMENT = re.compile(r"\$\S*|[A-Z_]{3,}\w*")
+_O_LINE = re.compile(rb"\s*/?\s*(?:N[\d.\s]*)?O\s*[<\d#\[]", re.IGNORECASE)
 Record = Any
 """A numpy record; numpy does not type its fields."""
 
@@ -102,8 +103,11 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     a, b, c = (float(row[name]) for name in "abc")
     excerpt = quote(texts[line], number, a, b, c) if line in texts else ""
     issue = f.make_issue(number, line, a, b, c, excerpt)
+    if excerpt:
+        issue = replace(issue, column=column(texts[line], number, a, b, c))
     letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
-    usual = slip(texts[line], issue.code, letter) if line in texts else None
+    may_slip = line in texts and not (number == f.O_WORD and _O_LINE.match(texts[line]))
+    usual = slip(texts[line], issue.code, letter) if may_slip else None
     return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
 
 

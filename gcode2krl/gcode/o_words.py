@@ -1,8 +1,9 @@
 """O-words: which line ends what, and where a program goes on behind each.
 
 An O-line is looked at once a file: its label, its word, and the words (columns of the scanner) to which it
-leads. A line whose label or word makes no sense gets its fault and is reported where it is executed, as in
-LinuxCNC: what a program passes over may be anything.
+leads. A line whose label or word makes no sense gets its fault and is reported where it is executed. What a
+program passes over may be anything, as in LinuxCNC, but for such a line: it may be the else or the end of
+what it stands in, so an if or a loop around it is not entered.
 """
 
 import re
@@ -41,6 +42,7 @@ _LINE = re.compile(
 )
 _CALL = re.compile(_BLANKS.join((b"c", b"a", b"l", b"l")), re.IGNORECASE)
 _ALONE = re.compile(rb"[ \t\r\x1a]*(?:[(;].*)?\Z", re.DOTALL)
+_WITHOUT_EXPRESSION = {"sub", "do", "else", "endif", "endwhile", "endrepeat", "break", "continue"}
 _SPACE = re.compile(rb"[ \t\r]")
 
 
@@ -53,6 +55,8 @@ class OLine(NamedTuple):
     behind: int
     """Bytes before its expressions; for a computed label, before the label."""
     deleted: bool
+    ends: bool = True
+    """Nothing but a comment stands behind a word that has no expression."""
 
 
 def parsed(line: bytes) -> OLine:
@@ -71,7 +75,9 @@ def parsed(line: bytes) -> OLine:
         else str(int(_SPACE.sub(b"", number)))
     )
     if word_found is not None:
-        return OLine(label, _SPACE.sub(b"", word_found).lower().decode(), found.end(), deleted)
+        word = _SPACE.sub(b"", word_found).lower().decode()
+        ends = word not in _WITHOUT_EXPRESSION or _ALONE.match(line, found.end()) is not None
+        return OLine(label, word, found.end(), deleted, ends)
     alone = _ALONE.match(line, found.end()) is not None
     return OLine(label, "program" if alone and number is not None else "", found.end(), deleted)
 
@@ -94,6 +100,8 @@ class _Open:
         self.branches = [row]
         self.breaks: list[int] = []
         self.continues: list[int] = []
+        self.unread: int | None = None
+        """The first row inside that makes no sense."""
 
 
 class Flow:
@@ -113,9 +121,11 @@ class Flow:
         handler = getattr(self, f"_{line.word}", None) if line.word else None
         if handler is None:
             known = line.label or line.word
-            self._fault(row, faults.FAULT_WORD if known else faults.FAULT_LABEL)
+            self._unread(row, faults.FAULT_WORD if known else faults.FAULT_LABEL)
         elif not line.label and line.word != "call":
-            self._fault(row, faults.FAULT_LABEL)
+            self._unread(row, faults.FAULT_LABEL)
+        elif not line.ends:
+            self._unread(row, faults.FAULT_BEHIND)
         else:
             handler(row, line.label)
 
@@ -133,6 +143,19 @@ class Flow:
         self._set(row, tables.KIND_FAULT)
         self.lines["fault"][row] = fault
 
+    def _unread(self, row: int, fault: int) -> None:
+        """Take a line that makes no sense, and remember it for all that is open around it."""
+        self._fault(row, fault)
+        for each in reversed(self._open):
+            if each.word == "sub":
+                break
+            each.unread = row if each.unread is None else each.unread
+
+    def _lead_to_unread(self, closed: _Open) -> None:
+        """Let what has a line inside that makes no sense lead there, so that it is reported."""
+        if closed.unread is not None:
+            self._set(closed.row, tables.KIND_JUMP, self._word(closed.unread))
+
     def _word(self, row: int) -> int:
         return int(self.word_of_row[row])
 
@@ -148,13 +171,14 @@ class Flow:
         if self._open and self._open[-1].label == label and self._open[-1].word in words:
             return self._open.pop()
         crossed = any(each.label == label and each.word in words for each in self._open)
-        self._fault(row, faults.FAULT_CROSSED if crossed else faults.FAULT_NO_OPENING)
+        self._unread(row, faults.FAULT_CROSSED if crossed else faults.FAULT_NO_OPENING)
         return None
 
     def _close_all(self, depth: int) -> None:
         for each in self._open[depth:]:
             if self.lines["kind"][each.row] != tables.KIND_FAULT:
                 self._fault(each.row, faults.FAULT_NO_CLOSING)
+            self._lead_to_unread(each)
         del self._open[depth:]
 
     def _set_jumps(self, rows: list[int], target: int) -> None:
@@ -194,6 +218,7 @@ class Flow:
         self._set(row, tables.KIND_ENDIF)
         self.lines["target"][found.branches[-1]] = self._word(row)
         self.lines["end"][found.branches] = self._word(row)
+        self._lead_to_unread(found)
 
     # --- loops ----------------------------------------------------------------------------------------
 
@@ -206,6 +231,7 @@ class Flow:
             self._set(row, tables.KIND_DO_WHILE, self._word(found.row) + 1)
             self._set_jumps(found.breaks, self._word(row) + 1)
             self._set_jumps(found.continues, self._word(row))
+            self._lead_to_unread(found)
 
     def _do(self, row: int, label: Label) -> None:
         self._begin(row, label, "do", tables.KIND_NOTHING)
@@ -227,6 +253,7 @@ class Flow:
         self.lines["target"][found.row] = self._word(row) + 1
         self._set_jumps(found.breaks, self._word(row) + 1)
         self._set_jumps(found.continues, self._word(found.row))
+        self._lead_to_unread(found)
 
     def _break(self, row: int, label: Label) -> None:
         found = self._enclosing(label, "while", "do")

@@ -250,7 +250,8 @@ class Program:
         if not self._is_elsewhere(issue.line):
             return replace(issue, message=message)
         name, line = self.place(issue.line)
-        return replace(issue, line=0, message=f"{message} (in {Path(name).name} line {line})")
+        told = f"{message} (in {Path(name).name} line {line})"
+        return replace(issue, line=0, message=told, file=name, file_line=line)
 
     def _is_elsewhere(self, line: int) -> bool:
         return len(self.files) > 1 and line >= self.files[1].first_line

@@ -58,7 +58,8 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     OF_OTHER_AXIS,
     FEED_OF_TIME,
     FEED_OF_OTHER_UNIT,
-) = range(13)
+    TURNED_UNDER_SHIFT,
+) = range(14)
 VALUE_FAULTS: dict[int, str] = {
     DIVISION_BY_ZERO: "division by zero",
     SQUARE_ROOT: "the square root of {b:g} does not exist",
@@ -72,6 +73,7 @@ VALUE_FAULTS: dict[int, str] = {
     OF_TOOL_TABLE: "#{b:.0f} comes from the tool table of the control",
     OF_OTHER_AXIS: "#{b:.0f} belongs to a rotary or secondary axis, and is not kept here",
     FEED_OF_TIME: "#<_feed> under G93 is no feed, but what the move before made of it",
+    TURNED_UNDER_SHIFT: "the place is not sure: G10 L2 R has turned the zero while G52 or G92 shifts it",
     FEED_OF_OTHER_UNIT: "#<_feed> was programmed in another unit, before G20 or G21",
 }
 VALUE_REMEDY = "check the parameters that the expression takes"
@@ -80,6 +82,7 @@ VALUE_REMEDIES: dict[int, str] = {
     OF_TOOL_TABLE: "write the number itself",
     OF_OTHER_AXIS: "write the number itself",
     FEED_OF_TIME: "keep the number in a parameter of its own, #1 = 5 and F#1",
+    TURNED_UNDER_SHIFT: "program X and Y behind G10, or end the shift before it (G92.1)",
     FEED_OF_OTHER_UNIT: "program F behind G20 or G21, in a line of its own",
 }
 """Remedies of values that are known on the control and not here."""
@@ -103,7 +106,8 @@ VALUE_REMEDIES: dict[int, str] = {
     FAULT_ARGUMENTS,
     FAULT_REPEATS,
     FAULT_NOT_FIRST,
-) = range(18)
+    FAULT_BEHIND,
+) = range(19)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -113,6 +117,10 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     ),
     FAULT_NO_OPENING: ("this O-word has no beginning", "check the label: both ends have the same"),
     FAULT_NO_CLOSING: ("this O-word has no end", "add its end with the same label"),
+    FAULT_BEHIND: (
+        "nothing but a comment may stand behind this O-word",
+        "check how the word is spelt; write other things on a line of their own",
+    ),
     FAULT_CROSSED: ("this ends something that was begun outside of what is open here", "nest them"),
     FAULT_LABEL_TWICE: ("the label is used twice", "give each if, while, do and repeat a label of its own"),
     FAULT_NESTED_SUB: ("a subprogram is defined within another", "define it on its own"),

@@ -39,7 +39,7 @@ from gcode2krl.gcode.state import (
     initial_state,
 )
 from gcode2krl.gcode.text import pieces
-from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools
+from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools, tool_not_changed
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
@@ -178,6 +178,7 @@ def read_stream(
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
+        doubts += tool_not_changed(*interpreter.selected(), toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
 
@@ -301,6 +302,10 @@ class _Interpreter:
     @property
     def ended(self) -> bool:
         return bool(self.state["ended"][0])
+
+    def selected(self) -> tuple[int, int]:
+        """Return the tool that T named last, and the line; below 0 where there is none."""
+        return int(self.state["selected_tool"][0]), int(self.state["selected_line"][0])
 
     def _count(self, what: str) -> int:
         return int(self.counts[what][0])

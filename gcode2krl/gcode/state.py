@@ -28,6 +28,7 @@ STATE = np.dtype(
         ("arc_absolute", "i1"),
         ("plane", "i4"),  # PLANE_…
         ("motion", "i4"),  # MOTION_…
+        ("motion_beside_cycles", "i4"),  # the last that was no cycle
         ("feed_mode", "i4"),  # INVERSE_TIME, PER_MINUTE or PER_REVOLUTION
         ("feed", "f8"),  # mm/min, mm/rev; 0 = none yet
         ("feed_of_other_unit", "f8"),  # the feed when G20 or G21 last changed the unit
@@ -35,6 +36,7 @@ STATE = np.dtype(
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
         ("tool", "i4"),
         ("selected_tool", "i4"),  # -1 = none yet
+        ("selected_line", "i4"),  # where it was named
         ("length_offset", "f8"),  # NaN = G49
         ("offset_tool", "i4"),  # whose length it is, -1 = G49
         ("exact_stop", "i1"),
@@ -43,6 +45,7 @@ STATE = np.dtype(
         ("base_mm", "f8", 3),  # zero of the programmed numbers: work offset plus shift, before its rotation
         ("shift_mm", "f8", 3),  # by G52 and G92, in force
         ("shift_kept_mm", "f8", 3),  # what G92.3 restores
+        ("turned_under_shift", "i1"),  # by G10: until X and Y are programmed, controls differ about the place
         ("shift_line", "i4"),  # where the shift was set last, 0 = nowhere
         ("pivot_mm", "f8", 2),  # about which the work offset in force is rotated
         ("rotation_cos", "f8"),
@@ -144,7 +147,7 @@ def initial_state() -> NDArray[np.void]:
     state["unit_mm"] = 1.0
     state["absolute"] = 1
     state["plane"] = v.PLANE_XY
-    state["motion"] = v.MOTION_CANCELLED
+    state["motion"] = state["motion_beside_cycles"] = v.MOTION_CANCELLED
     state["feed_mode"] = v.PER_MINUTE
     state["selected_tool"] = -1
     state["length_offset"] = np.nan

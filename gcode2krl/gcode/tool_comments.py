@@ -1,4 +1,4 @@
-"""Diameters that a CAM system names in comments, against those of the cell's tools.
+"""Tools that a program names and does not change to: diameters in comments, T without M6.
 
 The tool in the comment is the one that the path was made for; another in the cell gives another part, and
 wrong forces. The forms that posts write (`_DIAMETER`) are read, where it is certain which tool is meant;
@@ -116,6 +116,21 @@ def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") ->
             f"{tool.diameter_mm:g} mm",
             f"correct tool.{number}.diameter_mm in the cell, or put the right tool into the magazine",
         )
+
+
+def tool_not_changed(number: int, line: int, toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
+    """Yield a warning where the program names one tool, changes to none, and the cell has another mounted."""
+    changes = any(event.kind == "tool" for event in toolpath.events)
+    if number <= 0 or changes or cell.mounted_tool in (None, number):
+        return
+    yield Issue(
+        "warning",
+        "tool-not-changed",
+        line,
+        f"T{number} is named, but no M6 puts it into the spindle: the cell says that tool "
+        f"{cell.mounted_tool} is mounted",
+        f"mount tool {number} and give mounted_tool = {number} in the cell, or let the post write M6",
+    )
 
 
 def _may_be(said: NamedDiameter, diameter_mm: float) -> bool:

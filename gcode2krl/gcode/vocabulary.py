@@ -55,6 +55,7 @@ G43_4, G43_5 = 434, 435  # the tip is programmed: with rotary words, with tool v
 G52, G53 = 520, 530  # local offset, machine coordinates
 G54, G59 = 540, 590  # the first work offset, and the last before G59.1
 G64 = 640  # blending; else exact stop
+G70, G71 = 700, 710  # of Mach3: inch and mm, as G20 and G21
 G80 = 800  # ends the motion mode
 G90 = 900  # absolute distances; else incremental
 G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs

@@ -317,7 +317,7 @@ class _Composer:
             cell=self.cell,
             motions=len(self.targets),
             options=st.ascii_text(self.layout.options, 200),
-            allowed=self.layout.allowed,
+            allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
             guard=self.layout.guard,
             forces=self.layout.forces,
             provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import PurePath
 
 from gcode2krl.errors import Issue, RefusedError, input_error
 
@@ -15,9 +16,14 @@ STRICTER_HERE = frozenset(
         "offset-from-unknown",
         "parameter-unset",
         "tool-length-differs",
+        "tool-not-changed",
     }
 )
 """Warnings of reading and predicting that are errors in a program for a robot."""
+_RELEASE = re.compile(r"(?P<code>[a-z0-9-]+)(?::(?:(?P<file>[^\x00-\x1f:]+):)?(?P<line>[0-9]{1,9}))?")
+_REMEDY = "use CODE:LINE as printed, CODE:FILE:LINE in a subprogram's file, or CODE for all of a kind"
+Place = tuple[str, int]
+"""Name of a subprogram's file, empty for the program's own, and the line in it; 0 is the whole file."""
 NEVER_RELEASED = frozenset(
     {
         "out-of-reach",
@@ -41,8 +47,8 @@ NEVER_RELEASED = frozenset(
 def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False) -> tuple[Issue, ...]:
     """Return the findings with those released by hand turned into warnings.
 
-    ``CODE:LINE`` releases the findings of a line, ``CODE`` all of a kind in the file. ``strict`` refuses
-    warnings too.
+    ``CODE:LINE`` releases the findings of a line, ``CODE:FILE:LINE`` those of a line in a subprogram's file,
+    ``CODE`` all of a kind, wherever they are. ``strict`` refuses warnings too.
 
     Raises
     ------
@@ -56,8 +62,7 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
     for word in allow:
         matches = _matches(found, word)
         if not matches:
-            remedy = "use CODE:LINE as printed, or CODE for all of a kind"
-            raise input_error("allow", f"--allow {word}: no such finding", remedy)
+            raise input_error("allow", f"--allow {word}: no such finding", _REMEDY)
         first = found[matches[0]]
         if first.code in NEVER_RELEASED:
             raise input_error("allow", f"--allow {word}: {first.code} cannot be released", first.remedy)
@@ -91,21 +96,23 @@ def _as_written(issues: Iterable[Issue]) -> list[Issue]:
 
 def _matches(findings: Sequence[Issue], word: str) -> list[int]:
     """Return the errors (rows) that a release means."""
-    code, line = _parse(word)
+    code, place = _parse(word)
     return [
         k
         for k, issue in enumerate(findings)
-        if issue.severity == "error" and issue.code == code and line in (None, issue.line)
+        if issue.severity == "error" and issue.code == code and place in (None, *_places(issue))
     ]
 
 
-def _parse(word: str) -> tuple[str, int | None]:
-    """Return code and line of a release; no line means the whole file."""
-    code, colon, line = word.partition(":")
-    if not re.fullmatch(r"[a-z0-9-]+", code) or (colon and not re.fullmatch(r"[0-9]{1,9}", line)):
-        raise input_error(
-            "allow",
-            f"--allow {word}: not of the form CODE:LINE or CODE",
-            "use CODE:LINE as printed, or CODE for all of a kind",
-        )
-    return code, int(line) if colon else None
+def _places(issue: Issue) -> tuple[Place, ...]:
+    """Return how a release may name the place of a finding."""
+    own = ("", issue.line)
+    return ((PurePath(issue.file).name, issue.file_line), own) if issue.file else (own,)
+
+
+def _parse(word: str) -> tuple[str, Place | None]:
+    """Return code and place of a release; none means everywhere."""
+    found = _RELEASE.fullmatch(word)
+    if found is None:
+        raise input_error("allow", f"--allow {word}: not of the form CODE:LINE or CODE", _REMEDY)
+    return found["code"], None if found["line"] is None else (found["file"] or "", int(found["line"]))

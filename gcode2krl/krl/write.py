@@ -118,7 +118,8 @@ def write_krl(
     cell : needed with Targets; the others have their own.
     joints : joints at the targets where they are known already.
     name : program name; default: the file's stem. A controller needs both alike.
-    allow : findings released by hand, ``CODE:LINE`` or ``CODE`` for all of a kind; the header lists them.
+    allow : findings released by hand, ``CODE:LINE``, ``CODE:FILE:LINE`` or ``CODE`` for all; the header
+        lists them.
     guard : compare frames, robot and inputs before the first motion.
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
     options : words for the header.

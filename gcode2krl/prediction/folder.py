@@ -226,7 +226,8 @@ def _table(kind: type[AnyTable], frame: Any, **more: Any) -> AnyTable:
 
 
 def _issue_record(issue: Issue) -> dict[str, Any]:
-    return {name: getattr(issue, name) for name in ("severity", "code", "line", "message", "remedy")}
+    names = ("severity", "code", "line", "message", "remedy", *(("file", "file_line") if issue.file else ()))
+    return {name: getattr(issue, name) for name in names}
 
 
 def _restart_record(restart: Restart) -> dict[str, Any]:

@@ -38,6 +38,8 @@ class _IssueRecord(_Part):
     line: _Line
     message: StrictStr
     remedy: StrictStr = ""
+    file: StrictStr = ""
+    file_line: _Line = 0
 
 
 class _EventValues(_Part):
@@ -121,7 +123,10 @@ class PredictionRecord(BaseModel):
 
     def findings(self) -> tuple[Issue, ...]:
         """Return the findings."""
-        return tuple(Issue(i.severity, i.code, i.line, i.message, i.remedy) for i in self.issues)
+        return tuple(
+            Issue(i.severity, i.code, i.line, i.message, i.remedy, file=i.file, file_line=i.file_line)
+            for i in self.issues
+        )
 
     def plain_inputs(self) -> dict[str, Any]:
         """Return program, version and settings as they were saved."""

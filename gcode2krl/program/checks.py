@@ -20,7 +20,7 @@ _TOUCHED_OFF = (
 
 def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     """Return the findings on a Toolpath that would make its program unsafe, with their lines."""
-    feed = ~toolpath.rapid & ~toolpath.machine
+    feed = ~toolpath.rapid & ~toolpath.machine & ~_stands(toolpath)
     feed[:1] = False
     findings: list[Issue] = []
     for check in (_undefined_positions, _machine_moves, _spindle, _speeds, _length_offsets, _clearance):
@@ -30,6 +30,14 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     findings += doubtful_issues(toolpath, cell)
     findings += list(_events(toolpath, cell))
     return tuple(findings)
+
+
+def _stands(toolpath: Toolpath) -> Bools:
+    """Tell which rows move nothing and state no position: ``G1 F100`` alone, as posts write it at the top."""
+    stands = np.zeros(len(toolpath), dtype=np.bool_)
+    for column in (toolpath.position_mm, toolpath.axis, toolpath.known):
+        stands[1:] |= (column[1:] != column[:-1]).any(axis=1)
+    return ~stands
 
 
 def require_geometry(toolpath: Toolpath, cell: Cell) -> None:
@@ -79,7 +87,9 @@ def _why_unknown(toolpath: Toolpath, row: int, axis: int) -> str:
     line = int(toolpath.source_line[lost])
     if toolpath.machine[lost]:
         return f"{name} is unknown since the machine move (G28, G30, G53) in line {line}"
-    return f"{name} is unknown since the tool length changed before line {line}"
+    if name == "Z":
+        return f"{name} is unknown since the tool length changed before line {line}"
+    return f"{name} is unknown since the zero was turned, or the tool's length tilted, before line {line}"
 
 
 def axes_nowhere(toolpath: Toolpath) -> str:

@@ -47,10 +47,14 @@ class Finding(_Strict):
     severity: Literal["error", "warning", "note"]
     code: str = Field(description="docs/findings.md lists them.")
     line: NotNegative = Field(description="Of the G-code or the file, from 1; 0 where there is none.")
+    column: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="Of the culprit in its line, in characters from 1, where it is certain."
+    )
     message: str
     remedy: str
     file: str | None = Field(
-        default=None, description="What the line is of where it is not the input: a cell, a job."
+        default=None,
+        description="What the line is of where it is not the input: a cell, job or subprogram.",
     )
 
 

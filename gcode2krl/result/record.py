@@ -50,9 +50,16 @@ def record_of(
 
 def issue_dicts(issues: Iterable[Issue], file: str | None = None) -> list[dict[str, Any]]:
     """Return findings as the objects of a record; ``file`` is what they are about if not the input."""
-    elsewhere = {} if file is None else {"file": file}
-    return [
-        {"severity": i.severity, "code": i.code, "line": i.line, "message": i.message, "remedy": i.advice()}
-        | elsewhere
-        for i in issues
-    ]
+    return [_issue_dict(issue, issue.file or file) for issue in issues]
+
+
+def _issue_dict(issue: Issue, file: str | None) -> dict[str, Any]:
+    return {
+        "severity": issue.severity,
+        "code": issue.code,
+        "line": issue.file_line or issue.line,
+        **({"column": issue.column} if issue.column else {}),
+        "message": issue.message,
+        "remedy": issue.advice(),
+        **({} if file is None else {"file": file}),
+    }

@@ -25,6 +25,7 @@ typedef struct {
     uint8_t next_word;                        /* what a dialect says of the next word, 0 = nothing */
     int32_t pointless, absolute, incremental; /* bits of the letters of which it has been said */
     int32_t harmless;                         /* a code that says nothing, ten times */
+    int32_t unit_again;                       /* G70 or G71, ten times */
     bool exact_once;                          /* an exact stop of this block alone */
     double turn_deg[V_ROTARY_AXES]; /* where the rotary words lead, once they have been read */
 } Block;

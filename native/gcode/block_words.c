@@ -34,6 +34,10 @@ static Taken take_g(Block *b, double value) {
         report(b, F_UNKNOWN_G, (Says){.a = tenfold});
         return faulty(AT(b->machine->doubt_of_g, V_LARGEST_G));
     }
+    if (code == V_G70 || code == V_G71) {
+        b->unit_again = code;
+        return UNDERSTOOD;
+    }
     if (group == S_UNSUPPORTED_GROUP) {
         report(b, F_UNSUPPORTED_G, (Says){.a = (double)code});
         return faulty(AT(b->machine->doubt_of_g, code));
@@ -191,6 +195,14 @@ static bool rotary_is_harmless(Block *b) {
     return good;
 }
 
+/* Tell whether G70 or G71 says again which unit is in force, as posts for Mach3 write behind G20 and G21; as a
+   lathe's cycle it would have words that nothing here uses. */
+static bool repeats_unit(const Block *b) {
+    const bool inches = b->g[V_UNIT] >= 0 ? b->g[V_UNIT] == V_G20 : b->state->unit_mm != 1.0;
+    const bool named = b->g[V_UNIT] >= 0 || b->state->unit_named;
+    return named && !(b->state->doubt & S_DOUBT_UNIT) && b->unit_again == (inches ? V_G70 : V_G71);
+}
+
 static void begin_without_codes(Block *b) {
     for (int k = 0; k < V_GROUPS; k++)
         b->g[k] = -1;
@@ -201,6 +213,7 @@ static void begin_without_codes(Block *b) {
 /* Sort the words of a block that has none yet; `doubt` gets the bits of what is in doubt after it. */
 BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t *doubt) {
     bool good = true, used = false;
+    int slashes = 0;
     *doubt = 0;
     begin_without_codes(b);
     for (int64_t k = from; k < to; k++) {
@@ -209,6 +222,10 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             if (b->machine->block_delete) {
                 pass_marks(b, words, from, to);
                 return LEFT_OUT;
+            }
+            if (slashes++ > 0) { /* the second may be a slip for a digit or a letter */
+                report(b, F_BAD_CHARACTER, (Says){.a = CH_SLASH});
+                good = false;
             }
         } else if (c == CH_PERCENT) {
             tape_mark(b, words, k, to, to - from == 1);
@@ -234,6 +251,11 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
     }
     if (b->has[V_WORD_E] && good) { /* else it belongs to what has been reported, as in M68 E0 */
         report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
+        good = false;
+    }
+    if (b->unit_again && !repeats_unit(b)) {
+        report(b, F_UNSUPPORTED_G, (Says){.a = (double)b->unit_again});
+        *doubt |= AT(b->machine->doubt_of_g, b->unit_again);
         good = false;
     }
     if (good && !to_core_words(b))

@@ -216,8 +216,14 @@ static bool use_harmless_words(Block *b) {
     return true;
 }
 
+static void leave_out_idle_words(Block *b) {
+    for (int index = 0; index < V_LETTERS; index++)
+        b->has[index] = b->has[index] && !(b->machine->idle_letters & 1 << index);
+}
+
 /* Make the words of a block those of the core; return false, with a finding, where that cannot be. */
 bool to_core_words(Block *b) {
+    leave_out_idle_words(b);
     bool good = read_cycle(b);
     if (b->pointless)
         good = read_pointless(b) && good;

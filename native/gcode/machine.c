@@ -172,7 +172,12 @@ static void motion_mode(Block *b) {
     b->motion_before = s->motion;
     if (b->g[V_MOTION] < 0)
         return;
-    s->motion = b->g[V_MOTION] == V_G80 ? V_MOTION_CANCELLED : b->g[V_MOTION] / V_TENFOLD;
+    if (b->g[V_MOTION] != V_G80)
+        s->motion = b->g[V_MOTION] / V_TENFOLD;
+    else
+        s->motion = b->machine->g80_keeps_motion ? s->motion_beside_cycles : V_MOTION_CANCELLED;
+    if (!is_cycle(s->motion))
+        s->motion_beside_cycles = s->motion;
     s->motion_line = b->line;
     s->doubt &= ~S_DOUBT_MOTION;
 }

@@ -163,6 +163,14 @@ static void set_by_words(const Block *b, double *offset_mm) {
         offset_mm[OFFSET_ROTATION] = b->word[V_WORD_R];
 }
 
+/* Tell whether R turns the work offset in force while G52 or G92 shifts it: LinuxCNC then takes the tool to stand
+   elsewhere than it does. */
+static bool turns_under_shift(const Block *b, int32_t system) {
+    const State *s = b->state;
+    return b->has[V_WORD_R] && system == s->work_offset && (s->shift_mm[0] != 0.0 || s->shift_mm[1] != 0.0) &&
+           b->word[V_WORD_R] != offset_of(b->machine, system)[OFFSET_ROTATION];
+}
+
 static void set_offset(Block *b, int32_t l, int32_t p) {
     State *s = b->state;
     if (p == NOT_WHOLE || p > WORK_OFFSETS || !b->has[V_WORD_P]) {
@@ -182,6 +190,10 @@ static void set_offset(Block *b, int32_t l, int32_t p) {
     double *offset_mm = offset_of(b->machine, system);
     const double before_mm[3] = {offset_mm[0], offset_mm[1], offset_mm[2]};
     const double rotation = offset_mm[OFFSET_ROTATION];
+    if (turns_under_shift(b, system)) {
+        s->known_x = s->known_y = 0;
+        s->turned_under_shift = 1;
+    }
     if (l == V_L_OFFSET)
         set_by_words(b, offset_mm);
     else

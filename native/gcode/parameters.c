@@ -109,10 +109,15 @@ static bool is_in_machine_unit(int64_t number) {
     return number < FIRST_SYSTEM || (number - FIRST_SYSTEM) % OF_A_SYSTEM != OF_A_SYSTEM_ROTATION;
 }
 
+/* Tell whether controls differ about where the tool stands: in X and Y, behind a rotation under a shift. */
+static bool is_turned(const State *s) { return s->turned_under_shift && !(s->known_x && s->known_y); }
+
 /* Return why the value of a parameter cannot be told: a number of VALUE_FAULTS, KNOWN = it can. */
 int fault_of_number(const Machine *machine, int64_t number) {
     if (is_of_other_axis(machine, number))
         return PF_OF_OTHER_AXIS;
+    if ((number == POSITION || number == POSITION + 1) && is_turned(machine->state.at))
+        return PF_TURNED_UNDER_SHIFT;
     if (number >= TOOL_OFFSET && number <= LAST_OF_TOOL)
         return PF_OF_TOOL_TABLE;
     return machine->state.at->unit_mm != 1.0 && is_in_machine_unit(number) ? PF_IN_MACHINE_UNIT : KNOWN;
@@ -121,6 +126,8 @@ int fault_of_number(const Machine *machine, int64_t number) {
 /* The same for a name; its row is given. */
 int fault_of_name(const Machine *machine, int64_t name) {
     const State *s = machine->state.at;
+    if ((name == N_X || name == N_Y) && is_turned(s))
+        return PF_TURNED_UNDER_SHIFT;
     if (name != N_FEED)
         return KNOWN;
     if (s->feed_mode == V_INVERSE_TIME)

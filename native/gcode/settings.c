@@ -71,6 +71,7 @@ static void select_tool(Block *b, double t) {
         return;
     }
     b->state->selected_tool = tool;
+    b->state->selected_line = b->line;
     b->state->doubt &= ~S_DOUBT_TOOL;
 }
 

@@ -8,6 +8,7 @@ import pytest
 from gcode2krl import Gcode2KrlError, load_cell
 from gcode2krl.cell import Cell
 from gcode2krl.gcode import read_stream
+from gcode2krl.program.checks import check_toolpath
 
 FUSION = """\
 %
@@ -282,6 +283,49 @@ def test_what_has_no_plain_meaning_beside_g28_is_refused(block):
     with pytest.raises(Gcode2KrlError) as caught:
         read(f"G21 G0 X0 Y0 Z0 F100\n{block}\nM2\n")
     assert (caught.value.issues[0].code, caught.value.issues[0].line) == ("two-axis-codes", 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("G20\nG71\n", 2),
+        ("G71\nG21\n", 1),
+        ("G21\nG70\n", 2),
+        ("G21\nG71 Q10 X5 Z-5 D1\n", 2),
+        ("G21\nG71 G20\n", 2),
+    ],
+)
+def test_g70_and_g71_say_the_unit_again_or_are_refused(text, line):
+    rest = "G0 X1 Y1 Z1\nM2\n"
+    with pytest.raises(Gcode2KrlError) as caught:
+        read(text + rest)
+    assert caught.value.issues[0].line == line
+    for again in ("G21\nG71G91.1\n", "G21 G71\n", "G71 G21\n".replace("G71 G21", "G21\nG71 G21")):
+        np.testing.assert_array_equal(read(again + rest).position_mm[-1], [1, 1, 1])
+    np.testing.assert_allclose(read("G20\nG70\n" + rest).position_mm[-1], [25.4] * 3)
+
+
+def test_a_feed_move_that_names_no_axis_moves_nothing_and_is_no_fault(cell):
+    head, end = "G21\nG1 F120\nG0 X0 Y0 Z5\nT1 M6\nG43 H1\nG0 Z5\nS900 M3\n", "G1 Z-1\nM2\n"
+    faults = {i.code for i in check_toolpath(read(head + end, cell), cell) if i.severity == "error"}
+    assert not faults & {"undefined-position", "spindle-off"}
+    named = head.replace("G1 F120", "G1 X0 Y0 Z0 F120")
+    faults = {i.code for i in check_toolpath(read(named + end, cell), cell) if i.severity == "error"}
+    assert faults >= {"undefined-position", "spindle-off"}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("T4\n", [("tool-not-changed", 2)]),
+        ("T1\n", []),
+        ("T4\nM6\nT5\n", []),
+        ("", []),
+    ],
+)
+def test_a_tool_that_is_named_and_never_changed_to_is_found(cell, text, found):
+    issues = read(f"G21\n{text}G0 X1 Y1 Z1\nM2\n", cell).issues
+    assert [(i.code, i.line) for i in issues if i.code == "tool-not-changed"] == found
 
 
 @pytest.mark.parametrize("block", ["G2", "N5.G3 X5 I2.5", "N+10 X1", "N.5 X1", "M6"])

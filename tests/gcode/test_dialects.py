@@ -77,10 +77,20 @@ def test_a_table_is_whole(name):
             "G81 X5 Z-5 R1 F100\nG91 X2 Z-6 R-4 L3\nG80\n",
         ),
         ("G2 X10. Y0 R5. F100\n", "G2 X10 Y0 R5 F100\n"),
+        ("G99 G81 X5. Z-5. R1. F100\nG80\nZ9.\n", "G99 G81 X5 Z-5 R1 F100\nG0 Z9\n"),
+        ("G1 X1. F100\nG99 G81 X5. Z-5. R1.\nG80\nZ9.\n", "G1 X1 F100\nG99 G81 X5 Z-5 R1\nG1 Z9\n"),
+        ("G80\nZ9.\n", "G0 Z9\n"),
+        ("G187 P2\nG103 P1\nG1 X1. F100\nG187\nG103\n", "G1 X1 F100\n"),
+        ("G1 X1. D36 F100\nD2\nX2.\n", "G1 X1 F100\nX2\n"),
     ],
 )
 def test_fanuc(text, plain):
     same(f"%\nO0001 (PART)\n{HEAD}{text}M30\n%\n", "fanuc", f"{HEAD}{plain}M30\n")
+
+
+def test_an_arc_before_a_cycle_is_in_force_again_behind_g80():
+    text = f"{HEAD}G2 X10. Y0. R5. F100\nG99 G81 X5. Z-5. R1.\nG80\nX9.\nM30\n"
+    assert [issue.code for issue in errors(text, "fanuc")] == ["arc-no-centre"]
 
 
 def test_a_number_without_a_point_is_never_guessed():

@@ -261,6 +261,28 @@ def test_what_is_not_understood_is_one_finding_at_its_line(block, code):
     assert errors == [(code, 3)]
 
 
+@pytest.mark.parametrize("shift", ["G52 X24", "G92 Y3"])
+def test_behind_a_rotation_under_a_shift_the_place_is_unknown(shift):
+    """LinuxCNC takes the tool to stand elsewhere: an axis that the next block does not name would jump."""
+    turned = f"{HEAD}{shift}\nG10 L2 P1 R90\n"
+    assert not read(turned + "G0 X1").known[-1, :2].all()
+    assert not read(turned + "G91 G0 X1 Y2").known[-1, :2].any()
+    assert read(turned + "G0 X1 Y2").known[-1].all()
+    for block in ("G0 X#5420 Y1", "G0 X#<_y> Y1", "G0 X1\nG0 Y#5421"):
+        assert ("expression-value", "error") in [
+            (code, severity) for code, severity, _ in found(turned + block)
+        ]
+    assert not [code for code, severity, _ in found(f"{turned}G0 X1 Y2\nX#5420") if severity == "error"]
+    for turn in (
+        "G10 L2 P1 R0",
+        "G10 L2 P2 R90",
+        "G10 L2 P1 X5",
+        "G92.1\nG10 L2 P1 R90",
+        "G52 X0 Y0\nG10 L2 P1 R90",
+    ):
+        assert read(f"{HEAD}{shift}\n{turn}\nG0 Z1").known[-1].all(), turn
+
+
 def test_rs274_loses_a_length_in_inches_and_this_reader_does_not():
     """``G20 G43 H2 / G21 / G49``: stand-alone rs274 forgets to convert the length in force, 48 mm here."""
     cell = cell_with_tools(10.0, 50.8)

@@ -153,6 +153,24 @@ def test_the_culprit_is_quoted_with_a_caret(block, quoted):
     assert "\n" not in found.text("part.nc")
 
 
+@pytest.mark.parametrize(
+    ("block", "column"),
+    [
+        ("G1 X5 F100 Q3", 12),
+        ("(45°) G1 X5 F100 Q3", 18),  # in characters, not in bytes
+        ("\tG1 X5 F100 Q3", 13),
+        ("G1 X[1 + 2/[3-3]] F100", 11),
+        ("G1 X- F100", 4),
+        ("G1 X5,5,5 F100", 0),  # two commas: which one is not told
+        ("G2 X5 Y5 F100", 0),
+    ],
+)
+def test_the_column_of_the_culprit_where_it_is_certain(block, column):
+    with pytest.raises(Gcode2KrlError) as caught:
+        read_stream(io.BytesIO(f"G21 G0 X0 Y0 Z0\n{block}\nM2\n".encode()), "part.nc")
+    assert caught.value.issues[0].column == column
+
+
 def test_a_finding_without_a_quotation_is_as_before():
     assert (
         Issue("error", "code", 3, "wrong", "mend it").text("a.nc") == "a.nc:3: error: wrong [code] -> mend it"

@@ -82,7 +82,7 @@ def test_rows_have_the_line_that_made_them():
         ("o1 while [1] X5\no1 endwhile", ("expression", 3)),
         ("o1 if [1]\nX1", ("o-word", 3)),
         ("X1\no1 endif", ("o-word", 4)),
-        ("o1 if [1]\no2 while [0]\no1 endif\no2 endwhile", ("o-word", 3)),
+        ("o1 if [1]\no2 while [0]\no1 endif\no2 endwhile", ("o-word", 5)),
         ("o1 break", ("o-word", 3)),
         ("o1 foo", ("o-word", 3)),
         ("X1 o1 call", ("o-word", 3)),
@@ -107,7 +107,34 @@ def test_a_caret_stands_before_the_culprit():
 
 
 def test_what_is_passed_over_may_be_anything():
-    assert ends("o1 if [0]\nX[1/0] $ (\no2 foo\no1 endif\nX1") == [1.0]
+    assert ends("o1 if [0]\nX[1/0] $ (\no2 call [1/0]\no1 endif\nX1") == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("o1 if [0]\nX1\no1 lese\nX2\no1 endif", 5),
+        ("o1 if [1]\nX1\no1 lese\nX2\no1 endif", 5),
+        ("o1 if [0]\nX1\no1 elsee\nX2\no1 endif", 5),
+        ("o1 if [0]\nX1\no2 else\nX2\no1 endif", 5),
+        ("o1 if [0]\nX1\no1 endif 5", 5),
+        ("o1 while [0]\no2 if [0]\no2 elfe\no2 endif\no1 endwhile", 5),
+        ("o1 repeat [2]\nX1\no1 endrepeatt", 5),
+        ("#1=0\no1 while [#1 LT 2]\n#1=[#1+1]\no1 endwhile x", 6),
+        ("o1 do x\nX1\no1 while [0]", 3),
+        ("o1 do\nX1\no1 breakk\no1 while [0]", 5),
+        ("o1 subb\nX1\no1 endsub\no1 call", 3),
+        ("o1 sub\no2 if [0]\no2 elso\nX1\no2 endif\no1 endsub\no1 call", 5),
+    ],
+)
+def test_an_o_word_is_never_passed_over_unread(text, line):
+    """It may be the else, or the end, of what it stands in."""
+    assert refused(text) == ("o-word", line)
+
+
+def test_behind_an_o_word_a_comment_may_stand():
+    text = "o1 if [0] (a)\nX1\no1 else ; b\nX2\no1 endif (c)\no2 repeat [2]\nX3\no2 endrepeat\t(d)"
+    assert ends(text) == [2.0, 3.0, 3.0]
 
 
 def test_a_subprogram_of_another_file_names_its_caller(tmp_path):

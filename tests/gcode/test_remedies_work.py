@@ -29,6 +29,8 @@ def errors(text):
         ("G1 X5,5 F100", "decimal point", "G1 X5.5 F100"),
         ("G1 X5 F100 )", "remove the )", "G1 X5 F100"),
         ("G1 G1 X5 F100", "keep one", "G1 X5 F100"),
+        ("//G1 X5 F100", "remove it", "/G1 X5 F100"),
+        ("/ / G1 X5 F100", "remove it", "/G1 X5 F100"),
         ("M5 M5", "keep one", "M5"),
     ],
 )

@@ -43,7 +43,8 @@ def test_a_release_that_matches_no_error(word):
 
 
 @pytest.mark.parametrize(
-    "word", ["", ":3", "spindle-off:", "spindle-off:x", "spindle off", "a:1:2", "A\n; x"]
+    "word",
+    ["", ":3", "spindle-off:", "spindle-off:x", "spindle off", "a:1:x", "a:b:1:2", "A\n; x", "a:b\n; x:1"],
 )
 def test_a_release_of_another_form(word):
     with pytest.raises(NotUnderstoodError, match="CODE:LINE or CODE"):

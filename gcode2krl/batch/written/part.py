@@ -150,6 +150,7 @@ def _finding(stated: Mapping[str, Any]) -> Finding:
         line=max(int(line), 0),
         message=str(stated.get("message") or ""),
         remedy=str(stated.get("remedy") or ""),
+        column=max(int(_number(stated.get("column")) or 0), 0),
     )
     return Finding(issue, str(stated.get("file") or "").replace("\\", "/"))
 

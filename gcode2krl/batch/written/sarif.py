@@ -19,21 +19,22 @@ MOST_RESULTS = 20_000
 _BASE = "%SRCROOT%"
 _RANK = ("error", "warning", "note")
 
-_Result = tuple[int, str, int, str, str]
-"""Rank of the severity, path, line, code, sentence: what makes a finding the same as another."""
+_Result = tuple[int, str, int, int, str, str]
+"""Rank of the severity, path, line, column (0: not known), code, sentence: by these a finding is the
+same as another."""
 
 
 def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     """Return the file; ``root`` is the absolute folder in which the run began."""
     found = sorted(set(_results(parts_of(records), root)))
     kept = found[:MOST_RESULTS]
-    codes = sorted({code for _, _, _, code, _ in kept})
+    codes = sorted({code for *_, code, _ in kept})
     run = {
         "tool": {"driver": _driver(codes)},
         "invocations": [{"executionSuccessful": True} | _left_out(len(found) - len(kept))],
         "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
         "columnKind": "unicodeCodePoints",
-        "results": [_result(one, codes.index(one[3])) for one in kept],
+        "results": [_result(one, codes.index(one[4])) for one in kept],
     }
     log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
     return (json.dumps(log, indent=1) + "\n").encode("ascii")
@@ -46,7 +47,8 @@ def _results(parts: Iterable[Part], root: str) -> Iterator[_Result]:
         for finding in part.findings:
             issue = finding.issue
             place = below_root(finding.file, root) if finding.file else path
-            yield _RANK.index(issue.severity), place, issue.line, printable(issue.code), _sentence(issue)
+            rank, code = _RANK.index(issue.severity), printable(issue.code)
+            yield rank, place, issue.line, issue.column, code, _sentence(issue)
 
 
 def _sentence(issue: Issue) -> str:
@@ -55,9 +57,10 @@ def _sentence(issue: Issue) -> str:
 
 
 def _result(found: _Result, rule: int) -> dict[str, Any]:
-    rank, path, line, code, sentence = found
+    rank, path, line, column, code, sentence = found
     place = {"uri": uri(path)} if is_absolute(path) else {"uri": uri(path), "uriBaseId": _BASE}
     region = {"startLine": max(line, 1)}  # GitHub refuses a result without a line
+    region |= {"startColumn": column} if line and column else {}
     return {
         "ruleId": code,
         "ruleIndex": rule,

@@ -1,0 +1,24 @@
+(Project: part)
+(Created by Estlcam version 12 build 12.132)
+(Machining time about 00:02:30 hours)
+(Required tools:)
+(T4: Flat 6mm)
+G21
+G90
+G17
+(Tool change: Flat 6mm)
+M05
+T4 M06
+M03 S18000
+G00 Z5.0000
+(No. 1: Part 1)
+G00 X10.0000 Y0.0000
+G00 Z0.5000
+G01 Z-1.0000 F600 S18000
+G02 X0.0000 Y-10.0000 I-10.0000 J0.0000 F1200
+G02 X10.0000 Y0.0000 I0.0000 J10.0000
+G01 X30.0000 Y0.0000
+G00 Z5.0000
+G00 X0.0000 Y0.0000
+M05
+M30
