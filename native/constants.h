@@ -252,7 +252,13 @@
 #define V_M48 48
 #define V_M53 53
 #define V_M61 61
+#define V_M66 66
 #define V_M62 62
+#define V_M63 63
+#define V_M64 64
+#define V_M65 65
+#define V_M67 67
+#define V_M68 68
 #define V_M70 70
 #define V_M71 71
 #define V_M72 72
@@ -304,6 +310,7 @@
 #define V_SHIFT_STATE 13
 #define V_GROUPS 14
 #define V_M_STOP 4
+#define V_M_IO 5
 #define V_M_TOOL_CHANGE 6
 #define V_M_SPINDLE 7
 #define V_M_COOLANT 8
@@ -495,6 +502,16 @@
 #define FO_LENGTH_DIFFERS 233
 #define FO_ROTARY 234
 #define FO_ROTATION_WITH_ROTARY 235
+
+/* gcode2krl.gcode.mode_findings */
+#define FM_IO_WORD 260
+#define FM_IO_VALUE 261
+#define FM_IO_BESIDE 262
+#define FM_TOOL_NUMBER 263
+#define FM_NOT_SAVED 264
+#define FM_RESTORE_BESIDE 265
+#define FM_RESTORE_CUTTER 266
+#define FM_RESTORE_LENGTH 267
 
 /* gcode2krl.gcode.state */
 #define S_CUTTER_ON 1
@@ -804,6 +821,7 @@ typedef struct {
     int32_t tape_marks;
     int8_t unit_named;
     int64_t blocks;
+    int32_t level;
     double largest_mm;
     int32_t unknown_feed_line;
     int8_t unknown_reported;
@@ -910,63 +928,113 @@ typedef char State_end_line_stands_at_424[offsetof(State, end_line) == 424 ? 1 :
 typedef char State_tape_marks_stands_at_428[offsetof(State, tape_marks) == 428 ? 1 : -1];
 typedef char State_unit_named_stands_at_432[offsetof(State, unit_named) == 432 ? 1 : -1];
 typedef char State_blocks_stands_at_440[offsetof(State, blocks) == 440 ? 1 : -1];
-typedef char State_largest_mm_stands_at_448[offsetof(State, largest_mm) == 448 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_456[offsetof(State, unknown_feed_line) == 456 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_460[offsetof(State, unknown_reported) == 460 ? 1 : -1];
-typedef char State_doubt_stands_at_464[offsetof(State, doubt) == 464 ? 1 : -1];
-typedef char State_motion_line_stands_at_468[offsetof(State, motion_line) == 468 ? 1 : -1];
-typedef char State_distance_line_stands_at_472[offsetof(State, distance_line) == 472 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_476[offsetof(State, feed_mode_line) == 476 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_480[offsetof(State, rotary_refused) == 480 ? 1 : -1];
-typedef char State_note_count_stands_at_484[offsetof(State, note_count) == 484 ? 1 : -1];
-typedef char State_note_line_stands_at_520[offsetof(State, note_line) == 520 ? 1 : -1];
-typedef char State_note_word_stands_at_556[offsetof(State, note_word) == 556 ? 1 : -1];
-typedef char State_moved_mm_stands_at_592[offsetof(State, moved_mm) == 592 ? 1 : -1];
-typedef char State_misfits_stands_at_664[offsetof(State, misfits) == 664 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_668[offsetof(State, misfits_other_centre) == 668 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_672[offsetof(State, misfits_reversed) == 672 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_676[offsetof(State, misfits_exchanged) == 676 ? 1 : -1];
-typedef char State_spirals_stands_at_680[offsetof(State, spirals) == 680 ? 1 : -1];
-typedef char State_spiral_line_stands_at_684[offsetof(State, spiral_line) == 684 ? 1 : -1];
-typedef char State_spiral_start_stands_at_688[offsetof(State, spiral_start) == 688 ? 1 : -1];
-typedef char State_spiral_end_stands_at_696[offsetof(State, spiral_end) == 696 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_704[offsetof(State, spiral_unit_mm) == 704 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_712[offsetof(State, cutter_mode) == 712 ? 1 : -1];
-typedef char State_cutter_side_stands_at_716[offsetof(State, cutter_side) == 716 ? 1 : -1];
-typedef char State_cutter_code_stands_at_720[offsetof(State, cutter_code) == 720 ? 1 : -1];
-typedef char State_cutter_line_stands_at_724[offsetof(State, cutter_line) == 724 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_728[offsetof(State, cutter_radius_mm) == 728 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_736[offsetof(State, cutter_entered) == 736 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_737[offsetof(State, cutter_failed) == 737 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_744[offsetof(State, cutter_normal) == 744 ? 1 : -1];
-typedef char State_held_turn_stands_at_760[offsetof(State, held_turn) == 760 ? 1 : -1];
-typedef char State_held_line_stands_at_764[offsetof(State, held_line) == 764 ? 1 : -1];
-typedef char State_held_from_stands_at_768[offsetof(State, held_from) == 768 ? 1 : -1];
-typedef char State_held_along_stands_at_784[offsetof(State, held_along) == 784 ? 1 : -1];
-typedef char State_held_centre_stands_at_800[offsetof(State, held_centre) == 800 ? 1 : -1];
-typedef char State_held_w_stands_at_816[offsetof(State, held_w) == 816 ? 1 : -1];
-typedef char State_held_sweep_stands_at_832[offsetof(State, held_sweep) == 832 ? 1 : -1];
-typedef char State_held_rows_stands_at_840[offsetof(State, held_rows) == 840 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_856[offsetof(State, cutter_rows_removed) == 856 ? 1 : -1];
-typedef char State_held_events_stands_at_864[offsetof(State, held_events) == 864 ? 1 : -1];
-typedef char State_retract_stands_at_872[offsetof(State, retract) == 872 ? 1 : -1];
-typedef char State_retract_line_stands_at_876[offsetof(State, retract_line) == 876 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_880[offsetof(State, unset_parameter) == 880 ? 1 : -1];
-typedef char State_unset_line_stands_at_884[offsetof(State, unset_line) == 884 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_888[offsetof(State, retract_unnamed_line) == 888 ? 1 : -1];
-typedef char State_in_cycles_stands_at_892[offsetof(State, in_cycles) == 892 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_896[offsetof(State, cycle_level_mm) == 896 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_904[offsetof(State, cycle_level_known) == 904 ? 1 : -1];
-typedef char State_cycle_r_stands_at_912[offsetof(State, cycle_r) == 912 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_920[offsetof(State, cycle_depth) == 920 ? 1 : -1];
-typedef char State_cycle_q_stands_at_928[offsetof(State, cycle_q) == 928 ? 1 : -1];
-typedef char State_cycle_p_stands_at_936[offsetof(State, cycle_p) == 936 ? 1 : -1];
-typedef char State_cycle_line_stands_at_944[offsetof(State, cycle_line) == 944 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_948[offsetof(State, cycle_plane) == 948 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_952[offsetof(State, cycle_unit_mm) == 952 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_960[offsetof(State, cycle_absolute) == 960 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 968 ? 1 : -1];
+typedef char State_level_stands_at_448[offsetof(State, level) == 448 ? 1 : -1];
+typedef char State_largest_mm_stands_at_456[offsetof(State, largest_mm) == 456 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_464[offsetof(State, unknown_feed_line) == 464 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_468[offsetof(State, unknown_reported) == 468 ? 1 : -1];
+typedef char State_doubt_stands_at_472[offsetof(State, doubt) == 472 ? 1 : -1];
+typedef char State_motion_line_stands_at_476[offsetof(State, motion_line) == 476 ? 1 : -1];
+typedef char State_distance_line_stands_at_480[offsetof(State, distance_line) == 480 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_484[offsetof(State, feed_mode_line) == 484 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_488[offsetof(State, rotary_refused) == 488 ? 1 : -1];
+typedef char State_note_count_stands_at_492[offsetof(State, note_count) == 492 ? 1 : -1];
+typedef char State_note_line_stands_at_528[offsetof(State, note_line) == 528 ? 1 : -1];
+typedef char State_note_word_stands_at_564[offsetof(State, note_word) == 564 ? 1 : -1];
+typedef char State_moved_mm_stands_at_600[offsetof(State, moved_mm) == 600 ? 1 : -1];
+typedef char State_misfits_stands_at_672[offsetof(State, misfits) == 672 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_676[offsetof(State, misfits_other_centre) == 676 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_680[offsetof(State, misfits_reversed) == 680 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_684[offsetof(State, misfits_exchanged) == 684 ? 1 : -1];
+typedef char State_spirals_stands_at_688[offsetof(State, spirals) == 688 ? 1 : -1];
+typedef char State_spiral_line_stands_at_692[offsetof(State, spiral_line) == 692 ? 1 : -1];
+typedef char State_spiral_start_stands_at_696[offsetof(State, spiral_start) == 696 ? 1 : -1];
+typedef char State_spiral_end_stands_at_704[offsetof(State, spiral_end) == 704 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_712[offsetof(State, spiral_unit_mm) == 712 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_720[offsetof(State, cutter_mode) == 720 ? 1 : -1];
+typedef char State_cutter_side_stands_at_724[offsetof(State, cutter_side) == 724 ? 1 : -1];
+typedef char State_cutter_code_stands_at_728[offsetof(State, cutter_code) == 728 ? 1 : -1];
+typedef char State_cutter_line_stands_at_732[offsetof(State, cutter_line) == 732 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_736[offsetof(State, cutter_radius_mm) == 736 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_744[offsetof(State, cutter_entered) == 744 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_745[offsetof(State, cutter_failed) == 745 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_752[offsetof(State, cutter_normal) == 752 ? 1 : -1];
+typedef char State_held_turn_stands_at_768[offsetof(State, held_turn) == 768 ? 1 : -1];
+typedef char State_held_line_stands_at_772[offsetof(State, held_line) == 772 ? 1 : -1];
+typedef char State_held_from_stands_at_776[offsetof(State, held_from) == 776 ? 1 : -1];
+typedef char State_held_along_stands_at_792[offsetof(State, held_along) == 792 ? 1 : -1];
+typedef char State_held_centre_stands_at_808[offsetof(State, held_centre) == 808 ? 1 : -1];
+typedef char State_held_w_stands_at_824[offsetof(State, held_w) == 824 ? 1 : -1];
+typedef char State_held_sweep_stands_at_840[offsetof(State, held_sweep) == 840 ? 1 : -1];
+typedef char State_held_rows_stands_at_848[offsetof(State, held_rows) == 848 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_864[offsetof(State, cutter_rows_removed) == 864 ? 1 : -1];
+typedef char State_held_events_stands_at_872[offsetof(State, held_events) == 872 ? 1 : -1];
+typedef char State_retract_stands_at_880[offsetof(State, retract) == 880 ? 1 : -1];
+typedef char State_retract_line_stands_at_884[offsetof(State, retract_line) == 884 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_888[offsetof(State, unset_parameter) == 888 ? 1 : -1];
+typedef char State_unset_line_stands_at_892[offsetof(State, unset_line) == 892 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_896[offsetof(State, retract_unnamed_line) == 896 ? 1 : -1];
+typedef char State_in_cycles_stands_at_900[offsetof(State, in_cycles) == 900 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_904[offsetof(State, cycle_level_mm) == 904 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_912[offsetof(State, cycle_level_known) == 912 ? 1 : -1];
+typedef char State_cycle_r_stands_at_920[offsetof(State, cycle_r) == 920 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_928[offsetof(State, cycle_depth) == 928 ? 1 : -1];
+typedef char State_cycle_q_stands_at_936[offsetof(State, cycle_q) == 936 ? 1 : -1];
+typedef char State_cycle_p_stands_at_944[offsetof(State, cycle_p) == 944 ? 1 : -1];
+typedef char State_cycle_line_stands_at_952[offsetof(State, cycle_line) == 952 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_956[offsetof(State, cycle_plane) == 956 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_960[offsetof(State, cycle_unit_mm) == 960 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_968[offsetof(State, cycle_absolute) == 968 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 976 ? 1 : -1];
 VIEW(StateView, State);
+
+typedef struct {
+    int32_t is_saved;
+    int32_t restored_on_return;
+    double unit_mm;
+    int32_t absolute;
+    int32_t arc_absolute;
+    int32_t plane;
+    int32_t feed_mode;
+    double feed;
+    double feed_of_other_unit;
+    double feed_word;
+    double rpm;
+    int32_t direction;
+    int32_t mist;
+    int32_t flood;
+    double length_offset;
+    int32_t offset_tool;
+    int32_t length_code;
+    int32_t exact_stop;
+    double tolerance;
+    int32_t work_offset;
+    int32_t retract;
+    int32_t cutter_mode;
+} Modes;
+typedef char Modes_is_saved_stands_at_0[offsetof(Modes, is_saved) == 0 ? 1 : -1];
+typedef char Modes_restored_on_return_stands_at_4[offsetof(Modes, restored_on_return) == 4 ? 1 : -1];
+typedef char Modes_unit_mm_stands_at_8[offsetof(Modes, unit_mm) == 8 ? 1 : -1];
+typedef char Modes_absolute_stands_at_16[offsetof(Modes, absolute) == 16 ? 1 : -1];
+typedef char Modes_arc_absolute_stands_at_20[offsetof(Modes, arc_absolute) == 20 ? 1 : -1];
+typedef char Modes_plane_stands_at_24[offsetof(Modes, plane) == 24 ? 1 : -1];
+typedef char Modes_feed_mode_stands_at_28[offsetof(Modes, feed_mode) == 28 ? 1 : -1];
+typedef char Modes_feed_stands_at_32[offsetof(Modes, feed) == 32 ? 1 : -1];
+typedef char Modes_feed_of_other_unit_stands_at_40[offsetof(Modes, feed_of_other_unit) == 40 ? 1 : -1];
+typedef char Modes_feed_word_stands_at_48[offsetof(Modes, feed_word) == 48 ? 1 : -1];
+typedef char Modes_rpm_stands_at_56[offsetof(Modes, rpm) == 56 ? 1 : -1];
+typedef char Modes_direction_stands_at_64[offsetof(Modes, direction) == 64 ? 1 : -1];
+typedef char Modes_mist_stands_at_68[offsetof(Modes, mist) == 68 ? 1 : -1];
+typedef char Modes_flood_stands_at_72[offsetof(Modes, flood) == 72 ? 1 : -1];
+typedef char Modes_length_offset_stands_at_80[offsetof(Modes, length_offset) == 80 ? 1 : -1];
+typedef char Modes_offset_tool_stands_at_88[offsetof(Modes, offset_tool) == 88 ? 1 : -1];
+typedef char Modes_length_code_stands_at_92[offsetof(Modes, length_code) == 92 ? 1 : -1];
+typedef char Modes_exact_stop_stands_at_96[offsetof(Modes, exact_stop) == 96 ? 1 : -1];
+typedef char Modes_tolerance_stands_at_104[offsetof(Modes, tolerance) == 104 ? 1 : -1];
+typedef char Modes_work_offset_stands_at_112[offsetof(Modes, work_offset) == 112 ? 1 : -1];
+typedef char Modes_retract_stands_at_116[offsetof(Modes, retract) == 116 ? 1 : -1];
+typedef char Modes_cutter_mode_stands_at_120[offsetof(Modes, cutter_mode) == 120 ? 1 : -1];
+typedef char Modes_has_its_size[sizeof(Modes) == 128 ? 1 : -1];
+VIEW(ModesView, Modes);
 
 typedef struct {
     int64_t rows;
@@ -1002,6 +1070,8 @@ typedef struct {
     double a;
     double b;
     double dwell;
+    double q;
+    double e;
 } Event;
 typedef char Event_row_stands_at_0[offsetof(Event, row) == 0 ? 1 : -1];
 typedef char Event_kind_stands_at_8[offsetof(Event, kind) == 8 ? 1 : -1];
@@ -1009,7 +1079,9 @@ typedef char Event_line_stands_at_12[offsetof(Event, line) == 12 ? 1 : -1];
 typedef char Event_a_stands_at_16[offsetof(Event, a) == 16 ? 1 : -1];
 typedef char Event_b_stands_at_24[offsetof(Event, b) == 24 ? 1 : -1];
 typedef char Event_dwell_stands_at_32[offsetof(Event, dwell) == 32 ? 1 : -1];
-typedef char Event_has_its_size[sizeof(Event) == 40 ? 1 : -1];
+typedef char Event_q_stands_at_40[offsetof(Event, q) == 40 ? 1 : -1];
+typedef char Event_e_stands_at_48[offsetof(Event, e) == 48 ? 1 : -1];
+typedef char Event_has_its_size[sizeof(Event) == 56 ? 1 : -1];
 VIEW(EventView, Event);
 
 typedef struct {
@@ -1210,12 +1282,15 @@ typedef struct {
     Rows rows;
     EventView events;
     FoundView found;
+    ModesView saved;
     Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
     int64_t runs_programs;
+    int64_t has_m61_to_m73;
+    int64_t mounted_tool;
     Ints32 core_g;
     Floats dwell_by_letter;
     int64_t points;

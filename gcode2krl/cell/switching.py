@@ -9,7 +9,7 @@ from gcode2krl.errors import Issue, Severity
 
 _OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
 """Spindle speeds in rpm: what a template switches may depend on the speed."""
-SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
+SAMPLE = {"rpm": 1000.0, "p": 1.0, "q": 1.0, "e": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """Which M-code switches off what another switches on."""
 _SPINDLE, _COOLANT = ("M3", "M4"), ("M7", "M8")
@@ -35,7 +35,13 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
 def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
     """Return key → KRL at several spindle speeds, with and without the optional words of a block."""
     texts: dict[str, list[str]] = {}
-    others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
+    others: list[dict[str, Any]] = [
+        {},
+        {"p": None, "q": None, "e": None},
+        {"text": ""},
+        {"line": 0},
+        {"line": 10**6},
+    ]
     others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
     for other in others:
         for key, text in rendered(templates, {**view, **other}).items():

@@ -86,6 +86,8 @@ class Dialect:
     """Bits of `dialect_marks`: what of its text is no word."""
     runs_programs: bool = False
     """What is LinuxCNC's own is read: parameters, expressions, O-words, M98, M99, polar words @ and ^."""
+    has_m61_to_m73: bool = False
+    """M61 to M73 are LinuxCNC's (tool number, outputs, saved modes), not the machine builder's."""
     turns_axes: bool = True
     """Rotary words of a cell with rotary axes are read."""
     own: tuple[float, ...] = ()
@@ -152,6 +154,7 @@ class Dialect:
         """Return what the interpreter is given."""
         return {
             "runs_programs": int(self.runs_programs),
+            "has_m61_to_m73": int(self.has_m61_to_m73),
             "core_g": self.core_g(),
             "dwell_by_letter": self.dwell_by_letter(),
             "points": self.points,
@@ -236,7 +239,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }
 _LIST: Final = (
-    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True),
+    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True, has_m61_to_m73=True),
     Dialect("fanuc", "Fanuc milling; a number without a point is refused", **_FANUC, points=d.POINT_REQUIRED),
     Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC, points=d.CALCULATOR),
     Dialect("fanuc-increments", "Fanuc milling; X100 is 0.1 mm", **_FANUC, points=d.THOUSANDTHS),
@@ -244,6 +247,7 @@ _LIST: Final = (
         "grbl",
         "Grbl 1.1: G0, G21 at the start, $ lines",
         syntax=d.DOLLAR_LINES,
+        has_m61_to_m73=True,
         refused={_LEAD: (41, 41.1, 42, 42.1)},
         start={"motion": v.MOTION_RAPID, "unit_named": 1},
     ),

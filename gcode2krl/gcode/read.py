@@ -22,6 +22,7 @@ from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
 from gcode2krl.gcode.program import HandsOver, Program
+from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.state import (
@@ -34,6 +35,7 @@ from gcode2krl.gcode.state import (
     EVENT_TOOL,
     GROUP_OF_G,
     IMPLIED_M5,
+    MODES,
     OF_CYCLE,
     WORK_OFFSETS,
     initial_state,
@@ -171,6 +173,7 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
+        mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
     size = _size_of(stream)
@@ -199,6 +202,11 @@ def read_stream(
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
+
+
+def _mounted_tool(cell: "Cell | None") -> int:
+    """Return the tool that is in the spindle at the start, -1 where nobody says which."""
+    return -1 if cell is None or cell.mounted_tool is None else cell.mounted_tool
 
 
 def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
@@ -282,6 +290,7 @@ class _Interpreter:
             rows=self.columns.views(),
             events=self.events,
             found=self.found,
+            saved=np.zeros(FRAMES, MODES),
             **spoken.settings(),
             group_of_g=GROUP_OF_G,
             doubt_of_g=DOUBT_OF_G,
@@ -423,8 +432,9 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
-        for row, kind, line, a, b, dwell_s in self.events[: self._count("events")].tolist():
+        for row, kind, line, a, b, dwell_s, q, e in self.events[: self._count("events")].tolist():
             what, values = self._said(kind, line, a, b)
+            values |= {letter: word for letter, word in (("q", q), ("e", e)) if not math.isnan(word)}
             if dwell_s > 0:
                 values["dwell_s"] = dwell_s
             yield Event(row, what, values)

@@ -7,21 +7,6 @@
 #include "gcode/machine.h"
 #include "gcode/program_line.h"
 
-/* Let rows and events of another file say the line of the main program that called it. */
-static void name_caller(const Run *run, int64_t first_row, int64_t first_event) {
-    const int32_t main_line = frame_of(run)->main_line;
-    if (main_line == 0)
-        return;
-    Machine *machine = run->machine;
-    const Counts *counts = machine->counts.at;
-    for (int64_t row = first_row; row < counts->rows; row++)
-        AT(machine->rows.source_line, row) = main_line;
-    for (int64_t k = first_event; k < counts->events; k++)
-        AT(machine->events, k).line = main_line;
-    if (machine->state.at->ended)
-        machine->state.at->end_line = main_line;
-}
-
 /* Execute a block whose words are known; return the word at which to go on. */
 static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
     Counts *counts = run->machine->counts.at;

@@ -4,7 +4,9 @@
 
 #include "gcode/expressions.h"
 #include "gcode/program_line.h"
+#include "gcode/machine.h"
 #include "gcode/reporting.h"
+#include "gcode/saved_modes.h"
 #include "gcode/settings.h"
 
 /* --- the end of a program that cannot go on ------------------------------------------------------------- */
@@ -125,10 +127,27 @@ static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
     return jump(run, marked->target);
 }
 
+/* Let rows and events of another file say the line of the main program that called it. */
+void name_caller(const Run *run, int64_t first_row, int64_t first_event) {
+    const int32_t main_line = frame_of(run)->main_line;
+    if (main_line == 0)
+        return;
+    Machine *machine = run->machine;
+    const Counts *counts = machine->counts.at;
+    for (int64_t row = first_row; row < counts->rows; row++)
+        AT(machine->rows.source_line, row) = main_line;
+    for (int64_t k = first_event; k < counts->events; k++)
+        AT(machine->events, k).line = main_line;
+    if (machine->state.at->ended)
+        machine->state.at->end_line = main_line;
+}
+
 /* --- calls ---------------------------------------------------------------------------------------------- */
 
-/* Begin the next run of a program that M98 calls several times: its names are new. */
+/* Begin the next run of a program that M98 calls several times: its names are new, no modes are saved in it. */
 static int64_t enter(Run *run, Frame *frame) {
+    run->machine->state.at->level = (int32_t)run->course->frame;
+    forget_modes(run->machine);
     frame->generation = ++run->course->generation;
     return frame->entry;
 }
@@ -241,14 +260,33 @@ int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int
     return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, times, next);
 }
 
+/* Restore what M73 has saved in the subprogram that ends; return false where room is wanted, or with a finding. */
+static bool restore_on_return(Run *run) {
+    Machine *machine = run->machine;
+    if (!restores_on_return(machine))
+        return true;
+    if (!has_room(machine, 0))
+        return false;
+    const int64_t rows = machine->counts.at->rows, first_event = machine->counts.at->events;
+    Block block = {.machine = machine, .state = machine->state.at, .counts = machine->counts.at, .line = run->line};
+    const bool restored = restore_modes(&block);
+    if (!restored)
+        run->course->is_stopped = 1;
+    name_caller(run, rows, first_event);
+    return restored;
+}
+
 /* Go back to behind the call. */
 static int64_t leave(Run *run) {
     Course *at = run->course;
     const Frame *frame = frame_of(run);
+    if (!restore_on_return(run))
+        return at->is_stopped ? frame->return_to : WAIT;
     at->repeats = frame->repeats;
     for (int k = 0; !frame->is_program && k < P_LOCAL_PARAMETERS; k++)
         AT(run->program->parameters, k + 1) = frame->parameters[k];
     at->frame--;
+    run->machine->state.at->level = (int32_t)at->frame;
     return frame->return_to;
 }
 
@@ -261,11 +299,13 @@ int64_t end_program(Run *run, bool is_alone, int64_t next) {
         return stop_at_fault(run, PF_FAULT_NOT_FIRST, next);
     if (!frame->is_program)
         return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
-    if (frame->times-- > 0) {
-        run->course->repeats = frame->repeats;
-        return enter(run, frame);
-    }
-    return leave(run);
+    if (frame->times <= 0)
+        return leave(run);
+    if (!restore_on_return(run))
+        return run->course->is_stopped ? next : WAIT;
+    frame->times--;
+    run->course->repeats = frame->repeats;
+    return enter(run, frame);
 }
 
 /* endsub and return, with a value or without. */

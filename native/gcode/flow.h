@@ -20,6 +20,7 @@ enum { NOTHING_WANTED = -1, WANTED_BY_NUMBER = -2 };
 
 static inline Frame *frame_of(const Run *run) { return &AT(run->program->frames, run->course->frame); }
 
+void name_caller(const Run *run, int64_t first_row, int64_t first_event);
 int64_t stop_with(Run *run, int finding, double a, int64_t next);
 void report_unless_caused(Run *run, const Evaluation *e, int64_t start);
 int64_t flow(Run *run, const MarkedLine *marked, int64_t next);
