@@ -55,9 +55,9 @@ def predict(
     ``dt_s`` is the sample time, by default the controller's cycle; ``simplify_mm`` merges feed moves, see
     `set_targets`; ``search`` are folders with subprograms. ``forces`` False leaves out material removal and
     what depends on it. A stage that cannot run (no material, unknown stiffness) leaves None and a note.
-    ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; ``effect_folders`` are folders with
-    the user's own effects. Raises `NotUnderstoodError` where the G-code, the cell or an option is wrong; what
-    a program must not do is in the prediction's ``issues``.
+    ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
+    ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
+    the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
 
     The worst second of every tool:
 
