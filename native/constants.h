@@ -42,6 +42,7 @@
 #define CH_CARET 94
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
+#define CH_LETTER_E 69
 #define CH_LETTER_F 70
 #define CH_LETTER_G 71
 #define CH_LETTER_I 73
@@ -319,6 +320,7 @@
 
 /* gcode2krl.gcode.dialect_marks */
 #define D_AMPERSAND 38
+#define D_COLON 58
 #define D_GREATER 62
 #define D_LESS 60
 #define D_POINT 46
@@ -327,10 +329,15 @@
 #define D_DOLLAR_LINES 4
 #define D_STATEMENTS 8
 #define D_POINTS 16
+#define D_MACROS 32
+#define D_PROGRAMS_NONE 0
+#define D_PROGRAMS_LINUXCNC 1
+#define D_PROGRAMS_FANUC 2
 #define D_NEXT_ABSOLUTE 60
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
 #define D_SKIPPED 38
+#define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
 #define D_RADIUS 2
@@ -348,7 +355,8 @@
 #define D_CODE_UNKNOWN (-1)
 #define D_CODE_HARMLESS (-2)
 #define D_CODE_EXACT (-3)
-#define D_CODE_REFUSED (-4)
+#define D_CODE_CALL (-4)
+#define D_CODE_REFUSED (-5)
 
 /* gcode2krl.gcode.dialects */
 #define DR_REASON_POLAR 3
@@ -553,6 +561,10 @@
 #define P_LINE_LIMIT 4096
 #define P_MOST_PARAMETERS 5602
 #define P_LOCAL_PARAMETERS 30
+#define P_MACRO_LOCALS 33
+#define P_MACRO_COMMON {100, 199}
+#define P_MACRO_KEPT {500, 999}
+#define P_MACRO_END 1000
 #define P_FRAMES 10
 #define P_MOST_NAMES 10000
 #define P_MOST_REPEATS 256
@@ -576,6 +588,9 @@
 #define P_KIND_PROGRAM_NUMBER 15
 #define P_KIND_END_OF_FILE 16
 #define P_KIND_FAULT 17
+#define P_KIND_GOTO 18
+#define P_KIND_MACRO_IF 19
+#define P_KIND_MACRO_WHILE 20
 
 /* gcode2krl.gcode.program_faults */
 #define PF_NO_VALUE 0
@@ -591,6 +606,13 @@
 #define PF_TOO_DEEP 10
 #define PF_NO_PARAMETER 11
 #define PF_BEHIND_O_WORD 12
+#define PF_MACRO_NAME 13
+#define PF_MACRO_ALONE 14
+#define PF_MACRO_BEHIND_IF 15
+#define PF_MACRO_BEHIND_THEN 16
+#define PF_MACRO_BEHIND_WHILE 17
+#define PF_MACRO_COMPARISONS 18
+#define PF_MACRO_NULL 19
 #define PF_DIVISION_BY_ZERO 0
 #define PF_SQUARE_ROOT 1
 #define PF_LOGARITHM 2
@@ -604,6 +626,15 @@
 #define PF_OF_OTHER_AXIS 10
 #define PF_FEED_OF_TIME 11
 #define PF_FEED_OF_OTHER_UNIT 12
+#define PF_MACRO_OF_CONTROL 13
+#define PF_MACRO_UNKNOWN 14
+#define PF_MACRO_ALARM 15
+#define PF_MACRO_ATAN 16
+#define PF_MACRO_ASIN 17
+#define PF_MACRO_ROUND 18
+#define PF_MACRO_NEAR 19
+#define PF_MACRO_BITS 20
+#define PF_MACRO_REMAINDER 21
 #define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
@@ -623,6 +654,17 @@
 #define PF_FAULT_ARGUMENTS 15
 #define PF_FAULT_REPEATS 16
 #define PF_FAULT_NOT_FIRST 17
+#define PF_FAULT_STATEMENT 18
+#define PF_FAULT_DO_NUMBER 19
+#define PF_FAULT_DO_OPEN 20
+#define PF_FAULT_END_ALONE 21
+#define PF_FAULT_NO_LABEL 22
+#define PF_FAULT_INTO_LOOP 23
+#define PF_FAULT_NEXT_PROGRAM 24
+#define PF_FAULT_MACRO_WORDS 25
+#define PF_FAULT_MACRO_POINT 26
+#define PF_FAULT_M98_MACRO 27
+#define PF_FAULT_M99_WORDS 28
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -1108,6 +1150,7 @@ typedef struct {
     int32_t subprogram;
     int32_t first_message;
     int32_t fault;
+    int32_t segment;
 } MarkedLine;
 typedef char MarkedLine_start_stands_at_0[offsetof(MarkedLine, start) == 0 ? 1 : -1];
 typedef char MarkedLine_target_stands_at_8[offsetof(MarkedLine, target) == 8 ? 1 : -1];
@@ -1117,7 +1160,8 @@ typedef char MarkedLine_kind_stands_at_32[offsetof(MarkedLine, kind) == 32 ? 1 :
 typedef char MarkedLine_subprogram_stands_at_36[offsetof(MarkedLine, subprogram) == 36 ? 1 : -1];
 typedef char MarkedLine_first_message_stands_at_40[offsetof(MarkedLine, first_message) == 40 ? 1 : -1];
 typedef char MarkedLine_fault_stands_at_44[offsetof(MarkedLine, fault) == 44 ? 1 : -1];
-typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 48 ? 1 : -1];
+typedef char MarkedLine_segment_stands_at_48[offsetof(MarkedLine, segment) == 48 ? 1 : -1];
+typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 56 ? 1 : -1];
 VIEW(MarkedLineView, MarkedLine);
 
 typedef struct {
@@ -1154,19 +1198,21 @@ typedef struct {
     int64_t generation;
     int64_t entry;
     int32_t is_program;
+    int32_t has_arguments;
     int32_t main_line;
     int32_t repeats;
-    double parameters[30];
+    double parameters[33];
 } Frame;
 typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
 typedef char Frame_times_stands_at_8[offsetof(Frame, times) == 8 ? 1 : -1];
 typedef char Frame_generation_stands_at_16[offsetof(Frame, generation) == 16 ? 1 : -1];
 typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
 typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
-typedef char Frame_main_line_stands_at_36[offsetof(Frame, main_line) == 36 ? 1 : -1];
-typedef char Frame_repeats_stands_at_40[offsetof(Frame, repeats) == 40 ? 1 : -1];
+typedef char Frame_has_arguments_stands_at_36[offsetof(Frame, has_arguments) == 36 ? 1 : -1];
+typedef char Frame_main_line_stands_at_40[offsetof(Frame, main_line) == 40 ? 1 : -1];
+typedef char Frame_repeats_stands_at_44[offsetof(Frame, repeats) == 44 ? 1 : -1];
 typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
-typedef char Frame_has_its_size[sizeof(Frame) == 288 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 312 ? 1 : -1];
 VIEW(FrameView, Frame);
 
 typedef struct {
@@ -1190,6 +1236,21 @@ typedef char Assignment_number_stands_at_8[offsetof(Assignment, number) == 8 ? 1
 typedef char Assignment_value_stands_at_16[offsetof(Assignment, value) == 16 ? 1 : -1];
 typedef char Assignment_has_its_size[sizeof(Assignment) == 24 ? 1 : -1];
 VIEW(AssignmentView, Assignment);
+
+typedef struct {
+    int64_t segment;
+    int64_t number;
+    int64_t word;
+    int64_t loop_first;
+    int64_t loop_last;
+} Label;
+typedef char Label_segment_stands_at_0[offsetof(Label, segment) == 0 ? 1 : -1];
+typedef char Label_number_stands_at_8[offsetof(Label, number) == 8 ? 1 : -1];
+typedef char Label_word_stands_at_16[offsetof(Label, word) == 16 ? 1 : -1];
+typedef char Label_loop_first_stands_at_24[offsetof(Label, loop_first) == 24 ? 1 : -1];
+typedef char Label_loop_last_stands_at_32[offsetof(Label, loop_last) == 32 ? 1 : -1];
+typedef char Label_has_its_size[sizeof(Label) == 40 ? 1 : -1];
+VIEW(LabelView, Label);
 
 typedef struct {
     int64_t steps;
@@ -1288,7 +1349,7 @@ typedef struct {
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
-    int64_t runs_programs;
+    int64_t programs;
     int64_t has_m61_to_m73;
     int64_t mounted_tool;
     Ints32 core_g;
@@ -1328,6 +1389,8 @@ typedef struct {
     Floats value;
     Ints32 line;
     Floats extra;
+    LabelView labels;
+    int64_t language;
 } Program;
 
 typedef struct {

@@ -63,6 +63,7 @@ RECORDS = {
     "Frame": ("gcode2krl.gcode.program_tables", "FRAME"),
     "Repeat": ("gcode2krl.gcode.program_tables", "REPEAT"),
     "Assignment": ("gcode2krl.gcode.program_tables", "ASSIGNMENT"),
+    "Label": ("gcode2krl.gcode.program_tables", "LABEL"),
     "Course": ("gcode2krl.gcode.program_tables", "COURSE"),
 }
 """Name of the struct -> module and numpy record."""

@@ -49,7 +49,7 @@ REASONS: Final = (
     ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
     ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
     (
-        "variables, jumps and subprograms are read in the dialect linuxcnc alone",
+        "variables, jumps and subprograms are read in the dialects linuxcnc and fanuc alone",
         "let the post write the program out in plain numbers",
     ),
     (
@@ -64,6 +64,10 @@ REASONS: Final = (
     ),
     ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
     ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
+    (
+        "a modal call runs its macro behind each move that follows",
+        "call the macro with G65 where it is meant",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -71,7 +75,7 @@ _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
-_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED = range(23, 30)
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _MODAL_CALL = range(23, 31)
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
@@ -84,8 +88,8 @@ class Dialect:
     title: str
     syntax: int = 0
     """Bits of `dialect_marks`: what of its text is no word."""
-    runs_programs: bool = False
-    """What is LinuxCNC's own is read: parameters, expressions, O-words, M98, M99, polar words @ and ^."""
+    programs: int = d.PROGRAMS_NONE
+    """How parameters, jumps and subprograms are written; LinuxCNC's go with its polar words @ and ^."""
     has_m61_to_m73: bool = False
     """M61 to M73 are LinuxCNC's (tool number, outputs, saved modes), not the machine builder's."""
     turns_axes: bool = True
@@ -98,6 +102,8 @@ class Dialect:
     """G numbers of an exact stop in their block alone."""
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
+    calls: tuple[float, ...] = ()
+    """G numbers that call a subprogram."""
     refused: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     """Number of the reason: G numbers that are refused for it."""
     dwell_s: Mapping[str, float] = field(default_factory=lambda: {"P": 1.0})
@@ -125,7 +131,11 @@ class Dialect:
         table = np.full(d.MOST_CODES + 1, d.CODE_UNKNOWN, np.int32)
         own = np.array([_tenfold(code) for code in self.own]) if self.own else np.arange(v.LARGEST_G + 1)
         table[own] = own
-        for special, codes in ((d.CODE_HARMLESS, self.harmless), (d.CODE_EXACT, self.exact)):
+        for special, codes in (
+            (d.CODE_HARMLESS, self.harmless),
+            (d.CODE_EXACT, self.exact),
+            (d.CODE_CALL, self.calls),
+        ):
             for code in codes:
                 table[_tenfold(code)] = special
         for reason, codes in self.refused.items():
@@ -153,7 +163,7 @@ class Dialect:
     def settings(self) -> dict[str, Any]:
         """Return what the interpreter is given."""
         return {
-            "runs_programs": int(self.runs_programs),
+            "programs": self.programs,
             "has_m61_to_m73": int(self.has_m61_to_m73),
             "core_g": self.core_g(),
             "dwell_by_letter": self.dwell_by_letter(),
@@ -183,7 +193,7 @@ _FANUC_REFUSED = {
     _PROBING: (31, 37),
     _THREAD: (33,),
     _OFFSETS: (54.1,),
-    _FLOW: (65, 66, 66.1),
+    _MODAL_CALL: (66, 66.1),
     _SPLINE: (6.2, 5.2),
     _RETURN: (29,),
     _HOME: (27,),
@@ -193,7 +203,9 @@ _FANUC_REFUSED = {
     _CYCLE: (70, 71, 72, 75, 77, 78, 79),
 }
 _FANUC: dict[str, Any] = {
-    "syntax": d.SKIP_LEVEL | d.HEAD_LINES,
+    "programs": d.PROGRAMS_FANUC,
+    "syntax": d.SKIP_LEVEL | d.HEAD_LINES | d.MACROS,
+    "calls": (65,),
     "same": {63: 64, 62: 64},
     "exact": (9,),
     "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1),
@@ -239,7 +251,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }
 _LIST: Final = (
-    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True, has_m61_to_m73=True),
+    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", programs=d.PROGRAMS_LINUXCNC, has_m61_to_m73=True),
     Dialect("fanuc", "Fanuc milling; a number without a point is refused", **_FANUC, points=d.POINT_REQUIRED),
     Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC, points=d.CALCULATOR),
     Dialect("fanuc-increments", "Fanuc milling; X100 is 0.1 mm", **_FANUC, points=d.THOUSANDTHS),

@@ -171,7 +171,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "subprogram-missing",
         "the subprogram is neither in this program nor a file",
-        "put its file (label.ngc) beside the program",
+        "put its file (label.ngc, for a Fanuc O1234.nc) beside the program, or name its folder: --search",
     ),
     CALLS_TOO_DEEP: Finding(
         "error",

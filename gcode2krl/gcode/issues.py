@@ -132,14 +132,20 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
 
 
 def program_issues(
-    state: Record, texts: Mapping[int, bytes], *, rest_line: int, most_decimals: int, head: bytes
+    state: Record,
+    texts: Mapping[int, bytes],
+    *,
+    rest_line: int,
+    most_decimals: int,
+    head: bytes,
+    is_macro: bool,
 ) -> Iterator[Issue]:
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
     yield from zero_issues(state)
     if state["unset_line"]:
-        yield _unset(int(state["unset_line"]), int(state["unset_parameter"]))
+        yield _unset(int(state["unset_line"]), int(state["unset_parameter"]), is_macro=is_macro)
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
     if not state["ended"]:
@@ -195,12 +201,13 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
 
 
-def _unset(line: int, number: int) -> Issue:
+def _unset(line: int, number: int, *, is_macro: bool) -> Issue:
+    counts = "empty, and a word with it is left out" if is_macro else "0, as in LinuxCNC"
     return Issue(
         "warning",
         "parameter-unset",
         line,
-        f"#{number} is read before anything sets it; it counts as 0, as in LinuxCNC",
+        f"#{number} is read before anything sets it; it counts as {counts}",
         f"set it at the beginning of the program: #{number} = …",
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
@@ -187,9 +188,11 @@ def read_stream(
                 refuse_other_languages(head, name)
             stopped_at = interpreter.feed(words, text, first_line, size)
             if stopped_at is not None:
-                rest = text[_start_of_line(text, stopped_at - first_line) :]
+                # GOTO may lead back to a line that has run, as far as it is in this piece
+                begin = first_line if spoken.programs == d.PROGRAMS_FANUC else stopped_at
+                rest = text[_start_of_line(text, begin - first_line) :]
                 whole = b"".join((rest, *(more for _, more, _ in scanned)))
-                interpreter.run_whole(whole, stopped_at, folders)
+                interpreter.run_whole(whole, begin, stopped_at, folders)
                 break
             diameters += named_diameters(text, first_line)
             if progress is not None:
@@ -275,7 +278,7 @@ class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
     def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
-        self.name = name
+        self.name, self.spoken = name, spoken
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
         for key, value in spoken.start.items():
             self.state[key] = value
@@ -339,10 +342,11 @@ class _Interpreter:
                 return int(words.line[at])
             self._make_room()
 
-    def run_whole(self, text: bytes, first_line: int, folders: Sequence[Path]) -> None:
-        """Run the rest of a program from its first line on that computes or jumps."""
-        program = Program(self.name, folders, block_delete=bool(self.machine.block_delete))
+    def run_whole(self, text: bytes, first_line: int, begin: int, folders: Sequence[Path]) -> None:
+        """Run the rest of a program from the line ``begin`` on, the first that computes or jumps."""
+        program = Program(self.name, self.spoken, folders, block_delete=bool(self.machine.block_delete))
         program.add(self.name, text, first_line, len(self.messages))
+        program.start_at(begin)
         program.run(HandsOver(self.machine, self.state, self.counts, self.found), self._make_room)
         self.messages += [_decode(message) for message in program.messages]
         self.most_decimals = max(self.most_decimals, program.most_decimals)
@@ -394,6 +398,7 @@ class _Interpreter:
             rest_line=self.rest_line,
             most_decimals=self.most_decimals,
             head=head,
+            is_macro=self.spoken.programs == d.PROGRAMS_FANUC,
         )
         return self._toolpath((*found, *map(self._placed, whole)), cell)
 

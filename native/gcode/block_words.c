@@ -27,6 +27,10 @@ static Taken take_g(Block *b, double value) {
     bool read = true;
     const bool no_code = written < 0 || written > D_MOST_CODES || fabs(tenfold - (double)written) > CODE_SLACK;
     const int32_t code = no_code ? D_CODE_UNKNOWN : core_code(b, written, &read);
+    if (code == D_CODE_CALL) {
+        b->counts->program_wanted = 1;
+        return WITHOUT_DOUBT;
+    }
     if (code < D_CODE_UNKNOWN)
         return read ? UNDERSTOOD : faulty(S_DOUBT_MOTION | S_DOUBT_POSITION);
     const bool outside = code < 0;
@@ -62,11 +66,11 @@ static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99;
 
 /* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
 static bool want_program(Block *b) {
-    if (b->machine->runs_programs)
+    if (b->machine->programs != D_PROGRAMS_NONE)
         b->counts->program_wanted = 1;
     else
         report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_PROGRAM});
-    return b->machine->runs_programs != 0;
+    return b->machine->programs != D_PROGRAMS_NONE;
 }
 
 /* Return the modal group of an M-code, 0 for none. */
@@ -233,6 +237,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
+        } else if (c == D_PROGRAM_NUMBER) { /* behind blocks another program begins */
+            b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < CH_AT_SIGN) {
             take_dialect_mark(b, c);
         } else {

@@ -74,7 +74,11 @@ static int64_t head_line(Scan *scan, int64_t i, int64_t line) {
     int64_t end = i + 1;
     while (end < text.rows && is_digit(AT(text, end)))
         end++;
-    return AT(text, i) == CH_COLON && end > i + 1 ? end : i;
+    if (end == i + 1 || (scan->syntax & D_MACROS && scan->whole_program))
+        return i;
+    if (scan->syntax & D_MACROS)
+        put(scan, D_PROGRAM_NUMBER, 0.0, line);
+    return end;
 }
 
 /* A line that begins with $ sets up, homes, jogs or asks; ? and ~ alone ask and go on. */
@@ -232,21 +236,22 @@ static int64_t statement_item(Scan *scan, int64_t i, int64_t line) {
 /* Tell whether a letter's numbers are lengths, angles or feeds, which Fanuc reads by their point. */
 static bool has_point_rule(int letter) {
     return letter >= CH_LETTER_X || (letter >= CH_LETTER_I && letter <= CH_LETTER_K) || letter == CH_LETTER_F ||
-           letter == CH_LETTER_R || letter == CH_LETTER_R - 1 || letter <= CH_LETTER_C ||
+           letter == CH_LETTER_R || letter == CH_LETTER_R - 1 || letter <= CH_LETTER_C || letter == CH_LETTER_E ||
            (letter > CH_LETTER_T && letter < CH_LETTER_X);
 }
 
-/* Mark the word at i where its number, other than 0, has no point. */
-static void mark_pointless(Scan *scan, int64_t i, int64_t line) {
-    const Bytes text = scan->text;
+/* Tell whether the number of the word at i goes by its point, and, other than 0, has none. */
+bool lacks_point(Bytes text, int64_t i) {
     if (!has_point_rule(AT(text, i) & ~CH_CASE_BIT))
-        return;
+        return false;
     bool zero = true;
     for (i++; i < text.rows && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || is_space(AT(text, i))); i++)
         zero = zero && !(is_digit(AT(text, i)) && AT(text, i) != CH_DIGIT_0);
-    if (!zero && !stands_at(text, i, CH_POINT))
-        put(scan, D_NEXT_POINTLESS, 0.0, line);
+    return !zero && !stands_at(text, i, CH_POINT);
 }
+
+/* Return the place behind the digit of /2, whose / stands before i. */
+int64_t after_skip_level(Bytes text, int64_t i) { return i < text.rows && is_digit(AT(text, i)) ? i + 1 : i; }
 
 /* --- all ------------------------------------------------------------------------------------------------ */
 
@@ -256,8 +261,8 @@ int64_t dialect_item(Scan *scan, int64_t i, int64_t line, bool first) {
     const uint8_t c = AT(text, i);
     const int64_t syntax = scan->syntax;
     if (is_letter(c)) {
-        if (syntax & D_POINTS)
-            mark_pointless(scan, i, line);
+        if (syntax & D_POINTS && lacks_point(text, i))
+            put(scan, D_NEXT_POINTLESS, 0.0, line);
         return syntax & D_STATEMENTS ? statement_item(scan, i, line) : i;
     }
     if (syntax & D_SKIP_LEVEL && c == CH_SLASH && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {

@@ -6,6 +6,8 @@
 #include "constants.h"
 #include "core.h"
 
+bool lacks_point(Bytes text, int64_t i);
+int64_t after_skip_level(Bytes text, int64_t i);
 int64_t dialect_item(Scan *scan, int64_t i, int64_t line, bool first);
 
 #endif

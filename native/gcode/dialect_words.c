@@ -232,7 +232,7 @@ bool to_core_words(Block *b) {
             good = count_axis(b, axis) && good;
             count_centre(b, axis);
         }
-    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && !b->machine->runs_programs)
+    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
     if (b->harmless)
         good = use_harmless_words(b) && good;

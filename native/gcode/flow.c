@@ -3,6 +3,7 @@
 #include "gcode/flow.h"
 
 #include "gcode/expressions.h"
+#include "gcode/macro_flow.h"
 #include "gcode/program_line.h"
 #include "gcode/machine.h"
 #include "gcode/reporting.h"
@@ -19,7 +20,7 @@ int64_t stop_with(Run *run, int finding, double a, int64_t next) {
     return next;
 }
 
-static int64_t stop_at_fault(Run *run, int fault, int64_t next) { return stop_with(run, F_O_WORD, fault, next); }
+int64_t stop_at_fault(Run *run, int fault, int64_t next) { return stop_with(run, F_O_WORD, fault, next); }
 
 /* Report what is wrong with an expression; behind another error its value may be a consequence. */
 void report_unless_caused(Run *run, const Evaluation *e, int64_t start) {
@@ -31,7 +32,7 @@ void report_unless_caused(Run *run, const Evaluation *e, int64_t start) {
 }
 
 /* The same, and go no further. */
-static int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
+int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
     report_unless_caused(run, e, start);
     run->course->is_stopped = 1;
     return next;
@@ -40,7 +41,7 @@ static int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t 
 /* --- expressions of O-lines ----------------------------------------------------------------------------- */
 
 /* Tell whether nothing but a comment stands from i on; else that is wrong. */
-static bool line_ends(Evaluation *e, int64_t i) {
+bool line_ends(Evaluation *e, int64_t i) {
     const Bytes text = e->program->text;
     i = after_blanks(text, i, e->end);
     if (e->finding == F_OK && i < e->end && AT(text, i) != CH_PAREN_OPEN && AT(text, i) != CH_SEMICOLON)
@@ -49,7 +50,7 @@ static bool line_ends(Evaluation *e, int64_t i) {
 }
 
 /* Work out the bracket at i. */
-static double bracket_value(Evaluation *e, int64_t *i) {
+double bracket_value(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     *i = after_blanks(text, *i, e->end);
     if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
@@ -71,7 +72,7 @@ static bool only_value(Run *run, const MarkedLine *marked, double *value) {
 /* --- jumps ---------------------------------------------------------------------------------------------- */
 
 /* Go on at a word: repeat loops that it is outside of are over. */
-static int64_t jump(Run *run, int64_t word) {
+int64_t jump(Run *run, int64_t word) {
     Course *at = run->course;
     const int32_t base = frame_of(run)->repeats;
     while (at->repeats > base) {
@@ -160,16 +161,27 @@ static int32_t main_line_of(const Run *run, int64_t entry) {
     return callers != 0 ? callers : run->line;
 }
 
-/* Call the subprogram of a row; `arguments` are none for M98, which keeps #1 to #30. */
-static int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
+/* Tell whether the subprogram of a row can be entered; else it is wanted. */
+bool is_ready(Run *run, int64_t row) {
+    if (AT(run->program->subprograms, row).is_ready)
+        return true;
+    run->course->wanted = row;
+    run->course->wanted_word = run->word;
+    return false;
+}
+
+/* Return how many parameters each call has of its own. */
+static int locals_of(const Program *program) {
+    return program->language == D_PROGRAMS_FANUC ? P_MACRO_LOCALS : P_LOCAL_PARAMETERS;
+}
+
+/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's. */
+int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
     Course *at = run->course;
     const Subprogram *subprogram = &AT(run->program->subprograms, row);
-    if (!subprogram->is_ready) {
-        at->wanted = row;
-        at->wanted_word = run->word;
+    if (!is_ready(run, row))
         return WAIT;
-    }
-    if ((subprogram->is_program != 0) != (arguments == NULL))
+    if (run->program->language != D_PROGRAMS_FANUC && (subprogram->is_program != 0) != (arguments == NULL))
         return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
     if (at->frame + 1 >= run->program->frames.rows)
         return stop_with(run, F_CALLS_TOO_DEEP, P_FRAMES - 1, next);
@@ -180,10 +192,11 @@ static int64_t call(Run *run, int64_t row, const double *arguments, int64_t time
     frame->return_to = next;
     frame->times = times - 1;
     frame->entry = subprogram->entry;
-    frame->is_program = arguments == NULL;
+    frame->is_program = subprogram->is_program;
+    frame->has_arguments = arguments != NULL;
     frame->main_line = main_line;
     frame->repeats = (int32_t)at->repeats;
-    for (int k = 0; arguments != NULL && k < P_LOCAL_PARAMETERS; k++) {
+    for (int k = 0; arguments != NULL && k < locals_of(run->program); k++) {
         frame->parameters[k] = AT(run->program->parameters, k + 1);
         AT(run->program->parameters, k + 1) = arguments[k];
     }
@@ -191,7 +204,7 @@ static int64_t call(Run *run, int64_t row, const double *arguments, int64_t time
 }
 
 /* Find the row of the subprogram with a number; else it is wanted. */
-static int64_t row_of_number(Run *run, int64_t number) {
+int64_t row_of_number(Run *run, int64_t number) {
     for (int64_t row = 0; row < run->course->subprograms; row++)
         if (AT(run->program->subprograms, row).number == number)
             return row;
@@ -283,7 +296,7 @@ static int64_t leave(Run *run) {
     if (!restore_on_return(run))
         return at->is_stopped ? frame->return_to : WAIT;
     at->repeats = frame->repeats;
-    for (int k = 0; !frame->is_program && k < P_LOCAL_PARAMETERS; k++)
+    for (int k = 0; frame->has_arguments && k < locals_of(run->program); k++)
         AT(run->program->parameters, k + 1) = frame->parameters[k];
     at->frame--;
     run->machine->state.at->level = (int32_t)at->frame;
@@ -367,6 +380,9 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_RETURN: return return_from(run, marked, next);
     case P_KIND_SUB: return define(run, marked, next);
     case P_KIND_END_OF_FILE: return end_of_file(run, next);
+    case P_KIND_GOTO: return go_to_number(run, marked, next);
+    case P_KIND_MACRO_IF: return macro_if(run, marked, next);
+    case P_KIND_MACRO_WHILE: return macro_while(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

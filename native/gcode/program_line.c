@@ -2,6 +2,8 @@
 
 #include "gcode/program_line.h"
 
+#include "gcode/dialect_text.h"
+#include "gcode/expressions.h"
 #include "gcode/reporting.h"
 #include "gcode/words.h"
 
@@ -46,19 +48,40 @@ static Item letter_at(Evaluation *e, int64_t *i, bool first) {
     const Number behind = number(text, *i + 1);
     if (letter != CH_LETTER_N && letter != CH_LETTER_O) {
         if (behind.digits > 0 && behind.finding == F_OK) {
+            if (is_macro(e) && lacks_point(text, *i))
+                put(e, D_NEXT_POINTLESS, 0.0);
             put(e, letter, behind.value);
             *i = behind.end;
             return DONE;
         }
         if (behind.digits == 0 && begins_value(text, *i + 1, e->end)) {
             ++*i;
-            put(e, letter, value_at(e, i));
+            e->in_word = true;
+            const double value = value_at(e, i);
+            e->in_word = false;
+            if (!e->is_null) /* else the word is left out */
+                put(e, letter, value);
             return DONE;
         }
     }
     const Item item = odd_word(text, *i, letter, &behind, first);
     *i = item.end;
     return item;
+}
+
+/* Read a Fanuc's calculation at i, which stands alone; return the place behind. */
+static int64_t calculation_at(Evaluation *e, int64_t i) {
+    const Course *at = e->program->course.at;
+    const int64_t place = i;
+    const bool is_alone = at->words == 0 || (at->words == 1 && AT(e->program->letter, 0) == CH_SLASH);
+    if (is_alone)
+        assignment_at(e, &i);
+    const int64_t behind = after_blanks(e->program->text, i, e->end);
+    const bool ends = behind >= e->end || AT(e->program->text, behind) == CH_PAREN_OPEN ||
+                      AT(e->program->text, behind) == CH_SEMICOLON;
+    if (!is_alone || (e->finding == F_OK && !ends))
+        wrong(e, F_EXPRESSION, PF_MACRO_ALONE, 0.0, place);
+    return i;
 }
 
 /* Read the words and assignments of the line from `start` on, with their values; its message comments are
@@ -78,13 +101,15 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
             continue;
         }
         Item item = {.kind = NOTHING};
-        if (c == CH_HASH) {
+        if (c == CH_HASH && is_macro(e)) {
+            i = calculation_at(e, i);
+        } else if (c == CH_HASH) {
             assignment_at(e, &i);
         } else if (begins_word(c)) {
             item = letter_at(e, &i, first);
         } else {
             item = other_item(text, i, first);
-            i = item.end;
+            i = item.kind == CH_SLASH && is_macro(e) ? after_skip_level(text, item.end) : item.end;
         }
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);
