@@ -13,6 +13,11 @@ _CONVERSATIONAL = re.compile(
 )
 _INCOMPLETE = {"consequences", "more"}
 """Findings that say that others are not listed."""
+_OF_PROGRAMS = {
+    *("expression", "expression-value", "parameter-number", "parameter-undefined", "parameter-read-only"),
+    *("o-word", "subprogram-missing", "calls-too-deep", "endless-loop"),
+}
+"""Findings of lines that a dialect which has stopped before may never have reached."""
 _OF_TEXT = {"binary-file", "empty", "gzip-damaged", "line-ends", "file-unreadable", "dialect-unknown"}
 
 Reread = Callable[[str], Toolpath]
@@ -54,6 +59,8 @@ def _with_dialects(issue: Issue, left: dict[str, tuple[Issue, ...]]) -> Issue:
     if issue.severity != "error" or not issue.line:
         return issue
     for name, wrong in left.items():
+        if wrong and issue.code in _OF_PROGRAMS:
+            continue
         if any(other.code in _INCOMPLETE or other.line in (0, issue.line) for other in wrong):
             continue
         return replace(issue, remedy=f"{issue.remedy}; --dialect {name} reads this")

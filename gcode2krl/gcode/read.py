@@ -2,8 +2,9 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
@@ -180,27 +181,27 @@ def read_stream(
     size = _size_of(stream)
     head, rest_bytes = b"", 0
     diameters: list[NamedDiameter] = []
-    scanned = _scanned(pieces(stream, name), spoken)
-    for first_line, text, words in scanned:
-        if not interpreter.ended:
-            if not head:
-                head = text[:4000]
-                refuse_other_languages(head, name)
-            stopped_at = interpreter.feed(words, text, first_line, size)
-            if stopped_at is not None:
-                # GOTO may lead back to a line that has run, as far as it is in this piece
-                begin = first_line if spoken.programs == d.PROGRAMS_FANUC else stopped_at
-                rest = text[_start_of_line(text, begin - first_line) :]
-                whole = b"".join((rest, *(more for _, more, _ in scanned)))
-                interpreter.run_whole(whole, begin, stopped_at, folders)
-                break
-            diameters += named_diameters(text, first_line)
-            if progress is not None:
-                progress(len(text))
-        if interpreter.ended:
-            rest_bytes += len(text)
-            if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
-                break
+    with closing(_scanned(pieces(stream, name), spoken)) as scanned:  # its thread ends here, whatever happens
+        for first_line, text, words in scanned:
+            if not interpreter.ended:
+                if not head:
+                    head = text[:4000]
+                    refuse_other_languages(head, name)
+                stopped_at = interpreter.feed(words, text, first_line, size)
+                if stopped_at is not None:
+                    # GOTO may lead back to a line that has run, as far as it is in this piece
+                    begin = first_line if spoken.programs == d.PROGRAMS_FANUC else stopped_at
+                    rest = text[_start_of_line(text, begin - first_line) :]
+                    whole = b"".join((rest, *(more for _, more, _ in scanned)))
+                    interpreter.run_whole(whole, begin, stopped_at, folders)
+                    break
+                diameters += named_diameters(text, first_line)
+                if progress is not None:
+                    progress(len(text))
+            if interpreter.ended:
+                rest_bytes += len(text)
+                if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
+                    break
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
@@ -223,7 +224,7 @@ def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
 def _scanned(
     whole_lines: Iterator[tuple[int, bytes]],
     spoken: Dialect,
-) -> Iterator[tuple[int, bytes, Words]]:
+) -> Generator[tuple[int, bytes, Words], None, None]:
     """Yield (first line, text, its words); the next piece is scanned while one is interpreted."""
     scanners = cycle((Scanner(spoken), Scanner(spoken)))  # one's words are read while the other writes
 

@@ -299,6 +299,14 @@ def test_a_label_of_a_loop_may_be_gone_to_within_it():
     assert xs(text) == [1.0, 3.0]
 
 
+def test_no_dialect_is_recommended_that_never_reached_the_line(tmp_path):
+    main = tmp_path / "part.nc"
+    main.write_text(f"{HEAD}G65 P2 A1.\nM30\nO2\nIF [#2 EQ #0] THEN #3000=1\nM99\n")
+    with pytest.raises(Gcode2KrlError) as caught:
+        read_gcode(main, dialect="fanuc")
+    assert "--dialect" not in caught.value.issues[0].remedy
+
+
 def test_a_caret_stands_before_the_statement():
     with pytest.raises(Gcode2KrlError) as caught:
         read("N7 GOTO 5\nM30")
