@@ -321,8 +321,10 @@
 /* gcode2krl.gcode.dialect_marks */
 #define D_AMPERSAND 38
 #define D_COLON 58
+#define D_EQUALS 61
 #define D_GREATER 62
 #define D_LESS 60
+#define D_PLUS 43
 #define D_POINT 46
 #define D_SKIP_LEVEL 1
 #define D_HEAD_LINES 2
@@ -337,6 +339,8 @@
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
 #define D_SKIPPED 38
+#define D_SHIFT_SET 61
+#define D_SHIFT_ADD 43
 #define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
@@ -346,6 +350,7 @@
 #define D_CODE 5
 #define D_ENDS 6
 #define D_WHOLE_LINE 7
+#define D_SHIFT 8
 #define D_KIND_STEP 16
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
@@ -368,6 +373,7 @@
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
 #define DR_REASON_VECTORS 11
+#define DR_REASON_SHIFT_BESIDE 30
 #define DR_REASON_PROGRAM 23
 #define DR_REASON_STILL 27
 #define DR_REASON_TWICE 28

@@ -4,7 +4,7 @@ Plain module constants: the compiled core takes their values from here. What a d
 `dialects`.
 """
 
-from gcode2krl.ascii_codes import AMPERSAND, COLON, GREATER, LESS, POINT
+from gcode2krl.ascii_codes import AMPERSAND, COLON, EQUALS, GREATER, LESS, PLUS, POINT
 
 SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS, MACROS = 1, 2, 4, 8, 16, 32
 """Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without
@@ -16,10 +16,12 @@ NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = LESS, GREATER, POINT
 """Marks before a word: ``X=AC(5)``, ``X=IC(5)``, a number without a decimal point."""
 SKIPPED = AMPERSAND
 """A statement that says nothing to this robot."""
+SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
+"""``TRANS`` and ``ATRANS``: the axis words of the block are a shift of the zero, or are added to it."""
 PROGRAM_NUMBER = COLON
 """``O1234`` alone in its line, where a program of that number begins."""
 
-HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE = range(8)
+HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT = range(9)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 16
 

@@ -64,6 +64,7 @@ REASONS: Final = (
     ),
     ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
     ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
+    ("TRANS and ATRANS stand beside another code that moves the zero", "give each a block of its own"),
     (
         "a modal call runs its macro behind each move that follows",
         "call the macro with G65 where it is meant",
@@ -75,8 +76,10 @@ _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
-_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _MODAL_CALL = range(23, 31)
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _SHIFT_BESIDE = range(23, 31)
+_MODAL_CALL = 31
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
+REASON_SHIFT_BESIDE = _SHIFT_BESIDE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
 
@@ -230,7 +233,8 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
     _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
-    _kind(d.REFUSED, _SHIFT): ("TRANS", "ATRANS"),
+    _kind(d.SHIFT, 0): ("TRANS",),
+    _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),

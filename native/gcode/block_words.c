@@ -241,6 +241,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < CH_AT_SIGN) {
             take_dialect_mark(b, c);
+            used = used || b->shift;
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;

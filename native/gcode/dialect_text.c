@@ -191,6 +191,9 @@ static int64_t statement(Scan *scan, int64_t i, int64_t end, int64_t line) {
     case D_MESSAGE: return message(scan, end, line);
     case D_CODE: put(scan, CH_LETTER_G, kind / D_KIND_STEP, line); return end;
     case D_ENDS: put(scan, CH_LETTER_M, V_M30, line); return end;
+    case D_SHIFT:
+        put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
+        return end;
     case D_REFUSED: return refuse(scan, i, line, kind / D_KIND_STEP);
     }
     if (stands_at(text, behind, CH_COLON)) { /* a label: jumps to it are refused */

@@ -131,6 +131,33 @@ def test_sinumerik(text, plain):
     same(f"%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\n{SIEMENS}{text}M17\n", "sinumerik", f"{HEAD}{plain}M30\n")
 
 
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("TRANS X10 Y=5\nX1 Y1\n", "G52 X10 Y5\nX1 Y1\n"),
+        ("TRANS X10 Y5\nATRANS Z-1 X1\nX0 Y0 Z0\n", "G52 X11 Y5 Z-1\nX0 Y0 Z0\n"),
+        ("TRANS X10 Y5\nTRANS Y1\nX0 Y0\n", "G52 X0 Y1\nX0 Y0\n"),
+        ("TRANS X10 Y5\nX1\nTRANS\nX1 Y1\n", "G52 X10 Y5\nX1\nG52 X0 Y0\nX1 Y1\n"),
+        ("G700\nTRANS X1\nG710\nX0\n", "G52 X25.4\nX0\n"),
+        ("G54\nTRANS X10\nG55\nX0\nSUPA G0 X0\n", "G52 X10\nG55\nX0\nG53 G0 X0\n"),
+        ("TRANS X10\nX=IC(5)\nX=IC(5) Y=AC(1)\n", "X5\nX10 Y1\n"),
+        ("TRANS X10 Z2\nG91 X1 Y1\nG90 X0\n", "G91 X1 Y1\nG90 X10\n"),
+    ],
+)
+def test_a_sinumerik_shifts_its_zero(text, plain):
+    same(f"{SIEMENS}{text}M30\n", "sinumerik", f"{HEAD}{plain}M30\n")
+
+
+def test_a_shift_of_the_zero_is_told_by_its_name():
+    issues = {
+        issue.code: issue.message for issue in read(f"{SIEMENS}TRANS X10\nX0\nM30\n", "sinumerik").issues
+    }
+    assert issues == {
+        "program-offset": "TRANS moves the zero by X10 mm",
+        "offset-left": "the shift by X10 mm is in force at the end",
+    }
+
+
 def test_a_message_is_kept():
     events = read(f'{SIEMENS}N10 MSG("Pocket (1); rough")\nG0 X1\nM30\n', "sinumerik").events
     assert events[0].values == {"m": -1, "text": "Pocket (1); rough", "line": 3}
@@ -143,8 +170,13 @@ def test_a_message_is_kept():
         *("IF R1>2 GOTOF A", "R1=5", "X=R1", "X=IC(R1)", "X=5+3", "X=IC(5", "X=SIN(3)", 'T="MILL"', "D2"),
         *("DEF REAL A", "A3=0 B3=0 C3=1", "G147 X1", "G500", "G505", "NONSENSE", "S2=100", "CR", "G58 X1"),
         *(
-            "TRANS X10",
-            "ATRANS Z5",
+            "ATRANS",
+            "G0 TRANS X10",
+            "TRANS X10 G153",
+            "TRANS X10 TRANS Y5",
+            "TRANS X=IC(5)",
+            "AROT Z45",
+            "MIRROR X0",
             "G70",
             "G41",
             "G26 S5000",
