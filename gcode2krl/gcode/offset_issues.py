@@ -42,7 +42,7 @@ def zero_issues(state: Record) -> Iterator[Issue]:
             "offset-left",
             int(state["shift_line"]),
             what if is_trans else f"{what}; LinuxCNC would keep it",
-            f"write {'TRANS' if is_trans else 'G92.1'} before the end; here the next program starts without it",
+            f"write {'TRANS' if is_trans else 'G92.1'} before the end; here the next program begins without",
         )
 
 
