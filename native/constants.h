@@ -335,6 +335,7 @@
 #define D_PROGRAMS_NONE 0
 #define D_PROGRAMS_LINUXCNC 1
 #define D_PROGRAMS_FANUC 2
+#define D_PROGRAMS_SINUMERIK 3
 #define D_NEXT_ABSOLUTE 60
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
@@ -351,6 +352,7 @@
 #define D_ENDS 6
 #define D_WHOLE_LINE 7
 #define D_SHIFT 8
+#define D_JUMP 9
 #define D_KIND_STEP 16
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
@@ -373,7 +375,8 @@
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
 #define DR_REASON_VECTORS 11
-#define DR_REASON_SHIFT_BESIDE 30
+#define DR_REASON_SHIFT_BESIDE 31
+#define DR_REASON_MESSAGE 30
 #define DR_REASON_PROGRAM 23
 #define DR_REASON_STILL 27
 #define DR_REASON_TWICE 28
@@ -567,6 +570,7 @@
 #define P_LINE_LIMIT 4096
 #define P_MOST_PARAMETERS 5602
 #define P_LOCAL_PARAMETERS 30
+#define P_MOST_R 100
 #define P_MACRO_LOCALS 33
 #define P_MACRO_COMMON {100, 199}
 #define P_MACRO_KEPT {500, 999}
@@ -597,6 +601,7 @@
 #define P_KIND_GOTO 18
 #define P_KIND_MACRO_IF 19
 #define P_KIND_MACRO_WHILE 20
+#define P_KIND_SIEMENS_IF 21
 
 /* gcode2krl.gcode.program_faults */
 #define PF_NO_VALUE 0
@@ -619,6 +624,12 @@
 #define PF_MACRO_BEHIND_WHILE 17
 #define PF_MACRO_COMPARISONS 18
 #define PF_MACRO_NULL 19
+#define PF_SIEMENS_VALUE 20
+#define PF_SIEMENS_BRACKET 21
+#define PF_SIEMENS_ATAN2 22
+#define PF_SIEMENS_COMPARISONS 23
+#define PF_SIEMENS_SAME_BLOCK 24
+#define PF_SIEMENS_GOTO 25
 #define PF_DIVISION_BY_ZERO 0
 #define PF_SQUARE_ROOT 1
 #define PF_LOGARITHM 2
@@ -641,6 +652,7 @@
 #define PF_MACRO_NEAR 19
 #define PF_MACRO_BITS 20
 #define PF_MACRO_REMAINDER 21
+#define PF_SIEMENS_R 22
 #define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
@@ -1396,6 +1408,9 @@ typedef struct {
     Ints32 line;
     Floats extra;
     LabelView labels;
+    Bytes statement_names;
+    Ints32 statement_kinds;
+    int64_t syntax;
     int64_t language;
 } Program;
 

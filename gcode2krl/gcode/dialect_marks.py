@@ -9,8 +9,8 @@ from gcode2krl.ascii_codes import AMPERSAND, COLON, EQUALS, GREATER, LESS, PLUS,
 SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS, MACROS = 1, 2, 4, 8, 16, 32
 """Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without
 a point, ``IF``."""
-PROGRAMS_NONE, PROGRAMS_LINUXCNC, PROGRAMS_FANUC = range(3)
-"""How parameters, jumps and subprograms are written: not at all, O-words, custom macro B."""
+PROGRAMS_NONE, PROGRAMS_LINUXCNC, PROGRAMS_FANUC, PROGRAMS_SINUMERIK = range(4)
+"""How parameters, jumps and subprograms are written: not at all, O-words, custom macro B, R parameters."""
 
 NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = LESS, GREATER, POINT
 """Marks before a word: ``X=AC(5)``, ``X=IC(5)``, a number without a decimal point."""
@@ -21,7 +21,7 @@ SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
 PROGRAM_NUMBER = COLON
 """``O1234`` alone in its line, where a program of that number begins."""
 
-HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT = range(9)
+HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP = range(10)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 16
 

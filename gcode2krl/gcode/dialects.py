@@ -64,6 +64,7 @@ REASONS: Final = (
     ),
     ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
     ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
+    ("a message in a line that computes", "give MSG a line of its own, with plain text"),
     ("TRANS and ATRANS stand beside another code that moves the zero", "give each a block of its own"),
     (
         "a modal call runs its macro behind each move that follows",
@@ -76,10 +77,10 @@ _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
-_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _SHIFT_BESIDE = range(23, 31)
-_MODAL_CALL = 31
+_PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _MESSAGE = range(23, 31)
+_SHIFT_BESIDE, _MODAL_CALL = 31, 32
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
-REASON_SHIFT_BESIDE = _SHIFT_BESIDE
+REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
 
@@ -234,6 +235,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
     _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
     _kind(d.SHIFT, 0): ("TRANS",),
+    _kind(d.JUMP): ("GOTO", "GOTOF", "GOTOB", "IF"),
     _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
@@ -245,7 +247,7 @@ _SINUMERIK_STATEMENTS = {
         *("CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
     ),
     _kind(d.REFUSED, _FLOW): (
-        *("GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
+        *("GOTOC", "GOTOS", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
         *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
@@ -270,6 +272,7 @@ _LIST: Final = (
     Dialect(
         "sinumerik",
         "Sinumerik 840D sl, as CAM posts write it",
+        programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
         turns_axes=False,
         own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),

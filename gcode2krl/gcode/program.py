@@ -26,6 +26,7 @@ from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
+from gcode2krl.gcode.siemens_words import SiemensFlow
 from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
 from gcode2krl.gcode.words import Scanner, Words
@@ -90,7 +91,7 @@ class Program:
         self.course = np.zeros(1, tables.COURSE)
         self._subprograms = np.zeros(0, tables.SUBPROGRAM)
         self._segments, self._numbered = 0, np.zeros(0, tables.LABEL)
-        self._program = _empty_program(self.course, spoken.programs)
+        self._program = _empty_program(self.course, spoken)
 
     # --- files ------------------------------------------------------------------------------------------
 
@@ -139,6 +140,8 @@ class Program:
         self._ends.append(len(self._letter))
         if self._is_macro:
             self._look_at_macro_lines(rows, word_of_row, words)
+        elif self._spoken.programs == d.PROGRAMS_SINUMERIK:
+            self._look_at_siemens_lines(rows, word_of_row)
         else:
             self._look_at_o_lines(rows, word_of_row)
         self._program.text = np.frombuffer(self._text, np.uint8)
@@ -185,6 +188,18 @@ class Program:
         if not flow.definitions and len(self.files) > 1:  # a file of a program without its number
             number = own_number(file.name)
             self._define([Definition(number, first_word, is_program=True)])
+
+    def _look_at_siemens_lines(self, first_row: int, word_of_row: Ints) -> None:
+        file = self.files[-1]
+        flow = SiemensFlow(file.text, file.first_line, self._line.astype(np.int64))
+        for row in range(first_row, len(self._lines) - 1):
+            start = int(self._lines["start"][row])
+            content = self._text[start : self._text.index(b"\n", start)]
+            if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
+                self._lines["kind"][row] = tables.KIND_NOTHING
+            else:
+                flow.add(self._lines, row, int(word_of_row[row]), content)
+        self._tell_subprograms()
 
     def _define(self, definitions: Iterable[Definition]) -> None:
         for definition in definitions:
@@ -337,9 +352,10 @@ class _Rows(dict[Label, int]):
         return self._labels.setdefault(label, len(self._labels))
 
 
-def _empty_program(course: NDArray[Any], language: int) -> Any:
+def _empty_program(course: NDArray[Any], spoken: Dialect) -> Any:
     """Return the tables of a program at its start; pages that nothing reaches cost nothing."""
     frames = np.zeros(tables.FRAMES, tables.FRAME)
+    statement_names, statement_kinds = spoken.names()
     course["wanted"] = _NOTHING_WANTED
     course["generation"] = frames["generation"][0] = 1
     names = np.zeros(tables.MOST_NAMES, tables.NAME)
@@ -364,7 +380,10 @@ def _empty_program(course: NDArray[Any], language: int) -> Any:
         line=np.zeros(tables.ROOM_OF_LINE, np.int32),
         extra=np.zeros(tables.ROOM_OF_LINE),
         labels=np.zeros(0, tables.LABEL),
-        language=language,
+        statement_names=statement_names,
+        statement_kinds=statement_kinds,
+        syntax=spoken.syntax_bits(),
+        language=spoken.programs,
     )
     _set_names(program)
     return program

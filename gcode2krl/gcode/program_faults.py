@@ -21,7 +21,13 @@
     MACRO_BEHIND_WHILE,
     MACRO_COMPARISONS,
     MACRO_NULL,
-) = range(20)
+    SIEMENS_VALUE,
+    SIEMENS_BRACKET,
+    SIEMENS_ATAN2,
+    SIEMENS_COMPARISONS,
+    SIEMENS_SAME_BLOCK,
+    SIEMENS_GOTO,
+) = range(26)
 
 EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     NO_VALUE: (
@@ -58,6 +64,18 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
         "two comparisons stand in one bracket, and on a Fanuc AND, OR and XOR go before them",
         "write [[#1 GT 5] AND [#2 LT 3]]",
     ),
+    SIEMENS_VALUE: (
+        "a value is missing here, or it is one that is not read",
+        "write numbers, R0 to R99 ( ) + - * / SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND LN EXP",
+    ),
+    SIEMENS_BRACKET: ("a bracket is not closed", "add )"),
+    SIEMENS_ATAN2: ("ATAN2 takes two arguments", "write ATAN2(y,x)"),
+    SIEMENS_COMPARISONS: ("two comparisons stand in one bracket", "write them in two lines with IF"),
+    SIEMENS_SAME_BLOCK: ("an R parameter is set and used, or set twice, in one block", "write two blocks"),
+    SIEMENS_GOTO: (
+        "IF and its condition are followed by something else than a jump",
+        "write IF R1<5 GOTOB LOOP",
+    ),
     MACRO_NULL: ("#0 is always empty", "use another variable"),
 }
 
@@ -84,7 +102,8 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     MACRO_NEAR,
     MACRO_BITS,
     MACRO_REMAINDER,
-) = range(22)
+    SIEMENS_R,
+) = range(23)
 VALUE_FAULTS: dict[int, str] = {
     DIVISION_BY_ZERO: "division by zero",
     SQUARE_ROOT: "the square root of {b:g} does not exist",
@@ -107,6 +126,7 @@ VALUE_FAULTS: dict[int, str] = {
     MACRO_ROUND: "ROUND in a word rounds to the least increment of the control",
     MACRO_NEAR: "numbers that differ by {b:.1e} are compared: which is larger hangs on the rounding",
     MACRO_BITS: "AND, OR and XOR take whole numbers from 0 on, here {b:g}",
+    SIEMENS_R: "R{b:.0f}: whether there are more than R0 to R99 is a setting of the machine",
     MACRO_REMAINDER: "MOD takes whole numbers, here {b:g}",
 }
 VALUE_REMEDY = "check the parameters that the expression takes"

@@ -6,13 +6,25 @@ A marked line is one with an expression, a parameter or an O-word: the scanner l
 
 import numpy as np
 
-from gcode2krl.compiled.core import BYTES, INT, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, ArrayOf, StructOf
+from gcode2krl.compiled.core import (
+    BYTES,
+    INT,
+    INTS32,
+    OUT_BYTES,
+    OUT_FLOATS,
+    OUT_INTS,
+    OUT_INTS32,
+    ArrayOf,
+    StructOf,
+)
 from gcode2krl.gcode.vocabulary import LINE_LIMIT
 
 MOST_PARAMETERS = 5602
 """LinuxCNC's parameters are #1 to #5601, and 0 is none."""
 LOCAL_PARAMETERS = 30
 """#1 to #30 are the arguments of a subprogram; each call has its own."""
+MOST_R = 100
+"""R0 to R99 are there on every Sinumerik; more are a setting of the machine."""
 MACRO_LOCALS = 33
 """#1 to #33 are those of a macro on a Fanuc."""
 MACRO_COMMON, MACRO_KEPT, MACRO_END = (100, 199), (500, 999), 1000
@@ -49,7 +61,8 @@ ROOM_OF_LINE = 2 * (LINE_LIMIT + 1)
     KIND_GOTO,
     KIND_MACRO_IF,
     KIND_MACRO_WHILE,
-) = range(21)
+    KIND_SIEMENS_IF,
+) = range(22)
 """What a marked line is: a block, an O-line that says nothing here, one that has not been looked at, …"""
 
 LINE = np.dtype(
@@ -145,5 +158,8 @@ PROGRAM = StructOf(
     line=OUT_INTS32,
     extra=OUT_FLOATS,
     labels=ArrayOf(LABEL),
+    statement_names=BYTES,
+    statement_kinds=INTS32,
+    syntax=INT,
     language=INT,
 )

@@ -189,8 +189,8 @@ def read_stream(
                     refuse_other_languages(head, name)
                 stopped_at = interpreter.feed(words, text, first_line, size)
                 if stopped_at is not None:
-                    # GOTO may lead back to a line that has run, as far as it is in this piece
-                    begin = first_line if spoken.programs == d.PROGRAMS_FANUC else stopped_at
+                    # a jump may lead back to a line that has run, as far as it is in this piece
+                    begin = stopped_at if spoken.programs == d.PROGRAMS_LINUXCNC else first_line
                     rest = text[_start_of_line(text, begin - first_line) :]
                     whole = b"".join((rest, *(more for _, more, _ in scanned)))
                     interpreter.run_whole(whole, begin, stopped_at, folders)
@@ -399,7 +399,7 @@ class _Interpreter:
             rest_line=self.rest_line,
             most_decimals=self.most_decimals,
             head=head,
-            is_macro=self.spoken.programs == d.PROGRAMS_FANUC,
+            programs=self.spoken.programs,
         )
         return self._toolpath((*found, *map(self._placed, whole)), cell)
 

@@ -65,12 +65,12 @@ static bool is_unsupported_m(const Block *b, int64_t code) {
 static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
 
 /* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
-static bool want_program(Block *b) {
-    if (b->machine->programs != D_PROGRAMS_NONE)
+static bool want_program(Block *b, bool is_there) {
+    if (is_there)
         b->counts->program_wanted = 1;
     else
         report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_PROGRAM});
-    return b->machine->programs != D_PROGRAMS_NONE;
+    return is_there;
 }
 
 /* Return the modal group of an M-code, 0 for none. */
@@ -99,7 +99,8 @@ static Taken take_m(Block *b, double value) {
         return faulty(0);
     }
     if (is_of_program(code)) {
-        return want_program(b) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
+        const bool is_there = b->machine->programs == D_PROGRAMS_LINUXCNC || b->machine->programs == D_PROGRAMS_FANUC;
+        return want_program(b, is_there) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
     }
     const int group = m_group(b->machine, code);
     bool good = true;
@@ -230,7 +231,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == CH_PAREN_OPEN) {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
         } else if (c == V_PROGRAM_LINE) {
-            if (!want_program(b)) {
+            if (!want_program(b, b->machine->programs != D_PROGRAMS_NONE)) {
                 good = false;
                 *doubt |= S_DOUBT_ALL;
             }

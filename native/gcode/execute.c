@@ -29,7 +29,7 @@ static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t t
         return next;
     if (run->program->language == D_PROGRAMS_FANUC)
         return macro_block(run, words, from + deletable, to, next);
-    if (from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
+    if (run->program->language == D_PROGRAMS_LINUXCNC && from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
         const double m = AT(words->value, from + deletable);
         if (m == V_M98)
             return call_program(run, words, from + deletable + 1, to, next);

@@ -29,24 +29,24 @@ static double radians(double degrees, double *left_over) {
 }
 
 /* Return radians in degrees, rounded once behind the product. */
-static double degrees(double radian) {
+double degrees(double radian) {
     const double product = radian * 180.0, quotient = product / PI;
     return quotient + (fma(-quotient, PI, product) - quotient * PI_REST) / PI;
 }
 
-static double sine(double degrees) {
+double sine(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over);
     return sin(angle) + left_over * cos(angle);
 }
 
-static double cosine(double degrees) {
+double cosine(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over);
     return cos(angle) - left_over * sin(angle);
 }
 
-static double tangent(double degrees) {
+double tangent(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over), t = tan(angle);
     return t + left_over * (1.0 + t * t);

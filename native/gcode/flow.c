@@ -9,6 +9,7 @@
 #include "gcode/reporting.h"
 #include "gcode/saved_modes.h"
 #include "gcode/settings.h"
+#include "gcode/siemens_values.h"
 
 /* --- the end of a program that cannot go on ------------------------------------------------------------- */
 
@@ -100,6 +101,19 @@ static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
         return branch(run, marked, next);
     run->course->is_testing = 0;
     return next;
+}
+
+/* IF condition GOTOF label, of a Sinumerik. */
+static int64_t siemens_if(Run *run, const MarkedLine *marked, int64_t next) {
+    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
+    int64_t i = marked->expression;
+    const double test = siemens_value(&e, &i);
+    i = after_blanks(run->program->text, i, e.end);
+    if (e.finding == F_OK && after_word(run->program->text, i, e.end, "goto") == i)
+        wrong(&e, F_EXPRESSION, PF_SIEMENS_GOTO, 0.0, least(i, e.end - 1));
+    if (e.finding != F_OK)
+        return stop_wrong(run, &e, marked->start, next);
+    return test != 0.0 ? jump(run, marked->target) : next;
 }
 
 static int64_t loop(Run *run, const MarkedLine *marked, int64_t next) {
@@ -383,6 +397,7 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_GOTO: return go_to_number(run, marked, next);
     case P_KIND_MACRO_IF: return macro_if(run, marked, next);
     case P_KIND_MACRO_WHILE: return macro_while(run, marked, next);
+    case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

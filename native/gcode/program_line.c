@@ -84,6 +84,50 @@ static int64_t calculation_at(Evaluation *e, int64_t i) {
     return i;
 }
 
+/* Read the words of a Sinumerik's line from `start` on, with their values, and its assignments to R parameters. */
+static void read_siemens_line(Evaluation *e, int64_t start) {
+    Program *p = e->program;
+    Course *at = p->course.at;
+    Scan scan = {.text = p->text,
+                 .statement_names = p->statement_names,
+                 .statement_kinds = p->statement_kinds,
+                 .syntax = p->syntax,
+                 .letter = p->letter,
+                 .value = p->value,
+                 .line = p->line,
+                 .extra = p->extra,
+                 .whole_program = 1};
+    bool first = true;
+    for (int64_t i = start; i < e->end && e->finding == F_OK;) {
+        const uint8_t c = AT(p->text, i);
+        if (is_blank(c) || c == CH_END_OF_TAPE) {
+            i++;
+            continue;
+        }
+        const int64_t words = scan.words = at->words, behind = dialect_item(&scan, e, i, e->line, first);
+        at->words = scan.words;
+        if (behind > i) {
+            first = first && (at->words == words || AT(p->letter, words) == CH_SLASH);
+            i = behind;
+            continue;
+        }
+        const bool is_word = begins_word(c);
+        if (c == CH_HASH || (is_word && number(p->text, i + 1).digits == 0 && begins_value(p->text, i + 1, e->end))) {
+            wrong(e, F_DIALECT_STATEMENT, DR_REASON_VALUES, 0.0, i);
+            return;
+        }
+        Item item = is_word ? letter_at(e, &i, first) : other_item(p->text, i, first);
+        if (!is_word)
+            i = item.end;
+        int64_t no_message = 0;
+        if (item.kind == V_PROGRAM_LINE)
+            wrong(e, F_DIALECT_STATEMENT, DR_REASON_PROGRAM, 0.0, i);
+        else if (item.kind != CH_PAREN_OPEN)
+            put_item(e, &item, &no_message);
+        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !is_word;
+    }
+}
+
 /* Read the words and assignments of the line from `start` on, with their values; its message comments are
    numbered from `first_message` on. */
 void read_line(Evaluation *e, int64_t start, int64_t first_message) {
@@ -92,6 +136,10 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
     int64_t i = start;
     if (e->end - start > V_LINE_LIMIT) {
         wrong(e, F_LINE_TOO_LONG, V_LINE_LIMIT, 0.0, start);
+        return;
+    }
+    if (e->program->language == D_PROGRAMS_SINUMERIK) {
+        read_siemens_line(e, start);
         return;
     }
     while (i < e->end && e->finding == F_OK) {

@@ -217,8 +217,10 @@ EXPORT void gcode_scan(Scan *scan) {
             i++;
             continue;
         }
+        bool needs_line = false;
         if (scan->syntax != 0) {
-            const int64_t words = scan->words, behind = dialect_item(scan, i, line, first);
+            const int64_t words = scan->words, behind = dialect_item(scan, NULL, i, line, first);
+            needs_line = behind == NEEDS_LINE;
             if (behind > i) {
                 first = first && (scan->words == words || AT(scan->letter, words) == CH_SLASH);
                 i = behind;
@@ -226,7 +228,7 @@ EXPORT void gcode_scan(Scan *scan) {
             }
         }
         Item item;
-        if (scan->syntax & D_MACROS && begins_statement(text, i, text.rows)) {
+        if (needs_line || (scan->syntax & D_MACROS && begins_statement(text, i, text.rows))) {
             item = whole_line(text, i);
         } else if (begins_word(c)) {
             const int letter = c & ~CH_CASE_BIT;
