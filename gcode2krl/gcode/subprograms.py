@@ -1,22 +1,15 @@
 """Where the file of a subprogram is: beside the program, or in a folder that was named, and nowhere else."""
 
-import gzip
 import re
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from gcode2krl.files.program_names import PACKED_ENDING
 from gcode2krl.gcode.o_words import Label
 
 _FILE_NAME = re.compile(r"[a-z0-9_][a-z0-9_.+-]*")
 """What a label has to look like to be the name of a file: no way out of the folder."""
 _ENDING = ".ngc"
 _NUMBER_IN_NAME = re.compile(r"[Oo]?(\d{1,9})")
-_CALL = re.compile(rb"M\s*0*98(?!\d)|G\s*65(?!\d)|c\s*a\s*l\s*l|\bL\d", re.IGNORECASE)
-"""What a program says that may call a subprogram; a comment may say it too."""
-_MOST_CALL_BYTES = 32
-_PIECE_BYTES = 1_000_000
 
 
 def found_file(label: Label, folders: Sequence[Path], ending: str, *, of_fanuc: bool = False) -> Path | None:
@@ -45,30 +38,3 @@ def own_number(name: str) -> Label:
     """Return the number that the file of a Fanuc's program has in its name, empty where it has none."""
     digits = _NUMBER_IN_NAME.fullmatch(Path(name).stem)
     return str(int(digits[1])) if digits else ""
-
-
-def possible_files(part: Path, folders: Sequence[Path]) -> tuple[Path, ...]:
-    """Return the files whose content may belong to a program: none where it calls no subprogram."""
-    try:
-        if not _may_call(part):
-            return ()
-    except (OSError, EOFError, zlib.error):  # reading it reports it
-        return ()
-    endings = {_ENDING, ".nc", "", part.suffix.lower()}
-    files = {
-        file
-        for folder in dict.fromkeys((part.parent, *folders))
-        for file in folder.glob("*")
-        if file.suffix.lower() in endings and file.is_file() and file != part
-    }
-    return tuple(sorted(files))
-
-
-def _may_call(part: Path) -> bool:
-    rest = b""
-    with (gzip.open if part.suffix.lower() == PACKED_ENDING else open)(part, "rb") as stream:
-        while piece := stream.read(_PIECE_BYTES):
-            if _CALL.search(rest + piece):
-                return True
-            rest = piece[-_MOST_CALL_BYTES:]
-    return False

@@ -103,7 +103,7 @@ def require_search(folders: Sequence[str | Path]) -> None:
 
 def subprogram_files(part: str | Path, search: Sequence[str | Path]) -> tuple[Path, ...]:
     """Return the files whose content a part may take in as subprograms; none where it calls none."""
-    from gcode2krl.gcode.subprograms import possible_files
+    from gcode2krl.gcode.dependencies import possible_files
 
     return possible_files(Path(part), tuple(map(Path, search)))
 

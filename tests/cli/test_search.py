@@ -8,7 +8,7 @@ from gcode2krl.batch.cluster import make_shipped, pack
 from gcode2krl.batch.parts import Part
 from gcode2krl.batch.planning import plan
 from gcode2krl.batch.work import Task, make
-from gcode2krl.gcode.subprograms import possible_files
+from gcode2krl.gcode.dependencies import possible_files
 from gcode2krl.translation import Order
 
 HEAD = "G21 G90 G17\nT1 M6\nG0 G43 H1 Z50\nS12000 M3\nX0 Y0\n"
@@ -61,7 +61,29 @@ def test_a_batch_finds_them_and_takes_a_changed_one_for_a_changed_part(run, part
 def test_a_program_that_calls_nothing_depends_on_its_own_bytes_alone(part, tmp_path):
     (tmp_path / "plain.nc").write_text(HEAD + "G0 X5\nM30\n", encoding="ascii")
     assert possible_files(tmp_path / "plain.nc", [tmp_path / "macros"]) == ()
-    assert [file.name for file in possible_files(part, [tmp_path / "macros"])] == ["side.ngc", "plain.nc"]
+    assert [file.name for file in possible_files(part, [tmp_path / "macros"])] == ["side.ngc"]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("M98 P12\n", ["12.ngc", "O0012.nc"]),
+        ("m98p30012\n", ["12.ngc", "O0012.nc"]),
+        ("G65 P12 A1.\n", ["12.ngc", "O0012.nc"]),
+        ("O12 call [1]\n", ["12.ngc", "O0012.nc"]),
+        ("o<outer> call\n", ["inner.ngc", "outer.ngc"]),
+        ("M98 P#1\n", ["12.ngc", "O0012.nc", "inner.ngc", "outer.ngc"]),
+        ("O[#1] call\n", ["12.ngc", "O0012.nc", "inner.ngc", "outer.ngc"]),
+        ("o<nowhere> call\n", []),
+        ("G0 X5\n", []),
+    ],
+)
+def test_calls_name_their_files_and_what_those_call(tmp_path, text, names):
+    files = {"12.ngc": "", "O0012.nc": "", "outer.ngc": "o<inner> call\n", "inner.ngc": "", "other.txt": ""}
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, encoding="ascii")
+    (tmp_path / "part.nc").write_text(text, encoding="ascii")
+    assert sorted(file.name for file in possible_files(tmp_path / "part.nc", ())) == sorted(names)
 
 
 def test_a_cluster_gets_them(part, tmp_path):
