@@ -3,6 +3,8 @@
 import io
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gcode2krl import Gcode2KrlError, read_gcode
 from gcode2krl.gcode import read_stream
@@ -334,3 +336,51 @@ def test_a_step_limit_is_one_for_all_dialects():
     with pytest.raises(Gcode2KrlError) as caught:
         read("N1 GOTO 1")
     assert f"{MOST_STEPS // 1_000_000},000,0" in caught.value.issues[0].message
+
+
+def _sums(values):
+    """Return expressions as Python writes them: each operator between two, some in brackets."""
+    return st.builds(
+        lambda left, operator, right, bracket: (
+            f"({left}{operator}{right})" if bracket else f"{left}{operator}{right}"
+        ),
+        values,
+        st.sampled_from("+-*"),
+        values,
+        st.booleans(),
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.recursive(st.integers(0, 9).map(str), _sums, max_leaves=12))
+def test_ranks_and_brackets_are_those_of_arithmetic(expression):
+    of_fanuc = expression.replace("(", "[").replace(")", "]")
+    assert value_of(of_fanuc) == pytest.approx(eval(expression), rel=1e-12)
+    siemens = f"G710 G90\nG0 X0 Y0 Z0\nR1={expression}\nX=R1\nM30\n"
+    found = read_stream(io.BytesIO(siemens.encode()), "part.mpf", dialect="sinumerik")
+    assert found.position_mm[-1, 0] == pytest.approx(eval(expression), rel=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.integers(0, 5),
+    st.integers(1, 3),
+    st.integers(-5, 5),
+    st.integers(1, 4),
+)
+def test_loops_run_as_those_of_linuxcnc_do(start, step, shift, inner):
+    """The same loops in O-words, whose rows are compared with LinuxCNC's own elsewhere."""
+    macro = (
+        f"#1={start}\nWHILE [#1 LT 9] DO1\n#2=0\nWHILE [#2 NE {inner}] DO2\nG1 X[#1*10+#2] Y[#2-{shift}]\n"
+        f"#2=#2+1\nEND2\nIF [#1 GT 6] GOTO 5\n#1=#1+{step}\nEND1\nN5 G0 Z#1\nM30\n"
+    )
+    o_words = (
+        f"#1={start}\nO1 while [#1 LT 9]\n#2=0\nO2 while [#2 NE {inner}]\nG1 X[#1*10+#2] Y[#2-{shift}]\n"
+        f"#2=[#2+1]\nO2 endwhile\nO3 if [#1 GT 6]\nO1 break\nO3 endif\n#1=[#1+{step}]\nO1 endwhile\n"
+        "G0 Z#1\nM30\n"
+    )
+    head = "G21 G90 G17 G94 F500.\nG0 X0. Y0. Z0.\n"
+    found = read_stream(io.BytesIO((head + macro).encode()), "part.nc", dialect="fanuc")
+    wanted = read_stream(io.BytesIO((head + o_words).encode()), "part.ngc")
+    assert found.position_mm.tolist() == wanted.position_mm.tolist()
+    assert found.rapid.tolist() == wanted.rapid.tolist()
