@@ -8,6 +8,7 @@ import pytest
 from gcode2krl import Gcode2KrlError, load_cell
 from gcode2krl.gcode import read_stream
 from gcode2krl.krl.statements import event_statements
+from gcode2krl.program.checks import check_toolpath
 
 HEAD = "G21 G90 G17 G94 F600 S900\nG0 X0 Y0 Z0\n"
 
@@ -129,3 +130,20 @@ def test_the_cell_makes_krl_of_an_output():
 def test_elsewhere_they_are_codes_of_the_machine_builder():
     event, _end = (e.values for e in read("M66\nG0 X1.", dialect="fanuc").events if e.kind == "message")
     assert (event["m"], math.isnan(event.get("p", math.nan))) == (66, True)
+
+
+def test_a_word_may_not_name_an_output_of_the_spindle(tmp_path):
+    """The demonstration cell's spindle is $OUT[1]; the template alone does not say which output is meant."""
+    (tmp_path / "cell.toml").write_text(
+        'based_on = "demonstration"\n[m_code]\nM62 = "$OUT[{{ p | int }}]=TRUE"\n'
+        'M68 = "$ANOUT[{{ e | int }}]={{ q / 10 }}"\n',
+        encoding="ascii",
+    )
+    cell = load_cell(tmp_path / "cell.toml")
+
+    def found(text):
+        return [(i.code, i.line) for i in check_toolpath(read(text, cell), cell) if i.code == "signal-twice"]
+
+    assert found("M62 P20\nG0 X1") == []
+    assert found("M68 E1 Q5\nM68 E2 Q5\nG0 X1") == [("signal-twice", 3)]
+    assert found("M62 P20\nM62 P1\nG0 X1\nM62 P1") == [("signal-twice", 4)]
