@@ -22,7 +22,15 @@ _TURNED = "G10 L2 R of the work offset in force"
 _TWO_SIGNS = "two signs before a number"
 _HERE = (
     ("rotary-axis", "", "A, B, C (U, V, W) with the value 0, no rotary axes declared"),
-    ("unsupported-m", "", "M61-M73 | read"),
+    ("o-word", "M98 takes P", "M98 beside a word other than P and L"),
+    ("arc-turns", "", "an arc of more than 1000 turns"),
+    ("tool-number", "", "M61 Qn | sets the tool number"),
+    ("output-word", "", "M62-M65, M67, M68 | outputs"),
+    ("two-uses", "would share its words P, Q or E", "M62-M68 beside G4, G64, an arc or a cycle"),
+    ("unsupported-m", "", "M66 | waits for an input"),
+    ("modes-restore", "shares its block", "M72 beside other words"),
+    ("modes-restore", "tool length", "M72 where another tool length is in force"),
+    ("modes-restore", "cutter compensation", "M70-M73 under cutter compensation"),
     ("tool-not-selected", "", "M6 without a T before it"),
     ("too-far", "", "a coordinate beyond 1000 m"),
     ("arc-too-long", "", "a coordinate beyond 1000 m"),

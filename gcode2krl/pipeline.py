@@ -46,6 +46,7 @@ def predict(
     chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
     block_delete: bool = False,
     dialect: str = gcode.DEFAULT_DIALECT,
+    search: Sequence[str | Path] = (),
     forces: bool = True,
     effects: "Sequence[str | Applied]" = (),
     effect_folders: Sequence[str | Path] = (),
@@ -53,11 +54,11 @@ def predict(
     """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
 
     ``dt_s`` is the sample time, by default the controller's cycle; ``simplify_mm`` merges feed moves, see
-    `set_targets`; ``forces`` False leaves out material removal and what depends on it. A stage that cannot
-    run (no material, unknown stiffness) leaves None and a note. ``effects`` such as
-    ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell; ``effect_folders`` are folders with
-    the user's own effects. Raises `NotUnderstoodError` where the G-code, the cell or an option is wrong; what
-    a program must not do is in the prediction's ``issues``.
+    `set_targets`; ``search`` are folders with subprograms. ``forces`` False leaves out material removal and
+    what depends on it. A stage that cannot run (no material, unknown stiffness) leaves None and a note.
+    ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
+    ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
+    the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
 
     The worst second of every tool:
 
@@ -76,9 +77,20 @@ def predict(
     """
     cell = cell if cell is not None else load_cell()
     toolpath = gcode.read_gcode(
-        part, cell, dialect=dialect, chord_tolerance_mm=chord_tolerance_mm, block_delete=block_delete
+        part,
+        cell,
+        dialect=dialect,
+        chord_tolerance_mm=chord_tolerance_mm,
+        block_delete=block_delete,
+        search=search,
     )
-    settings = {"chord_tolerance_mm": chord_tolerance_mm, "block_delete": block_delete, "dialect": dialect}
+    settings: dict[str, Any] = {
+        "chord_tolerance_mm": chord_tolerance_mm,
+        "block_delete": block_delete,
+        "dialect": dialect,
+    }
+    if search:
+        settings["search"] = [str(folder) for folder in search]
     prediction = predict_toolpath(
         toolpath,
         cell,

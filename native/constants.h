@@ -42,6 +42,7 @@
 #define CH_CARET 94
 #define CH_LETTER_A 65
 #define CH_LETTER_C 67
+#define CH_LETTER_E 69
 #define CH_LETTER_F 70
 #define CH_LETTER_G 71
 #define CH_LETTER_I 73
@@ -254,7 +255,13 @@
 #define V_M48 48
 #define V_M53 53
 #define V_M61 61
+#define V_M66 66
 #define V_M62 62
+#define V_M63 63
+#define V_M64 64
+#define V_M65 65
+#define V_M67 67
+#define V_M68 68
 #define V_M70 70
 #define V_M71 71
 #define V_M72 72
@@ -306,6 +313,7 @@
 #define V_SHIFT_STATE 13
 #define V_GROUPS 14
 #define V_M_STOP 4
+#define V_M_IO 5
 #define V_M_TOOL_CHANGE 6
 #define V_M_SPINDLE 7
 #define V_M_COOLANT 8
@@ -314,18 +322,29 @@
 
 /* gcode2krl.gcode.dialect_marks */
 #define D_AMPERSAND 38
+#define D_COLON 58
+#define D_EQUALS 61
 #define D_GREATER 62
 #define D_LESS 60
+#define D_PLUS 43
 #define D_POINT 46
 #define D_SKIP_LEVEL 1
 #define D_HEAD_LINES 2
 #define D_DOLLAR_LINES 4
 #define D_STATEMENTS 8
 #define D_POINTS 16
+#define D_MACROS 32
+#define D_PROGRAMS_NONE 0
+#define D_PROGRAMS_LINUXCNC 1
+#define D_PROGRAMS_FANUC 2
+#define D_PROGRAMS_SINUMERIK 3
 #define D_NEXT_ABSOLUTE 60
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
 #define D_SKIPPED 38
+#define D_SHIFT_SET 61
+#define D_SHIFT_ADD 43
+#define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
 #define D_RADIUS 2
@@ -334,6 +353,8 @@
 #define D_CODE 5
 #define D_ENDS 6
 #define D_WHOLE_LINE 7
+#define D_SHIFT 8
+#define D_JUMP 9
 #define D_KIND_STEP 16
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
@@ -343,7 +364,8 @@
 #define D_CODE_UNKNOWN (-1)
 #define D_CODE_HARMLESS (-2)
 #define D_CODE_EXACT (-3)
-#define D_CODE_REFUSED (-4)
+#define D_CODE_CALL (-4)
+#define D_CODE_REFUSED (-5)
 
 /* gcode2krl.gcode.dialects */
 #define DR_REASON_POLAR 3
@@ -355,6 +377,8 @@
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
 #define DR_REASON_VECTORS 11
+#define DR_REASON_SHIFT_BESIDE 32
+#define DR_REASON_MESSAGE 31
 #define DR_REASON_PROGRAM 23
 #define DR_REASON_STILL 27
 #define DR_REASON_TWICE 28
@@ -498,6 +522,16 @@
 #define FO_ROTARY 234
 #define FO_ROTATION_WITH_ROTARY 235
 
+/* gcode2krl.gcode.mode_findings */
+#define FM_IO_WORD 260
+#define FM_IO_VALUE 261
+#define FM_IO_BESIDE 262
+#define FM_TOOL_NUMBER 263
+#define FM_NOT_SAVED 264
+#define FM_RESTORE_BESIDE 265
+#define FM_RESTORE_CUTTER 266
+#define FM_RESTORE_LENGTH 267
+
 /* gcode2krl.gcode.state */
 #define S_CUTTER_ON 1
 #define S_CUTTER_BESIDE 2
@@ -538,6 +572,11 @@
 #define P_LINE_LIMIT 4096
 #define P_MOST_PARAMETERS 5602
 #define P_LOCAL_PARAMETERS 30
+#define P_MOST_R 100
+#define P_MACRO_LOCALS 33
+#define P_MACRO_COMMON {100, 199}
+#define P_MACRO_KEPT {500, 999}
+#define P_MACRO_END 1000
 #define P_FRAMES 10
 #define P_MOST_NAMES 10000
 #define P_MOST_REPEATS 256
@@ -561,6 +600,10 @@
 #define P_KIND_PROGRAM_NUMBER 15
 #define P_KIND_END_OF_FILE 16
 #define P_KIND_FAULT 17
+#define P_KIND_GOTO 18
+#define P_KIND_MACRO_IF 19
+#define P_KIND_MACRO_WHILE 20
+#define P_KIND_SIEMENS_IF 21
 
 /* gcode2krl.gcode.program_faults */
 #define PF_NO_VALUE 0
@@ -576,6 +619,19 @@
 #define PF_TOO_DEEP 10
 #define PF_NO_PARAMETER 11
 #define PF_BEHIND_O_WORD 12
+#define PF_MACRO_NAME 13
+#define PF_MACRO_ALONE 14
+#define PF_MACRO_BEHIND_IF 15
+#define PF_MACRO_BEHIND_THEN 16
+#define PF_MACRO_BEHIND_WHILE 17
+#define PF_MACRO_COMPARISONS 18
+#define PF_MACRO_NULL 19
+#define PF_SIEMENS_VALUE 20
+#define PF_SIEMENS_BRACKET 21
+#define PF_SIEMENS_ATAN2 22
+#define PF_SIEMENS_COMPARISONS 23
+#define PF_SIEMENS_SAME_BLOCK 24
+#define PF_SIEMENS_GOTO 25
 #define PF_DIVISION_BY_ZERO 0
 #define PF_SQUARE_ROOT 1
 #define PF_LOGARITHM 2
@@ -590,6 +646,16 @@
 #define PF_FEED_OF_TIME 11
 #define PF_FEED_OF_OTHER_UNIT 12
 #define PF_TURNED_UNDER_SHIFT 13
+#define PF_MACRO_OF_CONTROL 14
+#define PF_MACRO_UNKNOWN 15
+#define PF_MACRO_ALARM 16
+#define PF_MACRO_ATAN 17
+#define PF_MACRO_ASIN 18
+#define PF_MACRO_ROUND 19
+#define PF_MACRO_NEAR 20
+#define PF_MACRO_BITS 21
+#define PF_MACRO_REMAINDER 22
+#define PF_SIEMENS_R 23
 #define PF_VALUE_REMEDY "check the parameters that the expression takes"
 #define PF_FAULT_LABEL 0
 #define PF_FAULT_WORD 1
@@ -610,6 +676,17 @@
 #define PF_FAULT_REPEATS 16
 #define PF_FAULT_NOT_FIRST 17
 #define PF_FAULT_BEHIND 18
+#define PF_FAULT_STATEMENT 19
+#define PF_FAULT_DO_NUMBER 20
+#define PF_FAULT_DO_OPEN 21
+#define PF_FAULT_END_ALONE 22
+#define PF_FAULT_NO_LABEL 23
+#define PF_FAULT_INTO_LOOP 24
+#define PF_FAULT_NEXT_PROGRAM 25
+#define PF_FAULT_MACRO_WORDS 26
+#define PF_FAULT_MACRO_POINT 27
+#define PF_FAULT_M98_MACRO 28
+#define PF_FAULT_M99_WORDS 29
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -811,6 +888,7 @@ typedef struct {
     int32_t tape_marks;
     int8_t unit_named;
     int64_t blocks;
+    int32_t level;
     double largest_mm;
     int32_t unknown_feed_line;
     int8_t unknown_reported;
@@ -920,63 +998,113 @@ typedef char State_end_line_stands_at_432[offsetof(State, end_line) == 432 ? 1 :
 typedef char State_tape_marks_stands_at_436[offsetof(State, tape_marks) == 436 ? 1 : -1];
 typedef char State_unit_named_stands_at_440[offsetof(State, unit_named) == 440 ? 1 : -1];
 typedef char State_blocks_stands_at_448[offsetof(State, blocks) == 448 ? 1 : -1];
-typedef char State_largest_mm_stands_at_456[offsetof(State, largest_mm) == 456 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_464[offsetof(State, unknown_feed_line) == 464 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_468[offsetof(State, unknown_reported) == 468 ? 1 : -1];
-typedef char State_doubt_stands_at_472[offsetof(State, doubt) == 472 ? 1 : -1];
-typedef char State_motion_line_stands_at_476[offsetof(State, motion_line) == 476 ? 1 : -1];
-typedef char State_distance_line_stands_at_480[offsetof(State, distance_line) == 480 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_484[offsetof(State, feed_mode_line) == 484 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_488[offsetof(State, rotary_refused) == 488 ? 1 : -1];
-typedef char State_note_count_stands_at_492[offsetof(State, note_count) == 492 ? 1 : -1];
-typedef char State_note_line_stands_at_528[offsetof(State, note_line) == 528 ? 1 : -1];
-typedef char State_note_word_stands_at_564[offsetof(State, note_word) == 564 ? 1 : -1];
-typedef char State_moved_mm_stands_at_600[offsetof(State, moved_mm) == 600 ? 1 : -1];
-typedef char State_misfits_stands_at_672[offsetof(State, misfits) == 672 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_676[offsetof(State, misfits_other_centre) == 676 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_680[offsetof(State, misfits_reversed) == 680 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_684[offsetof(State, misfits_exchanged) == 684 ? 1 : -1];
-typedef char State_spirals_stands_at_688[offsetof(State, spirals) == 688 ? 1 : -1];
-typedef char State_spiral_line_stands_at_692[offsetof(State, spiral_line) == 692 ? 1 : -1];
-typedef char State_spiral_start_stands_at_696[offsetof(State, spiral_start) == 696 ? 1 : -1];
-typedef char State_spiral_end_stands_at_704[offsetof(State, spiral_end) == 704 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_712[offsetof(State, spiral_unit_mm) == 712 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_720[offsetof(State, cutter_mode) == 720 ? 1 : -1];
-typedef char State_cutter_side_stands_at_724[offsetof(State, cutter_side) == 724 ? 1 : -1];
-typedef char State_cutter_code_stands_at_728[offsetof(State, cutter_code) == 728 ? 1 : -1];
-typedef char State_cutter_line_stands_at_732[offsetof(State, cutter_line) == 732 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_736[offsetof(State, cutter_radius_mm) == 736 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_744[offsetof(State, cutter_entered) == 744 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_745[offsetof(State, cutter_failed) == 745 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_752[offsetof(State, cutter_normal) == 752 ? 1 : -1];
-typedef char State_held_turn_stands_at_768[offsetof(State, held_turn) == 768 ? 1 : -1];
-typedef char State_held_line_stands_at_772[offsetof(State, held_line) == 772 ? 1 : -1];
-typedef char State_held_from_stands_at_776[offsetof(State, held_from) == 776 ? 1 : -1];
-typedef char State_held_along_stands_at_792[offsetof(State, held_along) == 792 ? 1 : -1];
-typedef char State_held_centre_stands_at_808[offsetof(State, held_centre) == 808 ? 1 : -1];
-typedef char State_held_w_stands_at_824[offsetof(State, held_w) == 824 ? 1 : -1];
-typedef char State_held_sweep_stands_at_840[offsetof(State, held_sweep) == 840 ? 1 : -1];
-typedef char State_held_rows_stands_at_848[offsetof(State, held_rows) == 848 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_864[offsetof(State, cutter_rows_removed) == 864 ? 1 : -1];
-typedef char State_held_events_stands_at_872[offsetof(State, held_events) == 872 ? 1 : -1];
-typedef char State_retract_stands_at_880[offsetof(State, retract) == 880 ? 1 : -1];
-typedef char State_retract_line_stands_at_884[offsetof(State, retract_line) == 884 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_888[offsetof(State, unset_parameter) == 888 ? 1 : -1];
-typedef char State_unset_line_stands_at_892[offsetof(State, unset_line) == 892 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_896[offsetof(State, retract_unnamed_line) == 896 ? 1 : -1];
-typedef char State_in_cycles_stands_at_900[offsetof(State, in_cycles) == 900 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_904[offsetof(State, cycle_level_mm) == 904 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_912[offsetof(State, cycle_level_known) == 912 ? 1 : -1];
-typedef char State_cycle_r_stands_at_920[offsetof(State, cycle_r) == 920 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_928[offsetof(State, cycle_depth) == 928 ? 1 : -1];
-typedef char State_cycle_q_stands_at_936[offsetof(State, cycle_q) == 936 ? 1 : -1];
-typedef char State_cycle_p_stands_at_944[offsetof(State, cycle_p) == 944 ? 1 : -1];
-typedef char State_cycle_line_stands_at_952[offsetof(State, cycle_line) == 952 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_956[offsetof(State, cycle_plane) == 956 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_960[offsetof(State, cycle_unit_mm) == 960 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_968[offsetof(State, cycle_absolute) == 968 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 976 ? 1 : -1];
+typedef char State_level_stands_at_456[offsetof(State, level) == 456 ? 1 : -1];
+typedef char State_largest_mm_stands_at_464[offsetof(State, largest_mm) == 464 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_472[offsetof(State, unknown_feed_line) == 472 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_476[offsetof(State, unknown_reported) == 476 ? 1 : -1];
+typedef char State_doubt_stands_at_480[offsetof(State, doubt) == 480 ? 1 : -1];
+typedef char State_motion_line_stands_at_484[offsetof(State, motion_line) == 484 ? 1 : -1];
+typedef char State_distance_line_stands_at_488[offsetof(State, distance_line) == 488 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_492[offsetof(State, feed_mode_line) == 492 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_496[offsetof(State, rotary_refused) == 496 ? 1 : -1];
+typedef char State_note_count_stands_at_500[offsetof(State, note_count) == 500 ? 1 : -1];
+typedef char State_note_line_stands_at_536[offsetof(State, note_line) == 536 ? 1 : -1];
+typedef char State_note_word_stands_at_572[offsetof(State, note_word) == 572 ? 1 : -1];
+typedef char State_moved_mm_stands_at_608[offsetof(State, moved_mm) == 608 ? 1 : -1];
+typedef char State_misfits_stands_at_680[offsetof(State, misfits) == 680 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_684[offsetof(State, misfits_other_centre) == 684 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_688[offsetof(State, misfits_reversed) == 688 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_692[offsetof(State, misfits_exchanged) == 692 ? 1 : -1];
+typedef char State_spirals_stands_at_696[offsetof(State, spirals) == 696 ? 1 : -1];
+typedef char State_spiral_line_stands_at_700[offsetof(State, spiral_line) == 700 ? 1 : -1];
+typedef char State_spiral_start_stands_at_704[offsetof(State, spiral_start) == 704 ? 1 : -1];
+typedef char State_spiral_end_stands_at_712[offsetof(State, spiral_end) == 712 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_720[offsetof(State, spiral_unit_mm) == 720 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_728[offsetof(State, cutter_mode) == 728 ? 1 : -1];
+typedef char State_cutter_side_stands_at_732[offsetof(State, cutter_side) == 732 ? 1 : -1];
+typedef char State_cutter_code_stands_at_736[offsetof(State, cutter_code) == 736 ? 1 : -1];
+typedef char State_cutter_line_stands_at_740[offsetof(State, cutter_line) == 740 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_744[offsetof(State, cutter_radius_mm) == 744 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_752[offsetof(State, cutter_entered) == 752 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_753[offsetof(State, cutter_failed) == 753 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_760[offsetof(State, cutter_normal) == 760 ? 1 : -1];
+typedef char State_held_turn_stands_at_776[offsetof(State, held_turn) == 776 ? 1 : -1];
+typedef char State_held_line_stands_at_780[offsetof(State, held_line) == 780 ? 1 : -1];
+typedef char State_held_from_stands_at_784[offsetof(State, held_from) == 784 ? 1 : -1];
+typedef char State_held_along_stands_at_800[offsetof(State, held_along) == 800 ? 1 : -1];
+typedef char State_held_centre_stands_at_816[offsetof(State, held_centre) == 816 ? 1 : -1];
+typedef char State_held_w_stands_at_832[offsetof(State, held_w) == 832 ? 1 : -1];
+typedef char State_held_sweep_stands_at_848[offsetof(State, held_sweep) == 848 ? 1 : -1];
+typedef char State_held_rows_stands_at_856[offsetof(State, held_rows) == 856 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_872[offsetof(State, cutter_rows_removed) == 872 ? 1 : -1];
+typedef char State_held_events_stands_at_880[offsetof(State, held_events) == 880 ? 1 : -1];
+typedef char State_retract_stands_at_888[offsetof(State, retract) == 888 ? 1 : -1];
+typedef char State_retract_line_stands_at_892[offsetof(State, retract_line) == 892 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_896[offsetof(State, unset_parameter) == 896 ? 1 : -1];
+typedef char State_unset_line_stands_at_900[offsetof(State, unset_line) == 900 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_904[offsetof(State, retract_unnamed_line) == 904 ? 1 : -1];
+typedef char State_in_cycles_stands_at_908[offsetof(State, in_cycles) == 908 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_912[offsetof(State, cycle_level_mm) == 912 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_920[offsetof(State, cycle_level_known) == 920 ? 1 : -1];
+typedef char State_cycle_r_stands_at_928[offsetof(State, cycle_r) == 928 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_936[offsetof(State, cycle_depth) == 936 ? 1 : -1];
+typedef char State_cycle_q_stands_at_944[offsetof(State, cycle_q) == 944 ? 1 : -1];
+typedef char State_cycle_p_stands_at_952[offsetof(State, cycle_p) == 952 ? 1 : -1];
+typedef char State_cycle_line_stands_at_960[offsetof(State, cycle_line) == 960 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_964[offsetof(State, cycle_plane) == 964 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_968[offsetof(State, cycle_unit_mm) == 968 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_976[offsetof(State, cycle_absolute) == 976 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 984 ? 1 : -1];
 VIEW(StateView, State);
+
+typedef struct {
+    int32_t is_saved;
+    int32_t restored_on_return;
+    double unit_mm;
+    int32_t absolute;
+    int32_t arc_absolute;
+    int32_t plane;
+    int32_t feed_mode;
+    double feed;
+    double feed_of_other_unit;
+    double feed_word;
+    double rpm;
+    int32_t direction;
+    int32_t mist;
+    int32_t flood;
+    double length_offset;
+    int32_t offset_tool;
+    int32_t length_code;
+    int32_t exact_stop;
+    double tolerance;
+    int32_t work_offset;
+    int32_t retract;
+    int32_t cutter_mode;
+} Modes;
+typedef char Modes_is_saved_stands_at_0[offsetof(Modes, is_saved) == 0 ? 1 : -1];
+typedef char Modes_restored_on_return_stands_at_4[offsetof(Modes, restored_on_return) == 4 ? 1 : -1];
+typedef char Modes_unit_mm_stands_at_8[offsetof(Modes, unit_mm) == 8 ? 1 : -1];
+typedef char Modes_absolute_stands_at_16[offsetof(Modes, absolute) == 16 ? 1 : -1];
+typedef char Modes_arc_absolute_stands_at_20[offsetof(Modes, arc_absolute) == 20 ? 1 : -1];
+typedef char Modes_plane_stands_at_24[offsetof(Modes, plane) == 24 ? 1 : -1];
+typedef char Modes_feed_mode_stands_at_28[offsetof(Modes, feed_mode) == 28 ? 1 : -1];
+typedef char Modes_feed_stands_at_32[offsetof(Modes, feed) == 32 ? 1 : -1];
+typedef char Modes_feed_of_other_unit_stands_at_40[offsetof(Modes, feed_of_other_unit) == 40 ? 1 : -1];
+typedef char Modes_feed_word_stands_at_48[offsetof(Modes, feed_word) == 48 ? 1 : -1];
+typedef char Modes_rpm_stands_at_56[offsetof(Modes, rpm) == 56 ? 1 : -1];
+typedef char Modes_direction_stands_at_64[offsetof(Modes, direction) == 64 ? 1 : -1];
+typedef char Modes_mist_stands_at_68[offsetof(Modes, mist) == 68 ? 1 : -1];
+typedef char Modes_flood_stands_at_72[offsetof(Modes, flood) == 72 ? 1 : -1];
+typedef char Modes_length_offset_stands_at_80[offsetof(Modes, length_offset) == 80 ? 1 : -1];
+typedef char Modes_offset_tool_stands_at_88[offsetof(Modes, offset_tool) == 88 ? 1 : -1];
+typedef char Modes_length_code_stands_at_92[offsetof(Modes, length_code) == 92 ? 1 : -1];
+typedef char Modes_exact_stop_stands_at_96[offsetof(Modes, exact_stop) == 96 ? 1 : -1];
+typedef char Modes_tolerance_stands_at_104[offsetof(Modes, tolerance) == 104 ? 1 : -1];
+typedef char Modes_work_offset_stands_at_112[offsetof(Modes, work_offset) == 112 ? 1 : -1];
+typedef char Modes_retract_stands_at_116[offsetof(Modes, retract) == 116 ? 1 : -1];
+typedef char Modes_cutter_mode_stands_at_120[offsetof(Modes, cutter_mode) == 120 ? 1 : -1];
+typedef char Modes_has_its_size[sizeof(Modes) == 128 ? 1 : -1];
+VIEW(ModesView, Modes);
 
 typedef struct {
     int64_t rows;
@@ -1012,6 +1140,8 @@ typedef struct {
     double a;
     double b;
     double dwell;
+    double q;
+    double e;
 } Event;
 typedef char Event_row_stands_at_0[offsetof(Event, row) == 0 ? 1 : -1];
 typedef char Event_kind_stands_at_8[offsetof(Event, kind) == 8 ? 1 : -1];
@@ -1019,7 +1149,9 @@ typedef char Event_line_stands_at_12[offsetof(Event, line) == 12 ? 1 : -1];
 typedef char Event_a_stands_at_16[offsetof(Event, a) == 16 ? 1 : -1];
 typedef char Event_b_stands_at_24[offsetof(Event, b) == 24 ? 1 : -1];
 typedef char Event_dwell_stands_at_32[offsetof(Event, dwell) == 32 ? 1 : -1];
-typedef char Event_has_its_size[sizeof(Event) == 40 ? 1 : -1];
+typedef char Event_q_stands_at_40[offsetof(Event, q) == 40 ? 1 : -1];
+typedef char Event_e_stands_at_48[offsetof(Event, e) == 48 ? 1 : -1];
+typedef char Event_has_its_size[sizeof(Event) == 56 ? 1 : -1];
 VIEW(EventView, Event);
 
 typedef struct {
@@ -1046,6 +1178,7 @@ typedef struct {
     int32_t subprogram;
     int32_t first_message;
     int32_t fault;
+    int32_t segment;
 } MarkedLine;
 typedef char MarkedLine_start_stands_at_0[offsetof(MarkedLine, start) == 0 ? 1 : -1];
 typedef char MarkedLine_target_stands_at_8[offsetof(MarkedLine, target) == 8 ? 1 : -1];
@@ -1055,7 +1188,8 @@ typedef char MarkedLine_kind_stands_at_32[offsetof(MarkedLine, kind) == 32 ? 1 :
 typedef char MarkedLine_subprogram_stands_at_36[offsetof(MarkedLine, subprogram) == 36 ? 1 : -1];
 typedef char MarkedLine_first_message_stands_at_40[offsetof(MarkedLine, first_message) == 40 ? 1 : -1];
 typedef char MarkedLine_fault_stands_at_44[offsetof(MarkedLine, fault) == 44 ? 1 : -1];
-typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 48 ? 1 : -1];
+typedef char MarkedLine_segment_stands_at_48[offsetof(MarkedLine, segment) == 48 ? 1 : -1];
+typedef char MarkedLine_has_its_size[sizeof(MarkedLine) == 56 ? 1 : -1];
 VIEW(MarkedLineView, MarkedLine);
 
 typedef struct {
@@ -1092,19 +1226,21 @@ typedef struct {
     int64_t generation;
     int64_t entry;
     int32_t is_program;
+    int32_t has_arguments;
     int32_t main_line;
     int32_t repeats;
-    double parameters[30];
+    double parameters[33];
 } Frame;
 typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
 typedef char Frame_times_stands_at_8[offsetof(Frame, times) == 8 ? 1 : -1];
 typedef char Frame_generation_stands_at_16[offsetof(Frame, generation) == 16 ? 1 : -1];
 typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
 typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
-typedef char Frame_main_line_stands_at_36[offsetof(Frame, main_line) == 36 ? 1 : -1];
-typedef char Frame_repeats_stands_at_40[offsetof(Frame, repeats) == 40 ? 1 : -1];
+typedef char Frame_has_arguments_stands_at_36[offsetof(Frame, has_arguments) == 36 ? 1 : -1];
+typedef char Frame_main_line_stands_at_40[offsetof(Frame, main_line) == 40 ? 1 : -1];
+typedef char Frame_repeats_stands_at_44[offsetof(Frame, repeats) == 44 ? 1 : -1];
 typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
-typedef char Frame_has_its_size[sizeof(Frame) == 288 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 312 ? 1 : -1];
 VIEW(FrameView, Frame);
 
 typedef struct {
@@ -1128,6 +1264,21 @@ typedef char Assignment_number_stands_at_8[offsetof(Assignment, number) == 8 ? 1
 typedef char Assignment_value_stands_at_16[offsetof(Assignment, value) == 16 ? 1 : -1];
 typedef char Assignment_has_its_size[sizeof(Assignment) == 24 ? 1 : -1];
 VIEW(AssignmentView, Assignment);
+
+typedef struct {
+    int64_t segment;
+    int64_t number;
+    int64_t word;
+    int64_t loop_first;
+    int64_t loop_last;
+} Label;
+typedef char Label_segment_stands_at_0[offsetof(Label, segment) == 0 ? 1 : -1];
+typedef char Label_number_stands_at_8[offsetof(Label, number) == 8 ? 1 : -1];
+typedef char Label_word_stands_at_16[offsetof(Label, word) == 16 ? 1 : -1];
+typedef char Label_loop_first_stands_at_24[offsetof(Label, loop_first) == 24 ? 1 : -1];
+typedef char Label_loop_last_stands_at_32[offsetof(Label, loop_last) == 32 ? 1 : -1];
+typedef char Label_has_its_size[sizeof(Label) == 40 ? 1 : -1];
+VIEW(LabelView, Label);
 
 typedef struct {
     int64_t steps;
@@ -1220,12 +1371,15 @@ typedef struct {
     Rows rows;
     EventView events;
     FoundView found;
+    ModesView saved;
     Floats offsets;
     Bools offset_known;
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
-    int64_t runs_programs;
+    int64_t programs;
+    int64_t has_m61_to_m73;
+    int64_t mounted_tool;
     Ints32 core_g;
     Floats dwell_by_letter;
     int64_t points;
@@ -1265,6 +1419,11 @@ typedef struct {
     Floats value;
     Ints32 line;
     Floats extra;
+    LabelView labels;
+    Bytes statement_names;
+    Ints32 statement_kinds;
+    int64_t syntax;
+    int64_t language;
 } Program;
 
 typedef struct {

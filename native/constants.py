@@ -33,6 +33,7 @@ MODULES = {
     "FC": "gcode2krl.gcode.cycle_findings",
     "FP": "gcode2krl.gcode.polar_findings",
     "FO": "gcode2krl.gcode.offset_findings",
+    "FM": "gcode2krl.gcode.mode_findings",
     "S": "gcode2krl.gcode.state",
     "P": "gcode2krl.gcode.program_tables",
     "PF": "gcode2krl.gcode.program_faults",
@@ -52,6 +53,7 @@ MODULES = {
 """Prefix -> module whose numbers and words the core uses."""
 RECORDS = {
     "State": ("gcode2krl.gcode.state", "STATE"),
+    "Modes": ("gcode2krl.gcode.state", "MODES"),
     "Counts": ("gcode2krl.gcode.reporting", "COUNTS"),
     "Event": ("gcode2krl.gcode.reporting", "EVENT"),
     "Found": ("gcode2krl.gcode.reporting", "FOUND"),
@@ -61,6 +63,7 @@ RECORDS = {
     "Frame": ("gcode2krl.gcode.program_tables", "FRAME"),
     "Repeat": ("gcode2krl.gcode.program_tables", "REPEAT"),
     "Assignment": ("gcode2krl.gcode.program_tables", "ASSIGNMENT"),
+    "Label": ("gcode2krl.gcode.program_tables", "LABEL"),
     "Course": ("gcode2krl.gcode.program_tables", "COURSE"),
 }
 """Name of the struct -> module and numpy record."""

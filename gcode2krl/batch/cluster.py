@@ -19,7 +19,7 @@ from gcode2krl.batch.identity import program_digest
 from gcode2krl.batch.work import Made, Task, make
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.errors import NotUnderstoodError, input_error
-from gcode2krl.translation.inputs import cell_files, files_of_job
+from gcode2krl.translation.inputs import cell_files, files_of_job, subprogram_files
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -45,9 +45,11 @@ def pack(task: Task) -> Shipment:
     cell = None if order.cell_path is None else str(order.cell_path)
     job = None if order.job_path is None else str(order.job_path)
     files = [Path(file).absolute() for file in (*cell_files(cell), *files_of_job(job))]
+    files += [file.absolute() for file in subprogram_files(order.part, order.search)]
     part = Path(order.part).absolute()
+    search = [Path(folder).absolute() for folder in order.search]
     try:
-        origin = Path(os.path.commonpath([part.parent, *(file.parent for file in files)]))
+        origin = Path(os.path.commonpath([part.parent, *(file.parent for file in files), *search]))
     except ValueError:
         remedy = "put part, cell and job on one drive"
         raise input_error("cluster", "its files are on several drives", remedy, source=str(part)) from None
@@ -55,6 +57,7 @@ def pack(task: Task) -> Shipment:
         name: None if path is None else _below(Path(path).absolute(), origin)
         for name, path in (("part", part), ("cell_path", cell), ("job_path", job))
     }
+    moved["search"] = tuple(_below(folder, origin) for folder in search)
     contents = {_below(file, origin): file.read_bytes() for file in {part, *files} if file.is_file()}
     return Shipment(replace(task, order=replace(order, **moved)), contents, str(origin / "x")[:-1])
 
@@ -72,7 +75,10 @@ def make_shipped(shipment: Shipment) -> Made:
             "part": place / order.part,
             "cell_path": None if order.cell_path is None else place / order.cell_path,
             "job_path": None if order.job_path is None else place / order.job_path,
+            "search": tuple(str(place / folder) for folder in order.search),
         }
+        for folder in moved["search"]:
+            Path(folder).mkdir(parents=True, exist_ok=True)
         made = make(replace(shipment.task, order=replace(order, **moved)))
         return Made(_at_home(made.record, f"{place}{os.sep}", shipment.origin), made.files)
 

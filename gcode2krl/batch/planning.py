@@ -15,9 +15,15 @@ from gcode2krl.errors import Issue
 from gcode2krl.files.program_names import likely_text_bytes
 from gcode2krl.result import cell_of, sha256_of
 from gcode2krl.translation import Order
-from gcode2krl.translation.inputs import cell_files, files_of_job, read_cell_under_job
+from gcode2krl.translation.inputs import (
+    cell_files,
+    files_of_job,
+    read_cell_under_job,
+    require_search,
+    subprogram_files,
+)
 
-_PLACES = ("report", "job_path")
+_PLACES = ("report", "job_path", "search")
 """Options that say where something is; for a key counts what it is."""
 
 
@@ -52,6 +58,7 @@ def plan(parts: Iterable[Part], order: Order, pages: bool = False) -> list[Plann
 
     Raises `NotUnderstoodError` where a cell or a job is wrong, or where two parts would have one output.
     """
+    require_search(order.search)
     listed = list(parts)
     cells = {(part.cell, part.job): _read_cell(part) for part in listed}
     names = {
@@ -83,7 +90,7 @@ def _planned(part: Part, cell: _Cell, order: Order, page: str) -> Planned:
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
     key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 else ""
-    inputs = (part.file, *cell.files)
+    inputs = (part.file, *cell.files, *(subprogram_files(own.part, own.search) if sha256 else ()))
     return Planned(part, Task(own, page), inputs, size_bytes, sha256, cell.sha256, key)
 
 
@@ -93,6 +100,9 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
     yield "part", Path(order.part).name
     yield "cell_name", Path(order.cell_path).name if order.cell_path is not None else None
     yield "page", page
+    subprograms = subprogram_files(order.part, order.search)
+    if subprograms:
+        yield "subprograms", [(file.name, sha256_of(file)) for file in subprograms]
     if order.job_path is not None:
         job = Path(order.job_path)
         yield "job", (job.name, hashlib.sha256(job.read_bytes()).hexdigest())

@@ -401,7 +401,7 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
         yield _key_issue("mounted_tool", f"found {number}, and the cell has no [tool.{number}]")
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
-    texts = switching.rendered(templates, view)
+    texts = switching.texts_without_words(templates, view)
     yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
 

@@ -1,5 +1,6 @@
 """What the M-codes of a cell switch, read back from its rendered templates: pairs, and double meanings."""
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,7 +10,10 @@ from gcode2krl.errors import Issue, Severity
 
 _OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
 """Spindle speeds in rpm: what a template switches may depend on the speed."""
-SAMPLE = {"rpm": 1000.0, "p": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
+SAMPLE = {"rpm": 1000.0, "p": 1.0, "q": 1.0, "e": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
+WORDS = ("p", "q", "e")
+"""What a template gets of the words of a block that only a program has."""
+_ANALOGUE = re.compile(r"(\$ANOUT ?\[ ?\d+ ?\]) ?=")
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """Which M-code switches off what another switches on."""
 _SPINDLE, _COOLANT = ("M3", "M4"), ("M7", "M8")
@@ -32,10 +36,32 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
     return texts
 
 
+def outputs_set(text: str) -> frozenset[str]:
+    """Return the digital and analogue outputs that KRL text sets."""
+    analogue = (
+        found[1].replace(" ", "") for line in rules.statements(text) if (found := _ANALOGUE.match(line))
+    )
+    return frozenset((*(one.name for one in rules.switched(text)), *analogue))
+
+
+def texts_without_words(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, str]:
+    """Return key → KRL of the templates whose outputs do not depend on the words of a block."""
+    texts, others = rendered(templates, view), rendered(templates, {**view, **dict.fromkeys(WORDS, 7919.0)})
+    return {
+        key: text for key, text in texts.items() if outputs_set(text) == outputs_set(others.get(key, text))
+    }
+
+
 def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, list[str]]:
     """Return key → KRL at several spindle speeds, with and without the optional words of a block."""
     texts: dict[str, list[str]] = {}
-    others: list[dict[str, Any]] = [{}, {"p": None}, {"text": ""}, {"line": 0}, {"line": 10**6}]
+    others: list[dict[str, Any]] = [
+        {},
+        {"p": None, "q": None, "e": None},
+        {"text": ""},
+        {"line": 0},
+        {"line": 10**6},
+    ]
     others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
     for other in others:
         for key, text in rendered(templates, {**view, **other}).items():

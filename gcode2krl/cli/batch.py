@@ -14,7 +14,7 @@ from gcode2krl.cli.batch_lines import Told, as_record, shown, table_lines
 from gcode2krl.cli.cache import cache_options, chosen_cache
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import dialect_option, simplify_option
+from gcode2krl.cli.inputs import dialect_option, search_option, simplify_option
 
 INTERRUPTED = 130
 
@@ -50,6 +50,7 @@ INTERRUPTED = 130
 )
 @simplify_option
 @dialect_option
+@search_option
 @click.option("--block-delete", is_flag=True, help="Skip lines that begin with /.")
 @click.option("--allow", multiple=True, metavar="CODE", help="Allow all findings of a code; may be repeated.")
 @click.option("--strict", is_flag=True, help="Warnings refuse a program too.")

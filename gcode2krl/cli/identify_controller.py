@@ -10,7 +10,14 @@ import numpy as np
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import common_options, dialect_option, read_cell, read_part, require_fit_outputs
+from gcode2krl.cli.inputs import (
+    common_options,
+    dialect_option,
+    read_cell,
+    read_part,
+    require_fit_outputs,
+    search_option,
+)
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
 from gcode2krl.units import MS_PER_S
 
@@ -37,6 +44,7 @@ _MOST_SHOWN = 20
     "--part", metavar="TEST.nc", help="The program that was run; default: that of `make-test controller`."
 )
 @dialect_option
+@search_option
 @common_options
 @click.option(
     "--tolerance", "tolerance_mm", type=float, metavar="MM", help="Blend tolerance it was translated with."
@@ -47,6 +55,7 @@ def command(
     trace: str,
     part: str | None,
     dialect: str,
+    search: tuple[str, ...],
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
@@ -64,7 +73,7 @@ def command(
     try:
         console.heading.reads(trace, part)
         require_fit_outputs(plot, apply_to, cell_path, trace, part)
-        result = _identify(trace, part, dialect, read_cell(cell_path), tolerance_mm, console)
+        result = _identify(trace, part, dialect, search, read_cell(cell_path), tolerance_mm, console)
         files = []
         if plot is not None:
             files.append(_save_figure(result, Path(plot)))
@@ -87,6 +96,7 @@ def _identify(
     trace_path: str,
     part: str | None,
     dialect: str,
+    search: tuple[str, ...],
     cell: "Cell",
     tolerance_mm: float | None,
     console: Console,
@@ -98,7 +108,7 @@ def _identify(
     trace = read_controller_trace(trace_path)
     if part is None:
         return _identify_test(trace, cell, console)
-    targets = set_targets(read_part(part, cell, console, 0.01, False, dialect), cell, tolerance_mm)
+    targets = set_targets(read_part(part, cell, console, 0.01, False, dialect, search), cell, tolerance_mm)
     with console.stage("fitting"):
         return identify_controller(trace, targets, cell)
 

@@ -1,6 +1,7 @@
 """What several commands share: options, and reading the part with a bar on the terminal."""
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -48,6 +49,7 @@ __all__ = [
     "require_other",
     "require_outputs",
     "require_part",
+    "search_option",
     "simplify_option",
 ]
 
@@ -90,9 +92,20 @@ def dialect_option(function: Any) -> Any:
     )(function)
 
 
+def search_option(function: Any) -> Any:
+    """Add the option that names folders with subprograms."""
+    return click.option(
+        "--search",
+        multiple=True,
+        metavar="FOLDER",
+        help="Where subprograms are, beside the part's own folder; may be repeated.",
+    )(function)
+
+
 def gcode_options(function: Any) -> Any:
     """Add the options that say how G-code is read."""
     for option in (
+        search_option,
         dialect_option,
         click.option("--block-delete", is_flag=True, help="Skip lines that begin with /."),
         click.option(
@@ -160,12 +173,15 @@ def read_part(
     chord_tolerance_mm: float,
     block_delete: bool,
     dialect: str = DIALECT_NAMES[0],
+    search: Sequence[str] = (),
 ) -> "Toolpath":
     """Read the G-code of a command with a bar on the terminal, see `translation.inputs.read_part`."""
     standard = StandardInput() if part == STANDARD else None
     console.heading.reads(part)
     with console.stages() as begin:
-        toolpath = reading.read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect)
+        toolpath = reading.read_part(
+            part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect, search
+        )
     if standard is not None:
         console.heading.inputs[part] = standard.as_input()
     return toolpath

@@ -75,6 +75,7 @@ def simulate_command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     dialect: str,
+    search: tuple[str, ...],
     block_delete: bool,
     plot: str | None,
     **options: Any,
@@ -91,7 +92,7 @@ def simulate_command(
     settings = _changed(cell.online, options)
     world_values = _world_values(options)
     prediction = _predicted(
-        part, cell, settings, console, tolerance_mm, chord_tolerance_mm, block_delete, dialect
+        part, cell, settings, console, tolerance_mm, chord_tolerance_mm, block_delete, dialect, search
     )
     from gcode2krl.online.judge import judged as judge
     from gcode2krl.online.outcome import as_json as outcome_json
@@ -215,6 +216,7 @@ def _predicted(
     chord_tolerance_mm: float,
     block_delete: bool,
     dialect: str,
+    search: tuple[str, ...],
 ) -> "Prediction":
     """Predict a part at the cycle of the settings; a prediction's folder is loaded unchanged."""
     from gcode2krl.prediction import Prediction
@@ -230,7 +232,7 @@ def _predicted(
     from gcode2krl.pipeline import predict_toolpath
 
     try:
-        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect, search)
         with console.stages() as begin:
             return predict_toolpath(
                 toolpath, cell, dt_s=settings.cycle_s, tolerance_mm=tolerance_mm, begin=begin

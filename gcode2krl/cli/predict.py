@@ -77,6 +77,7 @@ def command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     dialect: str,
+    search: tuple[str, ...],
     block_delete: bool,
     simplify_mm: float | None,
     job_path: str | None,
@@ -107,7 +108,7 @@ def command(
         )
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
-        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect)
+        toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect, search)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
@@ -116,6 +117,7 @@ def command(
                 "chord_tolerance_mm": chord_tolerance_mm,
                 "block_delete": block_delete,
                 "dialect": dialect,
+                **({"search": list(search)} if search else {}),
             }
             prediction = predict_toolpath(
                 toolpath,

@@ -38,6 +38,7 @@ def command(
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     dialect: str,
+    search: tuple[str, ...],
     block_delete: bool,
     simplify_mm: float | None,
     compensate: Literal["offline"] | None,
@@ -58,7 +59,15 @@ def command(
         cell = read_cell(cell_path)
         with console.stages() as begin:
             toolpath = read_from_line(
-                part, cell, chord_tolerance_mm, block_delete, tolerance_mm, from_line, begin, dialect=dialect
+                part,
+                cell,
+                chord_tolerance_mm,
+                block_delete,
+                tolerance_mm,
+                from_line,
+                begin,
+                dialect=dialect,
+                search=search,
             )
         prediction = None
         if compensate == "offline":

@@ -4,17 +4,24 @@ Plain module constants: the compiled core takes their values from here. What a d
 `dialects`.
 """
 
-from gcode2krl.ascii_codes import AMPERSAND, GREATER, LESS, POINT
+from gcode2krl.ascii_codes import AMPERSAND, COLON, EQUALS, GREATER, LESS, PLUS, POINT
 
-SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS = 1, 2, 4, 8, 16
-"""Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without a point."""
+SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS, MACROS = 1, 2, 4, 8, 16, 32
+"""Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without
+a point, ``IF``."""
+PROGRAMS_NONE, PROGRAMS_LINUXCNC, PROGRAMS_FANUC, PROGRAMS_SINUMERIK = range(4)
+"""How parameters, jumps and subprograms are written: not at all, O-words, custom macro B, R parameters."""
 
 NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = LESS, GREATER, POINT
 """Marks before a word: ``X=AC(5)``, ``X=IC(5)``, a number without a decimal point."""
 SKIPPED = AMPERSAND
 """A statement that says nothing to this robot."""
+SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
+"""``TRANS`` and ``ATRANS``: the axis words of the block are a shift of the zero, or are added to it."""
+PROGRAM_NUMBER = COLON
+"""``O1234`` alone in its line, where a program of that number begins."""
 
-HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE = range(8)
+HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP = range(10)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 16
 
@@ -22,5 +29,6 @@ AS_WRITTEN, POINT_REQUIRED, THOUSANDTHS, CALCULATOR = range(4)
 """What a number without a decimal point is: units, an error, least increments, or units where it is sure."""
 MOST_CODES = 9999
 """Largest G number of a dialect, ten times: G999.9."""
-CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_REFUSED = -1, -2, -3, -4
-"""Instead of a code of the core; exact stop of one block; ``CODE_REFUSED - k`` for the reason k."""
+CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_REFUSED = -1, -2, -3, -4, -5
+"""Instead of a code of the core; exact stop of one block; call of a subprogram; ``CODE_REFUSED - k`` for the
+reason k."""

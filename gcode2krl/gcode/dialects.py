@@ -49,7 +49,7 @@ REASONS: Final = (
     ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
     ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
     (
-        "variables, jumps and subprograms are read in the dialect linuxcnc alone",
+        "variables, jumps and subprograms are read in the dialects linuxcnc and fanuc alone",
         "let the post write the program out in plain numbers",
     ),
     (
@@ -65,6 +65,12 @@ REASONS: Final = (
     ("a dwell counted twice, or a part of its unit", "write one word with a whole number of units"),
     ("a word that counts for itself beside a code that moves the zero", "give the code a block of its own"),
     ("not known to this control", "write G20 for inches, G21 for mm"),
+    ("a message in a line that computes", "give MSG a line of its own, with plain text"),
+    ("TRANS and ATRANS stand beside another code that moves the zero", "give each a block of its own"),
+    (
+        "a modal call runs its macro behind each move that follows",
+        "call the macro with G65 where it is meant",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -73,7 +79,9 @@ _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
 REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
+_MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
+REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
 
 
@@ -85,8 +93,10 @@ class Dialect:
     title: str
     syntax: int = 0
     """Bits of `dialect_marks`: what of its text is no word."""
-    runs_programs: bool = False
-    """What is LinuxCNC's own is read: parameters, expressions, O-words, M98, M99, polar words @ and ^."""
+    programs: int = d.PROGRAMS_NONE
+    """How parameters, jumps and subprograms are written; LinuxCNC's go with its polar words @ and ^."""
+    has_m61_to_m73: bool = False
+    """M61 to M73 are LinuxCNC's (tool number, outputs, saved modes), not the machine builder's."""
     turns_axes: bool = True
     """Rotary words of a cell with rotary axes are read."""
     own: tuple[float, ...] = ()
@@ -97,6 +107,8 @@ class Dialect:
     """G numbers of an exact stop in their block alone."""
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
+    calls: tuple[float, ...] = ()
+    """G numbers that call a subprogram."""
     refused: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     """Number of the reason: G numbers that are refused for it."""
     dwell_s: Mapping[str, float] = field(default_factory=lambda: {"P": 1.0})
@@ -128,7 +140,11 @@ class Dialect:
         table = np.full(d.MOST_CODES + 1, d.CODE_UNKNOWN, np.int32)
         own = np.array([_tenfold(code) for code in self.own]) if self.own else np.arange(v.LARGEST_G + 1)
         table[own] = own
-        for special, codes in ((d.CODE_HARMLESS, self.harmless), (d.CODE_EXACT, self.exact)):
+        for special, codes in (
+            (d.CODE_HARMLESS, self.harmless),
+            (d.CODE_EXACT, self.exact),
+            (d.CODE_CALL, self.calls),
+        ):
             for code in codes:
                 table[_tenfold(code)] = special
         for reason, codes in self.refused.items():
@@ -156,7 +172,8 @@ class Dialect:
     def settings(self) -> dict[str, Any]:
         """Return what the interpreter is given."""
         return {
-            "runs_programs": int(self.runs_programs),
+            "programs": self.programs,
+            "has_m61_to_m73": int(self.has_m61_to_m73),
             "core_g": self.core_g(),
             "dwell_by_letter": self.dwell_by_letter(),
             "points": self.points,
@@ -187,7 +204,7 @@ _FANUC_REFUSED = {
     _PROBING: (31, 37),
     _THREAD: (33,),
     _OFFSETS: (54.1,),
-    _FLOW: (65, 66, 66.1),
+    _MODAL_CALL: (66, 66.1),
     _SPLINE: (6.2, 5.2),
     _RETURN: (29,),
     _HOME: (27,),
@@ -197,7 +214,9 @@ _FANUC_REFUSED = {
     _CYCLE: (70, 71, 72, 75, 77, 78, 79),
 }
 _FANUC: dict[str, Any] = {
-    "syntax": d.SKIP_LEVEL | d.HEAD_LINES,
+    "programs": d.PROGRAMS_FANUC,
+    "syntax": d.SKIP_LEVEL | d.HEAD_LINES | d.MACROS,
+    "calls": (65,),
     "same": {63: 64, 62: 64},
     "exact": (9,),
     "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1, 103, 187),
@@ -224,7 +243,9 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
     _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
-    _kind(d.REFUSED, _SHIFT): ("TRANS", "ATRANS"),
+    _kind(d.SHIFT, 0): ("TRANS",),
+    _kind(d.JUMP): ("GOTO", "GOTOF", "GOTOB", "IF"),
+    _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
@@ -235,7 +256,7 @@ _SINUMERIK_STATEMENTS = {
         *("CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
     ),
     _kind(d.REFUSED, _FLOW): (
-        *("GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
+        *("GOTOC", "GOTOS", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
         *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
@@ -245,7 +266,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }
 _LIST: Final = (
-    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", runs_programs=True),
+    Dialect("linuxcnc", "LinuxCNC's RS274/NGC", programs=d.PROGRAMS_LINUXCNC, has_m61_to_m73=True),
     Dialect("fanuc", "Fanuc milling; a number without a point is refused", **_FANUC, points=d.POINT_REQUIRED),
     Dialect("fanuc-calculator", "Fanuc milling; X100 is 100 mm", **_FANUC, points=d.CALCULATOR),
     Dialect("fanuc-increments", "Fanuc milling; X100 is 0.1 mm", **_FANUC, points=d.THOUSANDTHS),
@@ -253,12 +274,14 @@ _LIST: Final = (
         "grbl",
         "Grbl 1.1: G0, G21 at the start, $ lines",
         syntax=d.DOLLAR_LINES,
+        has_m61_to_m73=True,
         refused={_LEAD: (41, 41.1, 42, 42.1), _NO_UNIT: (70, 71)},
         start={"motion": v.MOTION_RAPID, "unit_named": 1},
     ),
     Dialect(
         "sinumerik",
         "Sinumerik 840D sl, as CAM posts write it",
+        programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
         turns_axes=False,
         own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),

@@ -26,7 +26,7 @@ _OF_LETTER_A = {
 _FIXED = {
     f.COMMENT_OPEN: r"\((?!.*\))",
     f.COMMENT_NESTED: r"(?<=\()[^()]*(?P<culprit>\()",
-    f.O_WORD: "O",
+    f.O_WORD: r"GOTO|DO\s*\d|END\s*\d|M\s*0*9[89](?!\d)|G\s*65|O",
     f.EXPRESSION: r"[A-Z]?\s*[-+]?\s*[#\[\]=]|[A-Z](?=[A-Z]+\[)",
     f.NEGATIVE_FEED: "F",
     f.NEGATIVE_SPEED: "S",

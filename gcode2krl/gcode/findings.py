@@ -13,6 +13,7 @@ from typing import NamedTuple
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import cycle_findings as of_cycles
+from gcode2krl.gcode import mode_findings as of_modes
 from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import polar_findings as of_polar
 from gcode2krl.gcode import vocabulary as v
@@ -170,7 +171,7 @@ FINDINGS: dict[int, Finding] = {
         "error",
         "subprogram-missing",
         "the subprogram is neither in this program nor a file",
-        "put its file (label.ngc) beside the program",
+        "put its file (label.ngc, for a Fanuc O1234.nc) beside the program, or name its folder: --search",
     ),
     CALLS_TOO_DEEP: Finding(
         "error",
@@ -533,6 +534,7 @@ FINDINGS: dict[int, Finding] = {
 FINDINGS |= {number: Finding(*text) for number, text in of_offsets.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_cycles.TEXTS.items()}
 FINDINGS |= {number: Finding(*text) for number, text in of_polar.TEXTS.items()}
+FINDINGS |= {number: Finding(*text) for number, text in of_modes.TEXTS.items()}
 
 WITH_COLUMN = {
     *(EXPRESSION, O_WORD, EXPRESSION_VALUE, PARAMETER_UNDEFINED, PARAMETER_NUMBER, PARAMETER_READ_ONLY),
@@ -558,14 +560,9 @@ UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
         "spindle orientation is not mapped",
         "map it in [m_code] of the cell once it is read",
     ),
-    v.TENFOLD * v.M61: ("setting the tool number without a change is not read", "use T and M6"),
-    v.TENFOLD * v.M62: (
-        f"digital and analogue I/O words: {_LATER}",
-        "map an own M-code in [m_code] of the cell",
-    ),
-    v.TENFOLD * v.M70: (
-        f"saving and restoring the modes (M70 to M73): {_LATER}",
-        "write the modes themselves behind the subprogram: G90, G21, G17, G94, G54, F",
+    v.TENFOLD * v.M66: (
+        "it waits for an input and keeps its value in #5399, which is not known in translation",
+        'write an M-code of your own, and map it in [m_code] of the cell: M150 = "WAIT FOR $IN[7]"',
     ),
 }
 
@@ -624,6 +621,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         "code": f"{'M' if a < 0 else 'G'}{abs(a) / v.TENFOLD:g}",
         "decimals": decimals_needed(MM_PER_INCH if c < 0 else 1.0),
         "letter": chr(int(b)) if number in of_cycles.TEXTS and 0 < b < FIRST_FOREIGN else "",
+        **_of_modes(number, b, c),
         "state": _state(number, line, a, b, c),
         "reason": reason,
         "remedy": remedy,
@@ -637,6 +635,14 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
         _remedy(finding, number, a, b).format(**values),
         excerpt,
     )
+
+
+def _of_modes(number: int, b: float, c: float) -> dict[str, str]:
+    """Return which word an output lacks, or which tool is in the spindle."""
+    if number == of_modes.IO_WORD:
+        letter = chr(int(b))
+        return {"number": letter, "value": "" if math.isnan(c) else f", not {letter}{c:g}"}
+    return {"there": f"tool {b:.0f}" if b else "none"} if number == of_modes.TOOL_NUMBER else {}
 
 
 def _program_fault(number: int, a: float, b: float) -> dict[str, str]:

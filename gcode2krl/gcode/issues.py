@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
+from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode.excerpt import column, quote
 from gcode2krl.gcode.offset_issues import zero_issues
@@ -29,6 +30,7 @@ _O_LINE = re.compile(rb"\s*/?\s*(?:N[\d.\s]*)?O\s*[<\d#\[]", re.IGNORECASE)
 Record = Any
 """A numpy record; numpy does not type its fields."""
 
+_UNSET_COUNTS = {d.PROGRAMS_FANUC: "empty, and a word with it is left out", d.PROGRAMS_SINUMERIK: "0"}
 _INCH_DECIMALS = 4
 _INCH_EXTENT_MM = 60.0
 _NOTES = {
@@ -136,14 +138,20 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
 
 
 def program_issues(
-    state: Record, texts: Mapping[int, bytes], *, rest_line: int, most_decimals: int, head: bytes
+    state: Record,
+    texts: Mapping[int, bytes],
+    *,
+    rest_line: int,
+    most_decimals: int,
+    head: bytes,
+    programs: int,
 ) -> Iterator[Issue]:
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
     yield from zero_issues(state)
     if state["unset_line"]:
-        yield _unset(int(state["unset_line"]), int(state["unset_parameter"]))
+        yield _unset(int(state["unset_line"]), int(state["unset_parameter"]), programs)
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
     if not state["ended"]:
@@ -199,13 +207,15 @@ def _notes(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
         yield Issue("note", code, line, sentence.format(blocks=blocks, **values), remedy)
 
 
-def _unset(line: int, number: int) -> Issue:
+def _unset(line: int, number: int, programs: int) -> Issue:
+    counts = _UNSET_COUNTS.get(programs, "0, as in LinuxCNC")
+    name = f"R{number}" if programs == d.PROGRAMS_SINUMERIK else f"#{number}"
     return Issue(
         "warning",
         "parameter-unset",
         line,
-        f"#{number} is read before anything sets it; it counts as 0, as in LinuxCNC",
-        f"set it at the beginning of the program: #{number} = …",
+        f"{name} is read before anything sets it; it counts as {counts}",
+        f"set it at the beginning of the program: {name} = …",
     )
 
 

@@ -17,7 +17,7 @@ from gcode2krl.compiled.core import (
 )
 from gcode2krl.gcode.columns import ROWS
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
-from gcode2krl.gcode.state import STATE
+from gcode2krl.gcode.state import MODES, STATE
 
 MACHINE = StructOf(
     state=ArrayOf(STATE, written=True),
@@ -25,12 +25,15 @@ MACHINE = StructOf(
     rows=ROWS,
     events=ArrayOf(EVENT, written=True),
     found=ArrayOf(FOUND, written=True),
+    saved=ArrayOf(MODES, written=True),
     offsets=OUT_FLOATS,
     offset_known=OUT_BOOLS,
     tool_length_mm=OUT_FLOATS,
     tool_diameter_mm=FLOATS,
     cutter_diameter_mm=FLOATS,
-    runs_programs=INT,
+    programs=INT,
+    has_m61_to_m73=INT,
+    mounted_tool=INT,
     core_g=INTS32,
     dwell_by_letter=FLOATS,
     points=INT,
@@ -54,7 +57,9 @@ MACHINE = StructOf(
 """What the interpreter goes on with from block to block.
 
 ``offsets`` are the work offsets G54 to G59.3 (9, 4): X, Y, Z in mm and the rotation about Z in degrees. G10
-writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared.
+writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared. ``saved`` are the
+modes that M70 and M73 have saved, one row a level of calls. ``mounted_tool`` is the cell's, -1 where it
+states none.
 """
 
 run = core_function("gcode_run", MACHINE, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)

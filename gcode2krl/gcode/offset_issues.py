@@ -10,7 +10,7 @@ Record = Any
 """A numpy record; numpy does not type its fields."""
 
 _SENTENCES: dict[int, tuple[Severity, str, str]] = {
-    NOTE_LOCAL: ("note", "G52 moves the zero{by}{more}", "nothing to do if the part lies there"),
+    NOTE_LOCAL: ("note", "{code} moves the zero{by}{more}", "nothing to do if the part lies there"),
     NOTE_SHIFT: (
         "warning",
         "G92 moves the zero{by}{more}",
@@ -32,15 +32,23 @@ def zero_issues(state: Record) -> Iterator[Issue]:
             first = 3 * (which - NOTE_LOCAL)
             by = _by(state["moved_mm"][first : first + 3])
             more = f"; {count} blocks move it" if count > 1 else ""
-            yield Issue(severity, "program-offset", line, sentence.format(by=by, more=more), remedy)
+            what = sentence.format(code=_code(state), by=by, more=more)
+            yield Issue(severity, "program-offset", line, what, remedy)
     if any(state["shift_mm"]):
+        is_trans = _code(state) == "TRANS"
+        what = f"the shift{_by(state['shift_mm'])} is in force at the end"
         yield Issue(
             "note",
             "offset-left",
             int(state["shift_line"]),
-            f"the shift{_by(state['shift_mm'])} is in force at the end; LinuxCNC would keep it",
-            "write G92.1 before M2 or M30; here the next program starts without it",
+            what if is_trans else f"{what}; LinuxCNC would keep it",
+            f"write {'TRANS' if is_trans else 'G92.1'} before the end; here the next program begins without",
         )
+
+
+def _code(state: Record) -> str:
+    """Return what shifts the zero: G52, which is its number in the state, or TRANS of a Sinumerik."""
+    return "G52" if state["note_word"][NOTE_LOCAL] or not state["note_count"][NOTE_LOCAL] else "TRANS"
 
 
 def _by(moved_mm: Any) -> str:

@@ -13,6 +13,11 @@ _CONVERSATIONAL = re.compile(
 )
 _INCOMPLETE = {"consequences", "more"}
 """Findings that say that others are not listed."""
+_OF_PROGRAMS = {
+    *("expression", "expression-value", "parameter-number", "parameter-undefined", "parameter-read-only"),
+    *("o-word", "subprogram-missing", "calls-too-deep", "endless-loop"),
+}
+"""Findings with which a program that computes stops: a dialect may never have reached the lines behind."""
 _OF_TEXT = {"binary-file", "empty", "gzip-damaged", "line-ends", "file-unreadable", "dialect-unknown"}
 
 Reread = Callable[[str], Toolpath]
@@ -29,8 +34,9 @@ def with_other_dialects(error: NotUnderstoodError, dialect: str, reread: Reread)
     """Return an error whose remedies name the dialects that read what is refused."""
     if all(issue.code in _OF_TEXT for issue in error.issues):
         return error
-    left = {name: _wrong(reread, name) for name in DIALECTS if name != dialect}
-    whole = [name for name, wrong in left.items() if not wrong]
+    found = {name: _wrong(reread, name) for name in DIALECTS if name != dialect}
+    whole = [name for name, wrong in found.items() if not wrong]
+    left = dict.fromkeys(whole, ()) | found  # those that read the whole program come first
     issues = [_with_dialects(issue, left) for issue in error.issues]
     if whole:
         names = " or ".join(f"--dialect {name}" for name in whole)
@@ -54,7 +60,11 @@ def _with_dialects(issue: Issue, left: dict[str, tuple[Issue, ...]]) -> Issue:
     if issue.severity != "error" or not issue.line:
         return issue
     for name, wrong in left.items():
+        if wrong and issue.code in _OF_PROGRAMS:
+            continue
         if any(other.code in _INCOMPLETE or other.line in (0, issue.line) for other in wrong):
+            continue
+        if any(other.code in _OF_PROGRAMS and other.line < issue.line for other in wrong):
             continue
         return replace(issue, remedy=f"{issue.remedy}; --dialect {name} reads this")
     return issue

@@ -17,12 +17,17 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import macro_words
+from gcode2krl.gcode import program_faults as faults
 from gcode2krl.gcode import program_tables as tables
+from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
-from gcode2krl.gcode.subprograms import found_file
+from gcode2krl.gcode.siemens_words import SiemensFlow
+from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
 from gcode2krl.gcode.words import Scanner, Words
 
@@ -68,9 +73,10 @@ class File(NamedTuple):
 class Program:
     """A whole program; `run` runs it from the line at which the reading in pieces has stopped."""
 
-    def __init__(self, name: str, folders: Sequence[Path], *, block_delete: bool) -> None:
-        """Take the program's name, and the folders in which its subprograms may be."""
+    def __init__(self, name: str, spoken: Dialect, folders: Sequence[Path], *, block_delete: bool) -> None:
+        """Take the program's name and dialect, and the folders in which its subprograms may be."""
         self.name, self._folders, self._block_delete = name, folders, block_delete
+        self._spoken, self._is_macro = spoken, spoken.programs == d.PROGRAMS_FANUC
         self.files: list[File] = []
         self.messages: list[bytes] = []
         self.most_decimals = 0
@@ -84,7 +90,8 @@ class Program:
         self._at = 0
         self.course = np.zeros(1, tables.COURSE)
         self._subprograms = np.zeros(0, tables.SUBPROGRAM)
-        self._program = _empty_program(self.course)
+        self._segments, self._numbered = 0, np.zeros(0, tables.LABEL)
+        self._program = _empty_program(self.course, spoken)
 
     # --- files ------------------------------------------------------------------------------------------
 
@@ -100,7 +107,7 @@ class Program:
         first_line = int(self._line[-1]) + 1 if self.files else start_line
         text = text if text.endswith(b"\n") else text + b"\n"
         self.files.append(File(name, first_line, text, start_line))
-        scanned, lines = Scanner().scan_whole(text, first_line)
+        scanned, lines = Scanner(self._spoken).scan_whole(text, first_line)
         self.most_decimals = max(self.most_decimals, scanned.most_decimals)
         messages += len(self.messages)
         self.messages += [text[a:b] for a, b in scanned.message_span]
@@ -131,7 +138,12 @@ class Program:
         word_of_row[rows : rows + len(lines)] = words + np.flatnonzero(marked)
         self._text += text
         self._ends.append(len(self._letter))
-        self._look_at_o_lines(rows, word_of_row)
+        if self._is_macro:
+            self._look_at_macro_lines(rows, word_of_row, words)
+        elif self._spoken.programs == d.PROGRAMS_SINUMERIK:
+            self._look_at_siemens_lines(rows, word_of_row)
+        else:
+            self._look_at_o_lines(rows, word_of_row)
         self._program.text = np.frombuffer(self._text, np.uint8)
         self._program.lines = self._lines
         self._count("most_steps", MOST_STEPS + int(self._line[-1]))
@@ -149,10 +161,55 @@ class Program:
             else:
                 flow.add(row, line)
         flow.finish()
-        for definition in flow.definitions:
+        self._define(flow.definitions)
+
+    def _look_at_macro_lines(self, first_row: int, word_of_row: Ints, first_word: int) -> None:
+        file = self.files[-1]
+        at_start = len(self.files) == 1 and file.start_line == 1
+        flow = macro_words.MacroFlow(self._lines, word_of_row, first_word, at_start=at_start)
+        kind = self._lines["kind"][first_row:]
+        for row in (first_row + np.flatnonzero(kind == tables.KIND_O_WORD)).tolist():
+            start = int(self._lines["start"][row])
+            line = macro_words.parsed(self._text[start : self._text.index(b"\n", start)])
+            if line.deleted and self._block_delete:
+                self._lines["kind"][row] = tables.KIND_NOTHING
+            else:
+                flow.add(row, line)
+        flow.finish()
+        self._lines["segment"][first_row:] += self._segments
+        labels = macro_words.labels_of(
+            file.text, file.first_line, self._line.astype(np.int64), first_word, flow, self._segments
+        )
+        self._segments += len(flow.segments)
+        known = np.concatenate((self._numbered, labels))
+        self._numbered = known[np.lexsort((known["word"], known["number"], known["segment"]))]
+        self._program.labels = self._numbered
+        self._define(flow.definitions)
+        if not flow.definitions and len(self.files) > 1:  # a file of a program without its number
+            number = own_number(file.name)
+            self._define([Definition(number, first_word, is_program=True)])
+
+    def _look_at_siemens_lines(self, first_row: int, word_of_row: Ints) -> None:
+        file = self.files[-1]
+        flow = SiemensFlow(file.text, file.first_line, self._line.astype(np.int64))
+        for row in range(first_row, len(self._lines) - 1):
+            start = int(self._lines["start"][row])
+            content = self._text[start : self._text.index(b"\n", start)]
+            if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
+                self._lines["kind"][row] = tables.KIND_NOTHING
+            else:
+                flow.add(self._lines, row, int(word_of_row[row]), content)
+        self._tell_subprograms()
+
+    def _define(self, definitions: Iterable[Definition]) -> None:
+        for definition in definitions:
             self._labels.setdefault(definition.label, len(self._labels))
             self._definitions.setdefault(definition.label, []).append((len(self.files) - 1, definition))
         self._tell_subprograms()
+
+    def start_at(self, line: int) -> None:
+        """Begin at a line of the main program: what stands before it has run."""
+        self._at = int(np.searchsorted(self._line, line))
 
     def _tell_subprograms(self) -> None:
         known = self._subprograms
@@ -189,10 +246,14 @@ class Program:
         label = self._wanted_label()
         word = int(self.course["wanted_word"][0])
         file = next(k for k, end in enumerate(self._ends) if word < end)
-        self._read_file(label, len(self.messages))
-        found = self._definition(label, file, word)
+        if not self._is_macro or not self._in_file(label, file):
+            self._read_file(label)
+        found = self._macro(label, file) if self._is_macro else self._definition(label, file, word)
         if found is None:
-            self._report_missing(hands_over, word)
+            self._report(hands_over, word, f.SUBPROGRAM_MISSING)
+            return
+        if self._is_macro and len(self._in_file(label, file)) > 1:
+            self._report(hands_over, word, f.O_WORD, faults.FAULT_SUB_TWICE)
             return
         self._tell_subprograms()
         ready = (int(label) if label.isdigit() else -1, found.entry, 1, found.is_program)
@@ -214,22 +275,32 @@ class Program:
         below = [d for k, d in known if k == file and d.entry > word]
         return next(iter((*of_own_file, *below)), None)
 
-    def _is_own(self, file: int, label: Label) -> bool:
-        return Path(self.files[file].name).stem.lower() == label
+    def _in_file(self, label: Label, file: int) -> list[Definition]:
+        """Return where a program of a number begins in a file."""
+        return [definition for k, definition in self._definitions.get(label, []) if k == file]
 
-    def _read_file(self, label: Label, messages: int) -> None:
+    def _macro(self, label: Label, file: int) -> Definition | None:
+        """Return where a program of a Fanuc begins: in the file that calls it, else in its own."""
+        own = [k for k in range(1, len(self.files)) if self._is_own(k, label)]
+        return next((each for k in (file, *own) for each in self._in_file(label, k)), None)
+
+    def _is_own(self, file: int, label: Label) -> bool:
+        name = self.files[file].name
+        return own_number(name) == label if self._is_macro else Path(name).stem.lower() == label
+
+    def _read_file(self, label: Label) -> None:
         if label in self._looked_for:
             return
         self._looked_for.add(label)
-        path = found_file(label, self._folders, Path(self.name).suffix)
+        path = found_file(label, self._folders, Path(self.name).suffix, of_fanuc=self._is_macro)
         if path is not None:
             self.add(str(path), path.read_bytes(), 1, messages=0)
 
-    def _report_missing(self, hands_over: HandsOver, word: int) -> None:
+    def _report(self, hands_over: HandsOver, word: int, number: int, fault: int = 0) -> None:
         counts, found = hands_over.counts, hands_over.found
         row = int(counts["findings"][0])
         if row < len(found):
-            found[row] = (f.SUBPROGRAM_MISSING, int(self._line[word]), 0.0, 0.0, -1.0)
+            found[row] = (number, int(self._line[word]), float(fault), 0.0, -1.0)
             counts["findings"] += 1
         counts["errors"] += 1
         self.course["is_stopped"] = 1
@@ -282,14 +353,15 @@ class _Rows(dict[Label, int]):
         return self._labels.setdefault(label, len(self._labels))
 
 
-def _empty_program(course: NDArray[Any]) -> Any:
+def _empty_program(course: NDArray[Any], spoken: Dialect) -> Any:
     """Return the tables of a program at its start; pages that nothing reaches cost nothing."""
     frames = np.zeros(tables.FRAMES, tables.FRAME)
+    statement_names, statement_kinds = spoken.names()
     course["wanted"] = _NOTHING_WANTED
     course["generation"] = frames["generation"][0] = 1
     names = np.zeros(tables.MOST_NAMES, tables.NAME)
     parameters = np.full(tables.MOST_PARAMETERS, np.nan)  # none is set
-    parameters[_DEBUG_IS_SHOWN] = 1.0
+    parameters[_DEBUG_IS_SHOWN] = 1.0  # no variable of a Fanuc
     program = tables.PROGRAM(
         text=np.frombuffer("\n".join(f"<{name}>" for name in NAMES).encode(), np.uint8),
         lines=np.zeros(0, tables.LINE),
@@ -308,6 +380,11 @@ def _empty_program(course: NDArray[Any]) -> Any:
         value=np.zeros(tables.ROOM_OF_LINE),
         line=np.zeros(tables.ROOM_OF_LINE, np.int32),
         extra=np.zeros(tables.ROOM_OF_LINE),
+        labels=np.zeros(0, tables.LABEL),
+        statement_names=statement_names,
+        statement_kinds=statement_kinds,
+        syntax=spoken.syntax_bits(),
+        language=spoken.programs,
     )
     _set_names(program)
     return program

@@ -14,7 +14,20 @@
     TOO_DEEP,
     NO_PARAMETER,
     BEHIND_O_WORD,
-) = range(13)
+    MACRO_NAME,
+    MACRO_ALONE,
+    MACRO_BEHIND_IF,
+    MACRO_BEHIND_THEN,
+    MACRO_BEHIND_WHILE,
+    MACRO_COMPARISONS,
+    MACRO_NULL,
+    SIEMENS_VALUE,
+    SIEMENS_BRACKET,
+    SIEMENS_ATAN2,
+    SIEMENS_COMPARISONS,
+    SIEMENS_SAME_BLOCK,
+    SIEMENS_GOTO,
+) = range(26)
 
 EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     NO_VALUE: (
@@ -42,6 +55,28 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
         "nothing but a comment may stand here, behind the O-word",
         "write it on a line of its own",
     ),
+    MACRO_NAME: ("a Fanuc's variables have numbers", "write #100; or is this a program for linuxcnc?"),
+    MACRO_ALONE: ("a calculation (#1 = …) shares its block with words", "give it a block of its own"),
+    MACRO_BEHIND_IF: ("IF […] is followed by GOTO or THEN", "write IF [#1 GT 5] GOTO 10"),
+    MACRO_BEHIND_THEN: ("THEN is followed by one calculation", "write IF [#1 GT 5] THEN #2 = 3"),
+    MACRO_BEHIND_WHILE: ("WHILE […] is followed by DO1, DO2 or DO3", "write WHILE [#1 LT 5] DO1"),
+    MACRO_COMPARISONS: (
+        "two comparisons stand in one bracket, and on a Fanuc AND, OR and XOR go before them",
+        "write [[#1 GT 5] AND [#2 LT 3]]",
+    ),
+    SIEMENS_VALUE: (
+        "a value is missing here, or it is one that is not read",
+        "write numbers, R0 to R99 ( ) + - * / SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND LN EXP",
+    ),
+    SIEMENS_BRACKET: ("a bracket is not closed", "add )"),
+    SIEMENS_ATAN2: ("ATAN2 takes two arguments", "write ATAN2(y,x)"),
+    SIEMENS_COMPARISONS: ("two comparisons stand in one bracket", "write them in two lines with IF"),
+    SIEMENS_SAME_BLOCK: ("an R parameter is set and used, or set twice, in one block", "write two blocks"),
+    SIEMENS_GOTO: (
+        "IF and its condition are followed by something else than a jump",
+        "write IF R1<5 GOTOB LOOP",
+    ),
+    MACRO_NULL: ("#0 is always empty", "use another variable"),
 }
 
 (
@@ -59,7 +94,17 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     FEED_OF_TIME,
     FEED_OF_OTHER_UNIT,
     TURNED_UNDER_SHIFT,
-) = range(14)
+    MACRO_OF_CONTROL,
+    MACRO_UNKNOWN,
+    MACRO_ALARM,
+    MACRO_ATAN,
+    MACRO_ASIN,
+    MACRO_ROUND,
+    MACRO_NEAR,
+    MACRO_BITS,
+    MACRO_REMAINDER,
+    SIEMENS_R,
+) = range(24)
 VALUE_FAULTS: dict[int, str] = {
     DIVISION_BY_ZERO: "division by zero",
     SQUARE_ROOT: "the square root of {b:g} does not exist",
@@ -75,6 +120,16 @@ VALUE_FAULTS: dict[int, str] = {
     FEED_OF_TIME: "#<_feed> under G93 is no feed, but what the move before made of it",
     TURNED_UNDER_SHIFT: "the place is not sure: G10 L2 R has turned the zero while G52 or G92 shifts it",
     FEED_OF_OTHER_UNIT: "#<_feed> was programmed in another unit, before G20 or G21",
+    MACRO_OF_CONTROL: "#{b:.0f} is a system variable, which only the control knows",
+    MACRO_UNKNOWN: "there is no #{b:.0f}: variables are #1 to #33, #100 to #199 and #500 to #999",
+    MACRO_ALARM: "the program stops here with an alarm of its own (#3000)",
+    MACRO_ATAN: "ATAN of {b:g} over a number is an angle below 0 or above 180, by a parameter of the control",
+    MACRO_ASIN: "ASIN of {b:g} is an angle below 0 or above 270, by a parameter of the control",
+    MACRO_ROUND: "ROUND in a word rounds to the least increment of the control",
+    MACRO_NEAR: "numbers that differ by {b:.1e} are compared: which is larger hangs on the rounding",
+    MACRO_BITS: "AND, OR and XOR take whole numbers from 0 on, here {b:g}",
+    SIEMENS_R: "R{b:.0f}: whether there are more than R0 to R99 is a setting of the machine",
+    MACRO_REMAINDER: "MOD takes whole numbers, here {b:g}",
 }
 VALUE_REMEDY = "check the parameters that the expression takes"
 VALUE_REMEDIES: dict[int, str] = {
@@ -83,6 +138,13 @@ VALUE_REMEDIES: dict[int, str] = {
     OF_OTHER_AXIS: "write the number itself",
     FEED_OF_TIME: "keep the number in a parameter of its own, #1 = 5 and F#1",
     TURNED_UNDER_SHIFT: "program X and Y behind G10, or end the shift before it (G92.1)",
+    MACRO_OF_CONTROL: "write the number itself; leave out what sets up the control, such as #3003 and #3006",
+    MACRO_UNKNOWN: "use one of these",
+    MACRO_ALARM: "check what the program tests: an argument may be missing",
+    MACRO_ATAN: "let the first number of ATAN be positive, and turn the angle yourself",
+    MACRO_ASIN: "let ASIN take a positive number, and turn the angle yourself",
+    MACRO_ROUND: "write #1 = ROUND[…] on a line of its own, and then X#1",
+    MACRO_NEAR: "compare with a margin: LT 10.05 instead of LE 10",
     FEED_OF_OTHER_UNIT: "program F behind G20 or G21, in a line of its own",
 }
 """Remedies of values that are known on the control and not here."""
@@ -107,7 +169,18 @@ VALUE_REMEDIES: dict[int, str] = {
     FAULT_REPEATS,
     FAULT_NOT_FIRST,
     FAULT_BEHIND,
-) = range(19)
+    FAULT_STATEMENT,
+    FAULT_DO_NUMBER,
+    FAULT_DO_OPEN,
+    FAULT_END_ALONE,
+    FAULT_NO_LABEL,
+    FAULT_INTO_LOOP,
+    FAULT_NEXT_PROGRAM,
+    FAULT_MACRO_WORDS,
+    FAULT_MACRO_POINT,
+    FAULT_M98_MACRO,
+    FAULT_M99_WORDS,
+) = range(30)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -139,6 +212,42 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_NOT_FIRST: (
         "an O-word, M98 or M99 stands behind other words",
         "write it on a line of its own",
+    ),
+    FAULT_STATEMENT: (
+        "this is no statement of a macro that is read",
+        "there are #1 = …, IF GOTO THEN, GOTO, WHILE DO END, G65, M98 and M99",
+    ),
+    FAULT_DO_NUMBER: ("DO and END have a number from 1 to 3", "write DO1 and END1"),
+    FAULT_DO_OPEN: ("this DO has no END of its number", "add END1 behind the loop of DO1, and nest loops"),
+    FAULT_END_ALONE: ("this END has no DO of its number", "nest loops: the inner one ends first"),
+    FAULT_NO_LABEL: (
+        "no line of this program has the number that GOTO names",
+        "write N and this number at the line that is meant",
+    ),
+    FAULT_INTO_LOOP: (
+        "GOTO leads into a loop from outside",
+        "let it lead before the WHILE, or behind the END",
+    ),
+    FAULT_NEXT_PROGRAM: (
+        "another program begins here, and the one before has no end",
+        "end the main program with M30, a subprogram with M99",
+    ),
+    FAULT_MACRO_WORDS: (
+        "G65 is followed by P, the number of a program, and arguments, a letter once, I J K in this order, "
+        "no G L N O",
+        "write G65 P9010 A1. B2.",
+    ),
+    FAULT_MACRO_POINT: (
+        "an argument of G65 has no decimal point: what it is hangs on its letter and on the control",
+        "write the point: A10.",
+    ),
+    FAULT_M98_MACRO: (
+        "M98 takes P, the number of a program, and L, how often; P31234 is 3 times O1234",
+        "write M98 P1234 L3",
+    ),
+    FAULT_M99_WORDS: (
+        "words stand behind M99: M99 P would go on at a line of the caller",
+        "write M99 alone, or GOTO before it",
     ),
     FAULT_REPEATS: ("more than 256 repeat loops are within each other", "write it otherwise"),
 }

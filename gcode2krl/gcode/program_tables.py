@@ -6,13 +6,29 @@ A marked line is one with an expression, a parameter or an O-word: the scanner l
 
 import numpy as np
 
-from gcode2krl.compiled.core import BYTES, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, ArrayOf, StructOf
+from gcode2krl.compiled.core import (
+    BYTES,
+    INT,
+    INTS32,
+    OUT_BYTES,
+    OUT_FLOATS,
+    OUT_INTS,
+    OUT_INTS32,
+    ArrayOf,
+    StructOf,
+)
 from gcode2krl.gcode.vocabulary import LINE_LIMIT
 
 MOST_PARAMETERS = 5602
 """LinuxCNC's parameters are #1 to #5601, and 0 is none."""
 LOCAL_PARAMETERS = 30
 """#1 to #30 are the arguments of a subprogram; each call has its own."""
+MOST_R = 100
+"""R0 to R99 are there on every Sinumerik; more are a setting of the machine."""
+MACRO_LOCALS = 33
+"""#1 to #33 are those of a macro on a Fanuc."""
+MACRO_COMMON, MACRO_KEPT, MACRO_END = (100, 199), (500, 999), 1000
+"""First and last of the common variables of a Fanuc, and the first of the control's own."""
 FRAMES = 10
 """Levels of calls, the main program among them, as in LinuxCNC."""
 MOST_NAMES = 10_000
@@ -42,7 +58,11 @@ ROOM_OF_LINE = 2 * (LINE_LIMIT + 1)
     KIND_PROGRAM_NUMBER,
     KIND_END_OF_FILE,
     KIND_FAULT,
-) = range(18)
+    KIND_GOTO,
+    KIND_MACRO_IF,
+    KIND_MACRO_WHILE,
+    KIND_SIEMENS_IF,
+) = range(22)
 """What a marked line is: a block, an O-line that says nothing here, one that has not been looked at, …"""
 
 LINE = np.dtype(
@@ -55,6 +75,7 @@ LINE = np.dtype(
         ("subprogram", "i4"),  # row of SUBPROGRAM: which is called, -1 = its number is computed
         ("first_message", "i4"),  # number of the first message comment of the line
         ("fault", "i4"),  # FAULT_… of KIND_FAULT
+        ("segment", "i4"),  # which program of a Fanuc the line is in
     ],
     align=True,
 )
@@ -75,14 +96,25 @@ FRAME = np.dtype(
         ("generation", "i8"),  # which names of the frame's row are its own
         ("entry", "i8"),
         ("is_program", "i4"),
+        ("has_arguments", "i4"),  # its parameters are its own
         ("main_line", "i4"),  # of the main program's file: the line of the call, 0 = this is that file
         ("repeats", "i4"),  # loops that were begun before the call
-        ("parameters", "f8", LOCAL_PARAMETERS),  # of the caller
+        ("parameters", "f8", MACRO_LOCALS),  # of the caller
     ],
     align=True,
 )
 REPEAT = np.dtype([("word", "i8"), ("end", "i8"), ("left", "i8")])
 ASSIGNMENT = np.dtype([("name", "i8"), ("number", "i8"), ("value", "f8")])
+LABEL = np.dtype(
+    [
+        ("segment", "i8"),
+        ("number", "i8"),
+        ("word", "i8"),  # at which GOTO goes on
+        ("loop_first", "i8"),  # words of the innermost loop that it is in, -1 = none
+        ("loop_last", "i8"),
+    ]
+)
+"""N and its number, for GOTO; sorted by segment, number and word."""
 COURSE = np.dtype(
     [
         ("steps", "i8"),  # lines executed
@@ -125,4 +157,9 @@ PROGRAM = StructOf(
     value=OUT_FLOATS,
     line=OUT_INTS32,
     extra=OUT_FLOATS,
+    labels=ArrayOf(LABEL),
+    statement_names=BYTES,
+    statement_kinds=INTS32,
+    syntax=INT,
+    language=INT,
 )

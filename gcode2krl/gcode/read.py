@@ -14,6 +14,7 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
@@ -22,6 +23,7 @@ from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
 from gcode2krl.gcode.program import HandsOver, Program
+from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.state import (
@@ -34,6 +36,7 @@ from gcode2krl.gcode.state import (
     EVENT_TOOL,
     GROUP_OF_G,
     IMPLIED_M5,
+    MODES,
     OF_CYCLE,
     WORK_OFFSETS,
     initial_state,
@@ -171,10 +174,13 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
+        mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
     with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
-        head, diameters = _interpreted(interpreter, scanned, name, _size_of(stream), folders, progress)
+        head, diameters = _interpreted(
+            interpreter, scanned, spoken, name, _size_of(stream), folders, progress
+        )
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
         doubts += other_tools(diameters, toolpath, cell)
@@ -185,6 +191,7 @@ def read_stream(
 def _interpreted(
     interpreter: "_Interpreter",
     scanned: Iterator[tuple[int, bytes, Words]],
+    spoken: Dialect,
     name: str,
     size: int,
     folders: Sequence[Path],
@@ -200,9 +207,11 @@ def _interpreted(
                 refuse_other_languages(head, name)
             stopped_at = interpreter.feed(words, text, first_line, size)
             if stopped_at is not None:
-                rest = text[_start_of_line(text, stopped_at - first_line) :]
+                # a jump may lead back to a line that has run, as far as it is in this piece
+                begin = stopped_at if spoken.programs == d.PROGRAMS_LINUXCNC else first_line
+                rest = text[_start_of_line(text, begin - first_line) :]
                 whole = b"".join((rest, *(more for _, more, _ in scanned)))
-                interpreter.run_whole(whole, stopped_at, folders)
+                interpreter.run_whole(whole, begin, stopped_at, folders)
                 break
             diameters += named_diameters(text, first_line)
             if progress is not None:
@@ -212,6 +221,11 @@ def _interpreted(
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
     return head, diameters
+
+
+def _mounted_tool(cell: "Cell | None") -> int:
+    """Return the tool that is in the spindle at the start, -1 where nobody says which."""
+    return -1 if cell is None or cell.mounted_tool is None else cell.mounted_tool
 
 
 def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
@@ -271,7 +285,7 @@ class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
     def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
-        self.name = name
+        self.name, self.spoken = name, spoken
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
         for key, value in spoken.start.items():
             self.state[key] = value
@@ -286,6 +300,7 @@ class _Interpreter:
             rows=self.columns.views(),
             events=self.events,
             found=self.found,
+            saved=np.zeros(FRAMES, MODES),
             **spoken.settings(),
             group_of_g=GROUP_OF_G,
             doubt_of_g=DOUBT_OF_G,
@@ -338,10 +353,11 @@ class _Interpreter:
                 return int(words.line[at])
             self._make_room()
 
-    def run_whole(self, text: bytes, first_line: int, folders: Sequence[Path]) -> None:
-        """Run the rest of a program from its first line on that computes or jumps."""
-        program = Program(self.name, folders, block_delete=bool(self.machine.block_delete))
+    def run_whole(self, text: bytes, first_line: int, begin: int, folders: Sequence[Path]) -> None:
+        """Run the rest of a program from the line ``begin`` on, the first that computes or jumps."""
+        program = Program(self.name, self.spoken, folders, block_delete=bool(self.machine.block_delete))
         program.add(self.name, text, first_line, len(self.messages))
+        program.start_at(begin)
         program.run(HandsOver(self.machine, self.state, self.counts, self.found), self._make_room)
         self.messages += [_decode(message) for message in program.messages]
         self.most_decimals = max(self.most_decimals, program.most_decimals)
@@ -393,6 +409,7 @@ class _Interpreter:
             rest_line=self.rest_line,
             most_decimals=self.most_decimals,
             head=head,
+            programs=self.spoken.programs,
         )
         return self._toolpath((*found, *map(self._placed, whole)), cell)
 
@@ -431,8 +448,9 @@ class _Interpreter:
 
     def _events(self) -> Iterator[Event]:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
-        for row, kind, line, a, b, dwell_s in self.events[: self._count("events")].tolist():
+        for row, kind, line, a, b, dwell_s, q, e in self.events[: self._count("events")].tolist():
             what, values = self._said(kind, line, a, b)
+            values |= {letter: word for letter, word in (("q", q), ("e", e)) if not math.isnan(word)}
             if dwell_s > 0:
                 values["dwell_s"] = dwell_s
             yield Event(row, what, values)

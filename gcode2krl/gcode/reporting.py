@@ -2,7 +2,18 @@
 
 import numpy as np
 
-EVENT = np.dtype([("row", "i8"), ("kind", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8"), ("dwell", "f8")])
+EVENT = np.dtype(
+    [
+        ("row", "i8"),
+        ("kind", "i4"),
+        ("line", "i4"),
+        ("a", "f8"),
+        ("b", "f8"),
+        ("dwell", "f8"),
+        ("q", "f8"),  # words Q and E of an M-code, NaN = none
+        ("e", "f8"),
+    ]
+)
 FOUND = np.dtype([("number", "i4"), ("line", "i4"), ("a", "f8"), ("b", "f8"), ("c", "f8")])
 COUNTS = np.dtype(
     [

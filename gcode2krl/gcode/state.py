@@ -70,6 +70,7 @@ STATE = np.dtype(
         ("tape_marks", "i4"),
         ("unit_named", "i1"),
         ("blocks", "i8"),
+        ("level", "i4"),  # of the calls of subprograms, 0 = main program
         ("largest_mm", "f8"),
         ("unknown_feed_line", "i4"),  # first feed move from a position not programmed
         ("unknown_reported", "i1"),
@@ -128,6 +129,35 @@ STATE = np.dtype(
     ],
     align=True,  # as C lays it out
 )
+
+MODES = np.dtype(
+    [
+        ("is_saved", "i4"),  # by M70 or M73
+        ("restored_on_return", "i4"),  # by M73
+        ("unit_mm", "f8"),
+        ("absolute", "i4"),
+        ("arc_absolute", "i4"),
+        ("plane", "i4"),
+        ("feed_mode", "i4"),
+        ("feed", "f8"),
+        ("feed_of_other_unit", "f8"),
+        ("feed_word", "f8"),
+        ("rpm", "f8"),
+        ("direction", "i4"),
+        ("mist", "i4"),
+        ("flood", "i4"),
+        ("length_offset", "f8"),
+        ("offset_tool", "i4"),
+        ("length_code", "i4"),
+        ("exact_stop", "i4"),
+        ("tolerance", "f8"),
+        ("work_offset", "i4"),
+        ("retract", "i4"),
+        ("cutter_mode", "i4"),
+    ],
+    align=True,
+)
+"""What M70 saves: all modes but that of motion; the shift of G52 and G92 is no mode."""
 
 CUTTER_ON, CUTTER_BESIDE = 1, 2
 """Cutter compensation is on; G40 has left the tool beside the programmed point, until a straight move."""

@@ -68,7 +68,8 @@ M6 = 6  # tool change
 M7, M9 = 7, 9  # mist, both off; M8 between them is flood
 M19 = 19  # spindle orientation
 M48, M53 = 48, 53  # overrides, M48 to M53
-M61, M62 = 61, 62  # tool number, inputs and outputs
+M61, M66 = 61, 66  # tool number, wait for an input
+M62, M63, M64, M65, M67, M68 = 62, 63, 64, 65, 67, 68  # outputs: on, off, on, off; values
 M70, M71, M72, M73 = 70, 71, 72, 73  # modal state: save, forget, restore, save and restore on return
 M98, M99 = 98, 99  # subprograms
 
@@ -92,7 +93,7 @@ RADIUS_COMPENSATION, LENGTH_OFFSET, RETRACT, WORK_OFFSET, PATH_CONTROL, SPINDLE_
 SHIFT_STATE = 13
 GROUPS = 14
 """Modal groups of G-codes, numbered in the order of the tables in `state`."""
-M_STOP, M_TOOL_CHANGE, M_SPINDLE, M_COOLANT, M_OVERRIDE = 4, 6, 7, 8, 9
+M_STOP, M_IO, M_TOOL_CHANGE, M_SPINDLE, M_COOLANT, M_OVERRIDE = 4, 5, 6, 7, 8, 9
 """Modal groups of M-codes as RS274/NGC numbers them; M-codes of no group are 0."""
 M_CODES = 4
 """M-codes that a block may have."""

@@ -34,6 +34,7 @@ NEVER_RELEASED = frozenset(
         "tool-lies",
         "no-clearance",
         "no-feed",
+        "signal-twice",
         "template",
         "cell-missing",
         "online-nothing",

@@ -137,6 +137,8 @@ def event_statements(event: Event, cell: Cell) -> str:
         rpm=rpm,
         m=code,
         p=event.values.get("p"),
+        q=event.values.get("q"),
+        e=event.values.get("e"),
         text=ascii_text(event.values.get("text", "")),
         line=line,
     )

@@ -29,6 +29,7 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     findings += missing_issues(toolpath, cell)
     findings += doubtful_issues(toolpath, cell)
     findings += list(_events(toolpath, cell))
+    findings += list(_outputs_of_words(toolpath, cell))
     return tuple(findings)
 
 
@@ -326,6 +327,28 @@ def _events(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
                 "give tool_change in the cell"
                 if code == "M6"
                 else f'add {code} = "…" to [m_code] of the cell',
+            )
+
+
+def _outputs_of_words(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the M-codes whose words name an output of the spindle, the coolant or the online side."""
+    with_words = [event for event in toolpath.events if {"p", "q", "e"} & event.values.keys()]
+    if not with_words:
+        return
+    from gcode2krl.cell.output_words import reserved_outputs, switched_by_words
+
+    reserved, seen = reserved_outputs(cell), set()
+    for event in with_words:
+        for signal in sorted(switched_by_words(event, cell) & reserved.keys()):
+            if (event.values["m"], signal) in seen:
+                continue
+            seen.add((event.values["m"], signal))
+            yield Issue(
+                "error",
+                "signal-twice",
+                int(event.values["line"]),
+                f"M{event.values['m']} switches {signal} here, which belongs to {reserved[signal]}",
+                "name another output",
             )
 
 

@@ -1,5 +1,6 @@
 """A program that begins at a later G-code line: its options, its name, its record."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,9 +66,10 @@ def read_from_line(
     begin: Begin = unseen,
     standard: StandardInput | None = None,
     dialect: str = DIALECT_NAMES[0],
+    search: Sequence[str | Path] = (),
 ) -> "Toolpath":
     """Read G-code, from a line on where one is named; see `inputs.read_part`."""
-    toolpath = read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect)
+    toolpath = read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect, search)
     if from_line is None:
         return toolpath
     from gcode2krl.restart import restarted

@@ -3,7 +3,7 @@
 import hashlib
 import io
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
@@ -56,9 +56,12 @@ def read_part(
     begin: Begin = unseen,
     standard: StandardInput | None = None,
     dialect: str = DIALECT_NAMES[0],
+    search: Sequence[str | Path] = (),
 ) -> "Toolpath":
     """Read G-code from a file, or from standard input (which may be given, to ask it for its hash)."""
     from gcode2krl.gcode import read_gcode, read_stream
+
+    require_search(search)
 
     whole = part != STANDARD and Path(part).is_file() and not part.lower().endswith(PACKED_ENDING)
     size = Path(part).stat().st_size if whole else 0
@@ -76,6 +79,7 @@ def read_part(
             dialect=dialect,
             chord_tolerance_mm=chord_tolerance_mm,
             block_delete=block_delete,
+            search=search,
             progress=advance,
         )
     return read_stream(
@@ -85,8 +89,23 @@ def read_part(
         dialect=dialect,
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
+        folders=tuple(map(Path, search)),
         progress=advance,
     )
+
+
+def require_search(folders: Sequence[str | Path]) -> None:
+    """Refuse what is no folder where folders with subprograms are wanted."""
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise input_error("option-value", f"--search {folder}: this is not a folder", "name a folder")
+
+
+def subprogram_files(part: str | Path, search: Sequence[str | Path]) -> tuple[Path, ...]:
+    """Return the files whose content a part may take in as subprograms; none where it calls none."""
+    from gcode2krl.gcode.dependencies import possible_files
+
+    return possible_files(Path(part), tuple(map(Path, search)))
 
 
 def require_part(part: str) -> None:

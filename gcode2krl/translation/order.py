@@ -28,6 +28,8 @@ class Order:
     chord_tolerance_mm: float = 0.01
     block_delete: bool = False
     dialect: str = DIALECT_NAMES[0]
+    search: tuple[str, ...] = ()
+    """Folders with subprograms, beside that of the part."""
     allow: tuple[str, ...] = ()
     strict: bool = False
     no_guard: bool = False

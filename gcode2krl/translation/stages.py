@@ -130,6 +130,7 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
         begin,
         known.standard,
         order.dialect,
+        order.search,
     )
     known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job))
 
@@ -235,6 +236,7 @@ def _header_words(order: Order, cell: "Cell") -> str:
         "chord_tolerance": order.chord_tolerance_mm,
         "block_delete": order.block_delete,
         "dialect": order.dialect if order.dialect != DIALECT_NAMES[0] else None,
+        "search": ",".join(Path(folder).name for folder in order.search) or None,
         "job": Path(order.job_path).name if order.job_path is not None else None,
         "spin": cell.frames.spin,
         "compensate": order.compensate,

@@ -24,6 +24,7 @@ typedef struct {
     int32_t g[V_GROUPS], m_codes[V_M_CODES];
     uint8_t next_word;                        /* what a dialect says of the next word, 0 = nothing */
     int32_t pointless, absolute, incremental; /* bits of the letters of which it has been said */
+    uint8_t shift;                            /* TRANS or ATRANS, 0 = neither */
     int32_t harmless;                         /* a code that says nothing, ten times */
     int32_t unit_again;                       /* G70 or G71, ten times */
     bool exact_once;                          /* an exact stop of this block alone */

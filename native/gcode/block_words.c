@@ -5,6 +5,7 @@
 #include "gcode/dialect_words.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
+#include "gcode/saved_modes.h"
 
 /* A code this far from a whole number is one that a post has rounded. */
 static const double CODE_SLACK = 1e-6;
@@ -26,6 +27,10 @@ static Taken take_g(Block *b, double value) {
     bool read = true;
     const bool no_code = written < 0 || written > D_MOST_CODES || fabs(tenfold - (double)written) > CODE_SLACK;
     const int32_t code = no_code ? D_CODE_UNKNOWN : core_code(b, written, &read);
+    if (code == D_CODE_CALL) {
+        b->counts->program_wanted = 1;
+        return WITHOUT_DOUBT;
+    }
     if (code < D_CODE_UNKNOWN)
         return read ? UNDERSTOOD : faulty(S_DOUBT_MOTION | S_DOUBT_POSITION);
     const bool outside = code < 0;
@@ -56,27 +61,28 @@ static Taken take_g(Block *b, double value) {
 
 /* --- M-codes -------------------------------------------------------------------------------------------- */
 
-static bool is_unsupported_m(int64_t code) { return code == V_M19 || (code >= V_M61 && code <= V_M73); }
+static bool is_unsupported_m(const Block *b, int64_t code) {
+    return code == V_M19 || (b->machine->has_m61_to_m73 && code == V_M66);
+}
 
 /* Tell whether an M-code jumps: native/gcode/execute.c does that. */
 static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
 
 /* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
-static bool want_program(Block *b) {
-    if (b->machine->runs_programs)
+static bool want_program(Block *b, bool is_there) {
+    if (is_there)
         b->counts->program_wanted = 1;
     else
         report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_PROGRAM});
-    return b->machine->runs_programs != 0;
+    return is_there;
 }
 
-/* Return what is in doubt after an M-code that is not read. */
-static int32_t doubt_of_m(int64_t code) { return code == V_M61 ? S_DOUBT_TOOL : 0; }
-
 /* Return the modal group of an M-code, 0 for none. */
-static int m_group(int64_t code) {
+static int m_group(const Machine *machine, int64_t code) {
     if (code == V_M0 || code == V_M1 || code == V_M2 || code == V_M30 || code == V_M60)
         return V_M_STOP;
+    if (is_own_m(machine, code))
+        return code == V_M61 ? V_M_TOOL_CHANGE : code < V_M70 ? V_M_IO : V_M_SPINDLE;
     if (code == V_M6)
         return V_M_TOOL_CHANGE;
     if (code >= V_M3 && code <= V_M5)
@@ -92,14 +98,15 @@ static Taken take_m(Block *b, double value) {
         report(b, F_BAD_M, (Says){.a = value});
         return WITHOUT_DOUBT;
     }
-    if (is_unsupported_m(code)) {
+    if (is_unsupported_m(b, code)) {
         report(b, F_UNSUPPORTED_M, (Says){.a = (double)(code * V_TENFOLD)});
-        return faulty(doubt_of_m(code));
+        return faulty(0);
     }
     if (is_of_program(code)) {
-        return want_program(b) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
+        const bool is_there = b->machine->programs == D_PROGRAMS_LINUXCNC || b->machine->programs == D_PROGRAMS_FANUC;
+        return want_program(b, is_there) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
     }
-    const int group = m_group(code);
+    const int group = m_group(b->machine, code);
     bool good = true;
     int count = 0;
     while (count < V_M_CODES && b->m_codes[count] >= 0)
@@ -109,13 +116,21 @@ static Taken take_m(Block *b, double value) {
         return WITHOUT_DOUBT;
     }
     for (int k = 0; k < count; k++)
-        if (group > 0 && m_group(b->m_codes[k]) == group) {
+        if (group > 0 && m_group(b->machine, b->m_codes[k]) == group) {
             report(b, F_SAME_GROUP_M,
                    (Says){.a = b->m_codes[k] * V_TENFOLD, .b = (double)(code * V_TENFOLD)});
             good = false;
         }
     b->m_codes[count] = (int32_t)code;
     return good ? UNDERSTOOD : WITHOUT_DOUBT;
+}
+
+/* Tell whether a block has M67 or M68, whose E is the number of an output. */
+static bool sets_output(const Block *b) {
+    for (int k = 0; b->machine->has_m61_to_m73 && k < V_M_CODES; k++)
+        if (b->m_codes[k] == V_M67 || b->m_codes[k] == V_M68)
+            return true;
+    return false;
 }
 
 /* --- all words of a block ------------------------------------------------------------------------------- */
@@ -233,15 +248,18 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == CH_PAREN_OPEN) {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
         } else if (c == V_PROGRAM_LINE) {
-            if (!want_program(b)) {
+            if (!want_program(b, b->machine->programs != D_PROGRAMS_NONE)) {
                 good = false;
                 *doubt |= S_DOUBT_ALL;
             }
         } else if (c == V_MARK) {
             take_mark(b, words, AT(words->value, k));
             good = false;
+        } else if (c == D_PROGRAM_NUMBER) { /* behind blocks another program begins */
+            b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < CH_AT_SIGN) {
             take_dialect_mark(b, c);
+            used = used || b->shift;
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;
@@ -249,7 +267,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             *doubt |= taken.doubt;
         }
     }
-    if (b->has[V_WORD_E] && good) { /* else it belongs to what has been reported, as in M68 E0 */
+    if (b->has[V_WORD_E] && good && !sets_output(b)) { /* else it belongs to what has been reported */
         report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
         good = false;
     }

@@ -4,10 +4,11 @@
 
 #include "gcode/numbers.h"
 #include "gcode/scan_columns.h"
+#include "gcode/siemens_values.h"
 
 /* --- characters ----------------------------------------------------------------------------------------- */
 
-static int64_t after_blanks(Bytes text, int64_t i) {
+static int64_t behind_blanks(Bytes text, int64_t i) {
     while (i < text.rows && is_blank(AT(text, i)))
         i++;
     return i;
@@ -46,15 +47,22 @@ static int64_t after_arguments(Bytes text, int64_t i) {
 
 /* Tell whether nothing of a value follows a number that ends at i: no operator, no name, no bracket. */
 static bool ends_value(Bytes text, int64_t i) {
-    i = after_blanks(text, i);
+    i = behind_blanks(text, i);
     if (i >= text.rows)
         return true;
     const uint8_t c = AT(text, i);
     return c == CH_NEWLINE || c == CH_SEMICOLON || c == CH_PAREN_CLOSE || c == CH_PAREN_OPEN || is_letter(c);
 }
 
-/* Write a refusal for a reason and leave out the rest of the line. */
-static int64_t refuse(Scan *scan, int64_t i, int64_t line, int reason) {
+/* Write a refusal for a reason and leave out the rest of the line; in a program that computes it is reported when the
+   line is executed. */
+static int64_t refuse(Scan *scan, Evaluation *e, int64_t i, int64_t line, int reason) {
+    if (e != NULL)
+        wrong(e, F_DIALECT_STATEMENT, reason, 0.0, i);
+    else if (scan->whole_program)
+        return NEEDS_LINE;
+    if (e != NULL)
+        return line_end(scan->text, i);
     put_mark(scan, F_DIALECT_STATEMENT, reason, line);
     return line_end(scan->text, i);
 }
@@ -65,7 +73,7 @@ static int64_t refuse(Scan *scan, int64_t i, int64_t line, int reason) {
 static int64_t head_line(Scan *scan, int64_t i, int64_t line) {
     const Bytes text = scan->text;
     if (AT(text, i) == CH_PERCENT) {
-        const int64_t behind = after_blanks(text, i + 1);
+        const int64_t behind = behind_blanks(text, i + 1);
         if (behind >= text.rows || AT(text, behind) == CH_NEWLINE)
             return i;
         put(scan, CH_PERCENT, 0.0, line);
@@ -74,11 +82,15 @@ static int64_t head_line(Scan *scan, int64_t i, int64_t line) {
     int64_t end = i + 1;
     while (end < text.rows && is_digit(AT(text, end)))
         end++;
-    return AT(text, i) == CH_COLON && end > i + 1 ? end : i;
+    if (end == i + 1 || (scan->syntax & D_MACROS && scan->whole_program))
+        return i;
+    if (scan->syntax & D_MACROS)
+        put(scan, D_PROGRAM_NUMBER, 0.0, line);
+    return end;
 }
 
 /* A line that begins with $ sets up, homes, jogs or asks; ? and ~ alone ask and go on. */
-static int64_t dollar_line(Scan *scan, int64_t i, int64_t line, bool first) {
+static int64_t dollar_line(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool first) {
     const Bytes text = scan->text;
     const uint8_t c = AT(text, i);
     if (c == CH_QUESTION || c == CH_TILDE) {
@@ -90,7 +102,7 @@ static int64_t dollar_line(Scan *scan, int64_t i, int64_t line, bool first) {
     const int64_t end = line_end(text, i);
     for (int64_t k = i; k < end; k++)
         if (AT(text, k) == CH_EQUALS)
-            return refuse(scan, i, line,
+            return refuse(scan, e, i, line,
                           (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_J ? DR_REASON_JOG : DR_REASON_SETTING);
     put(scan, D_SKIPPED, 0.0, line);
     return end;
@@ -117,34 +129,43 @@ static int32_t statement_kind(const Scan *scan, int64_t i, int64_t end) {
 }
 
 /* Write a word whose value stands behind =, i being the place behind it; its value gets `more`. */
-static int64_t assigned(Scan *scan, int letter, int64_t i, int64_t line, double more) {
+static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_t line, double more) {
     const Bytes text = scan->text;
-    i = after_blanks(text, i);
+    i = behind_blanks(text, i);
     const int64_t name_end = after_name(text, i);
     const bool counted = name_end == i + 2 && (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_C &&
-                         stands_at(text, after_blanks(text, name_end), CH_PAREN_OPEN);
+                         stands_at(text, behind_blanks(text, name_end), CH_PAREN_OPEN);
     const int kind = counted ? AT(text, i) & ~CH_CASE_BIT : 0;
     if (counted)
-        i = after_blanks(text, name_end) + 1;
-    const Number value = number(text, after_blanks(text, i));
-    int64_t end = value.end;
-    const bool closed = !counted || stands_at(text, end, CH_PAREN_CLOSE);
-    if (value.digits == 0 || value.finding != F_OK || !closed || !ends_value(text, end) ||
-        (counted && kind != CH_LETTER_A && kind != CH_LETTER_I))
-        return refuse(scan, i, line, DR_REASON_VALUES);
+        i = behind_blanks(text, name_end) + 1;
+    const Number plain = number(text, behind_blanks(text, i));
+    int64_t end = plain.end;
+    double value = plain.value;
+    const bool is_plain = plain.digits > 0 && plain.finding == F_OK && ends_value(text, end);
+    if (counted && kind != CH_LETTER_A && kind != CH_LETTER_I)
+        return refuse(scan, e, i, line, DR_REASON_VALUES);
+    if (!is_plain) {
+        if (e == NULL)
+            return NEEDS_LINE;
+        end = i;
+        value = siemens_value(e, &end);
+    }
+    end = behind_blanks(text, end);
+    if (counted && !stands_at(text, end, CH_PAREN_CLOSE))
+        return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (counted)
         put(scan, kind == CH_LETTER_A ? D_NEXT_ABSOLUTE : D_NEXT_INCREMENTAL, 0.0, line);
-    put(scan, letter, value.value + more, line);
+    put(scan, letter, value + more, line);
     return end + counted;
 }
 
 /* MSG("text"); MSG() clears what is shown. */
 static int64_t message(Scan *scan, int64_t i, int64_t line) {
     const Bytes text = scan->text;
-    const int64_t open = after_blanks(text, i);
+    const int64_t open = behind_blanks(text, i);
     if (!stands_at(text, open, CH_PAREN_OPEN))
         return i;
-    const int64_t quote = after_blanks(text, open + 1), end = after_arguments(text, open);
+    const int64_t quote = behind_blanks(text, open + 1), end = after_arguments(text, open);
     if (stands_at(text, quote, CH_QUOTE))
         put_message(scan, i - 3, after_quotes(text, quote) - 1, line); /* MSG("text */
     return end;
@@ -152,7 +173,7 @@ static int64_t message(Scan *scan, int64_t i, int64_t line) {
 
 /* Leave out what belongs to a statement that says nothing: its arguments or its value. */
 static int64_t after_harmless(Bytes text, int64_t i) {
-    const int64_t behind = after_blanks(text, i);
+    const int64_t behind = behind_blanks(text, i);
     if (stands_at(text, behind, CH_BRACKET_OPEN)) {
         while (i < text.rows && AT(text, i) != CH_NEWLINE && AT(text, i) != CH_BRACKET_CLOSE)
             i++;
@@ -162,69 +183,78 @@ static int64_t after_harmless(Bytes text, int64_t i) {
         return after_arguments(text, behind);
     if (!stands_at(text, behind, CH_EQUALS))
         return i;
-    const int64_t value = after_blanks(text, behind + 1);
+    const int64_t value = behind_blanks(text, behind + 1);
     const Number number_behind = number(text, value);
     return number_behind.digits > 0 ? number_behind.end : after_name(text, value);
 }
 
 /* Write what the statement makes whose name stands from i to end. */
-static int64_t statement(Scan *scan, int64_t i, int64_t end, int64_t line) {
+static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
     const int32_t kind = statement_kind(scan, i, end);
-    const int64_t behind = after_blanks(text, end);
+    const int64_t behind = behind_blanks(text, end);
     const bool is_assigned = stands_at(text, behind, CH_EQUALS);
     switch (kind < 0 ? -1 : kind % D_KIND_STEP) {
     case D_HARMLESS: put(scan, D_SKIPPED, 0.0, line); return after_harmless(text, end);
     case D_WHOLE_LINE: put(scan, D_SKIPPED, 0.0, line); return line_end(text, i);
     case D_RADIUS:
         if (is_assigned)
-            return assigned(scan, CH_LETTER_R, behind + 1, line, 0.0);
+            return assigned(scan, e, CH_LETTER_R, behind + 1, line, 0.0);
         break;
     case D_TURNS: /* full circles beside the arc itself, which P counts too */
         if (is_assigned)
-            return assigned(scan, CH_LETTER_P, behind + 1, line, 1.0);
+            return assigned(scan, e, CH_LETTER_P, behind + 1, line, 1.0);
         break;
-    case D_MESSAGE: return message(scan, end, line);
+    case D_JUMP: return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
+    case D_MESSAGE:
+        if (e != NULL)
+            return refuse(scan, e, i, line, DR_REASON_MESSAGE);
+        return message(scan, end, line);
     case D_CODE: put(scan, CH_LETTER_G, kind / D_KIND_STEP, line); return end;
     case D_ENDS: put(scan, CH_LETTER_M, V_M30, line); return end;
-    case D_REFUSED: return refuse(scan, i, line, kind / D_KIND_STEP);
+    case D_SHIFT:
+        put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
+        return end;
+    case D_REFUSED: return refuse(scan, e, i, line, kind / D_KIND_STEP);
     }
     if (stands_at(text, behind, CH_COLON)) { /* a label: jumps to it are refused */
         put(scan, D_SKIPPED, 0.0, line);
         return behind + 1;
     }
-    return refuse(scan, i, line, DR_REASON_FLOW);
+    return refuse(scan, e, i, line, DR_REASON_FLOW);
 }
 
 /* X=5, S1=8000, M1=3: a word with its value behind =; i where none stands there. */
-static int64_t word_with_equals(Scan *scan, int64_t i, int64_t line) {
+static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
     const Bytes text = scan->text;
     int64_t behind = i + 1;
     while (behind < text.rows && is_digit(AT(text, behind)))
         behind++;
-    const int64_t equals = after_blanks(text, behind);
+    const int64_t equals = behind_blanks(text, behind);
     if (!stands_at(text, equals, CH_EQUALS))
         return i;
     const int letter = AT(text, i) & ~CH_CASE_BIT;
     const bool numbered = behind > i + 1;
     const bool first_one = behind == i + 2 && AT(text, i + 1) == CH_DIGIT_1;
     if (letter == CH_LETTER_T)
-        return refuse(scan, i, line, DR_REASON_TOOL_NAME);
+        return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
     if (letter == CH_LETTER_A + 1 || letter == CH_LETTER_A || letter == CH_LETTER_C)
         if (numbered)
-            return refuse(scan, i, line, DR_REASON_VECTORS);
+            return refuse(scan, e, i, line, DR_REASON_VECTORS);
+    if (letter == CH_LETTER_R && numbered)
+        return e == NULL ? NEEDS_LINE : assign_r(e, i, behind, equals + 1);
     if (letter == CH_LETTER_R || letter == CH_LETTER_N || letter == CH_LETTER_O ||
         (numbered && !(first_one && (letter == CH_LETTER_S || letter == CH_LETTER_M))))
-        return refuse(scan, i, line, DR_REASON_VALUES);
-    return assigned(scan, letter, equals + 1, line, 0.0);
+        return refuse(scan, e, i, line, DR_REASON_VALUES);
+    return assigned(scan, e, letter, equals + 1, line, 0.0);
 }
 
 /* Return the place behind a statement or a word with =, i where the letter at i begins a plain word. */
-static int64_t statement_item(Scan *scan, int64_t i, int64_t line) {
+static int64_t statement_item(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
     const int64_t end = after_name(scan->text, i);
     if (end > i + 1 && (is_letter(AT(scan->text, i + 1)) || AT(scan->text, i + 1) == CH_UNDERSCORE))
-        return statement(scan, i, end, line);
-    return word_with_equals(scan, i, line);
+        return statement(scan, e, i, end, line);
+    return word_with_equals(scan, e, i, line);
 }
 
 /* --- numbers without a point ---------------------------------------------------------------------------- */
@@ -232,33 +262,35 @@ static int64_t statement_item(Scan *scan, int64_t i, int64_t line) {
 /* Tell whether a letter's numbers are lengths, angles or feeds, which Fanuc reads by their point. */
 static bool has_point_rule(int letter) {
     return letter >= CH_LETTER_X || (letter >= CH_LETTER_I && letter <= CH_LETTER_K) || letter == CH_LETTER_F ||
-           letter == CH_LETTER_R || letter == CH_LETTER_R - 1 || letter <= CH_LETTER_C ||
+           letter == CH_LETTER_R || letter == CH_LETTER_R - 1 || letter <= CH_LETTER_C || letter == CH_LETTER_E ||
            (letter > CH_LETTER_T && letter < CH_LETTER_X);
 }
 
-/* Mark the word at i where its number, other than 0, has no point. */
-static void mark_pointless(Scan *scan, int64_t i, int64_t line) {
-    const Bytes text = scan->text;
+/* Tell whether the number of the word at i goes by its point, and, other than 0, has none. */
+bool lacks_point(Bytes text, int64_t i) {
     if (!has_point_rule(AT(text, i) & ~CH_CASE_BIT))
-        return;
+        return false;
     bool zero = true;
     for (i++; i < text.rows && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || is_space(AT(text, i))); i++)
         zero = zero && !(is_digit(AT(text, i)) && AT(text, i) != CH_DIGIT_0);
-    if (!zero && !stands_at(text, i, CH_POINT))
-        put(scan, D_NEXT_POINTLESS, 0.0, line);
+    return !zero && !stands_at(text, i, CH_POINT);
 }
+
+/* Return the place behind the digit of /2, whose / stands before i. */
+int64_t after_skip_level(Bytes text, int64_t i) { return i < text.rows && is_digit(AT(text, i)) ? i + 1 : i; }
 
 /* --- all ------------------------------------------------------------------------------------------------ */
 
-/* Write what a dialect has at i beside plain words; return the place behind, i where a plain word stands there. */
-int64_t dialect_item(Scan *scan, int64_t i, int64_t line, bool first) {
+/* Write what a dialect has at i beside plain words; return the place behind, i where a plain word stands there, and
+   NEEDS_LINE where the line has to be read when it is executed: then with an evaluation, else without. */
+int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool first) {
     const Bytes text = scan->text;
     const uint8_t c = AT(text, i);
     const int64_t syntax = scan->syntax;
     if (is_letter(c)) {
-        if (syntax & D_POINTS)
-            mark_pointless(scan, i, line);
-        return syntax & D_STATEMENTS ? statement_item(scan, i, line) : i;
+        if (syntax & D_POINTS && lacks_point(text, i))
+            put(scan, D_NEXT_POINTLESS, 0.0, line);
+        return syntax & D_STATEMENTS ? statement_item(scan, e, i, line) : i;
     }
     if (syntax & D_SKIP_LEVEL && c == CH_SLASH && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {
         put(scan, CH_SLASH, 0.0, line);
@@ -266,5 +298,5 @@ int64_t dialect_item(Scan *scan, int64_t i, int64_t line, bool first) {
     }
     if (syntax & D_HEAD_LINES && first && (c == CH_PERCENT || c == CH_COLON))
         return head_line(scan, i, line);
-    return syntax & D_DOLLAR_LINES ? dollar_line(scan, i, line, first) : i;
+    return syntax & D_DOLLAR_LINES ? dollar_line(scan, e, i, line, first) : i;
 }

@@ -27,9 +27,19 @@ static bool in_cycle(const Block *b) {
     return b->g[V_NON_MODAL] != V_G4 && is_cycle(named ? b->g[V_MOTION] / V_TENFOLD : b->state->motion);
 }
 
+/* TRANS and ATRANS are G52 with other axis words. */
+static void take_shift(Block *b, uint8_t c) {
+    if (b->shift || b->g[V_NON_MODAL] >= 0)
+        refuse_statement(b, DR_REASON_SHIFT_BESIDE);
+    b->shift = c;
+    b->g[V_NON_MODAL] = V_G52;
+}
+
 /* Take what the scanner has marked: the next word, or something that says nothing. */
 void take_dialect_mark(Block *b, uint8_t c) {
-    if (c == D_SKIPPED)
+    if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
+        take_shift(b, c);
+    else if (c == D_SKIPPED)
         note(b, S_NOTE_STATEMENT, 0);
     else
         b->next_word = c;
@@ -238,7 +248,7 @@ bool to_core_words(Block *b) {
             good = count_axis(b, axis) && good;
             count_centre(b, axis);
         }
-    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && !b->machine->runs_programs)
+    if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
     if (b->harmless)
         good = use_harmless_words(b) && good;

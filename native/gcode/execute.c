@@ -4,37 +4,13 @@
    jumps of O-words have been found by gcode2krl/gcode/o_words.py, as words at which to go on. */
 
 #include "gcode/flow.h"
+#include "gcode/macro_flow.h"
 #include "gcode/machine.h"
 #include "gcode/program_line.h"
 
-/* Let rows and events of another file say the line of the main program that called it. */
-static void name_caller(const Run *run, int64_t first_row, int64_t first_event) {
-    const int32_t main_line = frame_of(run)->main_line;
-    if (main_line == 0)
-        return;
-    Machine *machine = run->machine;
-    const Counts *counts = machine->counts.at;
-    for (int64_t row = first_row; row < counts->rows; row++)
-        AT(machine->rows.source_line, row) = main_line;
-    for (int64_t k = first_event; k < counts->events; k++)
-        AT(machine->events, k).line = main_line;
-    if (machine->state.at->ended)
-        machine->state.at->end_line = main_line;
-}
-
-/* Execute a block whose words are known; return the word at which to go on. */
-static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
+/* Execute a block that calls nothing; return the word at which to go on. */
+int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
     Counts *counts = run->machine->counts.at;
-    const bool deletable = AT(words->letter, from) == CH_SLASH;
-    if (deletable && run->machine->block_delete)
-        return next;
-    if (from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
-        const double m = AT(words->value, from + deletable);
-        if (m == V_M98)
-            return call_program(run, words, from + deletable + 1, to, next);
-        if (m == V_M99)
-            return end_program(run, from + deletable + 1 == to, next);
-    }
     const State *s = run->machine->state.at;
     const int64_t first_row = counts->rows + s->cutter_rows_removed, first_event = counts->events;
     counts->marks = counts->program_wanted = 0;
@@ -44,6 +20,23 @@ static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t t
     if (counts->rows > run->course->most_rows)
         return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
     return next;
+}
+
+/* Execute a block whose words are known; return the word at which to go on. */
+static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
+    const bool deletable = AT(words->letter, from) == CH_SLASH;
+    if (deletable && run->machine->block_delete)
+        return next;
+    if (run->program->language == D_PROGRAMS_FANUC)
+        return macro_block(run, words, from + deletable, to, next);
+    if (run->program->language == D_PROGRAMS_LINUXCNC && from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
+        const double m = AT(words->value, from + deletable);
+        if (m == V_M98)
+            return call_program(run, words, from + deletable + 1, to, next);
+        if (m == V_M99)
+            return end_program(run, from + deletable + 1 == to, next);
+    }
+    return block_of_words(run, words, from, to, next);
 }
 
 /* Execute a block with an expression, a parameter or an assignment. */

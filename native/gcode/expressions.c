@@ -6,6 +6,7 @@
 
 #include "gcode/expressions.h"
 
+#include "gcode/macro_values.h"
 #include "gcode/numbers.h"
 
 enum { MOST_DEPTH = 200 }; /* of values within values */
@@ -28,30 +29,38 @@ static double radians(double degrees, double *left_over) {
 }
 
 /* Return radians in degrees, rounded once behind the product. */
-static double degrees(double radian) {
+double degrees(double radian) {
     const double product = radian * 180.0, quotient = product / PI;
     return quotient + (fma(-quotient, PI, product) - quotient * PI_REST) / PI;
 }
 
-static double sine(double degrees) {
+double sine(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over);
     return sin(angle) + left_over * cos(angle);
 }
 
-static double cosine(double degrees) {
+double cosine(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over);
     return cos(angle) - left_over * sin(angle);
 }
 
-static double tangent(double degrees) {
+double tangent(double degrees) {
     double left_over;
     const double angle = radians(degrees, &left_over), t = tan(angle);
     return t + left_over * (1.0 + t * t);
 }
 
 static double function_of(Evaluation *e, Function function, double x, int64_t place) {
+    if (is_macro(e)) {
+        if (function == FIX || function == FUP)
+            return function == FIX ? trunc(x) : x < 0.0 ? floor(x) : ceil(x);
+        if (function == ASIN && x < 0.0)
+            return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_ASIN, x, place);
+        if (function == ROUND && e->in_word)
+            return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_ROUND, x, place);
+    }
     switch (function) {
     case ABS: return fabs(x);
     case ACOS:
@@ -90,7 +99,7 @@ static Function function_at(const Evaluation *e, int64_t *i) {
         if (behind == *i)
             continue;
         behind = after_blanks(text, behind, e->end);
-        if (behind < e->end && is_letter(AT(text, behind)))
+        if ((behind < e->end && is_letter(AT(text, behind))) || (function == EXISTS && is_macro(e)))
             continue;
         *i = behind;
         return function;
@@ -100,13 +109,12 @@ static Function function_at(const Evaluation *e, int64_t *i) {
 
 /* --- operators ------------------------------------------------------------------------------------------ */
 
-typedef enum { CLOSING, POWER, TIMES, OVER, MODULO, PLUS, MINUS, EQ, NE, GT, GE, LT, LE, AND, OR, XOR } Kind;
 typedef struct {
     const char *word;
     Kind kind;
     int rank;
 } Operator;
-enum { LOWEST = 1, ANY = 0 };
+enum { LOWEST = 1, ANY = 0, POINT_RANK = 4, LINE_RANK = 3 };
 static const Operator WORDS[] = {{"mod", MODULO, 4}, {"eq", EQ, 2}, {"ne", NE, 2},   {"gt", GT, 2}, {"ge", GE, 2},
                                  {"lt", LT, 2},      {"le", LE, 2}, {"and", AND, 1}, {"or", OR, 1}, {"xor", XOR, 1}};
 enum { WORDS_COUNT = sizeof WORDS / sizeof *WORDS };
@@ -116,6 +124,9 @@ static Operator operator_at(Evaluation *e, int64_t i, int64_t *behind) {
     static const Operator CLOSES = {"]", CLOSING, ANY};
     const Bytes text = e->program->text;
     *behind = i + 1;
+    if (e->is_open && e->brackets == 0 &&
+        (i >= e->end || AT(text, i) == CH_PAREN_OPEN || AT(text, i) == CH_SEMICOLON))
+        return CLOSES;
     if (i >= e->end) {
         wrong(e, F_EXPRESSION, PF_UNCLOSED_BRACKET, 0.0, least(i, e->end - 1));
         return CLOSES;
@@ -127,7 +138,7 @@ static Operator operator_at(Evaluation *e, int64_t i, int64_t *behind) {
     case CH_SLASH: return (Operator){"/", OVER, 4};
     case CH_ASTERISK: {
         const int64_t second = after_blanks(text, i + 1, e->end);
-        if (second >= e->end || AT(text, second) != CH_ASTERISK)
+        if (second >= e->end || AT(text, second) != CH_ASTERISK || is_macro(e))
             return (Operator){"*", TIMES, 4};
         *behind = second + 1;
         return (Operator){"**", POWER, 5};
@@ -135,8 +146,12 @@ static Operator operator_at(Evaluation *e, int64_t i, int64_t *behind) {
     }
     for (int k = 0; k < WORDS_COUNT; k++) {
         *behind = after_word(text, i, e->end, WORDS[k].word);
-        if (*behind > i)
-            return WORDS[k];
+        if (*behind == i)
+            continue;
+        Operator found = WORDS[k];
+        if (is_macro(e) && found.kind >= AND) /* on a Fanuc they go with * and +, before comparisons */
+            found.rank = found.kind == AND ? POINT_RANK : LINE_RANK;
+        return found;
     }
     wrong(e, F_EXPRESSION, PF_UNKNOWN_OPERATOR, 0.0, i);
     return CLOSES;
@@ -176,6 +191,7 @@ static double apply(Evaluation *e, Kind kind, double a, double b, int64_t place)
 /* Work out values and operators of at least a rank. */
 static double operation(Evaluation *e, int64_t *i, int rank) {
     double left = value_at(e, i);
+    bool compared = false;
     while (e->finding == F_OK) {
         int64_t behind;
         *i = after_blanks(e->program->text, *i, e->end);
@@ -184,9 +200,19 @@ static double operation(Evaluation *e, int64_t *i, int rank) {
             break;
         const int64_t place = *i;
         *i = behind;
+        const bool left_is_null = e->is_null;
         const double right = operation(e, i, found.rank + 1);
-        if (e->finding == F_OK)
+        if (e->finding != F_OK)
+            break;
+        if (is_macro(e) && compared && is_comparison(found.kind))
+            return wrong(e, F_EXPRESSION, PF_MACRO_COMPARISONS, 0.0, place);
+        compared |= is_comparison(found.kind);
+        const Operands two = {left, right, left_is_null, e->is_null};
+        if (is_macro(e) && is_macro_operator(found.kind))
+            left = apply_in_macro(e, found.kind, &two, place);
+        else
             left = e->dry ? 1.0 : apply(e, found.kind, left, right, place);
+        e->is_null = false;
     }
     return left;
 }
@@ -194,9 +220,19 @@ static double operation(Evaluation *e, int64_t *i, int rank) {
 /* Work out the expression whose [ stands at i, and go behind its ]. */
 double bracket_at(Evaluation *e, int64_t *i) {
     ++*i;
+    e->brackets++;
     const double value = operation(e, i, LOWEST);
+    e->brackets--;
     if (e->finding == F_OK)
         ++*i; /* the closing bracket */
+    return value;
+}
+
+/* Work out an expression without a bracket around it, as a Fanuc has it behind =. */
+double open_value(Evaluation *e, int64_t *i) {
+    e->is_open = true;
+    const double value = operation(e, i, LOWEST);
+    e->is_open = false;
     return value;
 }
 
@@ -233,6 +269,8 @@ static int64_t parameter_number(Evaluation *e, int64_t *i) {
 static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
     const Bytes text = e->program->text;
     const int64_t place = *i;
+    if (is_macro(e))
+        return variable_at(e, i);
     *i = after_blanks(text, *i + 1, e->end);
     if (*i < e->end && AT(text, *i) == CH_LESS) {
         const int64_t name = name_at(e, i);
@@ -286,7 +324,9 @@ static double arc_tangent(Evaluation *e, int64_t *i, double y) {
     *i = after_blanks(text, slash + 1, e->end);
     if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
         return wrong(e, F_EXPRESSION, PF_NO_SLASH, 0.0, slash);
-    return degrees(atan2(y, bracket_at(e, i)));
+    if (is_macro(e) && y < 0.0)
+        return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_ATAN, y, slash);
+    return degrees(atan2(y + 0.0, bracket_at(e, i)));
 }
 
 static double call_at(Evaluation *e, int64_t *i) {
@@ -325,12 +365,16 @@ bool begins_value(Bytes text, int64_t i, int64_t end) {
 static double unsigned_value(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     const uint8_t c = AT(text, *i);
+    e->is_null = false;
     if (c == CH_BRACKET_OPEN)
         return bracket_at(e, i);
     if (c == CH_HASH)
         return parameter_at(e, i, false);
-    if (is_letter(c))
-        return call_at(e, i);
+    if (is_letter(c)) {
+        const double value = call_at(e, i);
+        e->is_null = false;
+        return value;
+    }
     if (!is_digit(c) && c != CH_POINT)
         return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, *i);
     const Number read = number(text, *i);
@@ -357,6 +401,7 @@ double value_at(Evaluation *e, int64_t *i) {
     e->depth++;
     const double value = unsigned_value(e, i);
     e->depth--;
+    e->is_null = e->is_null && !negative;
     if (isnan(value))
         return wrong(e, F_EXPRESSION_VALUE, PF_NOT_A_NUMBER, 0.0, place);
     if (isinf(value))
@@ -370,7 +415,9 @@ void assignment_at(Evaluation *e, int64_t *i) {
     const int64_t place = *i;
     Assignment made = {NO_NAME, 0, 0.0};
     *i = after_blanks(text, *i + 1, e->end);
-    if (*i < e->end && AT(text, *i) == CH_LESS)
+    if (is_macro(e))
+        made.number = variable_number(e, i, place);
+    else if (*i < e->end && AT(text, *i) == CH_LESS)
         made.name = name_at(e, i);
     else
         made.number = parameter_number(e, i);
@@ -379,12 +426,18 @@ void assignment_at(Evaluation *e, int64_t *i) {
         wrong(e, F_EXPRESSION, PF_NO_EQUALS, 0.0, place);
     if (e->finding != F_OK)
         return;
-    if (!e->dry && (made.name == NO_NAME ? is_read_only(made.number) : made.name < N_PREDEFINED)) {
+    if (is_macro(e) && made.number == 0) {
+        wrong(e, F_EXPRESSION, PF_MACRO_NULL, 0.0, place);
+        return;
+    }
+    if (!e->dry && !is_macro(e) && (made.name == NO_NAME ? is_read_only(made.number) : made.name < N_PREDEFINED)) {
         wrong(e, F_PARAMETER_READ_ONLY, 0.0, 0.0, place);
         return;
     }
     ++*i;
-    made.value = value_at(e, i);
+    made.value = is_macro(e) ? open_value(e, i) : value_at(e, i);
+    if (e->is_null)
+        made.value = VACANT;
     Course *at = e->program->course.at;
     if (e->finding == F_OK && !e->dry)
         AT(e->program->assignments, at->assignments++) = made;

@@ -3,9 +3,13 @@
 #include "gcode/flow.h"
 
 #include "gcode/expressions.h"
+#include "gcode/macro_flow.h"
 #include "gcode/program_line.h"
+#include "gcode/machine.h"
 #include "gcode/reporting.h"
+#include "gcode/saved_modes.h"
 #include "gcode/settings.h"
+#include "gcode/siemens_values.h"
 
 /* --- the end of a program that cannot go on ------------------------------------------------------------- */
 
@@ -17,7 +21,7 @@ int64_t stop_with(Run *run, int finding, double a, int64_t next) {
     return next;
 }
 
-static int64_t stop_at_fault(Run *run, int fault, int64_t next) { return stop_with(run, F_O_WORD, fault, next); }
+int64_t stop_at_fault(Run *run, int fault, int64_t next) { return stop_with(run, F_O_WORD, fault, next); }
 
 /* Report what is wrong with an expression; behind another error its value may be a consequence. */
 void report_unless_caused(Run *run, const Evaluation *e, int64_t start) {
@@ -29,7 +33,7 @@ void report_unless_caused(Run *run, const Evaluation *e, int64_t start) {
 }
 
 /* The same, and go no further. */
-static int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
+int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
     report_unless_caused(run, e, start);
     run->course->is_stopped = 1;
     return next;
@@ -38,7 +42,7 @@ static int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t 
 /* --- expressions of O-lines ----------------------------------------------------------------------------- */
 
 /* Tell whether nothing but a comment stands from i on; else that is wrong. */
-static bool line_ends(Evaluation *e, int64_t i) {
+bool line_ends(Evaluation *e, int64_t i) {
     const Bytes text = e->program->text;
     i = after_blanks(text, i, e->end);
     if (e->finding == F_OK && i < e->end && AT(text, i) != CH_PAREN_OPEN && AT(text, i) != CH_SEMICOLON)
@@ -47,7 +51,7 @@ static bool line_ends(Evaluation *e, int64_t i) {
 }
 
 /* Work out the bracket at i. */
-static double bracket_value(Evaluation *e, int64_t *i) {
+double bracket_value(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     *i = after_blanks(text, *i, e->end);
     if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
@@ -69,7 +73,7 @@ static bool only_value(Run *run, const MarkedLine *marked, double *value) {
 /* --- jumps ---------------------------------------------------------------------------------------------- */
 
 /* Go on at a word: repeat loops that it is outside of are over. */
-static int64_t jump(Run *run, int64_t word) {
+int64_t jump(Run *run, int64_t word) {
     Course *at = run->course;
     const int32_t base = frame_of(run)->repeats;
     while (at->repeats > base) {
@@ -99,6 +103,19 @@ static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
     return next;
 }
 
+/* IF condition GOTOF label, of a Sinumerik. */
+static int64_t siemens_if(Run *run, const MarkedLine *marked, int64_t next) {
+    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
+    int64_t i = marked->expression;
+    const double test = siemens_value(&e, &i);
+    i = after_blanks(run->program->text, i, e.end);
+    if (e.finding == F_OK && after_word(run->program->text, i, e.end, "goto") == i)
+        wrong(&e, F_EXPRESSION, PF_SIEMENS_GOTO, 0.0, least(i, e.end - 1));
+    if (e.finding != F_OK)
+        return stop_wrong(run, &e, marked->start, next);
+    return test != 0.0 ? jump(run, marked->target) : next;
+}
+
 static int64_t loop(Run *run, const MarkedLine *marked, int64_t next) {
     double test;
     if (!only_value(run, marked, &test))
@@ -125,10 +142,27 @@ static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
     return jump(run, marked->target);
 }
 
+/* Let rows and events of another file say the line of the main program that called it. */
+void name_caller(const Run *run, int64_t first_row, int64_t first_event) {
+    const int32_t main_line = frame_of(run)->main_line;
+    if (main_line == 0)
+        return;
+    Machine *machine = run->machine;
+    const Counts *counts = machine->counts.at;
+    for (int64_t row = first_row; row < counts->rows; row++)
+        AT(machine->rows.source_line, row) = main_line;
+    for (int64_t k = first_event; k < counts->events; k++)
+        AT(machine->events, k).line = main_line;
+    if (machine->state.at->ended)
+        machine->state.at->end_line = main_line;
+}
+
 /* --- calls ---------------------------------------------------------------------------------------------- */
 
-/* Begin the next run of a program that M98 calls several times: its names are new. */
+/* Begin the next run of a program that M98 calls several times: its names are new, no modes are saved in it. */
 static int64_t enter(Run *run, Frame *frame) {
+    run->machine->state.at->level = (int32_t)run->course->frame;
+    forget_modes(run->machine);
     frame->generation = ++run->course->generation;
     return frame->entry;
 }
@@ -141,16 +175,27 @@ static int32_t main_line_of(const Run *run, int64_t entry) {
     return callers != 0 ? callers : run->line;
 }
 
-/* Call the subprogram of a row; `arguments` are none for M98, which keeps #1 to #30. */
-static int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
+/* Tell whether the subprogram of a row can be entered; else it is wanted. */
+bool is_ready(Run *run, int64_t row) {
+    if (AT(run->program->subprograms, row).is_ready)
+        return true;
+    run->course->wanted = row;
+    run->course->wanted_word = run->word;
+    return false;
+}
+
+/* Return how many parameters each call has of its own. */
+static int locals_of(const Program *program) {
+    return program->language == D_PROGRAMS_FANUC ? P_MACRO_LOCALS : P_LOCAL_PARAMETERS;
+}
+
+/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's. */
+int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
     Course *at = run->course;
     const Subprogram *subprogram = &AT(run->program->subprograms, row);
-    if (!subprogram->is_ready) {
-        at->wanted = row;
-        at->wanted_word = run->word;
+    if (!is_ready(run, row))
         return WAIT;
-    }
-    if ((subprogram->is_program != 0) != (arguments == NULL))
+    if (run->program->language != D_PROGRAMS_FANUC && (subprogram->is_program != 0) != (arguments == NULL))
         return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
     if (at->frame + 1 >= run->program->frames.rows)
         return stop_with(run, F_CALLS_TOO_DEEP, P_FRAMES - 1, next);
@@ -161,10 +206,11 @@ static int64_t call(Run *run, int64_t row, const double *arguments, int64_t time
     frame->return_to = next;
     frame->times = times - 1;
     frame->entry = subprogram->entry;
-    frame->is_program = arguments == NULL;
+    frame->is_program = subprogram->is_program;
+    frame->has_arguments = arguments != NULL;
     frame->main_line = main_line;
     frame->repeats = (int32_t)at->repeats;
-    for (int k = 0; arguments != NULL && k < P_LOCAL_PARAMETERS; k++) {
+    for (int k = 0; arguments != NULL && k < locals_of(run->program); k++) {
         frame->parameters[k] = AT(run->program->parameters, k + 1);
         AT(run->program->parameters, k + 1) = arguments[k];
     }
@@ -172,7 +218,7 @@ static int64_t call(Run *run, int64_t row, const double *arguments, int64_t time
 }
 
 /* Find the row of the subprogram with a number; else it is wanted. */
-static int64_t row_of_number(Run *run, int64_t number) {
+int64_t row_of_number(Run *run, int64_t number) {
     for (int64_t row = 0; row < run->course->subprograms; row++)
         if (AT(run->program->subprograms, row).number == number)
             return row;
@@ -241,14 +287,33 @@ int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int
     return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, times, next);
 }
 
+/* Restore what M73 has saved in the subprogram that ends; return false where room is wanted, or with a finding. */
+static bool restore_on_return(Run *run) {
+    Machine *machine = run->machine;
+    if (!restores_on_return(machine))
+        return true;
+    if (!has_room(machine, 0))
+        return false;
+    const int64_t rows = machine->counts.at->rows, first_event = machine->counts.at->events;
+    Block block = {.machine = machine, .state = machine->state.at, .counts = machine->counts.at, .line = run->line};
+    const bool restored = restore_modes(&block);
+    if (!restored)
+        run->course->is_stopped = 1;
+    name_caller(run, rows, first_event);
+    return restored;
+}
+
 /* Go back to behind the call. */
 static int64_t leave(Run *run) {
     Course *at = run->course;
     const Frame *frame = frame_of(run);
+    if (!restore_on_return(run))
+        return at->is_stopped ? frame->return_to : WAIT;
     at->repeats = frame->repeats;
-    for (int k = 0; !frame->is_program && k < P_LOCAL_PARAMETERS; k++)
+    for (int k = 0; frame->has_arguments && k < locals_of(run->program); k++)
         AT(run->program->parameters, k + 1) = frame->parameters[k];
     at->frame--;
+    run->machine->state.at->level = (int32_t)at->frame;
     return frame->return_to;
 }
 
@@ -261,11 +326,13 @@ int64_t end_program(Run *run, bool is_alone, int64_t next) {
         return stop_at_fault(run, PF_FAULT_NOT_FIRST, next);
     if (!frame->is_program)
         return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
-    if (frame->times-- > 0) {
-        run->course->repeats = frame->repeats;
-        return enter(run, frame);
-    }
-    return leave(run);
+    if (frame->times <= 0)
+        return leave(run);
+    if (!restore_on_return(run))
+        return run->course->is_stopped ? next : WAIT;
+    frame->times--;
+    run->course->repeats = frame->repeats;
+    return enter(run, frame);
 }
 
 /* endsub and return, with a value or without. */
@@ -327,6 +394,10 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_RETURN: return return_from(run, marked, next);
     case P_KIND_SUB: return define(run, marked, next);
     case P_KIND_END_OF_FILE: return end_of_file(run, next);
+    case P_KIND_GOTO: return go_to_number(run, marked, next);
+    case P_KIND_MACRO_IF: return macro_if(run, marked, next);
+    case P_KIND_MACRO_WHILE: return macro_while(run, marked, next);
+    case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

@@ -292,7 +292,7 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
 }
 
 /* Tell whether there is room for what a block of so many words makes, but for an arc; else say how much. */
-static bool has_room(Machine *machine, int64_t words) {
+bool has_room(Machine *machine, int64_t words) {
     Counts *counts = machine->counts.at;
     counts->rows_wanted = counts->rows + ROWS_PER_BLOCK;
     counts->events_wanted = counts->events + EVENTS_PER_BLOCK + words; /* each may be a message */

@@ -64,7 +64,7 @@ static void note_moved(Block *b, int which, const double before_mm[3], const dou
         return;
     for (int axis = 0; axis < 3 && s->note_count[which] == 0; axis++)
         moved_mm[axis] = after_mm[axis] - before_mm[axis];
-    note(b, which, b->g[V_NON_MODAL]);
+    note(b, which, b->shift ? 0 : b->g[V_NON_MODAL]);
 }
 
 /* --- what is set by the position ------------------------------------------------------------------------ */
@@ -88,18 +88,25 @@ static int32_t unknown_axes(const Block *b, bool together) {
 
 /* --- G52 and G92 ---------------------------------------------------------------------------------------- */
 
-/* G52 shifts the zero by the words, G92 so that the tool stands at the words. */
+/* Return the shift that an axis has behind the block without a word of its own: TRANS clears it. */
+static double shift_without_word(const Block *b, int axis) {
+    return b->shift == D_SHIFT_SET ? 0.0 : b->state->shift_mm[axis];
+}
+
+/* G52 and TRANS shift the zero by the words, ATRANS further by them, G92 so that the tool stands at the words. */
 static void shift_by_words(Block *b, bool by_position) {
     State *s = b->state;
     const double *offset_mm = offset_of(b->machine, s->work_offset), here_mm[3] = {s->x, s->y, s->z};
     double shift_mm[3];
     bool stays = true;
     for (int axis = 0; axis < 3; axis++) {
-        shift_mm[axis] = s->shift_mm[axis];
+        shift_mm[axis] = shift_without_word(b, axis);
         if (!b->has[V_WORD_X + axis])
             continue;
         const double value_mm = b->word[V_WORD_X + axis] * s->unit_mm;
         shift_mm[axis] = by_position ? here_mm[axis] - offset_mm[axis] - value_mm : value_mm;
+        if (b->shift == D_SHIFT_ADD)
+            shift_mm[axis] += s->shift_mm[axis];
         stays = stays && shift_mm[axis] == s->shift_mm[axis];
     }
     if (by_position)
@@ -252,7 +259,7 @@ bool takes_axes(const Block *b, bool any_axis) {
 void offset_codes(Block *b, bool any_axis) {
     State *s = b->state;
     const int32_t code = b->g[V_NON_MODAL];
-    if ((code == V_G52 || code == V_G92) && !any_axis) {
+    if ((code == V_G52 || code == V_G92) && !any_axis && b->shift != D_SHIFT_SET) {
         report(b, FO_NO_AXES, (Says){.a = code});
         return;
     }

@@ -135,18 +135,23 @@ int fault_of_name(const Machine *machine, int64_t name) {
     return s->feed != 0.0 && s->feed == s->feed_of_other_unit ? PF_FEED_OF_OTHER_UNIT : KNOWN;
 }
 
-/* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC; the first such place is kept. */
+/* Keep the first place at which a parameter is read that nothing has set. */
+void note_unset(const Evaluation *e, int64_t number) {
+    State *s = e->machine->state.at;
+    if (s->unset_line != 0)
+        return;
+    s->unset_line = e->line;
+    s->unset_parameter = (int32_t)number;
+}
+
+/* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
     if (is_read_only(number))
         return of_state(e->machine, number);
     const double value = AT(e->program->parameters, number);
     if (!isnan(value))
         return value;
-    State *s = e->machine->state.at;
-    if (s->unset_line == 0) {
-        s->unset_line = e->line;
-        s->unset_parameter = (int32_t)number;
-    }
+    note_unset(e, number);
     return 0.0;
 }
 

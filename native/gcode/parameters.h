@@ -17,6 +17,10 @@ typedef struct {
     double a, b;
     int64_t place;
     int depth; /* of values within values */
+    bool is_null;  /* the value is that of a Fanuc's variable that is empty */
+    bool is_open;  /* the expression at hand stands in no bracket and ends with its line */
+    bool in_word;  /* it is the value of a word */
+    int brackets;  /* that are open */
 } Evaluation;
 
 /* Keep what is wrong, if it is the first; return 0 as the value. */
@@ -39,6 +43,10 @@ static inline int64_t after_blanks(Bytes text, int64_t i, int64_t end) {
 
 enum { NO_NAME = -1 };
 double numbered_parameter(const Evaluation *e, int64_t number);
+/* Tell whether a program is a Fanuc's, whose variables and operators are others. */
+static inline bool is_macro(const Evaluation *e) { return e->program->language == D_PROGRAMS_FANUC; }
+
+void note_unset(const Evaluation *e, int64_t number);
 bool is_read_only(int64_t number);
 enum { KNOWN = -1 };
 int fault_of_number(const Machine *machine, int64_t number);

@@ -2,6 +2,8 @@
 
 #include "gcode/program_line.h"
 
+#include "gcode/dialect_text.h"
+#include "gcode/expressions.h"
 #include "gcode/reporting.h"
 #include "gcode/words.h"
 
@@ -46,19 +48,84 @@ static Item letter_at(Evaluation *e, int64_t *i, bool first) {
     const Number behind = number(text, *i + 1);
     if (letter != CH_LETTER_N && letter != CH_LETTER_O) {
         if (behind.digits > 0 && behind.finding == F_OK) {
+            if (is_macro(e) && lacks_point(text, *i))
+                put(e, D_NEXT_POINTLESS, 0.0);
             put(e, letter, behind.value);
             *i = behind.end;
             return DONE;
         }
         if (behind.digits == 0 && begins_value(text, *i + 1, e->end)) {
             ++*i;
-            put(e, letter, value_at(e, i));
+            e->in_word = true;
+            const double value = value_at(e, i);
+            e->in_word = false;
+            if (!e->is_null) /* else the word is left out */
+                put(e, letter, value);
             return DONE;
         }
     }
     const Item item = odd_word(text, *i, letter, &behind, first);
     *i = item.end;
     return item;
+}
+
+/* Read a Fanuc's calculation at i, which stands alone; return the place behind. */
+static int64_t calculation_at(Evaluation *e, int64_t i) {
+    const Course *at = e->program->course.at;
+    const int64_t place = i;
+    const bool is_alone = at->words == 0 || (at->words == 1 && AT(e->program->letter, 0) == CH_SLASH);
+    if (is_alone)
+        assignment_at(e, &i);
+    const int64_t behind = after_blanks(e->program->text, i, e->end);
+    const bool ends = behind >= e->end || AT(e->program->text, behind) == CH_PAREN_OPEN ||
+                      AT(e->program->text, behind) == CH_SEMICOLON;
+    if (!is_alone || (e->finding == F_OK && !ends))
+        wrong(e, F_EXPRESSION, PF_MACRO_ALONE, 0.0, place);
+    return i;
+}
+
+/* Read the words of a Sinumerik's line from `start` on, with their values, and its assignments to R parameters. */
+static void read_siemens_line(Evaluation *e, int64_t start) {
+    Program *p = e->program;
+    Course *at = p->course.at;
+    Scan scan = {.text = p->text,
+                 .statement_names = p->statement_names,
+                 .statement_kinds = p->statement_kinds,
+                 .syntax = p->syntax,
+                 .letter = p->letter,
+                 .value = p->value,
+                 .line = p->line,
+                 .extra = p->extra,
+                 .whole_program = 1};
+    bool first = true;
+    for (int64_t i = start; i < e->end && e->finding == F_OK;) {
+        const uint8_t c = AT(p->text, i);
+        if (is_blank(c) || c == CH_END_OF_TAPE) {
+            i++;
+            continue;
+        }
+        const int64_t words = scan.words = at->words, behind = dialect_item(&scan, e, i, e->line, first);
+        at->words = scan.words;
+        if (behind > i) {
+            first = first && (at->words == words || AT(p->letter, words) == CH_SLASH);
+            i = behind;
+            continue;
+        }
+        const bool is_word = begins_word(c);
+        if (c == CH_HASH || (is_word && number(p->text, i + 1).digits == 0 && begins_value(p->text, i + 1, e->end))) {
+            wrong(e, F_DIALECT_STATEMENT, DR_REASON_VALUES, 0.0, i);
+            return;
+        }
+        Item item = is_word ? letter_at(e, &i, first) : other_item(p->text, i, first);
+        if (!is_word)
+            i = item.end;
+        int64_t no_message = 0;
+        if (item.kind == V_PROGRAM_LINE)
+            wrong(e, F_DIALECT_STATEMENT, DR_REASON_PROGRAM, 0.0, i);
+        else if (item.kind != CH_PAREN_OPEN)
+            put_item(e, &item, &no_message);
+        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !is_word;
+    }
 }
 
 /* Read the words and assignments of the line from `start` on, with their values; its message comments are
@@ -71,6 +138,10 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
         wrong(e, F_LINE_TOO_LONG, V_LINE_LIMIT, 0.0, start);
         return;
     }
+    if (e->program->language == D_PROGRAMS_SINUMERIK) {
+        read_siemens_line(e, start);
+        return;
+    }
     while (i < e->end && e->finding == F_OK) {
         const uint8_t c = AT(text, i);
         if (is_blank(c) || c == CH_END_OF_TAPE) {
@@ -78,13 +149,15 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
             continue;
         }
         Item item = {.kind = NOTHING};
-        if (c == CH_HASH) {
+        if (c == CH_HASH && is_macro(e)) {
+            i = calculation_at(e, i);
+        } else if (c == CH_HASH) {
             assignment_at(e, &i);
         } else if (begins_word(c)) {
             item = letter_at(e, &i, first);
         } else {
             item = other_item(text, i, first);
-            i = item.end;
+            i = item.kind == CH_SLASH && is_macro(e) ? after_skip_level(text, item.end) : item.end;
         }
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);

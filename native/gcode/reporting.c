@@ -51,5 +51,15 @@ void note(Block *block, int which, int32_t word) {
 void event(Block *block, int32_t kind, double a, double b) {
     const int64_t row = block->counts->rows - 1;
     const double dwell_s = AT(block->machine->rows.dwell_s, row);
-    AT(block->machine->events, block->counts->events++) = (Event){row, kind, block->line, a, b, dwell_s};
+    AT(block->machine->events, block->counts->events++) = (Event){row, kind, block->line, a, b, dwell_s, NAN, NAN};
+}
+
+static double word_or_none(const Block *block, int index) { return block->has[index] ? block->word[index] : NAN; }
+
+/* Keep an M-code that the cell maps to KRL, with its words. */
+void event_of_words(Block *block, int32_t m) {
+    event(block, S_EVENT_M, m, word_or_none(block, V_WORD_P));
+    Event *made = &AT(block->machine->events, block->counts->events - 1);
+    made->q = word_or_none(block, V_WORD_Q);
+    made->e = word_or_none(block, V_WORD_E);
 }

@@ -16,5 +16,6 @@ bool rests_on_doubt(Block *block, int32_t doubt);
 void report_unless(Block *block, int32_t doubt, int32_t number, Says says);
 void note(Block *block, int which, int32_t word);
 void event(Block *block, int32_t kind, double a, double b);
+void event_of_words(Block *block, int32_t m);
 
 #endif

@@ -6,6 +6,7 @@
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
+#include "gcode/saved_modes.h"
 #include "gcode/tool_lengths.h"
 
 enum { LARGEST_WHOLE = 99999 };
@@ -160,9 +161,37 @@ static void coolant(Block *b, int32_t m) {
     event(b, S_EVENT_COOLANT, m, s->mist + 2 * s->flood);
 }
 
+/* Tell whether a block has nothing but one M-code. */
+static bool is_alone(const Block *b) {
+    int count = 0;
+    for (int index = 0; index < V_LETTERS; index++)
+        count += b->has[index];
+    for (int k = 0; k < V_GROUPS; k++)
+        count += b->g[k] >= 0;
+    for (int k = 0; k < V_M_CODES; k++)
+        count += b->m_codes[k] >= 0;
+    return count == 1;
+}
+
+/* M61 to M73. */
+static void own_code(Block *b, int32_t m) {
+    if (m == V_M61)
+        set_tool_number(b);
+    else if (m < V_M70)
+        switch_output(b, m);
+    else if (m != V_M72)
+        save_modes(b, m);
+    else if (is_alone(b))
+        restore_modes(b);
+    else
+        report(b, FM_RESTORE_BESIDE, (Says){0});
+}
+
 /* One M-code for spindle, coolant or overrides, or one that the cell maps to KRL. */
 static void switch_on_or_off(Block *b, int32_t m) {
-    if (m >= V_M3 && m <= V_M5) {
+    if (is_own_m(b->machine, m)) {
+        own_code(b, m);
+    } else if (m >= V_M3 && m <= V_M5) {
         spindle(b, m);
     } else if (m >= V_M7 && m <= V_M9) {
         coolant(b, m);
@@ -172,7 +201,7 @@ static void switch_on_or_off(Block *b, int32_t m) {
     } else {
         b->used[V_WORD_P] |= b->has[V_WORD_P];
         b->used[V_WORD_Q] |= b->has[V_WORD_Q];
-        event(b, S_EVENT_M, m, b->has[V_WORD_P] ? b->word[V_WORD_P] : NAN);
+        event_of_words(b, m);
     }
 }
 

@@ -119,14 +119,25 @@ static int lost_letter(const Scan *scan, int lost, int64_t line) {
     return (letter >= CH_LETTER_A && letter <= CH_LETTER_Z) || is_polar_sign((uint8_t)letter) ? letter : 0;
 }
 
-/* Return what a line is that begins at i: one with an O-word, or a block. */
-static int32_t kind_of_line(Bytes text, int64_t i) {
+/* Tell whether a statement of a macro begins at i, such as IF or GOTO: two letters where a word has one. */
+static bool begins_statement(Bytes text, int64_t i, int64_t end) {
+    if (i >= end || !is_letter(AT(text, i)))
+        return false;
+    const int64_t behind = after_blanks(text, i + 1, end);
+    return behind < end && is_letter(AT(text, behind));
+}
+
+/* Return what a line is that begins at i: one with an O-word or a statement, or a block. */
+static int32_t kind_of_line(const Scan *scan, int64_t i) {
+    const Bytes text = scan->text;
     const int64_t end = line_end(text, i);
     i = after_blanks(text, i, end);
     if (i < end && AT(text, i) == CH_SLASH)
-        i = after_blanks(text, i + 1, end);
+        i = after_blanks(text, scan->syntax & D_MACROS ? after_skip_level(text, i + 1) : i + 1, end);
     if (i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_N)
         i = after_blanks(text, number(text, i + 1).end, end);
+    if (scan->syntax & D_MACROS && (begins_statement(text, i, end) || (i < end && AT(text, i) == CH_COLON)))
+        return P_KIND_O_WORD;
     return i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_O ? P_KIND_O_WORD : P_KIND_BLOCK;
 }
 
@@ -142,7 +153,7 @@ static void put_line(Scan *scan, int64_t start, int64_t line) {
         AT(scan->lines, scan->program_lines) =
             (MarkedLine){.start = start,
                          .target = -1,
-                         .kind = kind_of_line(scan->text, start),
+                         .kind = kind_of_line(scan, start),
                          .first_message = (int32_t)first_message};
     put(scan, V_PROGRAM_LINE, (double)scan->program_lines++, line);
 }
@@ -206,8 +217,10 @@ EXPORT void gcode_scan(Scan *scan) {
             i++;
             continue;
         }
+        bool needs_line = false;
         if (scan->syntax != 0) {
-            const int64_t words = scan->words, behind = dialect_item(scan, i, line, first);
+            const int64_t words = scan->words, behind = dialect_item(scan, NULL, i, line, first);
+            needs_line = behind == NEEDS_LINE;
             if (behind > i) {
                 first = first && (scan->words == words || AT(scan->letter, words) == CH_SLASH);
                 i = behind;
@@ -215,7 +228,9 @@ EXPORT void gcode_scan(Scan *scan) {
             }
         }
         Item item;
-        if (begins_word(c)) {
+        if (needs_line || (scan->syntax & D_MACROS && begins_statement(text, i, text.rows))) {
+            item = whole_line(text, i);
+        } else if (begins_word(c)) {
             const int letter = c & ~CH_CASE_BIT;
             const Number behind = number(text, i + 1);
             if (behind.digits > 0 && behind.finding == F_OK && letter != CH_LETTER_N &&
@@ -237,6 +252,8 @@ EXPORT void gcode_scan(Scan *scan) {
             put_messages(scan, i, item.end);
         } else {
             put_item(scan, &item, i, line, marked_line == line);
+            if (scan->syntax & D_MACROS && item.kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == CH_LETTER_O)
+                put(scan, D_PROGRAM_NUMBER, 0.0, line);
         }
         if (item.kind == V_MARK)
             marked_line = line;

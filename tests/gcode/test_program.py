@@ -189,8 +189,8 @@ def test_the_place_in_machine_coordinates_is_rotated():
     assert (x, y) == pytest.approx((-15.0, 16.0))
 
 
-def test_saved_modes_are_refused_for_what_they_are():
-    assert refused("#1=1\nM70") == ("unsupported-m", 4)
+def test_a_wait_for_an_input_is_refused_for_what_it_is():
+    assert refused("#1=1\nM66 P1") == ("unsupported-m", 4)
 
 
 def test_a_subprogram_is_looked_for_beside_the_program_and_in_named_folders_only(tmp_path):

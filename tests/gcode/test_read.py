@@ -1,6 +1,7 @@
 """Reading: conventions beyond what LinuxCNC's interpreter prints, memory, tools, events."""
 
 import io
+import threading
 
 import numpy as np
 import pytest
@@ -196,3 +197,13 @@ def test_a_tool_table_in_mm(tmp_path):
     table.write_text("Z1\n", encoding="ascii")
     with pytest.raises(Gcode2KrlError, match=r"tool\.tbl:1"):
         read("G21\n", tools=table)
+
+
+def test_a_refused_program_leaves_no_thread_behind():
+    before = threading.active_count()
+    kept = []
+    for _ in range(3):
+        with pytest.raises(Gcode2KrlError) as caught:
+            read_stream(io.BytesIO(b"BEGIN PGM PART MM\nL X+10 R0 FMAX\n"), "part.h")
+        kept.append(caught)
+    assert threading.active_count() == before

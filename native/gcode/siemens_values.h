@@ -1,0 +1,11 @@
+/* R parameters and expressions of a Sinumerik: X=R1+5, R2=SIN(R3)*4. */
+
+#ifndef GCODE_SIEMENS_VALUES_H
+#define GCODE_SIEMENS_VALUES_H
+
+#include "gcode/parameters.h"
+
+double siemens_value(Evaluation *e, int64_t *i);
+int64_t assign_r(Evaluation *e, int64_t place, int64_t behind, int64_t value);
+
+#endif

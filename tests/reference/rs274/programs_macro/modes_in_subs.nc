@@ -1,0 +1,49 @@
+G21 G90 G94 F600
+O100 sub
+M73
+G91 G20 F10
+G1 X0.1
+O100 endsub
+O200 sub
+M70
+G91
+G1 X5
+M72
+G1 Y3
+G91
+O200 endsub
+O300 sub
+M73
+G91
+M71
+G1 X1
+O300 endsub
+O400 sub
+M73
+G91 G1 Y1
+O500 if [#1 GT 0]
+O400 return
+O500 endif
+G93
+O400 endsub
+G0 X10
+O100 call
+G1 X1
+O200 call
+G1 X2
+G90
+O300 call
+G1 X3
+G90
+M98 P1000 L2
+G1 X7
+O400 call [1]
+G1 Y9 F600
+O400 call [0]
+G1 Y10 F600
+M2
+O1000
+M73
+G91
+G1 X1
+M99
