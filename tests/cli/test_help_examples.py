@@ -21,7 +21,6 @@ from tests.test_documents import CELL, folder, measured, traced  # noqa: F401 (f
 NEEDS_SHELL = ("|", ">", '"$(')
 LISTENS = "online serve --pilot"
 """Begins a line of an example that waits for a robot."""
-SLOW = ("diagnose", "identify force", "--plot", "online simulate part.nc --cell")
 
 
 def all_commands():
@@ -91,13 +90,8 @@ def force_run(place):
     np.savetxt(run / "force.csv", rows, delimiter=",", header=header, comments="", fmt="%.6f")
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        pytest.param(line, marks=pytest.mark.slow if any(word in line for word in SLOW) else ())
-        for line in LINES
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("line", LINES)
 def test_an_example_runs(line, ready, run, folder, monkeypatch, tmp_path):  # noqa: F811
     if LISTENS in line:
         pytest.skip("it waits for a robot; --files of the same command runs")
