@@ -1,0 +1,1 @@
+"""Collisions: whether arm, spindle and tool hit what stands in the cell, along every way they go."""
