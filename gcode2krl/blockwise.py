@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcode2krl import compliance, cutting, krc4, program, robot
+from gcode2krl import collision, compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.clearance import moves_watched_at_targets, watch_of
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
@@ -79,7 +80,7 @@ def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = Fals
         sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
-    issues += seen.acceleration.issues()
+    issues += [*seen.acceleration.issues(), *seen.contacts]
     return Planned(course, tuple(issues), seen.watch.outlook, seen.kept)
 
 
@@ -90,37 +91,69 @@ class _Seen(NamedTuple):
     """(n,) largest joint speed over its limit of each move of the chain; None where it is not judged."""
     acceleration: AccelerationLimit
     watch: cutting.Watch
+    contacts: tuple[Issue, ...]
+    """Collisions, and what comes near; see `collision`."""
     kept: Kept | None
 
 
 def _seen_along(
     course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, *, judges_joints: bool, keeps: bool
 ) -> _Seen:
-    """Go along a motion, and look at joint speeds, accelerations and tools."""
+    """Go along a motion, and look at joint speeds, accelerations, tools and collisions."""
     line = _line_of_move(targets, chain)
     acceleration, watch = AccelerationLimit(cell, course.dt_s, course.count), cutting.Watch()
     judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
-    follower = follower_of(course, cell) if judges_joints else None
+    guard = _Guard.over(targets, cell, line) if course.moves > 0 else None
+    follower = follower_of(course, cell) if judges_joints or guard is not None else None
     share = np.zeros(len(line)) if judges_joints else None
-    gathered, waiting = Gathered[Motion](course.count), np.zeros(0, dtype=np.int32)
-    angles = np.empty((2, course.count if keeps and judges_joints else 0, 6))
+    gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
+    angles = np.empty((2, course.count if keeps and follower is not None else 0, 6))
     solved = 0
     with ahead(course.blocks()) as blocks:
         for motion, ends in blocks:
             acceleration.take(motion, line[motion.move])
             watch.take(motion)
-            if follower is not None and share is not None:
+            if follower is not None:
                 q, qd = follower.take(motion, ends)
-                waiting = np.concatenate([waiting, motion.move])
-                robot.raise_shares(share, qd, waiting[: len(qd)], cell)
-                waiting = waiting[len(qd) :]
+                waiting = np.concatenate([waiting, [motion.move, motion.tool]], axis=1)
+                move, tool = waiting[:, : len(q)]
+                waiting = waiting[:, len(q) :]
+                if share is not None:
+                    robot.raise_shares(share, qd, move, cell)
+                if guard is not None:
+                    guard.take(q, move, tool)
                 if keeps:
                     angles[:, solved : solved + len(q)] = q, qd
                     solved += len(q)
             if keeps:
                 gathered.take(motion)
-    kept = Kept(gathered.table(), *(angles if judges_joints else (None, None))) if keeps else None
-    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, kept)
+    kept = Kept(gathered.table(), *(angles if follower is not None else (None, None))) if keeps else None
+    contacts = guard.watch.issues() if guard is not None else ()
+    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, contacts, kept)
+
+
+@dataclass(frozen=True)
+class _Guard:
+    """What looks for collisions along a motion."""
+
+    watch: collision.Watch
+    line: Ints32
+    """(n,) line of the G-code of each row of the Toolpath."""
+    elsewhere: Ints32
+    """Rows of the Toolpath that are watched at their targets."""
+
+    @classmethod
+    def over(cls, targets: Targets, cell: Cell, line: Ints32) -> "_Guard | None":
+        watch = watch_of(cell)
+        return cls(watch, line, moves_watched_at_targets(targets)) if watch is not None else None
+
+    def take(self, q_rad: Floats, move: Ints32, tool: Ints32) -> None:
+        """Go on along samples (m) with their joints."""
+        elsewhere = np.isin(move, self.elsewhere)
+        if elsewhere.any():
+            q_rad = np.where(elsewhere[:, None], np.nan, q_rad)
+        if len(q_rad):
+            self.watch.samples(q_rad, np.ascontiguousarray(tool), self.line[move])
 
 
 def follower_of(course: krc4.Course, cell: Cell) -> robot.Follower:

@@ -17,6 +17,7 @@ from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.clearance import collisions_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
@@ -301,8 +302,12 @@ def _simplified(
 
 
 def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
-    """Return targets with the findings on reach, limits, singularities and table, and their joints."""
+    """Return targets with the findings on reach, limits, singularities and table, and their joints.
+
+    Among them are the collisions on the motions that a Motion does not show (`clearance`).
+    """
     joints, findings = robot.follow(targets, cell, conditioning=False)
+    findings = (*findings, *collisions_beside(targets, joints.q_rad, cell))
     judged = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
     rows = np.flatnonzero(targets.ptp)
     _PTP_KNOWN[judged] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
