@@ -17,6 +17,7 @@ from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
 from gcode2krl.tables import (
+    Clearance,
     Deflection,
     Forces,
     Gathered,
@@ -53,6 +54,8 @@ class Kept(NamedTuple):
     q_rad: Floats | None
     """(m, 6) None where joints were not needed."""
     qd_rad_s: Floats | None
+    clearance: Clearance | None
+    """None where the cell describes nothing that may hit or be hit."""
 
 
 def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False) -> Planned:
@@ -103,7 +106,7 @@ def _seen_along(
     line = _line_of_move(targets, chain)
     acceleration, watch = AccelerationLimit(cell, course.dt_s, course.count), cutting.Watch()
     judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
-    guard = _Guard.over(targets, cell, line) if course.moves > 0 else None
+    guard = _Guard.over(targets, cell, line, keeps=keeps) if course.moves > 0 else None
     follower = follower_of(course, cell) if judges_joints or guard is not None else None
     share = np.zeros(len(line)) if judges_joints else None
     gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
@@ -127,33 +130,49 @@ def _seen_along(
                     solved += len(q)
             if keeps:
                 gathered.take(motion)
-    kept = Kept(gathered.table(), *(angles if follower is not None else (None, None))) if keeps else None
+    clearance = guard.clearance() if guard is not None and keeps else None
+    q_rad, qd_rad_s = angles if follower is not None else (None, None)
+    kept = Kept(gathered.table(), q_rad, qd_rad_s, clearance) if keeps else None
     contacts = guard.watch.issues() if guard is not None else ()
     return _Seen(share[chain.move] if share is not None else None, acceleration, watch, contacts, kept)
 
 
-@dataclass(frozen=True)
 class _Guard:
     """What looks for collisions along a motion."""
 
-    watch: collision.Watch
-    line: Ints32
-    """(n,) line of the G-code of each row of the Toolpath."""
-    elsewhere: Ints32
-    """Rows of the Toolpath that are watched at their targets."""
+    def __init__(self, watch: collision.Watch, line: Ints32, elsewhere: Ints32, *, keeps: bool) -> None:
+        """Take the lines (n,) of the rows of the Toolpath, and the rows that are watched at their targets."""
+        self.watch, self._line, self._elsewhere = watch, line, elsewhere
+        self._kept: list[tuple[Floats, Ints32]] | None = [] if keeps else None
 
     @classmethod
-    def over(cls, targets: Targets, cell: Cell, line: Ints32) -> "_Guard | None":
-        watch = watch_of(cell)
-        return cls(watch, line, moves_watched_at_targets(targets)) if watch is not None else None
+    def over(cls, targets: Targets, cell: Cell, line: Ints32, *, keeps: bool) -> "_Guard | None":
+        watch = watch_of(cell, tells=keeps)
+        if watch is None:
+            return None
+        return cls(watch, line, moves_watched_at_targets(targets), keeps=keeps)
 
     def take(self, q_rad: Floats, move: Ints32, tool: Ints32) -> None:
         """Go on along samples (m) with their joints."""
-        elsewhere = np.isin(move, self.elsewhere)
+        elsewhere = np.isin(move, self._elsewhere)
         if elsewhere.any():
             q_rad = np.where(elsewhere[:, None], np.nan, q_rad)
         if len(q_rad):
-            self.watch.samples(q_rad, np.ascontiguousarray(tool), self.line[move])
+            told = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move])
+            if self._kept is not None:
+                self._kept.append(told)
+
+    def clearance(self) -> Clearance:
+        """Return the clearances of all samples."""
+        gaps, near = zip(*(self._kept or []), strict=True)
+        link, obstacle = np.concatenate(near).T
+        return Clearance(
+            clearance_mm=np.concatenate(gaps),
+            clearance_link=np.ascontiguousarray(link),
+            clearance_obstacle=np.ascontiguousarray(obstacle),
+            links=tuple(self.watch.links),
+            obstacles=tuple(self.watch.obstacles),
+        )
 
 
 def follower_of(course: krc4.Course, cell: Cell) -> robot.Follower:

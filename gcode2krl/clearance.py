@@ -14,7 +14,7 @@ import numpy as np
 from gcode2krl import collision, robot
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.cell.collision_scope import checks_collisions
+from gcode2krl.cell.checked_parts import checks_collisions
 from gcode2krl.cutting.raw_part import load_mesh
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Targets

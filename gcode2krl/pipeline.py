@@ -25,7 +25,17 @@ from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
 from gcode2krl.progress import Begin, Progress, unheard, unseen
-from gcode2krl.tables import Deflection, Forces, Gathered, Joints, Motion, Targets, Toolpath, blocks_of
+from gcode2krl.tables import (
+    Clearance,
+    Deflection,
+    Forces,
+    Gathered,
+    Joints,
+    Motion,
+    Targets,
+    Toolpath,
+    blocks_of,
+)
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
 
@@ -35,6 +45,7 @@ if TYPE_CHECKING:
 _ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
+_CLEARANCE_KNOWN: WeakKeyDictionary[Motion, Clearance] = WeakKeyDictionary()
 
 
 def predict(
@@ -160,7 +171,8 @@ def predict_toolpath(
         content = source.read_bytes()
         inputs["program_sha256"] = hashlib.sha256(content).hexdigest()
         inputs["program_size_bytes"] = len(content)
-    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
+    clearance = _CLEARANCE_KNOWN.get(motion)
+    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads, clearance=clearance)
 
 
 def forecast_toolpath(
@@ -351,10 +363,12 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     planned = plan_course(targets, cell, dt_s, keeps=True)
     if planned.kept is None:
         raise AssertionError("samples that are asked for are kept")
-    motion, q_rad, qd_rad_s = planned.kept
+    motion, q_rad, qd_rad_s, clearance = planned.kept
     motion = replace(motion, issues=planned.issues)
     if q_rad is not None and qd_rad_s is not None:
         _ANGLES_KNOWN[motion] = (cell, q_rad, qd_rad_s)
+    if clearance is not None:
+        _CLEARANCE_KNOWN[motion] = clearance
     return motion
 
 

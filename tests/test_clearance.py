@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl import predict, set_targets, write_krl
-from gcode2krl.cell.collision_scope import collision_scope
+from gcode2krl import predict, robot, set_targets, write_krl
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, shown_otherwise
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
@@ -62,7 +62,7 @@ def test_a_free_cell_has_no_finding(part):
 
 def test_the_cutter_hits_a_box_in_its_way_at_the_line_where_it_begins(part):
     found = contacts(part, cell_with(box("clamp", [60.0, -20, -10], [70, 20, 20])))
-    assert [issue.line for issue in found][0] == 7
+    assert found[0].line == 7
     assert found[0].message.startswith("the cutter of T1 hits clamp, ")
     assert found[0].severity == "error"
 
@@ -95,9 +95,8 @@ def test_the_ptp_from_home_and_to_home_are_ways_of_the_joints(part):
     cell = cell_with()
     targets, joints = targets_and_joints(read_gcode(part, cell), cell)
     home, above = joints.q_rad[0], joints.q_rad[1]
-    assert targets.home[0] and targets.ptp[1]
-    from gcode2krl import robot
-
+    assert targets.home[0]
+    assert targets.ptp[1]
     middle, _ = robot.forward((home + above) / 2, cell)
     ends = robot.forward(np.stack([home, above]), cell)[0]
     straight = ends.mean(axis=0)
@@ -126,7 +125,7 @@ def test_a_way_to_home_within_the_program_is_one_of_the_joints(tmp_path):
     assert targets.move[inside] in moves
     assert not shown_otherwise(targets)[targets.move == 7].any()
     found = contacts(file, cell)
-    assert [issue.line for issue in found if "cutter" in issue.message][0] in (12, 13)
+    assert next(issue.line for issue in found if "cutter" in issue.message) in (12, 13)
     assert collisions_beside(targets, joints.q_rad, cell) == ()
 
 
@@ -208,3 +207,26 @@ def test_a_robot_without_capsules_is_said_to_be_unchecked(part):
     scope = collision_scope(bare, [1])
     assert any(word.startswith("arm (") for word in scope.unchecked)
     assert not any(word.startswith("arm") for word in scope.movers)
+
+
+def test_a_prediction_tells_the_clearance_of_each_sample_and_keeps_it(part, tmp_path):
+    cell = cell_with(box("clamp", [60.0, -40, -10], [70, -30, 20]))
+    prediction = predict(part, cell, forces=False)
+    samples = prediction.samples().to_pandas()
+    near = samples[samples.clearance_obstacle == "clamp"]
+    assert set(near.clearance_link) == {"the cutter of T1"}
+    assert near.clearance_mm.min() == pytest.approx(30 - 8.66, abs=0.5)
+    far = samples[samples.clearance_link == ""]
+    assert (far.clearance_mm == 50.0).all()
+    assert (samples.clearance_mm <= 50.0).all()
+    prediction.save(tmp_path / "saved", csv=True)
+    again = type(prediction).load(tmp_path / "saved")
+    assert again.clearance.links == prediction.clearance.links
+    np.testing.assert_array_equal(again.clearance.clearance_mm, prediction.clearance.clearance_mm)
+    np.testing.assert_array_equal(again.samples().to_pandas().clearance_obstacle, samples.clearance_obstacle)
+
+
+def test_a_prediction_without_obstacles_has_no_such_column(part):
+    prediction = predict(part, over_demonstration(), forces=False)
+    assert prediction.clearance is None
+    assert "clearance_mm" not in prediction.samples().to_polars().columns

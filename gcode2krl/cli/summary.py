@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gcode2krl.cell import Cell
-from gcode2krl.cell.collision_scope import collision_scope
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.prediction.forecast import Forecast

@@ -28,6 +28,8 @@ class _Setting(NamedTuple):
     bodies: Bodies
     pairs: list[Pair]
     names: list[tuple[str, str]]
+    places: Ints32
+    """(p + 1, 2) of each pair the places of its names in `Watch.links` and `Watch.obstacles`, then -1, -1."""
 
 
 class Watch:
@@ -42,6 +44,9 @@ class Watch:
         self._horizon_mm = HORIZON_MM if tells else 0.0
         self._way: Way | None = None
         self._tool = -1
+        self.links: list[str] = []
+        """Names of what may hit, as far as tools have come up."""
+        self.obstacles: list[str] = []
         self._last: Floats = np.zeros((0, 6))
 
     @cached_property
@@ -52,12 +57,13 @@ class Watch:
     def _to_base(self) -> Floats:
         return fr.invert(self._cell.base_matrix())
 
-    def samples(self, q_rad: Floats, tool: Ints32, line: Ints32) -> tuple[Floats, list[tuple[str, str]]]:
+    def samples(self, q_rad: Floats, tool: Ints32, line: Ints32) -> tuple[Floats, Ints32]:
         """Go on along the samples of a Motion: angles (n, 6) in rad, tools (n,) and lines (n,).
 
-        Returns the clearance (n,) in mm, up to `HORIZON_MM`, and who is near what, ("", "") where nothing is.
+        Returns the clearance (n,) in mm, and who is near what (n, 2): places in `links` and `obstacles`, -1
+        where nothing is. Both are of use only where the watch ``tells``.
         """
-        gap, near = np.full(len(q_rad), np.nan), [("", "")] * len(q_rad)
+        gap, near = np.full(len(q_rad), np.nan), np.full((len(q_rad), 2), -1, dtype=np.int32)
         borders = [0, *(np.flatnonzero(np.diff(tool)) + 1).tolist(), len(tool)]
         for start, end in itertools.pairwise(borders):
             if start == end:
@@ -71,9 +77,7 @@ class Watch:
                 q, lines = np.concatenate([self._last, q]), np.concatenate([lines[:skip], lines])
             found = self._way.take(q)
             self._contacts.take(found, setting.names, lines, self._to_base)
-            gap[rows] = found.gap_mm[skip:]
-            if self._horizon_mm:
-                near[rows] = [setting.names[pair] if pair >= 0 else ("", "") for pair in found.pair[skip:]]
+            gap[rows], near[rows] = found.gap_mm[skip:], setting.places[found.pair[skip:]]
             self._last = q[-1:].copy()
         return gap, near
 
@@ -108,5 +112,14 @@ class Watch:
                 (parts[a].name, self._around.names[o] if o >= 0 else parts[b].name + ITSELF)
                 for a, o, b in pairs
             ]
-            self._settings[tool] = _Setting(parts, capsules_of(parts, self._geometry), pairs, names)
+            places = [(_place(who, self.links), _place(what, self.obstacles)) for who, what in names]
+            numbers = np.array([*places, (-1, -1)], dtype=np.int32)
+            self._settings[tool] = _Setting(parts, capsules_of(parts, self._geometry), pairs, names, numbers)
         return self._settings[tool]
+
+
+def _place(name: str, names: list[str]) -> int:
+    """Return the place of a name, which is added where it is new."""
+    if name not in names:
+        names.append(name)
+    return names.index(name)

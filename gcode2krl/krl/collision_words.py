@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Iterable
 
-from gcode2krl.cell.collision_scope import CollisionScope
+from gcode2krl.cell.checked_parts import CollisionScope
 from gcode2krl.krl.statements import ascii_text
 
 _WIDTH = 76

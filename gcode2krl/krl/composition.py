@@ -12,7 +12,7 @@ from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
-from gcode2krl.cell.collision_scope import CollisionScope
+from gcode2krl.cell.checked_parts import CollisionScope
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
-from gcode2krl.cell.collision_scope import collision_scope
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block

@@ -26,7 +26,8 @@ def test_obstacles_of_each_kind_are_read(tmp_path):
         HEAD
         + '[[obstacle]]\nname = "clamp"\nbox_mm = [[0, 0, 0], [10, 10, 10]]\n'
         + '[[obstacle]]\nname = "vice"\nframe = "robroot"\nmesh = "vice.stl"\n'
-        + '[[obstacle]]\nname = "floor"\nframe = "robroot"\nplane = { point_mm = [0, 0, -1], normal = [0, 0, 2] }\n'
+        + '[[obstacle]]\nname = "floor"\nframe = "robroot"\n'
+        + "plane = { point_mm = [0, 0, -1], normal = [0, 0, 2] }\n"
         + "[collision]\nclearance_mm = 8\n"
         + "[spindle.body]\ncapsules = [{ from_mm = [0, 0, 20], to_mm = [240, 0, 180], radius_mm = 70 }]\n"
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
-from gcode2krl.cell.collision_scope import collision_scope
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.columns import packed, packed_text
