@@ -6,6 +6,7 @@ ones.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from gcode2krl import collision, robot
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import checks_collisions
+from gcode2krl.compiled.inputs import locked
 from gcode2krl.cutting.raw_part import load_mesh
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Targets
@@ -116,4 +118,14 @@ def _owners(move: Ints32) -> Ints32:
 
 
 def _triangles(file: str) -> Floats:
-    return np.asarray(load_mesh(Path(file), "obstacle").triangles, dtype=np.float64)
+    """Return the triangles (t, 3, 3) of a mesh file; as it is asked for several times, the last are kept."""
+    try:
+        state = Path(file).stat()
+    except OSError:
+        return _read(file, 0, 0)  # which says what is wrong
+    return _read(file, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read(file: str, changed_ns: int, size: int) -> Floats:
+    return locked(np.asarray(load_mesh(Path(file), "obstacle").triangles, dtype=np.float64))

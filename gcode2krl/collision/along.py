@@ -61,7 +61,7 @@ class Watched(NamedTuple):
     states: Floats
     """(p, 16) see native/collision/along.c."""
     ends_mm: Floats
-    """(b, 12) ends of the bodies in the last row and the one before it."""
+    """(b, 13) ends of the bodies in the last row and the one before it, and how far they have gone."""
     steps: Ints
     """(1,) rows since the way began."""
 
@@ -118,7 +118,7 @@ class Way:
             np.array(pairs, dtype=np.int32).reshape(-1, 3),
             np.zeros(len(pairs), dtype=np.bool_),
             np.zeros((len(pairs), _STATE)),
-            np.zeros((len(bodies.link), 12)),
+            np.zeros((len(bodies.link), 13)),
             np.zeros(1, dtype=np.int64),
         )
         self._last = np.zeros((0, 6))

@@ -8,7 +8,7 @@ enum { DEEPEST_HALVING = 40 };
 /* What is remembered of a pair since the pose at which its gap was computed last. */
 typedef struct {
     uint8_t *known;
-    double *gap, *moved, *own, *other; /* `moved`: since then, up to the last row */
+    double *gap, *limit, *own, *other; /* `limit`: the gap, and what the ends had gone until then */
     double *inside;                    /* 1: inside a mesh without touching its surface */
     double *triangle;
 } Pair;
@@ -21,6 +21,8 @@ typedef struct {
     double q_now[AXES], q_before[AXES];
     double bulge[SCENE_MOST_BODIES]; /* how far the real way may be from the way of the joints */
     double slack[SCENE_MOST_BODIES]; /* and from the chord */
+    double gone[SCENE_MOST_BODIES];  /* no end has moved farther, since the way began */
+    double share[AXES];              /* of the levers in a sagitta */
 } Walk;
 
 typedef struct {
@@ -66,31 +68,46 @@ static double segment_from_obstacle(const Walk *walk, int64_t of, const double *
     return *inside > 0.0 ? -far - radius : far - radius;
 }
 
-/* The gap of a pair: less than 0 where they overlap. */
-static Gap gap_of(const Walk *walk, const int32_t *pair, const Pair *state, const Ends *ends, bool may_be_inside) {
+/* The gap of a pair whose ends are these: less than 0 where they overlap. */
+static Gap gap_at(const Walk *walk, const int32_t *pair, const Pair *state, const double *own, const double *other,
+                  bool may_be_inside) {
     Gap gap;
     const double radius = AT(walk->bodies->radius_mm, pair[0]);
     if (pair[1] < 0) {
-        const double square = segment_segment(ends[pair[0]], ends[pair[2]], gap.place);
+        const double square = segment_segment(own, other, gap.place);
         gap.mm = sqrt(square) - radius - AT(walk->bodies->radius_mm, pair[2]);
         return gap;
     }
-    gap.mm = segment_from_obstacle(walk, pair[1], ends[pair[0]], radius, state->inside, state->triangle,
-                                   may_be_inside, gap.place);
+    gap.mm = segment_from_obstacle(walk, pair[1], own, radius, state->inside, state->triangle, may_be_inside,
+                                   gap.place);
     return gap;
+}
+
+static Gap gap_of(const Walk *walk, const int32_t *pair, const Pair *state, const Ends *ends, bool may_be_inside) {
+    return gap_at(walk, pair, state, ends[pair[0]], ends[pair[1] < 0 ? pair[2] : 0], may_be_inside);
 }
 
 static double ends_moved(const double *from, const double *to) {
     return greater(distance3(from, to), distance3(from + 3, to + 3));
 }
 
-/* How far an end may be from its chord on a way of the joints: an eighth of the second derivative. */
-static double sagitta(const Walk *walk, int64_t body, const double *from, const double *to) {
+/* Write by how much of each lever an end may be from its chord: an eighth of the second derivative, whose terms
+   are gathered by the outer one of their two axes. */
+static void sagitta_shares(const double *from, const double *to, double *share) {
+    double inner = 0.0;
+    for (int j = 0; j < AXES; j++) {
+        const double turned = fabs(to[j] - from[j]);
+        share[j] = 0.125 * turned * (turned + 2.0 * inner);
+        inner += turned;
+    }
+}
+
+static double sagitta(const Walk *walk, int64_t body) {
+    const double *lever = &CELL(walk->bodies->lever_mm, body, 0);
     double sum = 0.0;
-    for (int i = 0; i < AXES; i++)
-        for (int j = 0; j < AXES; j++)
-            sum += fabs(to[i] - from[i]) * fabs(to[j] - from[j]) * CELL(walk->bodies->lever_mm, body, i > j ? i : j);
-    return 0.125 * sum;
+    for (int j = 0; j < AXES; j++)
+        sum += walk->share[j] * lever[j];
+    return sum;
 }
 
 static double of_both(const double *values, const int32_t *pair) {
@@ -102,40 +119,63 @@ static double pair_moved(const int32_t *pair, const Ends *from, const Ends *to) 
     return pair[1] < 0 ? own + ends_moved(from[pair[2]], to[pair[2]]) : own;
 }
 
-/* Return the least gap between two poses whose gaps are known, where it may be below `allowed`.
+/* How far a pair has moved since its gap was computed. */
+static double moved_since(const int32_t *pair, const Pair *state, const Ends *to) {
+    const double own = ends_moved(state->own, to[pair[0]]);
+    return pair[1] < 0 ? own + ends_moved(state->other, to[pair[2]]) : own;
+}
+
+/* A part of the way between two rows, from u to u + wide: the ends of both bodies and the gaps at its borders. */
+typedef struct {
+    double u, wide, gap[2];
+    Ends ends[2][2]; /* border, body */
+} Stretch;
+
+static void copy_ends(const Ends *from, Ends *to) {
+    for (int k = 0; k < 6; k++) {
+        to[0][k] = from[0][k];
+        to[1][k] = from[1][k];
+    }
+}
+
+/* Return the least gap between two rows whose gaps are known, where it may be below `allowed`.
 
    Halves the way where the bound allows less than `allowed`, or once less was found, clearly less than that. A
    way so short that it cannot be told from touching counts as its bound. */
 static Gap least_between(const Walk *walk, const int32_t *pair, const Pair *state, double gap_before, Gap now,
                          double allowed) {
     Gap least = now;
+    const bool both = pair[1] < 0;
     const double bulge = of_both(walk->bulge, pair), slack_of_all = of_both(walk->slack, pair) - bulge;
-    double from[DEEPEST_HALVING], to[DEEPEST_HALVING], gap_from[DEEPEST_HALVING], gap_to[DEEPEST_HALVING];
-    int depth = 0;
-    from[0] = 0.0, to[0] = 1.0, gap_from[0] = gap_before, gap_to[0] = now.mm;
-    depth = 1;
+    Stretch open[DEEPEST_HALVING];
+    int depth = 1;
+    open[0].u = 0.0;
+    open[0].wide = 1.0;
+    open[0].gap[0] = gap_before;
+    open[0].gap[1] = now.mm;
+    for (int k = 0; k < 6; k++) {
+        open[0].ends[0][0][k] = walk->before[pair[0]][k];
+        open[0].ends[1][0][k] = walk->now[pair[0]][k];
+        open[0].ends[0][1][k] = both ? walk->before[pair[2]][k] : 0.0;
+        open[0].ends[1][1][k] = both ? walk->now[pair[2]][k] : 0.0;
+    }
     while (depth > 0 && least.mm > 0.0) {
-        depth--;
-        const double u0 = from[depth], u1 = to[depth], g0 = gap_from[depth], g1 = gap_to[depth];
-        double q0[AXES], q1[AXES], q[AXES];
-        for (int j = 0; j < AXES; j++) {
-            const double way = walk->q_now[j] - walk->q_before[j];
-            q0[j] = walk->q_before[j] + u0 * way;
-            q1[j] = walk->q_before[j] + u1 * way;
-            q[j] = walk->q_before[j] + 0.5 * (u0 + u1) * way;
-        }
-        Ends ends0[SCENE_MOST_BODIES], ends1[SCENE_MOST_BODIES], ends[SCENE_MOST_BODIES];
-        place_bodies(q0, &walk->arm, walk->bodies, ends0);
-        place_bodies(q1, &walk->arm, walk->bodies, ends1);
-        const double chord = pair_moved(pair, (const Ends *)ends0, (const Ends *)ends1);
-        const double slack = squared(u1 - u0) * slack_of_all + bulge;
-        const double bound = 0.5 * (g0 + g1 - chord) - slack; /* eq. 2 */
+        Stretch *first = &open[--depth];
+        double chord = ends_moved(first->ends[0][0], first->ends[1][0]);
+        if (both)
+            chord += ends_moved(first->ends[0][1], first->ends[1][1]);
+        const double slack = squared(first->wide) * slack_of_all + bulge;
+        const double bound = 0.5 * (first->gap[0] + first->gap[1] - chord) - slack; /* eq. 2 */
         const double clearly = greater(ADVANCE_EXACT_MM, ADVANCE_EXACT_SHARE * least.mm);
         if (bound > allowed || (bound > 0.0 && least.mm <= allowed && bound > least.mm - clearly))
             continue;
-        place_bodies(q, &walk->arm, walk->bodies, ends);
-        Gap middle = gap_of(walk, pair, state, (const Ends *)ends, false);
-        const double open = middle.mm;
+        double q[AXES];
+        Ends ends[2] = {{0.0}, {0.0}};
+        for (int j = 0; j < AXES; j++)
+            q[j] = walk->q_before[j] + (first->u + 0.5 * first->wide) * (walk->q_now[j] - walk->q_before[j]);
+        place_two(q, &walk->arm, walk->bodies, pair, ends);
+        Gap middle = gap_at(walk, pair, state, ends[0], ends[1], false);
+        const double gap = middle.mm;
         middle.mm -= bulge;
         if (middle.mm < least.mm)
             least = middle;
@@ -144,10 +184,14 @@ static Gap least_between(const Walk *walk, const int32_t *pair, const Pair *stat
                 least.mm = bound;
             continue;
         }
-        from[depth] = u0, to[depth] = 0.5 * (u0 + u1), gap_from[depth] = g0, gap_to[depth] = open;
-        depth++;
-        from[depth] = 0.5 * (u0 + u1), to[depth] = u1, gap_from[depth] = open, gap_to[depth] = g1;
-        depth++;
+        Stretch *second = first + 1;
+        first->wide *= 0.5;
+        *second = *first;
+        second->u += first->wide;
+        first->gap[1] = second->gap[0] = gap;
+        copy_ends((const Ends *)ends, first->ends[1]);
+        copy_ends((const Ends *)ends, second->ends[0]);
+        depth += 2;
     }
     return least;
 }
@@ -158,10 +202,11 @@ static Pair pair_state(Floats states, Bools known, int64_t pair) {
     return state;
 }
 
-static void remember(const Pair *state, const int32_t *pair, double gap, const Ends *ends) {
+static void remember(const Walk *walk, const Pair *state, const int32_t *pair, double gap) {
+    const Ends *ends = walk->now;
     *state->known = true;
     *state->gap = gap;
-    *state->moved = 0.0;
+    *state->limit = gap > 0.0 ? gap + of_both(walk->gone, pair) : -INFINITY;
     for (int k = 0; k < 6; k++) {
         state->own[k] = ends[pair[0]][k];
         state->other[k] = pair[1] < 0 ? ends[pair[2]][k] : 0.0;
@@ -172,19 +217,22 @@ static void remember(const Pair *state, const int32_t *pair, double gap, const E
 static Gap judged(const Walk *walk, const int32_t *pair, const Pair *state, bool has_before, double allowed,
                   double near_mm) {
     const Ends *now = walk->now, *before = walk->before;
-    const double slack = of_both(walk->slack, pair);
+    const double slack = of_both(walk->slack, pair), gone = of_both(walk->gone, pair);
+    const Gap far = {INFINITY, {NAN, NAN, NAN}};
     double gap_before = 0.0; /* no more than it was */
     if (*state->known && has_before) {
-        double moved = ends_moved(state->own, now[pair[0]]);
-        if (pair[1] < 0)
-            moved += ends_moved(state->other, now[pair[2]]);
-        const double room = fabs(*state->gap) - greater(*state->moved, moved) - slack; /* eq. 1 */
-        gap_before = *state->gap - *state->moved;
-        *state->moved = moved;
-        const double radius = AT(walk->bodies->radius_mm, pair[0]);
-        if (*state->gap > 0.0 ? room > allowed : *state->inside > 0.0 && room > 2.0 * radius) {
-            const Gap far = {*state->gap > 0.0 ? INFINITY : *state->gap + moved, {NAN, NAN, NAN}};
+        if (*state->limit - gone > allowed) /* eq. 1 by all that the ends have gone, which is no less */
             return far;
+        const double moved_before = moved_since(pair, state, before), moved = moved_since(pair, state, now);
+        const double room = fabs(*state->gap) - greater(moved_before, moved) - slack; /* eq. 1 */
+        gap_before = *state->gap - moved_before;
+        if (*state->gap > 0.0 && room > allowed) {
+            *state->limit = *state->gap - moved + gone;
+            return far;
+        }
+        if (*state->inside > 0.0 && room > 2.0 * AT(walk->bodies->radius_mm, pair[0])) {
+            const Gap within = {*state->gap + moved, {NAN, NAN, NAN}};
+            return within;
         }
     }
     const bool may_be_inside = !*state->known || *state->gap <= 0.0;
@@ -196,10 +244,10 @@ static Gap judged(const Walk *walk, const int32_t *pair, const Pair *state, bool
             least = gap_of(walk, pair, state, before, false);
         if (least.mm > 0.0) /* else it begins where it touches */
             least = least_between(walk, pair, state, least.mm, gap, near_mm);
-        remember(state, pair, least.mm > 0.0 ? gap.mm : least.mm, now); /* behind a surface it may be inside */
+        remember(walk, state, pair, least.mm > 0.0 ? gap.mm : least.mm); /* behind a surface it may be inside */
         return least;
     }
-    remember(state, pair, gap.mm, now);
+    remember(walk, state, pair, gap.mm);
     return gap;
 }
 
@@ -217,7 +265,7 @@ EXPORT int64_t collision_along(Floats q_rad, int64_t first, Floats geometry, con
     walk.arm = arm_of(geometry);
     const int64_t count = bodies->link.rows, pairs = watched->pairs.rows;
     int64_t steps = first > 0 ? AT(watched->steps, 0) : 0; /* rows without a break up to the last one */
-    Floats past = watched->ends_mm;                         /* of the last row and of the one before it */
+    Floats past = watched->ends_mm;                         /* of the last row and the one before it; way gone */
     for (int64_t i = first; i < q_rad.rows; i++) {
         if (AT(noted, 0) + pairs > notes.rows) {
             AT(watched->steps, 0) = steps;
@@ -235,6 +283,7 @@ EXPORT int64_t collision_along(Floats q_rad, int64_t first, Floats geometry, con
             walk.q_before[j] = steps > 0 ? CELL(q_rad, i - 1, j) : walk.q_now[j];
         }
         place_bodies(walk.q_now, &walk.arm, bodies, walk.now);
+        sagitta_shares(walk.q_before, walk.q_now, walk.share);
         for (int64_t body = 0; body < count; body++) {
             walk.bulge[body] = 0.0;
             double square[2] = {0.0, 0.0};
@@ -247,7 +296,10 @@ EXPORT int64_t collision_along(Floats q_rad, int64_t first, Floats geometry, con
                 CELL(past, body, k) = walk.now[body][k];
             }
             walk.bulge[body] = 0.125 * sqrt(greater(square[0], square[1]));
-            walk.slack[body] = walk.bulge[body] + sagitta(&walk, body, walk.q_before, walk.q_now);
+            walk.slack[body] = walk.bulge[body] + sagitta(&walk, body);
+            if (steps > 0)
+                CELL(past, body, 12) += ends_moved(walk.before[body], walk.now[body]) + walk.slack[body];
+            walk.gone[body] = CELL(past, body, 12);
         }
         for (int64_t each = 0; each < pairs; each++) {
             const int32_t *pair = &CELL(watched->pairs, each, 0);

@@ -49,16 +49,27 @@ static void link_frames(const double *q, const Arm *arm, LinkFrame *links) {
     links[6] = frame;
 }
 
+static void place(const LinkFrame *links, const Bodies *bodies, int64_t body, double *ends) {
+    const LinkFrame *frame = &links[AT(bodies->link, body)];
+    for (int end = 0; end < 2; end++)
+        for (int row = 0; row < 3; row++)
+            ends[3 * end + row] =
+                frame->origin[row] + dot3(&frame->turn[3 * row], &CELL(bodies->ends_mm, body, 3 * end));
+}
+
 void place_bodies(const double *q_rad, const Arm *arm, const Bodies *bodies, Ends *ends) {
     LinkFrame links[LINKS];
     link_frames(q_rad, arm, links);
-    for (int64_t body = 0; body < bodies->link.rows; body++) {
-        const LinkFrame *frame = &links[AT(bodies->link, body)];
-        for (int end = 0; end < 2; end++)
-            for (int row = 0; row < 3; row++)
-                ends[body][3 * end + row] =
-                    frame->origin[row] + dot3(&frame->turn[3 * row], &CELL(bodies->ends_mm, body, 3 * end));
-    }
+    for (int64_t body = 0; body < bodies->link.rows; body++)
+        place(links, bodies, body, ends[body]);
+}
+
+void place_two(const double *q_rad, const Arm *arm, const Bodies *bodies, const int32_t *pair, Ends *ends) {
+    LinkFrame links[LINKS];
+    link_frames(q_rad, arm, links);
+    place(links, bodies, pair[0], ends[0]);
+    if (pair[1] < 0)
+        place(links, bodies, pair[2], ends[1]);
 }
 
 /* Write the ends (n, b, 6) of all bodies in the robot root, for angles (n, 6). */
