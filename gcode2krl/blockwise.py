@@ -58,10 +58,13 @@ class Kept(NamedTuple):
     """None where the cell describes nothing that may hit or be hit."""
 
 
-def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False) -> Planned:
+def plan_course(
+    targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False, watches: bool = True
+) -> Planned:
     """Plan the motion that the controller will command; see `pipeline.plan_motion`.
 
-    Only where it ``keeps`` them are the samples of the first way along it returned.
+    Only where it ``keeps`` them are the samples of the first way along it returned, and only where it
+    ``watches`` are there collisions among the findings.
     """
     chain = krc4.build_chain(targets, cell)
     profile = krc4.plan(chain, cell)
@@ -71,7 +74,8 @@ def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = Fals
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)
         is_last = trial == _SLOWING_ROUNDS
-        seen = _seen_along(course, targets, chain, cell, judges_joints=not is_last, keeps=keeps)
+        judges = _Judges(joints=not is_last, collisions=watches)
+        seen = _seen_along(course, targets, chain, cell, judges, keeps=keeps)
         if seen.share is None or seen.share.max(initial=0.0) <= _LEAST_SHARE:
             break
         slowed = slowed / np.maximum(seen.share, 1.0)
@@ -99,14 +103,22 @@ class _Seen(NamedTuple):
     kept: Kept | None
 
 
+class _Judges(NamedTuple):
+    """What is looked at on a way along a motion."""
+
+    joints: bool
+    collisions: bool
+
+
 def _seen_along(
-    course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, *, judges_joints: bool, keeps: bool
+    course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, judges: "_Judges", *, keeps: bool
 ) -> _Seen:
     """Go along a motion, and look at joint speeds, accelerations, tools and collisions."""
     line = _line_of_move(targets, chain)
     acceleration, watch = AccelerationLimit(cell, course.dt_s, course.count), cutting.Watch()
-    judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
-    guard = _Guard.over(targets, cell, line, keeps=keeps) if course.moves > 0 else None
+    judges_joints = judges.joints and cell.robot.speeds.qd_deg_s is not None and course.moves > 0
+    watches = judges.collisions and course.moves > 0
+    guard = _Guard.over(targets, cell, line, keeps=keeps) if watches else None
     follower = follower_of(course, cell) if judges_joints or guard is not None else None
     share = np.zeros(len(line)) if judges_joints else None
     gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)

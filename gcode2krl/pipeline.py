@@ -125,7 +125,7 @@ def add_effects(
 
 def _plan_anew(prediction: Prediction) -> Callable[[Targets, Cell], Motion]:
     dt_s = float(prediction.inputs["dt_s"])
-    return lambda targets, cell: plan_motion(targets, cell, dt_s)
+    return lambda targets, cell: plan_motion(targets, cell, dt_s, watches=False)
 
 
 def predict_toolpath(
@@ -171,8 +171,8 @@ def predict_toolpath(
         content = source.read_bytes()
         inputs["program_sha256"] = hashlib.sha256(content).hexdigest()
         inputs["program_size_bytes"] = len(content)
-    clearance = _CLEARANCE_KNOWN.get(motion)
-    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads, clearance=clearance)
+    near = clearance_along(motion)
+    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads, clearance=near)
 
 
 def forecast_toolpath(
@@ -338,13 +338,15 @@ def controller_test_targets(
     return checked(trial_program.with_turning_lines(targets, cell), cell)[0] if turning else targets
 
 
-def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:
+def plan_motion(
+    source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012, *, watches: bool = True
+) -> Motion:
     """Return the path the controller will command, sampled every ``dt_s`` (12 ms, or 4 ms under RSI).
 
     Corners, time law and look-ahead by `krc4`; where a joint would exceed its speed limit the move is slowed
     down (assumption: to exactly that limit). ``issues`` say where time is lost and how much; what depends on
     a hypothesis about the controller says "unverified". Spindle start, tool changes and M-codes take no time
-    here.
+    here. Where it ``watches`` the issues name collisions too (`collision`), if the cell describes any.
 
     Raises
     ------
@@ -360,7 +362,7 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     0.004
     """
     targets = set_targets(source, cell) if isinstance(source, Toolpath) else source
-    planned = plan_course(targets, cell, dt_s, keeps=True)
+    planned = plan_course(targets, cell, dt_s, keeps=True, watches=watches)
     if planned.kept is None:
         raise AssertionError("samples that are asked for are kept")
     motion, q_rad, qd_rad_s, clearance = planned.kept
@@ -370,6 +372,11 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     if clearance is not None:
         _CLEARANCE_KNOWN[motion] = clearance
     return motion
+
+
+def clearance_along(motion: Motion) -> Clearance | None:
+    """Return how near anything comes along a Motion that `plan_motion` has watched, None for any other."""
+    return _CLEARANCE_KNOWN.get(motion)
 
 
 def corner_errors(

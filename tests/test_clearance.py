@@ -230,3 +230,23 @@ def test_a_prediction_without_obstacles_has_no_such_column(part):
     prediction = predict(part, over_demonstration(), forces=False)
     assert prediction.clearance is None
     assert "clearance_mm" not in prediction.samples().to_polars().columns
+
+
+def test_a_motion_that_is_planned_only_for_its_times_reads_no_mesh(part, tmp_path):
+    from gcode2krl import plan_motion
+
+    missing = cell_with(box("clamp", [60.0, -40, -10], [70, -30, 20]))
+    targets = set_targets(read_gcode(part, missing), missing)
+    gone = missing.obstacle[0].model_copy(update={"box_mm": None, "mesh": str(tmp_path / "gone.stl")})
+    cell = missing.model_copy(update={"obstacle": (gone,)})
+    assert len(plan_motion(targets, cell, watches=False)) > 100
+    with pytest.raises(NotUnderstoodError, match="cannot read the obstacle: no such file"):
+        plan_motion(targets, cell)
+
+
+def test_an_effect_keeps_the_clearance_with_its_motion(part):
+    cell = cell_with(box("clamp", [60.0, -40, -10], [70, -30, 20]))
+    prediction = predict(part, cell, forces=False, effects=["backlash:target=A2,gap_deg=0.02"])
+    assert len(prediction.clearance) == len(prediction.motion)
+    other = predict(part, cell, forces=False, effects=["velocity_rule:k_s=0.2"])
+    assert other.clearance is None or len(other.clearance) == len(other.motion)
