@@ -65,24 +65,22 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
 
 def _added(targets: Targets) -> Iterator[_Added]:
     """Yield the motions into each target that a Motion does not show as they are."""
-    beside = shown_otherwise(targets)
     line = targets.source_line
-    for row in np.flatnonzero(beside).tolist():
+    programmed = np.flatnonzero(targets.move >= 0)
+    for row in np.flatnonzero(shown_otherwise(targets)).tolist():
         if row == 0:
             continue
         if targets.home[row]:
             words = " on the PTP to HOME"
         elif targets.ptp[row]:
             words = " on the PTP from HOME" if targets.home[row - 1] else " on a PTP"
+        elif row <= programmed[0]:
+            words = " on the approach"
         else:
-            words = " on the approach" if targets.home[:row].any() and _leads_in(targets, row) else ""
+            words = " on the retract" if row > programmed[-1] else ""
         before = np.flatnonzero(line[:row])
         known = int(line[row]) or (int(line[before[-1]]) if len(before) else 0)
         yield _Added(row, known, words)
-
-
-def _leads_in(targets: Targets, row: int) -> bool:
-    return bool(targets.ptp[row - 1]) or targets.move[row] < 0
 
 
 def shown_otherwise(targets: Targets) -> Bools:

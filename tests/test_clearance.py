@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from gcode2krl import predict, robot, set_targets, write_krl
+from gcode2krl import plan_motion, predict, robot, set_targets, solve_joints, write_krl
 from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, shown_otherwise
+from gcode2krl.collision import scene
+from gcode2krl.collision.bodies import capsules_of, parts_of
+from gcode2krl.collision.gaps import obstacle_gaps, placed
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.release import released
@@ -233,8 +236,6 @@ def test_a_prediction_without_obstacles_has_no_such_column(part):
 
 
 def test_a_motion_that_is_planned_only_for_its_times_reads_no_mesh(part, tmp_path):
-    from gcode2krl import plan_motion
-
     missing = cell_with(box("clamp", [60.0, -40, -10], [70, -30, 20]))
     targets = set_targets(read_gcode(part, missing), missing)
     gone = missing.obstacle[0].model_copy(update={"box_mm": None, "mesh": str(tmp_path / "gone.stl")})
@@ -250,3 +251,46 @@ def test_an_effect_keeps_the_clearance_with_its_motion(part):
     assert len(prediction.clearance) == len(prediction.motion)
     other = predict(part, cell, forces=False, effects=["velocity_rule:k_s=0.2"])
     assert other.clearance is None or len(other.clearance) == len(other.motion)
+
+
+def test_random_boxes_are_hit_by_what_a_dense_sampling_says_at_its_lines(part):
+    """30 boxes near any part of the arm, the spindle or the cutter, 10 of them near a PTP."""
+    rng = np.random.default_rng(5)
+    base = cell_with()
+    geometry = base.robot.geometry.array()
+    toolpath = read_gcode(part, base)
+    targets, joints = targets_and_joints(toolpath, base)
+    motion = plan_motion(targets, base, 0.004)
+    parts = parts_of(base, 1)
+    bodies = capsules_of(parts, geometry)
+    cut = placed(solve_joints(motion, base).q_rad, geometry, bodies)
+    ways = [np.linspace(*joints.q_rad[rows], 3000) for rows in ([0, 1], [-2, -1])]
+    ptp = placed(np.concatenate(ways), geometry, bodies)
+    line = toolpath.source_line[motion.move]
+    hits = 0
+    for number in range(30):
+        ends = ptp if number % 3 == 0 else cut
+        row, body, u = int(rng.integers(len(ends))), int(rng.integers(1, len(parts))), rng.uniform()
+        middle = (1 - u) * ends[row, body, :3] + u * ends[row, body, 3:]
+        middle = middle + 0.6 * parts[body].radius_mm * rng.normal(size=3)
+        cell = cell_with(box("box", (middle - 10).tolist(), (middle + 10).tolist(), "robroot"))
+        shape = scene.box(middle - 10, middle + 10, np.eye(4))
+        sure, grazed, sure_ptp, grazed_ptp = set(), set(), set(), set()
+        for one, each in enumerate(parts):
+            if each.link == 0:
+                continue
+            gap, gap_ptp = (
+                obstacle_gaps(ends[:, one], float(bodies.radius_mm[one]), shape)[0] for ends in (cut, ptp)
+            )
+            sure |= {(each.name, at) for at in np.unique(line[gap < -0.05]).tolist()}
+            near = np.convolve(gap < 0.3, np.ones(4))[: len(gap)] > 0  # up to the next sample at 12 ms
+            grazed |= {(each.name, at) for at in np.unique(line[near]).tolist()}
+            sure_ptp |= {each.name} if (gap_ptp < -0.05).any() else set()
+            grazed_ptp |= {each.name} if (gap_ptp < 0.3).any() else set()
+        found = [(issue.message.partition(" hits "), issue.line) for issue in contacts(part, cell)]
+        on_ptp = {who for (who, _, rest), _ in found if " PTP " in rest}
+        plain = {(who, at) for (who, _, rest), at in found if " on " not in rest.partition(",")[0]}
+        assert sure <= plain <= grazed
+        assert sure_ptp <= on_ptp <= grazed_ptp
+        hits += bool(sure) + bool(sure_ptp)
+    assert hits > 20

@@ -22,10 +22,10 @@ class _Place:
 
 @dataclass
 class Contacts:
-    """Gaps below the clearance: (who, what) → line → where."""
+    """Gaps below the clearance: (who, what) → line and way → where."""
 
     clearance_mm: float
-    places: dict[tuple[str, str], dict[int, _Place]] = field(default_factory=dict)
+    places: dict[tuple[str, str], dict[tuple[int, str], _Place]] = field(default_factory=dict)
 
     def take(
         self,
@@ -47,26 +47,27 @@ class Contacts:
         least = order[np.flatnonzero(np.diff(keys, axis=0, prepend=-2).any(axis=1))]
         for note in least.tolist():
             gap_mm = float(found.note_gap_mm[note])
-            by_line = self.places.setdefault(names[int(found.note_pair[note])], {})
-            known = by_line.get(int(lines[note]))
-            if known is None or gap_mm < known.gap_mm:
-                by_line[int(lines[note])] = _Place(gap_mm, base_mm[note], way, is_ptp)
+            of_pair = self.places.setdefault(names[int(found.note_pair[note])], {})
+            key = (int(lines[note]), way)
+            if key not in of_pair or gap_mm < of_pair[key].gap_mm:
+                of_pair[key] = _Place(gap_mm, base_mm[note], way, is_ptp)
 
     def issues(self) -> Iterator[Issue]:
         """Yield a collision for each line and pair, and one word for each pair that comes near only."""
         count = 0
-        for (who, what), by_line in self.places.items():
-            hits = {line: place for line, place in sorted(by_line.items()) if place.gap_mm <= 0}
-            for line, place in hits.items():
+        for (who, what), of_pair in self.places.items():
+            hits = [(line, place) for (line, _), place in sorted(of_pair.items()) if place.gap_mm <= 0]
+            for line, place in hits:
                 count += 1
                 if count <= MOST_PLACES:
                     yield _collision(who, what, line, place)
             if not hits:
-                yield self._near(who, what, by_line)
+                yield self._near(who, what, of_pair)
 
-    def _near(self, who: str, what: str, by_line: dict[int, _Place]) -> Issue:
-        line, place = min(by_line.items(), key=lambda each: (each[1].gap_mm, each[0]))
-        others = f", the nearest of {len(by_line)} lines" if len(by_line) > 1 else ""
+    def _near(self, who: str, what: str, of_pair: dict[tuple[int, str], _Place]) -> Issue:
+        (line, _), place = min(of_pair.items(), key=lambda each: (each[1].gap_mm, each[0]))
+        lines = len({line for line, _ in of_pair})
+        others = f", the nearest of {lines} lines" if lines > 1 else ""
         sentence = (
             f"{who} comes within {place.gap_mm:.1f} mm of {what}{place.way}{_at(place)}: less than "
             f"{self.clearance_mm:g} mm{others}"
