@@ -9,6 +9,7 @@ from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, sho
 from gcode2krl.collision import scene
 from gcode2krl.collision.bodies import capsules_of, parts_of
 from gcode2krl.collision.gaps import obstacle_gaps, placed
+from gcode2krl.collision.surroundings import surroundings_of
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.release import released
@@ -294,3 +295,41 @@ def test_random_boxes_are_hit_by_what_a_dense_sampling_says_at_its_lines(part):
         assert sure_ptp <= on_ptp <= grazed_ptp
         hits += bool(sure) + bool(sure_ptp)
     assert hits > 20
+
+
+def test_obstacles_stand_in_their_frames(part):
+    """The same box in a turned ``$BASE``, and in the robot root: the same gap."""
+    turned = {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 30.0, "b_deg": 0.0, "c_deg": 0.0}
+    frames = over_demonstration().frames.model_dump(exclude_none=True) | {"base": turned}
+    inside = [60.0, -20, -10], [70, 20, 20]
+    assert [i.line for i in contacts(part, cell_with(box("clamp", *inside), frames=frames))][:1] == [7]
+    base = cell_with(frames=frames).base_matrix()
+    middle = (base @ [65.0, 0, 5, 1])[:3]
+    found = contacts(
+        part, cell_with(box("clamp", (middle - 5).tolist(), (middle + 5).tolist(), "robroot"), frames=frames)
+    )
+    assert [i.line for i in found][:1] == [7]
+    assert "at X 59.3 Y 0.0 Z 6.7 in $BASE" in found[0].message
+
+
+def test_the_table_is_that_of_a_robot_that_hangs(part):
+    """``$WORLD`` upside down for the robot: the table's free side is up in ``$BASE`` all the same."""
+    hanging = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": 2400.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 180.0}
+    frames = over_demonstration().frames.model_dump(exclude_none=True) | {"robroot": hanging}
+    scene_of = surroundings_of(cell_with(table={"z_mm": -60.0}, frames=frames), lambda file: np.empty(0))
+    np.testing.assert_allclose(scene_of.shapes.numbers[0, :4], [0, 0, -1, -(2400 - 740)], atol=1e-9)
+
+
+def test_the_report_and_the_list_of_the_cell_name_the_parts(part):
+    from gcode2krl.cli.cell_list import to_confirm
+    from gcode2krl.report.page.content import content_of
+
+    cell = cell_with(box("vice", [-200.0, -200, -60], [-150, -150, 20]))
+    said = " ".join(content_of(predict(part, cell, forces=False)).not_checked)
+    assert "Checked are arm (12 capsules, ESTIMATED); spindle (2 capsules, ESTIMATED); cutter of T1" in said
+    assert "against vice; arm itself" in said
+    plain = " ".join(content_of(predict(part, over_demonstration(), forces=False)).not_checked)
+    assert "Collisions of arm, spindle, holder and cables with anything" in plain
+    rows = {what: value for what, value, _ in to_confirm(cell)}
+    assert rows["obstacle vice"] == "box -200 -200 -60 to -150 -150 20 mm in $BASE"
+    assert rows["spindle body"] == "2 capsules in the flange frame"
