@@ -79,7 +79,8 @@ def cost(q_rad: np.ndarray, beside_mm: float) -> str:
     taken_s = time.process_time() - begin_s
     return (
         f"{len(q_rad):,} samples x {len(CAPSULES)} capsules, {len(ring):,} triangles "
-        f"{beside_mm:g} mm beside: {taken_s:.2f} s of one thread, {len(found.row):,} near; tree {tree_s:.2f} s"
+        f"{beside_mm:g} mm beside: {taken_s:.2f} s of one thread, {len(found.row):,} near; "
+        f"tree {tree_s:.2f} s"
     )
 
 
