@@ -94,6 +94,13 @@ def test_near_is_one_warning_for_each_pair(part):
     assert len(contacts(part, wide, "near")) == 1
 
 
+def test_near_says_between_which_lines(part):
+    found = contacts(part, cell_with(box("rail", [-20.0, -30, -10], [120, -11, 20])), "near")
+    assert len(found) == 1
+    assert found[0].line in (5, 6, 7)
+    assert found[0].message.endswith("less than 5 mm; near from line 5 to 8")
+
+
 def test_the_ptp_from_home_and_to_home_are_ways_of_the_joints(part):
     """A beam half-way between HOME and the part is above everything that the cut goes through."""
     cell = cell_with()

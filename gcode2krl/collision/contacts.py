@@ -15,17 +15,28 @@ class _Place:
     """The least gap of two things in a line of the G-code, or along an added motion."""
 
     gap_mm: float
+    line: int
     base_mm: Floats
     way: str
     is_ptp: bool
 
 
 @dataclass
+class _Pair:
+    """What is kept of two things: it does not grow with the lines, but for the first of the collisions."""
+
+    nearest: _Place | None = None
+    first_line: int = 0
+    last_line: int = 0
+    hits: dict[tuple[int, str], _Place] = field(default_factory=dict)
+
+
+@dataclass
 class Contacts:
-    """Gaps below the clearance: (who, what) → line and way → where."""
+    """Gaps below the clearance, by who and what."""
 
     clearance_mm: float
-    places: dict[tuple[str, str], dict[tuple[int, str], _Place]] = field(default_factory=dict)
+    pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
 
     def take(
         self,
@@ -38,52 +49,61 @@ class Contacts:
         is_ptp: bool = False,
     ) -> None:
         """Add what was noted along rows (n): ``names`` of each pair, ``line`` (n,) of the G-code."""
-        if not len(found.row):
-            return
         base_mm = found.place_mm @ to_base[:3, :3].T + to_base[:3, 3]
-        lines = line[found.row]
-        order = np.lexsort((found.note_gap_mm, lines, found.note_pair))
-        keys = np.stack([found.note_pair[order], lines[order]], axis=1)
-        least = order[np.flatnonzero(np.diff(keys, axis=0, prepend=-2).any(axis=1))]
-        for note in least.tolist():
-            gap_mm = float(found.note_gap_mm[note])
-            of_pair = self.places.setdefault(names[int(found.note_pair[note])], {})
-            key = (int(lines[note]), way)
-            if key not in of_pair or gap_mm < of_pair[key].gap_mm:
-                of_pair[key] = _Place(gap_mm, base_mm[note], way, is_ptp)
+        lines, gap_mm = line[found.row], found.note_gap_mm
+
+        def place(note: int) -> _Place:
+            return _Place(float(gap_mm[note]), int(lines[note]), base_mm[note], way, is_ptp)
+
+        for number in np.unique(found.note_pair).tolist():
+            notes = np.flatnonzero(found.note_pair == number)
+            pair = self.pairs.setdefault(names[number], _Pair())
+            nearest = int(notes[np.argmin(gap_mm[notes])])
+            if pair.nearest is None or gap_mm[nearest] < pair.nearest.gap_mm:
+                pair.nearest = place(nearest)
+            low, high = int(lines[notes].min()), int(lines[notes].max())
+            pair.first_line = min(pair.first_line or low, low)
+            pair.last_line = max(pair.last_line, high)
+            deepest = notes[np.lexsort((gap_mm[notes], lines[notes]))]
+            _, first = np.unique(lines[deepest], return_index=True)
+            for note in deepest[first][gap_mm[deepest[first]] <= 0][:MOST_PLACES].tolist():
+                key = (int(lines[note]), way)
+                is_worse = key in pair.hits and gap_mm[note] < pair.hits[key].gap_mm
+                if is_worse or (key not in pair.hits and len(pair.hits) < MOST_PLACES):
+                    pair.hits[key] = place(note)
 
     def issues(self) -> Iterator[Issue]:
         """Yield a collision for each line and pair, and one word for each pair that comes near only."""
         count = 0
-        for (who, what), of_pair in self.places.items():
-            hits = [(line, place) for (line, _), place in sorted(of_pair.items()) if place.gap_mm <= 0]
-            for line, place in hits:
+        for (who, what), pair in self.pairs.items():
+            for _, place in sorted(pair.hits.items(), key=lambda hit: hit[0]):
                 count += 1
                 if count <= MOST_PLACES:
-                    yield _collision(who, what, line, place)
-            if not hits:
-                yield self._near(who, what, of_pair)
+                    yield _collision(who, what, place)
+            if not pair.hits and pair.nearest is not None:
+                yield self._near(who, what, pair, pair.nearest)
 
-    def _near(self, who: str, what: str, of_pair: dict[tuple[int, str], _Place]) -> Issue:
-        (line, _), place = min(of_pair.items(), key=lambda each: (each[1].gap_mm, each[0]))
-        lines = len({line for line, _ in of_pair})
-        others = f", the nearest of {lines} lines" if lines > 1 else ""
+    def _near(self, who: str, what: str, pair: _Pair, place: _Place) -> Issue:
+        span = f"; near from line {pair.first_line} to {pair.last_line}"
+        others = span if pair.first_line != pair.last_line else ""
         sentence = (
             f"{who} comes within {place.gap_mm:.1f} mm of {what}{place.way}{_at(place)}: less than "
             f"{self.clearance_mm:g} mm{others}"
         )
         remedy = "move part or fixture, or lower [collision] clearance_mm if both are known well enough"
-        return Issue("warning", "near", line, sentence, remedy)
+        return Issue("warning", "near", place.line, sentence, remedy)
 
 
-def _collision(who: str, what: str, line: int, place: _Place) -> Issue:
+def _collision(who: str, what: str, place: _Place) -> Issue:
     deep = f"by {-place.gap_mm:.1f} mm or more" if place.gap_mm < -0.05 else "just so"
     remedy = (
         "set [clearance] z_mm higher or HOME elsewhere, so that the straight way of the joints is free"
         if place.is_ptp
         else "move part or fixture, turn the tool by [frames] spin, or use a longer tool"
     )
-    return Issue("error", "collision", line, f"{who} hits {what}{place.way}, {deep}{_at(place)}", remedy)
+    return Issue(
+        "error", "collision", place.line, f"{who} hits {what}{place.way}, {deep}{_at(place)}", remedy
+    )
 
 
 def _at(place: _Place) -> str:
