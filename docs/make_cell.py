@@ -23,6 +23,15 @@ _NAMED = {"tool": ".<number>", "compliance.virtual_joints": ".<name>"}
 """Tables of tables: what stands behind the name of the first."""
 _FRAME, _VALUES = "A frame", "A table with `source`"
 _TITLES = {"": "The cell", _FRAME: _FRAME, _VALUES: _VALUES}
+_LISTS = (
+    "effects",
+    "guard_inputs",
+    "online.axis_gains",
+    "obstacle",
+    "robot.body.capsules",
+    "spindle.body.capsules",
+)
+"""Tables of which a file may have several."""
 _ONCE = ("source", "sure")
 """Keys of many tables, listed once."""
 
@@ -57,7 +66,7 @@ def _below(place: str, section: type[BaseModel]) -> Iterator[tuple[str, type[Bas
 
 
 def _table(place: str, section: type[BaseModel]) -> str:
-    is_list = place in ("effects", "guard_inputs", "online.axis_gains")
+    is_list = place in _LISTS
     title = _TITLES.get(place) or (f"`[[{place}]]`" if is_list else f"`[{place}]`")
     keys = [key for key in descriptions_of(section) if key not in _ONCE or place in (_VALUES, "effects")]
     rows = [_row(place, section, key) for key in keys]

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcode2krl import compliance, cutting, krc4, program, robot
+from gcode2krl import collision, compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.clearance import moves_watched_at_targets, watch_of
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
@@ -16,6 +17,7 @@ from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
 from gcode2krl.tables import (
+    Clearance,
     Deflection,
     Forces,
     Gathered,
@@ -52,12 +54,17 @@ class Kept(NamedTuple):
     q_rad: Floats | None
     """(m, 6) None where joints were not needed."""
     qd_rad_s: Floats | None
+    clearance: Clearance | None
+    """None where the cell describes nothing that may hit or be hit."""
 
 
-def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False) -> Planned:
+def plan_course(
+    targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = False, watches: bool = True
+) -> Planned:
     """Plan the motion that the controller will command; see `pipeline.plan_motion`.
 
-    Only where it ``keeps`` them are the samples of the first way along it returned.
+    Only where it ``keeps`` them are the samples of the first way along it returned, and only where it
+    ``watches`` are there collisions among the findings.
     """
     chain = krc4.build_chain(targets, cell)
     profile = krc4.plan(chain, cell)
@@ -67,7 +74,8 @@ def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = Fals
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)
         is_last = trial == _SLOWING_ROUNDS
-        seen = _seen_along(course, targets, chain, cell, judges_joints=not is_last, keeps=keeps)
+        judges = _Judges(joints=not is_last, collisions=watches)
+        seen = _seen_along(course, targets, chain, cell, judges, keeps=keeps)
         if seen.share is None or seen.share.max(initial=0.0) <= _LEAST_SHARE:
             break
         slowed = slowed / np.maximum(seen.share, 1.0)
@@ -79,7 +87,7 @@ def plan_course(targets: Targets, cell: Cell, dt_s: float, *, keeps: bool = Fals
         sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
-    issues += seen.acceleration.issues()
+    issues += [*seen.acceleration.issues(), *seen.contacts]
     return Planned(course, tuple(issues), seen.watch.outlook, seen.kept)
 
 
@@ -90,37 +98,93 @@ class _Seen(NamedTuple):
     """(n,) largest joint speed over its limit of each move of the chain; None where it is not judged."""
     acceleration: AccelerationLimit
     watch: cutting.Watch
+    contacts: tuple[Issue, ...]
+    """Collisions, and what comes near; see `collision`."""
     kept: Kept | None
 
 
+class _Judges(NamedTuple):
+    """What is looked at on a way along a motion."""
+
+    joints: bool
+    collisions: bool
+
+
 def _seen_along(
-    course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, *, judges_joints: bool, keeps: bool
+    course: krc4.Course, targets: Targets, chain: krc4.Chain, cell: Cell, judges: "_Judges", *, keeps: bool
 ) -> _Seen:
-    """Go along a motion, and look at joint speeds, accelerations and tools."""
+    """Go along a motion, and look at joint speeds, accelerations, tools and collisions."""
     line = _line_of_move(targets, chain)
     acceleration, watch = AccelerationLimit(cell, course.dt_s, course.count), cutting.Watch()
-    judges_joints &= cell.robot.speeds.qd_deg_s is not None and course.moves > 0
-    follower = follower_of(course, cell) if judges_joints else None
+    judges_joints = judges.joints and cell.robot.speeds.qd_deg_s is not None and course.moves > 0
+    watches = judges.collisions and course.moves > 0
+    guard = _Guard.over(targets, cell, line, keeps=keeps) if watches else None
+    follower = follower_of(course, cell) if judges_joints or guard is not None else None
     share = np.zeros(len(line)) if judges_joints else None
-    gathered, waiting = Gathered[Motion](course.count), np.zeros(0, dtype=np.int32)
-    angles = np.empty((2, course.count if keeps and judges_joints else 0, 6))
+    gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
+    angles = np.empty((2, course.count if keeps and follower is not None else 0, 6))
     solved = 0
     with ahead(course.blocks()) as blocks:
         for motion, ends in blocks:
             acceleration.take(motion, line[motion.move])
             watch.take(motion)
-            if follower is not None and share is not None:
+            if follower is not None:
                 q, qd = follower.take(motion, ends)
-                waiting = np.concatenate([waiting, motion.move])
-                robot.raise_shares(share, qd, waiting[: len(qd)], cell)
-                waiting = waiting[len(qd) :]
+                waiting = np.concatenate([waiting, [motion.move, motion.tool]], axis=1)
+                move, tool = waiting[:, : len(q)]
+                waiting = waiting[:, len(q) :]
+                if share is not None:
+                    robot.raise_shares(share, qd, move, cell)
+                if guard is not None:
+                    guard.take(q, move, tool)
                 if keeps:
                     angles[:, solved : solved + len(q)] = q, qd
                     solved += len(q)
             if keeps:
                 gathered.take(motion)
-    kept = Kept(gathered.table(), *(angles if judges_joints else (None, None))) if keeps else None
-    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, kept)
+    clearance = guard.clearance() if guard is not None and keeps else None
+    q_rad, qd_rad_s = angles if follower is not None else (None, None)
+    kept = Kept(gathered.table(), q_rad, qd_rad_s, clearance) if keeps else None
+    contacts = guard.watch.issues() if guard is not None else ()
+    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, contacts, kept)
+
+
+class _Guard:
+    """What looks for collisions along a motion."""
+
+    def __init__(self, watch: collision.Watch, line: Ints32, elsewhere: Ints32, *, keeps: bool) -> None:
+        """Take the lines (n,) of the rows of the Toolpath, and the rows that are watched at their targets."""
+        self.watch, self._line, self._elsewhere = watch, line, elsewhere
+        self._kept: list[tuple[Floats, Ints32]] | None = [] if keeps else None
+
+    @classmethod
+    def over(cls, targets: Targets, cell: Cell, line: Ints32, *, keeps: bool) -> "_Guard | None":
+        watch = watch_of(cell, tells=keeps)
+        if watch is None:
+            return None
+        return cls(watch, line, moves_watched_at_targets(targets), keeps=keeps)
+
+    def take(self, q_rad: Floats, move: Ints32, tool: Ints32) -> None:
+        """Go on along samples (m) with their joints."""
+        elsewhere = np.isin(move, self._elsewhere)
+        if elsewhere.any():
+            q_rad = np.where(elsewhere[:, None], np.nan, q_rad)
+        if len(q_rad):
+            told = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move])
+            if self._kept is not None:
+                self._kept.append(told)
+
+    def clearance(self) -> Clearance:
+        """Return the clearances of all samples."""
+        gaps, near = zip(*(self._kept or []), strict=True)
+        link, obstacle = np.concatenate(near).T
+        return Clearance(
+            clearance_mm=np.concatenate(gaps),
+            clearance_link=np.ascontiguousarray(link),
+            clearance_obstacle=np.ascontiguousarray(obstacle),
+            links=tuple(self.watch.links),
+            obstacles=tuple(self.watch.obstacles),
+        )
 
 
 def follower_of(course: krc4.Course, cell: Cell) -> robot.Follower:

@@ -17,6 +17,7 @@ from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.clearance import collisions_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
@@ -24,7 +25,17 @@ from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
 from gcode2krl.progress import Begin, Progress, unheard, unseen
-from gcode2krl.tables import Deflection, Forces, Gathered, Joints, Motion, Targets, Toolpath, blocks_of
+from gcode2krl.tables import (
+    Clearance,
+    Deflection,
+    Forces,
+    Gathered,
+    Joints,
+    Motion,
+    Targets,
+    Toolpath,
+    blocks_of,
+)
 from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
 
@@ -34,6 +45,7 @@ if TYPE_CHECKING:
 _ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
+_CLEARANCE_KNOWN: WeakKeyDictionary[Motion, Clearance] = WeakKeyDictionary()
 
 
 def predict(
@@ -125,7 +137,7 @@ def add_effects(
 
 def _plan_anew(prediction: Prediction) -> Callable[[Targets, Cell], Motion]:
     dt_s = float(prediction.inputs["dt_s"])
-    return lambda targets, cell: plan_motion(targets, cell, dt_s)
+    return lambda targets, cell: plan_motion(targets, cell, dt_s, watches=False)
 
 
 def predict_toolpath(
@@ -171,7 +183,8 @@ def predict_toolpath(
         content = source.read_bytes()
         inputs["program_sha256"] = hashlib.sha256(content).hexdigest()
         inputs["program_size_bytes"] = len(content)
-    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads)
+    near = clearance_along(motion)
+    return Prediction(toolpath, targets, cell, motion, joints, inputs, *loads, clearance=near)
 
 
 def forecast_toolpath(
@@ -313,8 +326,12 @@ def _simplified(
 
 
 def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
-    """Return targets with the findings on reach, limits, singularities and table, and their joints."""
+    """Return targets with the findings on reach, limits, singularities and table, and their joints.
+
+    Among them are the collisions on the motions that a Motion does not show (`clearance`).
+    """
     joints, findings = robot.follow(targets, cell, conditioning=False)
+    findings = (*findings, *collisions_beside(targets, joints.q_rad, cell))
     judged = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
     rows = np.flatnonzero(targets.ptp)
     _PTP_KNOWN[judged] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
@@ -333,13 +350,15 @@ def controller_test_targets(
     return checked(trial_program.with_turning_lines(targets, cell), cell)[0] if turning else targets
 
 
-def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> Motion:
+def plan_motion(
+    source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012, *, watches: bool = True
+) -> Motion:
     """Return the path the controller will command, sampled every ``dt_s`` (12 ms, or 4 ms under RSI).
 
     Corners, time law and look-ahead by `krc4`; where a joint would exceed its speed limit the move is slowed
     down (assumption: to exactly that limit). ``issues`` say where time is lost and how much; what depends on
     a hypothesis about the controller says "unverified". Spindle start, tool changes and M-codes take no time
-    here.
+    here. Where it ``watches`` the issues name collisions too (`collision`), if the cell describes any.
 
     Raises
     ------
@@ -355,14 +374,21 @@ def plan_motion(source: Targets | Toolpath, cell: Cell, dt_s: float = 0.012) -> 
     0.004
     """
     targets = set_targets(source, cell) if isinstance(source, Toolpath) else source
-    planned = plan_course(targets, cell, dt_s, keeps=True)
+    planned = plan_course(targets, cell, dt_s, keeps=True, watches=watches)
     if planned.kept is None:
         raise AssertionError("samples that are asked for are kept")
-    motion, q_rad, qd_rad_s = planned.kept
+    motion, q_rad, qd_rad_s, clearance = planned.kept
     motion = replace(motion, issues=planned.issues)
     if q_rad is not None and qd_rad_s is not None:
         _ANGLES_KNOWN[motion] = (cell, q_rad, qd_rad_s)
+    if clearance is not None:
+        _CLEARANCE_KNOWN[motion] = clearance
     return motion
+
+
+def clearance_along(motion: Motion) -> Clearance | None:
+    """Return how near anything comes along a Motion that `plan_motion` has watched, None for any other."""
+    return _CLEARANCE_KNOWN.get(motion)
 
 
 def corner_errors(

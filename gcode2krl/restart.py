@@ -80,7 +80,7 @@ def _before(
     _refuse_missing_tools(toolpath, row, cell)
     targets, joints = targets_and_joints(toolpath, cell, tolerance_mm)
     try:
-        motion = plan_motion(targets, cell, cell.controller.cycle_s)
+        motion = plan_motion(targets, cell, cell.controller.cycle_s, watches=False)
         field, to_field = cutting.raw_field(toolpath, motion, cell)
         known = Restart(line=0, begins_line=0, left=field)
         done = _until(motion, krc4.build_chain(targets, cell), row)

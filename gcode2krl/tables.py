@@ -325,6 +325,31 @@ class Joints(Table):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Clearance(Table):
+    """How near arm, spindle and tool come to anything along a Motion."""
+
+    clearance_mm: Floats = column(np.float64)
+    """(m,) the least distance since the sample before, less than 0 where they overlap; `HORIZON_MM` of
+    `collision` where nothing is as near; NaN where the robot goes another way than the Motion (PTP)."""
+    clearance_link: Ints32 = column(np.int32)
+    """(m,) what of the robot that is, a place in ``links``; -1: nothing is as near."""
+    clearance_obstacle: Ints32 = column(np.int32)
+    """(m,) what it is near, a place in ``obstacles``."""
+    links: tuple[str, ...] = ()
+    obstacles: tuple[str, ...] = ()
+
+    def facts(self) -> str:
+        """Return how many samples there are, and the least distance."""
+        return f"{len(self)} samples, nearest {_most(-self.clearance_mm, -1.0, '.1f')} mm"
+
+    def names(self) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
+        """Return link and obstacle (m,) by name, "" where nothing is near."""
+        both = ((self.clearance_link, self.links), (self.clearance_obstacle, self.obstacles))
+        link, obstacle = (np.array([*names, ""], dtype=np.str_)[number] for number, names in both)
+        return link, obstacle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Forces(Table):
     """Cutting forces along a Motion: means over one spindle revolution, on the tool."""
 

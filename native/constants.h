@@ -767,6 +767,18 @@
 #define CHAIN_AXIS_SIGN {-1.0, 1.0, 1.0, -1.0, 1.0, -1.0}
 #define CHAIN_AXIS_ZERO {0.0, 0.0, -1.5707963267948966, 0.0, 0.0, 3.141592653589793}
 
+/* gcode2krl.collision.scene */
+#define SCENE_MOST_BODIES 96
+#define SCENE_PLANE 0
+#define SCENE_BOX 1
+#define SCENE_MESH 2
+#define SCENE_LEAF 4
+
+/* gcode2krl.collision.along */
+#define ADVANCE_EXACT_MM 0.05
+#define ADVANCE_EXACT_SHARE 0.25
+#define ADVANCE_SHORT_MM 0.01
+
 /* gcode2krl.online.feed */
 #define FEED_WINDOW_S 0.02
 #define FEED_LEAST_MM 0.02
@@ -1496,6 +1508,29 @@ typedef struct {
     Floats overlap_mm;
     Bools is_read;
 } Result;
+
+typedef struct {
+    Ints32 link;
+    Floats ends_mm;
+    Floats radius_mm;
+    Floats lever_mm;
+} Bodies;
+
+typedef struct {
+    Ints32 kind;
+    Floats numbers;
+    Ints tree;
+    Floats triangles;
+    Floats boxes;
+} Obstacles;
+
+typedef struct {
+    Ints32 pairs;
+    Bools known;
+    Floats states;
+    Floats ends_mm;
+    Ints steps;
+} Watched;
 
 typedef struct {
     Floats pose;

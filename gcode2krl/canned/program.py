@@ -126,5 +126,5 @@ def predicted(draft: Draft, cell: Cell, dt_s: float = COARSE_S) -> Prediction:
 
 def minutes_of(draft: Draft, targets: Targets, cell: Cell) -> float:
     """Return how long a program takes: its predicted motion, the spindle's starts and a person's halts."""
-    motion_s = float(plan_motion(targets, cell, COARSE_S).time_s[-1])
+    motion_s = float(plan_motion(targets, cell, COARSE_S, watches=False).time_s[-1])
     return (motion_s + draft.starts * (cell.spindle.start_s or 0.0) + draft.halts * HALT_S) / S_PER_MIN

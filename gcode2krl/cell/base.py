@@ -126,6 +126,11 @@ def _with_whole_paths(data: Table, beside: Path | None) -> Table:
     for section, key in _FILES:
         if isinstance(table.get(section), dict):
             table[section] = _whole_path(table[section], key, beside)
+    if isinstance(table.get("obstacle"), list):
+        table["obstacle"] = [
+            _whole_path(each, "mesh", beside) if isinstance(each, dict) else each
+            for each in table["obstacle"]
+        ]
     tools = table.get("tool")
     if isinstance(tools, dict):
         table["tool"] = {

@@ -26,6 +26,7 @@ from gcode2krl.cell.looks import cell_html, cell_words
 from gcode2krl.cell.sections import (
     Axis,
     Clearance,
+    Collision,
     Compliance,
     Controller,
     EffectEntry,
@@ -36,6 +37,7 @@ from gcode2krl.cell.sections import (
     Load,
     Machine,
     Material,
+    Obstacle,
     OneLine,
     Pilot,
     Program,
@@ -100,6 +102,9 @@ class Cell(Section):
     material: Material | None = None
     stock: Stock | None = None
     table: Table | None = None
+    obstacle: Annotated[tuple[Obstacle, ...], Field(max_length=100)] = ()
+    """What stands in the cell."""
+    collision: Collision = Collision()
     limits: ResultLimits = ResultLimits()
     load: Load = Load()
     compliance: Compliance = Compliance()
@@ -399,11 +404,24 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     if cell.mounted_tool is not None and cell.mounted_tool not in cell.tool:
         number = cell.mounted_tool
         yield _key_issue("mounted_tool", f"found {number}, and the cell has no [tool.{number}]")
+    yield from _obstacle_issues(cell)
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
     texts = switching.texts_without_words(templates, view)
     yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
+
+
+def _obstacle_issues(cell: Cell) -> Iterator[Issue]:
+    """Yield obstacles with the name of another one, and meshes that are not there."""
+    names: set[str] = set()
+    for number, obstacle in enumerate(cell.obstacle):
+        if obstacle.name in names:
+            yield _key_issue(f"obstacle.{number}.name", f"{obstacle.name!r} names two obstacles")
+        names.add(obstacle.name)
+        if obstacle.mesh is not None and not Path(obstacle.mesh).is_file():
+            words = f"there is no file {Path(obstacle.mesh).name!r}"
+            yield _key_issue(f"obstacle.{number}.mesh", words, "give its path relative to the cell file")
 
 
 def _split_pairs(stated: StatedCell) -> Iterator[Issue]:

@@ -1,12 +1,13 @@
 """What a person must confirm of a cell, where its values come from, and what it does not state."""
 
 from collections.abc import Iterator
+from pathlib import PurePath
 from typing import Any
 
 from gcode2krl.cell import Cell, plain_view, switching
 from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.cell.ranges import range_issues
-from gcode2krl.cell.sections import Frame
+from gcode2krl.cell.sections import Frame, Obstacle
 from gcode2krl.errors import Issue
 
 MISSING = "MISSING"
@@ -36,6 +37,7 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     plane = cell.clearance.z_mm
     place = MISSING if plane is None else f"Z {plane} mm in $BASE, free of obstacles all the way"
     yield "clearance plane", place, "assumption"
+    yield from _obstacles(cell)
     yield from _signals(cell)
     for item in cell.guard_inputs:
         yield f"$IN[{item.number}]", f"{item.meaning} = {item.value}", "assumption"
@@ -84,6 +86,30 @@ def _tools(cell: Cell) -> Iterator[Row]:
         frame = f", $TOOL {_frame(tool.frame)}, {tool.axis or '+z'} to the holder" if tool.frame else ""
         shape = f"{tool.model or tool.kind} D{tool.diameter_mm:g} z{tool.teeth}"
         yield f"tool T{number}", f"{shape} {length}{whose}{data}{frame}", tool.sure
+
+
+def _obstacles(cell: Cell) -> Iterator[Row]:
+    """Yield the shapes that collisions are checked with."""
+    for obstacle in cell.obstacle:
+        yield f"obstacle {obstacle.name}", _shape(obstacle), "assumption"
+    body, arm = cell.spindle.body, cell.robot.body
+    if body is not None:
+        yield "spindle body", f"{len(body.capsules)} capsules in the flange frame", body.sure
+    if (cell.obstacle or body is not None) and arm.capsules:
+        yield "arm", f"{len(arm.capsules)} capsules", arm.sure
+
+
+def _shape(obstacle: Obstacle) -> str:
+    where = "$BASE" if obstacle.frame == "base" else "the robot root"
+    if obstacle.box_mm is not None:
+        low, high = (" ".join(f"{x:g}" for x in corner) for corner in obstacle.box_mm)
+        return f"box {low} to {high} mm in {where}"
+    if obstacle.plane is not None:
+        point, normal = (
+            " ".join(f"{x:g}" for x in v) for v in (obstacle.plane.point_mm, obstacle.plane.normal)
+        )
+        return f"solid behind the plane through {point} mm, free towards {normal}, in {where}"
+    return f"mesh {PurePath(str(obstacle.mesh)).name} in {where}"
 
 
 def _signals(cell: Cell) -> Iterator[Row]:

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gcode2krl.cell import Cell
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.prediction.forecast import Forecast
@@ -48,7 +50,18 @@ def summary_lines(
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
     yield from load_lines(forecast.loads, cell)
-    yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
+    yield from _collisions(cell, np.unique(targets.tool).tolist())
+
+
+def _collisions(cell: Cell, tools: list[int]) -> Iterator[str]:
+    """Yield what was checked for collisions and what was not."""
+    scope = collision_scope(cell, tools)
+    if scope is None:
+        yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
+        return
+    yield f"  collisions none: {', '.join(scope.movers)}"
+    yield f"             against {', '.join(scope.obstacles) or 'nothing that the cell states'}"
+    yield f"  not known  collision of {', '.join(scope.unchecked)}; chatter"
 
 
 def _duration(seconds: float) -> str:

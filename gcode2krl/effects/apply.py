@@ -95,6 +95,7 @@ def with_effects(
         forces=_forces(signals, prediction.forces),
         deflection=_deflection(signals, prediction),
         added=added_columns(signals),
+        clearance=prediction.clearance if motion is prediction.motion else None,
     )
 
 

@@ -12,10 +12,12 @@ from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.cell.checked_parts import CollisionScope
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import statements as st
+from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
 from gcode2krl.krl.pilot_text import PilotText, checksum
@@ -71,6 +73,8 @@ class Layout:
     """True where material removal and cutting forces have been predicted."""
     online: str = ""
     """Name of the RSI files of a program that is corrected online."""
+    collisions: CollisionScope | None = None
+    """What was checked for collisions; None: nothing."""
 
 
 def compose(
@@ -320,6 +324,7 @@ class _Composer:
             allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
             guard=self.layout.guard,
             forces=self.layout.forces,
+            collisions=self._collision_lines(),
             provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
             restart=self.targets.restart,
             simplified=self.targets.simplified,
@@ -335,6 +340,10 @@ class _Composer:
             tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
         return _text(text) + _text(st.render(self.cell, "program.prologue"))
+
+    def _collision_lines(self) -> list[str]:
+        scope = self.layout.collisions
+        return [] if scope is None else collision_lines(scope, is_corrected=self.rsi is not None)
 
     def _foot(self) -> bytes:
         return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)

@@ -139,7 +139,7 @@ def verify_krl(
             force = pilot_force(prediction)
             case = PilotCase(pilot, force, force.force_N)
         else:
-            case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s))
+            case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s, watches=False))
     if announced:
         pieces = pieces_in(
             program.position_mm, program.ptp, program.cdis_mm, targets, cell, POSITION_LIMIT_MM

@@ -10,6 +10,7 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
@@ -175,6 +176,7 @@ def write_krl(
         allowed=header_allowed,
         forces=known,
         online=online or "",
+        collisions=None if isinstance(source, Targets) else collision_scope(cell, _tools(targets)),
     )
     bare = _Content(targets, joints)
     content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
@@ -192,6 +194,10 @@ def write_krl(
     return WrittenProgram(
         program_name, tuple(written), files.contents, report, tuple(issues), content.targets
     )
+
+
+def _tools(targets: Targets) -> list[int]:
+    return [int(number) for number in np.unique(targets.tool)]
 
 
 class _Files:
@@ -390,7 +396,7 @@ def _last_step(source: str) -> str:
 def _inputs(targets: Targets, cell: Cell) -> list[str]:
     """Return the files that a program is made from, as far as its tables name them."""
     stock = cell.stock.mesh if cell.stock is not None else None
-    named = (targets.source, stock, cell.online.calibration)
+    named = (targets.source, stock, cell.online.calibration, *(each.mesh for each in cell.obstacle))
     return [name for name in named if name]
 
 

@@ -24,7 +24,7 @@ from gcode2krl.prediction.head import hashed, head_of
 from gcode2krl.prediction.looks import Figures, figures_html, figures_words
 from gcode2krl.prediction.plots import Plots
 from gcode2krl.prediction.samples import joined_samples
-from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
+from gcode2krl.tables import Clearance, Deflection, Forces, Joints, Motion, Targets, Toolpath
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,6 +60,8 @@ class Prediction:
     added: dict[str, Floats] = field(default_factory=dict)
     """Columns (m,) beside Motion that effects bring: ``q1_act_rad`` …, ``q1_load_rad`` …,
     ``force_meas_x_N`` …."""
+    clearance: Clearance | None = None
+    """How near anything comes; None where the cell describes nothing that may be hit."""
 
     @property
     def issues(self) -> tuple[Issue, ...]:
@@ -108,7 +110,8 @@ class Prediction:
         ``source_line`` is the line of the G-code; ``kind`` of the move ``rapid``, ``line``, ``arc`` or
         ``machine``; ``pass`` counts the runs of feed moves of one tool from 1, 0 on rapids; ``cutting`` is
         where the tool is in material. ``force_N`` and ``deflection_mm`` are lengths of the vectors beside
-        them. Lengths are mm, times s, angles rad, forces N, torques N·mm: each name ends in its unit.
+        them; ``clearance_link`` and ``clearance_obstacle`` are names. Lengths are mm,
+        times s, angles rad, forces N, torques N·mm: each name ends in its unit.
         Columns of a stage that did not run are left out. Raises `NotUnderstoodError` without a motion.
 
         The largest force of each line:
@@ -121,7 +124,7 @@ class Prediction:
         ['source_line', 'force_N']
         """
         return joined_samples(
-            self.toolpath, self.motion, self.joints, self.forces, self.deflection, self.added
+            self.toolpath, self.motion, self.joints, self.forces, self.deflection, self.added, self.clearance
         )
 
     def save(self, folder: str | Path, csv: bool = False, inputs: Iterable[str | Path] = ()) -> list[Path]:
@@ -169,7 +172,9 @@ class Prediction:
         tables = {"toolpath": self.toolpath.columns(), "targets": self.targets.columns()}
         if self.motion is not None:
             beside: list[Table] = [
-                table for table in (self.joints, self.forces, self.deflection) if table is not None
+                table
+                for table in (self.joints, self.clearance, self.forces, self.deflection)
+                if table is not None
             ]
             tables["motion"] = self.motion.columns()
             for table in beside:
@@ -180,7 +185,14 @@ class Prediction:
     def _record_bytes(self, hashes: Mapping[str, str]) -> bytes:
         head = head_of(self.inputs, self.issues, self.cell, self._figures().as_dict(), hashes)
         return record_bytes(
-            self.inputs, self.issues, self.toolpath, self.targets, self.cell, self._bands(), head
+            self.inputs,
+            self.issues,
+            self.toolpath,
+            self.targets,
+            self.cell,
+            self._bands(),
+            head,
+            self.clearance,
         )
 
     def _bands(self) -> dict[str, float]:

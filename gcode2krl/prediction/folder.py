@@ -22,6 +22,7 @@ from gcode2krl.files import Content
 from gcode2krl.prediction.record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction.tables import PARQUET_TYPES, check_numbers, check_references, read_table
 from gcode2krl.tables import (
+    Clearance,
     Deflection,
     Event,
     Forces,
@@ -65,6 +66,7 @@ def record_bytes(
     cell: Cell,
     bands: Mapping[str, float],
     head: Mapping[str, Any],
+    clearance: Clearance | None = None,
 ) -> bytes:
     """Return ``prediction.toml``: ``bands`` of the tables that have one, ``head`` as of `head_of`."""
     import tomli_w
@@ -84,6 +86,8 @@ def record_bytes(
         record["simplified"] = asdict(targets.simplified)
     if targets.correction_mm:
         record["correction_mm"] = targets.correction_mm
+    if clearance is not None:
+        record["clearance"] = {"links": list(clearance.links), "obstacles": list(clearance.obstacles)}
     record |= {f"{name}_relative_band": band for name, band in bands.items()}
     return tomli_w.dumps(record).encode("utf-8", "replace")
 
@@ -141,20 +145,24 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
         bands = {"forces": record.forces_relative_band, "deflection": record.deflection_relative_band}
         for name, kind, mark in _BESIDE:
             if mark in motion_frame.columns:
-                band = {"relative_band": bands[name]} if name in bands else {}
-                parts[name] = _table(kind, motion_frame, **band)
+                more: dict[str, Any] = {"relative_band": bands[name]} if name in bands else {}
+                if name == "clearance":
+                    more = record.clearance.model_dump()
+                parts[name] = _table(kind, motion_frame, **more)
         parts["added"] = {
             name: motion_frame[name].to_numpy() for name in motion_frame.columns if _ADDED.fullmatch(name)
         }
     for table in parts.values():
         if isinstance(table, Table):
             check_numbers(table)
-    check_references(toolpath, targets, parts.get("motion"), parts.get("forces"), set(cell.tool))
+    beside = (parts.get("motion"), parts.get("forces"))
+    check_references(toolpath, targets, *beside, set(cell.tool), parts.get("clearance"))
     return parts
 
 
 _BESIDE: tuple[tuple[str, type[Table], str], ...] = (
     ("joints", Joints, "q1_rad"),
+    ("clearance", Clearance, "clearance_mm"),
     ("forces", Forces, "force_base_x_N"),
     ("deflection", Deflection, "deflection_base_x_mm"),
 )

@@ -97,6 +97,13 @@ class _SimplifiedRecord(_Part):
     worst_line: _Line
 
 
+class _ClearanceRecord(_Part):
+    """Names of `tables.Clearance`."""
+
+    links: tuple[StrictStr, ...] = ()
+    obstacles: tuple[StrictStr, ...] = ()
+
+
 class _Inputs(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, _Plain | list[_Plain]]
@@ -117,6 +124,7 @@ class PredictionRecord(BaseModel):
     cell: dict[str, Any]
     restart: _RestartRecord | None = None
     simplified: _SimplifiedRecord | None = None
+    clearance: _ClearanceRecord = _ClearanceRecord()
     correction_mm: _NotNegative = 0.0
     forces_relative_band: _Band = 0.0
     deflection_relative_band: _Band = 0.0

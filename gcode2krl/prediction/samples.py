@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import input_error
 from gcode2krl.exchange import Columns
-from gcode2krl.tables import Deflection, Forces, Joints, Motion, Toolpath, lengths
+from gcode2krl.tables import Clearance, Deflection, Forces, Joints, Motion, Toolpath, lengths
 
 
 def joined_samples(
@@ -19,6 +19,7 @@ def joined_samples(
     forces: Forces | None,
     deflection: Deflection | None,
     added: Mapping[str, Floats],
+    clearance: Clearance | None = None,
 ) -> Columns:
     """Return the samples of a motion with what every stage says of them; see `Prediction.samples`."""
     if motion is None:
@@ -40,6 +41,10 @@ def joined_samples(
     columns["feed_mm_s"] = toolpath.feed_mm_s[row]
     if joints is not None:
         columns |= joints.columns()
+    if clearance is not None:
+        link, obstacle = clearance.names()
+        columns["clearance_mm"] = clearance.clearance_mm
+        columns |= {"clearance_link": link, "clearance_obstacle": obstacle}
     if forces is not None:
         of_forces = forces.columns()
         del of_forces["tool"]  # that of the motion

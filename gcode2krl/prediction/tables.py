@@ -9,7 +9,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import input_error
 from gcode2krl.files.parquet_guard import DamagedError, outline_of, read_parquet
-from gcode2krl.tables import Forces, Motion, Table, Targets, Toolpath
+from gcode2krl.tables import Clearance, Forces, Motion, Table, Targets, Toolpath
 
 if TYPE_CHECKING:
     import polars as pl
@@ -20,6 +20,7 @@ PARQUET_TYPES = {"f": "DOUBLE", "i": "INT32", "b": "BOOLEAN"}
 _MAY_BE_NAN = {
     "Toolpath": ("tolerance_mm", "length_offset_mm"),
     "Targets": ("speed_mm_s",),
+    "Clearance": ("clearance_mm",),
     "Joints": ("q_rad", "qd_rad_s", "limit_margin_rad", "sigma_min"),
     "Forces": ("phi_rad",),
     "Deflection": ("deflection_base_mm", "correction_base_mm"),
@@ -83,8 +84,9 @@ def check_references(
     motion: Motion | None,
     forces: Forces | None,
     tools: set[int],
+    clearance: Clearance | None = None,
 ) -> None:
-    """Raise `ValueError` where tables do not fit each other: rows, tools, time, orientations."""
+    """Raise `ValueError` where tables do not fit each other: rows, tools, time, orientations, names."""
     _within("Targets.move", targets.move, -1, len(toolpath) - 1)
     _known_tools("Targets.tool", targets.tool, tools)
     _unit("Targets.rotation", targets.rotation)
@@ -100,6 +102,10 @@ def check_references(
         raise ValueError(f"Motion.time_s: does not rise at row {int(late[0]) + 1}")
     if forces is not None:
         _known_tools("Forces.tool", forces.tool, tools)
+    if clearance is not None:
+        _within("Clearance.clearance_link", clearance.clearance_link, -1, len(clearance.links) - 1)
+        obstacles = len(clearance.obstacles)
+        _within("Clearance.clearance_obstacle", clearance.clearance_obstacle, -1, obstacles - 1)
 
 
 def _within(name: str, values: Ints32, low: int, high: int) -> None:

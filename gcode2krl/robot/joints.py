@@ -76,6 +76,15 @@ def angles_near(motion: Motion, q_rad: Floats, cell: Cell) -> Floats:
     return same_branch(path, q_rad, cell)
 
 
+def line_angles(targets: Targets, row: int, q_rad: Floats, cell: Cell) -> Floats:
+    """Return the angles (s, 6) in rad along the LIN to a target, from the joints (6,) where it begins.
+
+    Branch and turns are those of these joints; the samples are those at which lines are checked, the target
+    the last of them.
+    """
+    return same_branch(_path(sample_lines(targets, cell, row, row + 1)), q_rad, cell)
+
+
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
     """Return angles (m, 6) in rad and speeds (m, 6) in rad/s of a Motion; speeds are central differences."""
     rows = trial_rows(len(motion))

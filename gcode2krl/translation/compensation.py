@@ -28,6 +28,7 @@ def compensated(
         Where there is no deflection, or it is too uncertain to move a robot by it.
     """
     from gcode2krl.compensation.iteration import compensate, keeping_forces
+    from gcode2krl.pipeline import clearance_along
 
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     if motion is None or forces is None or deflection is None:
@@ -60,6 +61,7 @@ def compensated(
         forces=forces,
         deflection=deflection,
         inputs={**prediction.inputs, "compensate": "offline", **done.figures},
+        clearance=clearance_along(motion),
     )
 
 

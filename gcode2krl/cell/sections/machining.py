@@ -19,6 +19,7 @@ from gcode2krl.cell.sections.fields import (
     SignalNumber,
     YesNo,
 )
+from gcode2krl.cell.sections.surroundings import SpindleBody
 
 _ROUNDED_SHARE = 0.005
 """Fraction of the diameter by which the radius of a ball may be rounded: 1.58 for a ball of 3.175 mm."""
@@ -118,6 +119,7 @@ class Spindle(Provenance):
     stop_s: NotNegative = 5.0
     flood_output: SignalNumber | None = None
     mist_output: SignalNumber | None = None
+    body: SpindleBody | None = None
 
 
 class GuardInput(Section):

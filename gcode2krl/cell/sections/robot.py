@@ -19,6 +19,7 @@ from gcode2krl.cell.sections.fields import (
     Sure,
     missing,
 )
+from gcode2krl.cell.sections.surroundings import RobotBody
 
 _LENGTHS = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
 
@@ -103,6 +104,7 @@ class Robot(Section):
     speeds: Speeds = Speeds()
     payload: Payload = Payload()
     drives: Drives = Drives()
+    body: RobotBody = RobotBody()
     note: str = ""
 
 

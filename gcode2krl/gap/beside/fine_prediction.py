@@ -25,7 +25,7 @@ def refined_prediction(prediction: Prediction) -> Prediction:
     if float(np.median(np.diff(motion.time_s))) <= LIMITS.fine_step_s * 1.01:
         return prediction
     try:
-        fine = plan_motion(prediction.targets, prediction.cell, LIMITS.fine_step_s)
+        fine = plan_motion(prediction.targets, prediction.cell, LIMITS.fine_step_s, watches=False)
         again = cubic(motion.time_s, fine.time_s, fine.position_mm)
         apart = np.linalg.norm(again - motion.position_mm, axis=1)
         if float(np.sqrt(np.mean(apart**2))) > LIMITS.fine_same_mm:
@@ -39,4 +39,6 @@ def refined_prediction(prediction: Prediction) -> Prediction:
     except Gcode2KrlError:
         return prediction
     inputs = {**prediction.inputs, "dt_s": LIMITS.fine_step_s}
-    return replace(prediction, motion=fine, joints=joints, forces=forces, deflection=None, inputs=inputs)
+    return replace(
+        prediction, motion=fine, joints=joints, forces=forces, deflection=None, inputs=inputs, clearance=None
+    )

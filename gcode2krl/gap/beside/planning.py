@@ -23,7 +23,7 @@ def remembered_plan(prediction: Prediction) -> Plan | None:
 
     dt_s = float(prediction.inputs.get("dt_s", prediction.cell.controller.cycle_s))
     slowed = any(issue.code == "joint-speed" for issue in prediction.issues)
-    plan = partial(plan_motion, dt_s=dt_s) if slowed else inputs_of(prediction).plan
+    plan = partial(plan_motion, dt_s=dt_s, watches=False) if slowed else inputs_of(prediction).plan
     if plan is None:
         return None
     known: OrderedDict[Any, Motion] = OrderedDict()

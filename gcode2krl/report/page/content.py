@@ -9,6 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.columns import packed, packed_text
@@ -27,11 +28,11 @@ from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
-NOT_CHECKED = (
+NO_COLLISIONS = (
     "Collisions of arm, spindle, holder and cables with anything: look along the path with the slider.",
-    "Chatter, run-out of the cutter, and vibration of robot and part.",
     "Clamps and fixtures, unless the cell states them.",
 )
+NOT_CHECKED = ("Chatter, run-out of the cutter, and vibration of robot and part.",)
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,7 @@ def _content(
         windows=[_on_page(window, rows) for window in windows],
         worst=[_worst(quantity, whole, rows) for quantity in whole.quantities if quantity.name != "speed"],
         told=findings,
-        not_checked=[*_not_known(whole, cell), *NOT_CHECKED],
+        not_checked=[*_not_known(whole, cell), *_collisions(whole, cell), *NOT_CHECKED],
         head=head,
         data=data,
         text=packed_text(text or ""),
@@ -291,6 +292,18 @@ def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
     if cell is not None and not cell.is_confirmed:
         missing.append("The cell's own numbers: nobody has confirmed all of them.")
     return missing
+
+
+def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
+    """Return what is not checked for collisions; where something is, also what."""
+    tools = [int(number) for number in np.unique(whole.tool)]
+    scope = collision_scope(cell, tools) if cell is not None and whole.q_rad is not None else None
+    if scope is None:
+        return list(NO_COLLISIONS)
+    return [
+        f"Collisions of {'; '.join(scope.unchecked)}: look along the path with the slider.",
+        f"Checked are {'; '.join(scope.movers)} against {'; '.join(scope.obstacles) or 'nothing'}.",
+    ]
 
 
 def _sentence(whole: Samples, lost_s: float, findings: Told, verdict: str) -> str:

@@ -1,0 +1,73 @@
+"""Which parts of a cell are checked for collisions, and which are not, in the words of header and report."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from gcode2krl.cell.definition import Cell
+
+_ESTIMATES = ("assumption", "memory", "unknown")
+
+
+@dataclass(frozen=True)
+class CollisionScope:
+    """What is held against what; each a list of words."""
+
+    movers: tuple[str, ...]
+    """What may hit."""
+    obstacles: tuple[str, ...]
+    """What may be hit."""
+    unchecked: tuple[str, ...]
+    """What is not known of the cell, or not looked at."""
+
+
+def checks_collisions(cell: Cell) -> bool:
+    """Tell whether the cell describes anything that may hit or be hit."""
+    return bool(cell.obstacle) or cell.table is not None or cell.spindle.body is not None
+
+
+def collision_scope(cell: Cell, tools: Collection[int]) -> CollisionScope | None:
+    """Return what is checked in a program with these tools; None where the cell describes nothing."""
+    if not checks_collisions(cell):
+        return None
+    movers, unchecked = [], []
+    arm, spindle = cell.robot.body, cell.spindle.body
+    if arm.capsules:
+        movers.append(f"arm ({len(arm.capsules)} capsules{_estimated(arm.sure)})")
+    else:
+        unchecked.append("arm ([robot.body] is not stated)")
+    if spindle is not None:
+        movers.append(f"spindle ({len(spindle.capsules)} capsules{_estimated(spindle.sure)})")
+    else:
+        unchecked.append("spindle and bracket ([spindle.body] is not stated)")
+    known = [number for number in sorted(tools) if number in cell.tool]
+    with_holder = [n for n in known if _has_holder(cell, n)]
+    without = [n for n in known if n not in with_holder]
+    movers.append(f"cutter of {_named(known)}")
+    if with_holder:
+        movers.append(f"holder of {_named(with_holder)}")
+    if without:
+        unchecked.append(f"holder of {_named(without)} (stick_out_mm or holder_diameter_mm is not stated)")
+    obstacles = [each.name for each in cell.obstacle]
+    if cell.table is not None:
+        obstacles.insert(0, f"table at z = {cell.table.z_mm:g} (by wrist, spindle, holder)")
+    if not cell.obstacle:
+        unchecked.append("fixtures ([[obstacle]] is not stated)")
+    if cell.table is None:
+        unchecked.append("table ([table] is not stated)")
+    if arm.capsules:
+        obstacles.append("arm itself (by wrist, spindle, tool)")
+    unchecked += ["cables", "part and stock by arm and spindle", "the way to the first HOME"]
+    return CollisionScope(tuple(movers), tuple(obstacles), tuple(unchecked))
+
+
+def _estimated(sure: str) -> str:
+    return ", ESTIMATED" if sure in _ESTIMATES else ""
+
+
+def _has_holder(cell: Cell, number: int) -> bool:
+    tool = cell.tool[number]
+    return None not in (tool.stick_out_mm, tool.holder_diameter_mm, tool.length_mm)
+
+
+def _named(tools: list[int]) -> str:
+    return ", ".join(f"T{number}" for number in tools)
