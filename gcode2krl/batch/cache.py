@@ -68,6 +68,11 @@ class Entry:
         return content
 
 
+_CLEARED = (FileNotFoundError, FileExistsError)
+"""Another process has taken the folder away, before a file in it is made or while `mkdir` looks for it."""
+_TRIES = 5
+
+
 @dataclass(frozen=True)
 class Cache:
     """Entries in a folder; ``most_bytes`` is what `prune` leaves."""
@@ -94,10 +99,10 @@ class Cache:
         """Keep an entry; raises `NotUnderstoodError` where the folder cannot be written."""
         place = self._place(key)
         try:
-            try:
-                self._write(place, record, files)
-            except FileNotFoundError:  # another process cleared the cache and took the folder away
-                self._write(place, record, files)
+            for _ in range(_TRIES - 1):
+                with contextlib.suppress(*_CLEARED):
+                    return self._write(place, record, files)
+            self._write(place, record, files)
         except PermissionError:
             if not place.exists():  # Windows: another process reads the entry, which is the same
                 raise unwritable(self.folder, "no rights to write there") from None

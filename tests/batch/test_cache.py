@@ -107,6 +107,28 @@ def test_a_folder_that_cannot_be_made_is_an_error(tmp_path):
         Cache(tmp_path / "file" / "cache", 1).put(key(1), RECORD, {})
 
 
+@pytest.mark.parametrize("error", [FileNotFoundError, FileExistsError])
+def test_a_folder_that_another_process_takes_away_is_made_again(tmp_path, monkeypatch, error):
+    cache, mkdir, times = Cache(tmp_path / "cache", 10**9), Path.mkdir, iter([True, True, False])
+
+    def taken_away(path, *arguments, **options):
+        if next(times, False):
+            raise error
+        mkdir(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "mkdir", taken_away)
+    cache.put(key(1), RECORD, {})
+    assert cache.get(key(1)) is not None
+
+
+def test_a_file_in_place_of_the_folder_is_an_error(tmp_path):
+    cache = Cache(tmp_path / "cache", 10**9)
+    cache.folder.mkdir()
+    (cache.folder / key(1)[:2]).write_text("")
+    with pytest.raises(NotUnderstoodError, match="cannot write"):
+        cache.put(key(1), RECORD, {})
+
+
 def put_many(folder):
     cache = Cache(folder, 10**9)
     for number in range(200):
