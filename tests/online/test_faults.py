@@ -26,8 +26,8 @@ def test_no_fault_in_any_state_makes_a_step():
 
 
 @pytest.mark.slow
-def test_no_fault_in_any_state_makes_a_step_in_a_million_cycles():
-    report = faults.drive(1_000_000, seed=11)
+def test_no_fault_in_any_state_makes_a_step_in_many_cycles():
+    report = faults.drive(250_000, seed=11)
     check(report)
     met = {(phase.value, name) for phase in faults.PHASES for name in faults.FAULTS}
     assert len(met & report.met) > 0.95 * len(met)
