@@ -19,6 +19,7 @@ _BY_G = {
 _LENGTH_IN_INCHES = "`G20 G43 H2`, then `G21`, then `G49`"
 _FORGOTTEN = "M6 behind a change of length, or of the rotation"
 _TURNED = "G10 L2 R of the work offset in force"
+_UNUSED_BESIDE_G10 = "G10 L2 P1.5, G10 L2 Q5"
 _TWO_SIGNS = "two signs before a number"
 _HERE = (
     ("rotary-axis", "", "A, B, C (U, V, W) with the value 0, no rotary axes declared"),
@@ -63,6 +64,7 @@ _THERE = (
     (r"File ended with no percent sign", "no M2, M30 or % at the end"),
     (r"Unknown m code used|M-code greater than 199", "M-codes it does not know"),
     (r"Requested tool \d+ not found in the tool table", "G43 H, M6 with an undeclared tool"),
+    (r"D word with no .*G0*[78]3(?!\d)", "D of G73 and G83, the clearance"),
     (r"G7x\.x +requires a Q word", "G70 behind G20, G71 behind G21"),
     (r"[IJK] word given for arc in", "a centre word 0 outside the plane of the arc"),
     (r"Cannot use two g codes from same modal group.*G0?[0-3]?.*80", "G80 beside G0"),
@@ -77,6 +79,8 @@ def why_refused_here(issue: Issue) -> str:
         return next((row for codes, row in _BY_G.items() if number and number[0] in codes), "")
     if issue.code == "no-number" and re.search(r"[-+]\s*[-+]", issue.excerpt):
         return _TWO_SIGNS
+    if issue.code == "unused-word" and re.search(r"G\s*0*10\s*L\s*0*2(?!\d)", issue.excerpt.replace("^", "")):
+        return _UNUSED_BESIDE_G10
     return next((row for code, words, row in _HERE if issue.code == code and words in issue.message), "")
 
 
@@ -127,6 +131,7 @@ def rows() -> tuple[str, ...]:
     """Return the words of all rows that a rule names."""
     return (
         _TWO_SIGNS,
+        _UNUSED_BESIDE_G10,
         _LENGTH_IN_INCHES,
         _FORGOTTEN,
         *_BY_G.values(),

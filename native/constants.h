@@ -452,31 +452,32 @@
 #define F_SUBPROGRAM_MISSING 60
 #define F_CALLS_TOO_DEEP 61
 #define F_TOO_MANY_STEPS 62
-#define F_TOO_MANY_ROWS 63
-#define F_NO_MACHINE 64
-#define F_ROTARY_UNKNOWN 65
-#define F_VECTOR_ZERO 66
-#define F_VECTOR_AND_ANGLE 67
-#define F_VECTOR_ARC 68
-#define F_TURN_PER_REV 69
-#define F_TURN_TOO_FAR 70
-#define F_CYCLE_TURNED 71
-#define F_CUTTER_ON 72
-#define F_CUTTER_PLANE 73
-#define F_CUTTER_NO_D 74
-#define F_CUTTER_NO_TOOL 75
-#define F_CUTTER_NO_DIAMETER 76
-#define F_CUTTER_LATHE 77
-#define F_CUTTER_DIFFERS 78
-#define F_CUTTER_ENTRY 79
-#define F_CUTTER_ENTRY_ARC 80
-#define F_CUTTER_EXIT_ARC 81
-#define F_CUTTER_ARC 82
-#define F_CUTTER_CORNER 83
-#define F_CUTTER_SHORT 84
-#define F_CUTTER_ROTATED 85
-#define F_CUTTER_TURNED 86
-#define F_CUTTER_PARAMETER 87
+#define F_LOOP_WITHOUT_CHANGE 63
+#define F_TOO_MANY_ROWS 64
+#define F_NO_MACHINE 65
+#define F_ROTARY_UNKNOWN 66
+#define F_VECTOR_ZERO 67
+#define F_VECTOR_AND_ANGLE 68
+#define F_VECTOR_ARC 69
+#define F_TURN_PER_REV 70
+#define F_TURN_TOO_FAR 71
+#define F_CYCLE_TURNED 72
+#define F_CUTTER_ON 73
+#define F_CUTTER_PLANE 74
+#define F_CUTTER_NO_D 75
+#define F_CUTTER_NO_TOOL 76
+#define F_CUTTER_NO_DIAMETER 77
+#define F_CUTTER_LATHE 78
+#define F_CUTTER_DIFFERS 79
+#define F_CUTTER_ENTRY 80
+#define F_CUTTER_ENTRY_ARC 81
+#define F_CUTTER_EXIT_ARC 82
+#define F_CUTTER_ARC 83
+#define F_CUTTER_CORNER 84
+#define F_CUTTER_SHORT 85
+#define F_CUTTER_ROTATED 86
+#define F_CUTTER_TURNED 87
+#define F_CUTTER_PARAMETER 88
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -1313,6 +1314,12 @@ typedef struct {
     double return_value;
     int64_t value_returned;
     int64_t subprograms;
+    int64_t changes;
+    int64_t laps;
+    int64_t laps_until;
+    int64_t lap_word;
+    int64_t lap_frame;
+    int64_t lap_changes;
 } Course;
 typedef char Course_steps_stands_at_0[offsetof(Course, steps) == 0 ? 1 : -1];
 typedef char Course_most_steps_stands_at_8[offsetof(Course, most_steps) == 8 ? 1 : -1];
@@ -1334,7 +1341,13 @@ typedef char Course_is_stopped_stands_at_128[offsetof(Course, is_stopped) == 128
 typedef char Course_return_value_stands_at_136[offsetof(Course, return_value) == 136 ? 1 : -1];
 typedef char Course_value_returned_stands_at_144[offsetof(Course, value_returned) == 144 ? 1 : -1];
 typedef char Course_subprograms_stands_at_152[offsetof(Course, subprograms) == 152 ? 1 : -1];
-typedef char Course_has_its_size[sizeof(Course) == 160 ? 1 : -1];
+typedef char Course_changes_stands_at_160[offsetof(Course, changes) == 160 ? 1 : -1];
+typedef char Course_laps_stands_at_168[offsetof(Course, laps) == 168 ? 1 : -1];
+typedef char Course_laps_until_stands_at_176[offsetof(Course, laps_until) == 176 ? 1 : -1];
+typedef char Course_lap_word_stands_at_184[offsetof(Course, lap_word) == 184 ? 1 : -1];
+typedef char Course_lap_frame_stands_at_192[offsetof(Course, lap_frame) == 192 ? 1 : -1];
+typedef char Course_lap_changes_stands_at_200[offsetof(Course, lap_changes) == 200 ? 1 : -1];
+typedef char Course_has_its_size[sizeof(Course) == 208 ? 1 : -1];
 VIEW(CourseView, Course);
 
 typedef struct {
@@ -1427,6 +1440,7 @@ typedef struct {
     RepeatView repeats;
     AssignmentView assignments;
     CourseView course;
+    StateView lap;
     Bytes letter;
     Floats value;
     Ints32 line;

@@ -102,6 +102,7 @@ class Finding(NamedTuple):
     SUBPROGRAM_MISSING,
     CALLS_TOO_DEEP,
     TOO_MANY_STEPS,
+    LOOP_WITHOUT_CHANGE,
     TOO_MANY_ROWS,
     NO_MACHINE,
     ROTARY_UNKNOWN,
@@ -127,7 +128,7 @@ class Finding(NamedTuple):
     CUTTER_ROTATED,
     CUTTER_TURNED,
     CUTTER_PARAMETER,
-) = range(88)
+) = range(89)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -178,6 +179,12 @@ FINDINGS: dict[int, Finding] = {
         "calls-too-deep",
         "subprograms call each other more than {a:.0f} levels deep",
         "does one call itself without end?",
+    ),
+    LOOP_WITHOUT_CHANGE: Finding(
+        "error",
+        "endless-loop",
+        "the program jumps back and nothing has changed since it was there: the loop has no end",
+        "let the loop count or move on, or remove the jump",
     ),
     TOO_MANY_STEPS: Finding(
         "error",

@@ -27,6 +27,7 @@ from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
 from gcode2krl.gcode.siemens_words import SiemensFlow
+from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
 from gcode2krl.gcode.words import Scanner, Words
@@ -358,6 +359,7 @@ def _empty_program(course: NDArray[Any], spoken: Dialect) -> Any:
     frames = np.zeros(tables.FRAMES, tables.FRAME)
     statement_names, statement_kinds = spoken.names()
     course["wanted"] = _NOTHING_WANTED
+    course["lap_word"] = -1
     course["generation"] = frames["generation"][0] = 1
     names = np.zeros(tables.MOST_NAMES, tables.NAME)
     parameters = np.full(tables.MOST_PARAMETERS, np.nan)  # none is set
@@ -376,6 +378,7 @@ def _empty_program(course: NDArray[Any], spoken: Dialect) -> Any:
         repeats=np.zeros(tables.MOST_REPEATS, tables.REPEAT),
         assignments=np.zeros(tables.ROOM_OF_LINE, tables.ASSIGNMENT),
         course=course,
+        lap=np.zeros(1, STATE),
         letter=np.zeros(tables.ROOM_OF_LINE, np.uint8),
         value=np.zeros(tables.ROOM_OF_LINE),
         line=np.zeros(tables.ROOM_OF_LINE, np.int32),

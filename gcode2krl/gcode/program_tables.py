@@ -17,6 +17,7 @@ from gcode2krl.compiled.core import (
     ArrayOf,
     StructOf,
 )
+from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.vocabulary import LINE_LIMIT
 
 MOST_PARAMETERS = 5602
@@ -137,6 +138,12 @@ COURSE = np.dtype(
         ("return_value", "f8"),
         ("value_returned", "i8"),
         ("subprograms", "i8"),
+        ("changes", "i8"),  # of parameters, repeats, calls and tables so far
+        ("laps", "i8"),  # jumps backwards
+        ("laps_until", "i8"),  # at which the next one is kept; then of the one that is kept:
+        ("lap_word", "i8"),
+        ("lap_frame", "i8"),
+        ("lap_changes", "i8"),
     ]
 )
 PROGRAM = StructOf(
@@ -153,6 +160,7 @@ PROGRAM = StructOf(
     repeats=ArrayOf(REPEAT, written=True),
     assignments=ArrayOf(ASSIGNMENT, written=True),
     course=ArrayOf(COURSE, written=True),
+    lap=ArrayOf(STATE, written=True),
     letter=OUT_BYTES,
     value=OUT_FLOATS,
     line=OUT_INTS32,

@@ -4,6 +4,7 @@
    jumps of O-words have been found by gcode2krl/gcode/o_words.py, as words at which to go on. */
 
 #include "gcode/flow.h"
+#include "gcode/laps.h"
 #include "gcode/macro_flow.h"
 #include "gcode/machine.h"
 #include "gcode/program_line.h"
@@ -19,6 +20,7 @@ int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, i
     name_caller(run, first_row - s->cutter_rows_removed, first_event);
     if (counts->rows > run->course->most_rows)
         return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
+    run->course->changes += writes_tables(words, from, to);
     return next;
 }
 
@@ -92,6 +94,8 @@ EXPORT int64_t gcode_execute(Machine *machine, Program *program, Bytes letter, F
         if (next == WAIT)
             break;
         course->steps++;
+        if (next <= from && repeats_itself(&run, next))
+            stop_with(&run, F_LOOP_WITHOUT_CHANGE, 0.0, next);
         from = next;
     }
     return from;

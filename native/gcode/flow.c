@@ -136,6 +136,7 @@ static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
         const double whole = floor(lesser(greater(count, 0.0), 1e15) + 0.5);
         AT(run->program->repeats, at->repeats++) = (Repeat){run->word, marked->target, (int64_t)whole};
     }
+    at->changes++;
     Repeat *inner = &AT(run->program->repeats, at->repeats - 1);
     if (inner->left-- > 0)
         return next;
@@ -201,6 +202,7 @@ int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int6
         return stop_with(run, F_CALLS_TOO_DEEP, P_FRAMES - 1, next);
     assign(run->program);
     const int32_t main_line = main_line_of(run, subprogram->entry);
+    at->changes++;
     at->frame++;
     Frame *frame = frame_of(run);
     frame->return_to = next;
@@ -330,6 +332,7 @@ int64_t end_program(Run *run, bool is_alone, int64_t next) {
         return leave(run);
     if (!restore_on_return(run))
         return run->course->is_stopped ? next : WAIT;
+    run->course->changes++;
     frame->times--;
     run->course->repeats = frame->repeats;
     return enter(run, frame);

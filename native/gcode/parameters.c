@@ -304,13 +304,19 @@ void assign(Program *program) {
     for (int64_t k = 0; k < at->assignments; k++) {
         const Assignment *each = &AT(program->assignments, k);
         if (each->name == NO_NAME) {
+            at->changes += AT(program->parameters, each->number) != each->value;
             AT(program->parameters, each->number) = each->value;
         } else if (is_global(program, each->name)) {
-            AT(program->names, each->name).value = each->value;
-            AT(program->names, each->name).is_set = 1;
+            ParameterName *name = &AT(program->names, each->name);
+            at->changes += !name->is_set || name->value != each->value;
+            name->value = each->value;
+            name->is_set = 1;
         } else {
-            CELL(program->local_value, at->frame, each->name) = each->value;
-            CELL(program->local_generation, at->frame, each->name) = generation(program);
+            double *value = &CELL(program->local_value, at->frame, each->name);
+            int64_t *set_in = &CELL(program->local_generation, at->frame, each->name);
+            at->changes += *set_in != generation(program) || *value != each->value;
+            *value = each->value;
+            *set_in = generation(program);
         }
     }
     at->assignments = 0;

@@ -282,6 +282,7 @@ def test_an_inch_program_computes_in_inches():
         ("G66 P2", ("dialect-code", 1)),
         ("N10 GOTO 10", ("endless-loop", 1)),
         ("WHILE [1 EQ 1] DO1\nEND1", ("endless-loop", 2)),
+        ("N10 #1=5\nIF [#1 GT 3] GOTO 10", ("endless-loop", 2)),
     ],
 )
 def test_what_is_refused(text, found):
@@ -334,7 +335,7 @@ def test_little_room_changes_nothing(monkeypatch):
 
 def test_a_step_limit_is_one_for_all_dialects():
     with pytest.raises(Gcode2KrlError) as caught:
-        read("N1 GOTO 1")
+        read("#1=0\nN1 #1=#1+1\nGOTO 1")
     assert f"{MOST_STEPS // 1_000_000},000,0" in caught.value.issues[0].message
 
 

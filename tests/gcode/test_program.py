@@ -5,7 +5,7 @@ import io
 import pytest
 
 from gcode2krl import Gcode2KrlError, read_gcode
-from gcode2krl.gcode import read_stream
+from gcode2krl.gcode import program, read_stream
 
 HEAD = "G21 G90 G17 G94 F500\nG0 X0 Y0 Z0\n"
 
@@ -130,6 +130,34 @@ def test_what_is_passed_over_may_be_anything():
 def test_an_o_word_is_never_passed_over_unread(text, line):
     """It may be the else, or the end, of what it stands in."""
     assert refused(text) == ("o-word", line)
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("G91\no1 while [#<_x> LT 3]\nG1 X1\no1 endwhile", 3),
+        ("o1 repeat [5]\nG1 X1\no1 endrepeat", 5),
+        ("o1 do\nG10 L2 P2 X[#5241 + 1]\nG1 X1\no1 while [#5241 LT 3]", 3),
+        ("o1 sub\n#<_n>=[#<_n> + 1]\no1 endsub\n#<_n>=0\no2 do\no1 call\nG1 X1\no2 while [#<_n> LT 4]", 4),
+        ("#1=0\no1 do\n#2=0\no2 do\n#2=[#2+1]\nG1 X1\no2 while [#2 LT 3]\n#1=[#1+1]\no1 while [#1 LT 3]", 9),
+        ("#1=0\no1 while [#1 LT 2]\n#2=#1\n#1=5\n#1=[#2+1]\nG1 X1\no1 endwhile", 2),
+    ],
+)
+def test_a_loop_that_changes_something_is_not_endless(text, rows):
+    assert len(ends(text, dialect="linuxcnc")) == rows
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "o1 do\nG1 X1\nX2 (MSG, still)\no1 while [#<_x> EQ 2]",
+        "#1=3\no1 while [#1 LT 5]\n#1=3\nG1 X#1\no1 endwhile",
+        "#1=0\no1 while [1]\no2 do\nG1 X#1\no2 while [#1 EQ 1]\no1 endwhile",
+    ],
+)
+def test_a_loop_that_changes_nothing_is_seen_at_once(text, monkeypatch):
+    monkeypatch.setattr(program, "MOST_STEPS", 10**15)
+    assert refused(text)[0] == "endless-loop"
 
 
 def test_behind_an_o_word_a_comment_may_stand():
