@@ -30,6 +30,7 @@
 #define CH_SLASH 47
 #define CH_DIGIT_0 48
 #define CH_DIGIT_1 49
+#define CH_DIGIT_3 51
 #define CH_DIGIT_6 54
 #define CH_DIGIT_9 57
 #define CH_COLON 58
@@ -322,12 +323,19 @@
 
 /* gcode2krl.gcode.dialect_marks */
 #define D_AMPERSAND 38
+#define D_ASTERISK 42
 #define D_COLON 58
+#define D_COMMA 44
 #define D_EQUALS 61
 #define D_GREATER 62
+#define D_HASH 35
 #define D_LESS 60
+#define D_MINUS 45
 #define D_PLUS 43
 #define D_POINT 46
+#define D_QUESTION 63
+#define D_QUOTE 34
+#define D_SEMICOLON 59
 #define D_SKIP_LEVEL 1
 #define D_HEAD_LINES 2
 #define D_DOLLAR_LINES 4
@@ -341,6 +349,13 @@
 #define D_NEXT_ABSOLUTE 60
 #define D_NEXT_INCREMENTAL 62
 #define D_NEXT_POINTLESS 46
+#define D_NEXT_SHORTEST 63
+#define D_NEXT_FORWARD 59
+#define D_NEXT_BACKWARD 35
+#define D_NEXT_VECTOR 42
+#define D_TIP_ON 44
+#define D_TIP_OFF 45
+#define D_OTHER_TIP 34
 #define D_SKIPPED 38
 #define D_SHIFT_SET 61
 #define D_SHIFT_ADD 43
@@ -355,6 +370,8 @@
 #define D_WHOLE_LINE 7
 #define D_SHIFT 8
 #define D_JUMP 9
+#define D_TIP 10
+#define D_FEED_AXES 11
 #define D_KIND_STEP 16
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
@@ -373,6 +390,12 @@
 #define DR_REASON_JOG 12
 #define DR_REASON_TOOL_NAME 17
 #define DR_REASON_VALUES 10
+#define DR_REASON_NO_TIP 34
+#define DR_REASON_VECTOR_AND_ANGLE 35
+#define DR_REASON_VECTOR_ARC 36
+#define DR_REASON_OTHER_TIP 37
+#define DR_REASON_SHIFT_AND_TIP 38
+#define DR_REASON_FEED_AXES 39
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -456,28 +479,29 @@
 #define F_TOO_MANY_ROWS 64
 #define F_NO_MACHINE 65
 #define F_ROTARY_UNKNOWN 66
-#define F_VECTOR_ZERO 67
-#define F_VECTOR_AND_ANGLE 68
-#define F_VECTOR_ARC 69
-#define F_TURN_PER_REV 70
-#define F_TURN_TOO_FAR 71
-#define F_CYCLE_TURNED 72
-#define F_CUTTER_ON 73
-#define F_CUTTER_PLANE 74
-#define F_CUTTER_NO_D 75
-#define F_CUTTER_NO_TOOL 76
-#define F_CUTTER_NO_DIAMETER 77
-#define F_CUTTER_LATHE 78
-#define F_CUTTER_DIFFERS 79
-#define F_CUTTER_ENTRY 80
-#define F_CUTTER_ENTRY_ARC 81
-#define F_CUTTER_EXIT_ARC 82
-#define F_CUTTER_ARC 83
-#define F_CUTTER_CORNER 84
-#define F_CUTTER_SHORT 85
-#define F_CUTTER_ROTATED 86
-#define F_CUTTER_TURNED 87
-#define F_CUTTER_PARAMETER 88
+#define F_VECTOR_NO_MACHINE 67
+#define F_VECTOR_ZERO 68
+#define F_VECTOR_AND_ANGLE 69
+#define F_VECTOR_ARC 70
+#define F_TURN_PER_REV 71
+#define F_TURN_TOO_FAR 72
+#define F_CYCLE_TURNED 73
+#define F_CUTTER_ON 74
+#define F_CUTTER_PLANE 75
+#define F_CUTTER_NO_D 76
+#define F_CUTTER_NO_TOOL 77
+#define F_CUTTER_NO_DIAMETER 78
+#define F_CUTTER_LATHE 79
+#define F_CUTTER_DIFFERS 80
+#define F_CUTTER_ENTRY 81
+#define F_CUTTER_ENTRY_ARC 82
+#define F_CUTTER_EXIT_ARC 83
+#define F_CUTTER_ARC 84
+#define F_CUTTER_CORNER 85
+#define F_CUTTER_SHORT 86
+#define F_CUTTER_ROTATED 87
+#define F_CUTTER_TURNED 88
+#define F_CUTTER_PARAMETER 89
 #define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
 #define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
@@ -891,6 +915,7 @@ typedef struct {
     double home_30_deg[3];
     double tool_vector[3];
     int8_t has_vector;
+    int8_t traori;
     int32_t length_code;
     double feed_word;
     int32_t arcs;
@@ -1001,6 +1026,7 @@ typedef char State_home_28_deg_stands_at_336[offsetof(State, home_28_deg) == 336
 typedef char State_home_30_deg_stands_at_360[offsetof(State, home_30_deg) == 360 ? 1 : -1];
 typedef char State_tool_vector_stands_at_384[offsetof(State, tool_vector) == 384 ? 1 : -1];
 typedef char State_has_vector_stands_at_408[offsetof(State, has_vector) == 408 ? 1 : -1];
+typedef char State_traori_stands_at_409[offsetof(State, traori) == 409 ? 1 : -1];
 typedef char State_length_code_stands_at_412[offsetof(State, length_code) == 412 ? 1 : -1];
 typedef char State_feed_word_stands_at_416[offsetof(State, feed_word) == 416 ? 1 : -1];
 typedef char State_arcs_stands_at_424[offsetof(State, arcs) == 424 ? 1 : -1];

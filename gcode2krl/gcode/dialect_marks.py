@@ -4,7 +4,22 @@ Plain module constants: the compiled core takes their values from here. What a d
 `dialects`.
 """
 
-from gcode2krl.ascii_codes import AMPERSAND, COLON, EQUALS, GREATER, LESS, PLUS, POINT
+from gcode2krl.ascii_codes import (
+    AMPERSAND,
+    ASTERISK,
+    COLON,
+    COMMA,
+    EQUALS,
+    GREATER,
+    HASH,
+    LESS,
+    MINUS,
+    PLUS,
+    POINT,
+    QUESTION,
+    QUOTE,
+    SEMICOLON,
+)
 
 SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS, MACROS = 1, 2, 4, 8, 16, 32
 """Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without
@@ -14,6 +29,14 @@ PROGRAMS_NONE, PROGRAMS_LINUXCNC, PROGRAMS_FANUC, PROGRAMS_SINUMERIK = range(4)
 
 NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = LESS, GREATER, POINT
 """Marks before a word: ``X=AC(5)``, ``X=IC(5)``, a number without a decimal point."""
+NEXT_SHORTEST, NEXT_FORWARD, NEXT_BACKWARD = QUESTION, SEMICOLON, HASH
+"""Marks before a rotary word: ``C=DC(5)`` the shorter way, ``C=ACP(5)`` and ``C=ACN(5)`` up and down."""
+NEXT_VECTOR = ASTERISK
+"""Mark before A, B or C: a component of the tool vector, ``A3=0.1``."""
+TIP_ON, TIP_OFF = COMMA, MINUS
+"""``TRAORI`` and ``TRAFOOF``: X, Y, Z are the tip, and the machine's axes again."""
+OTHER_TIP = QUOTE
+"""``TRAORI(2)``: another transformation than the first."""
 SKIPPED = AMPERSAND
 """A statement that says nothing to this robot."""
 SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
@@ -21,7 +44,7 @@ SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
 PROGRAM_NUMBER = COLON
 """``O1234`` alone in its line, where a program of that number begins."""
 
-HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP = range(10)
+HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP, TIP, FEED_AXES = range(12)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 16
 

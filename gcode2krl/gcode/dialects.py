@@ -33,7 +33,10 @@ REASONS: Final = (
     ("a cycle of the control", "let the post write the cycle out in G0 and G1"),
     ("jumps, loops and subprograms of this control are not read", "let the post write the program out"),
     ("variables and calculations of this control are not read", "let the post write plain numbers"),
-    ("tool vectors and orientations are not read in this dialect", "export for three axes"),
+    (
+        "the tool's direction by other angles than those of its axes, or by the surface",
+        "let the post write the tool vector A3, B3, C3, or the angles of the machine's axes",
+    ),
     ("moves the machine by hand", "remove the line"),
     ("a setting of the machine", "remove the line; the robot's settings are in the cell"),
     ("the arc by its opening angle", "let the post write I and J, or CR="),
@@ -71,6 +74,15 @@ REASONS: Final = (
         "a modal call runs its macro behind each move that follows",
         "call the macro with G65 where it is meant",
     ),
+    ("a tool vector where TRAORI is not in force, or beside SUPA or TRANS", "write TRAORI before it"),
+    ("a tool vector beside rotary words", "write one of the two"),
+    ("a tool vector beside an arc", "let the post write G1"),
+    ("another transformation than the first", "write TRAORI or TRAORI(1)"),
+    (
+        "whether TRANS outlives TRAORI and TRAFOOF is a setting of the control",
+        "clear the shift by TRANS alone before it, and write it again behind it",
+    ),
+    ("F would count rotary axes too", "let the post write FGROUP(X,Y,Z), or the feed by G93"),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -80,6 +92,8 @@ REASON_POLAR = _POLAR
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
+REASON_NO_TIP, REASON_VECTOR_AND_ANGLE, REASON_VECTOR_ARC, REASON_OTHER_TIP = range(34, 38)
+REASON_SHIFT_AND_TIP, REASON_FEED_AXES = 38, 39
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -97,8 +111,6 @@ class Dialect:
     """How parameters, jumps and subprograms are written; LinuxCNC's go with its polar words @ and ^."""
     has_m61_to_m73: bool = False
     """M61 to M73 are LinuxCNC's (tool number, outputs, saved modes), not the machine builder's."""
-    turns_axes: bool = True
-    """Rotary words of a cell with rotary axes are read."""
     own: tuple[float, ...] = ()
     """The only G numbers that are those of the core; empty: all that it does not read otherwise."""
     same: Mapping[int, int] = field(default_factory=dict)
@@ -237,10 +249,14 @@ _SINUMERIK_STATEMENTS = {
         *("FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "STOPRE", "FIFOCTRL", "STARTFIFO", "STOPFIFO"),
         *("DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "UPATH", "SPATH"),
         *("ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORISOF", "ORISON", "ORIRESET"),
-        *("TRAORI", "TRAFOOF", "CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2", "KONT"),
+        *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2", "KONT"),
         *("NORM", "DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
         *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
+        "FGREF",
     ),
+    _kind(d.TIP, 1): ("TRAORI",),
+    _kind(d.TIP, 0): ("TRAFOOF",),
+    _kind(d.FEED_AXES): ("FGROUP",),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
     _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
     _kind(d.SHIFT, 0): ("TRANS",),
@@ -260,6 +276,7 @@ _SINUMERIK_STATEMENTS = {
         *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
+    _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
     _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
     _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
@@ -283,7 +300,6 @@ _LIST: Final = (
         "Sinumerik 840D sl, as CAM posts write it",
         programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
-        turns_axes=False,
         own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),

@@ -106,6 +106,7 @@ class Finding(NamedTuple):
     TOO_MANY_ROWS,
     NO_MACHINE,
     ROTARY_UNKNOWN,
+    VECTOR_NO_MACHINE,
     VECTOR_ZERO,
     VECTOR_AND_ANGLE,
     VECTOR_ARC,
@@ -128,7 +129,7 @@ class Finding(NamedTuple):
     CUTTER_ROTATED,
     CUTTER_TURNED,
     CUTTER_PARAMETER,
-) = range(89)
+) = range(90)
 
 FINDINGS: dict[int, Finding] = {
     BAD_CHARACTER: Finding(
@@ -495,16 +496,22 @@ FINDINGS: dict[int, Finding] = {
         "G{g} programs the tip of a machine with rotary axes, and the cell declares no machine",
         "declare the machine that the program is for: [machine] in the cell",
     ),
+    VECTOR_NO_MACHINE: Finding(
+        "error",
+        "machine-missing",
+        "a tool vector turns the tool, and the cell declares no machine",
+        "declare the machine that the program is for: [machine] in the cell",
+    ),
     ROTARY_UNKNOWN: Finding(
         "error",
         "rotary-unknown",
-        "where {words} stands is not known since tool vectors (G43.5) turned the tool",
-        "program {words} under G90, or G28, after G43.5",
+        "where {words} stands is not known since tool vectors turned the tool",
+        "program {words} in absolute angles (G90), or G28, behind the tool vectors",
     ),
     VECTOR_ZERO: Finding(
         "error",
         "tool-vector",
-        "the tool vector I{a:g} J{b:g} K{c:g} has no direction",
+        "the tool vector {a:g}, {b:g}, {c:g} has no direction",
         "give the direction from the tip to the holder",
     ),
     VECTOR_AND_ANGLE: Finding(

@@ -147,13 +147,6 @@ def read_stream(
     ``folders`` are all in which a file of a subprogram may be.
     """
     spoken = dialect_of(dialect, name)
-    if cell is not None and cell.machine is not None and not spoken.turns_axes:
-        raise input_error(
-            "option-value",
-            f"the cell declares rotary axes in [machine], which are not read in dialect {dialect}",
-            "let the post write for LinuxCNC with G43.4, or use a cell without [machine] for three axes",
-            source=name,
-        )
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name

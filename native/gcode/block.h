@@ -24,7 +24,11 @@ typedef struct {
     int32_t g[V_GROUPS], m_codes[V_M_CODES];
     uint8_t next_word;                        /* what a dialect says of the next word, 0 = nothing */
     int32_t pointless, absolute, incremental; /* bits of the letters of which it has been said */
+    int32_t shortest, forward, backward;      /* the same, of the way of rotary axes */
     uint8_t shift;                            /* TRANS or ATRANS, 0 = neither */
+    uint8_t tip;                              /* TRAORI or TRAFOOF, 0 = neither */
+    double vector[V_ROTARY_AXES];             /* a Sinumerik's tool vector, A3 first */
+    int32_t vector_named;                     /* bits of its components that the block has */
     int32_t harmless;                         /* a code that says nothing, ten times */
     int32_t unit_again;                       /* G70 or G71, ten times */
     bool exact_once;                          /* an exact stop of this block alone */

@@ -151,6 +151,8 @@ static Taken take(Block *b, uint8_t c, double value) {
     if (c == CH_LETTER_M)
         return take_m(b, value);
     const int index = index_of_letter(c);
+    if (b->next_word == D_NEXT_VECTOR)
+        return take_component(b, index - V_WORD_A, value) ? UNDERSTOOD : faulty(S_DOUBT_POSITION);
     const bool repeated = b->has[index];
     if (b->next_word)
         say_of_word(b, index);
@@ -259,7 +261,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < CH_AT_SIGN) {
             take_dialect_mark(b, c);
-            used = used || b->shift;
+            used = used || b->shift || b->tip;
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;

@@ -128,21 +128,46 @@ static int32_t statement_kind(const Scan *scan, int64_t i, int64_t end) {
     return -1;
 }
 
+enum { UNKNOWN_COUNTING = 1 }; /* a name in its place that is none of them */
+
+static bool is_of_turn(int kind) {
+    return kind == D_NEXT_SHORTEST || kind == D_NEXT_FORWARD || kind == D_NEXT_BACKWARD;
+}
+
+/* Return the mark of AC, IC, DC, ACP or ACN, which stands from i to end; 0 where no such name does. */
+static int counting(Bytes text, int64_t i, int64_t end) {
+    static const struct {
+        const char *name;
+        int mark;
+    } KINDS[] = {{"AC", D_NEXT_ABSOLUTE},
+                 {"IC", D_NEXT_INCREMENTAL},
+                 {"DC", D_NEXT_SHORTEST},
+                 {"ACP", D_NEXT_FORWARD},
+                 {"ACN", D_NEXT_BACKWARD}};
+    for (size_t k = 0; k < sizeof KINDS / sizeof *KINDS; k++) {
+        int64_t n = 0;
+        while (i + n < end && KINDS[k].name[n] != 0 && (AT(text, i + n) & ~CH_CASE_BIT) == KINDS[k].name[n])
+            n++;
+        if (i + n == end && KINDS[k].name[n] == 0)
+            return KINDS[k].mark;
+    }
+    return end == i + 2 && (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_C ? UNKNOWN_COUNTING : 0;
+}
+
 /* Write a word whose value stands behind =, i being the place behind it; its value gets `more`. */
 static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_t line, double more) {
     const Bytes text = scan->text;
     i = behind_blanks(text, i);
     const int64_t name_end = after_name(text, i);
-    const bool counted = name_end == i + 2 && (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_C &&
-                         stands_at(text, behind_blanks(text, name_end), CH_PAREN_OPEN);
-    const int kind = counted ? AT(text, i) & ~CH_CASE_BIT : 0;
+    const int kind = stands_at(text, behind_blanks(text, name_end), CH_PAREN_OPEN) ? counting(text, i, name_end) : 0;
+    const bool counted = kind > 0;
     if (counted)
         i = behind_blanks(text, name_end) + 1;
     const Number plain = number(text, behind_blanks(text, i));
     int64_t end = plain.end;
     double value = plain.value;
     const bool is_plain = plain.digits > 0 && plain.finding == F_OK && ends_value(text, end);
-    if (counted && kind != CH_LETTER_A && kind != CH_LETTER_I)
+    if (kind == UNKNOWN_COUNTING || (is_of_turn(kind) && letter > CH_LETTER_C))
         return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (!is_plain) {
         if (e == NULL)
@@ -154,7 +179,7 @@ static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_
     if (counted && !stands_at(text, end, CH_PAREN_CLOSE))
         return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (counted)
-        put(scan, kind == CH_LETTER_A ? D_NEXT_ABSOLUTE : D_NEXT_INCREMENTAL, 0.0, line);
+        put(scan, kind, 0.0, line);
     put(scan, letter, value + more, line);
     return end + counted;
 }
@@ -188,6 +213,25 @@ static int64_t after_harmless(Bytes text, int64_t i) {
     return number_behind.digits > 0 ? number_behind.end : after_name(text, value);
 }
 
+/* Tell whether nothing or (1) stands behind TRAORI, at i. */
+static bool is_first_one(Bytes text, int64_t i) {
+    i = behind_blanks(text, i);
+    if (!stands_at(text, i, CH_PAREN_OPEN))
+        return true;
+    const int64_t first = behind_blanks(text, i + 1);
+    return stands_at(text, first, CH_PAREN_CLOSE) ||
+           (stands_at(text, first, CH_DIGIT_1) && stands_at(text, behind_blanks(text, first + 1), CH_PAREN_CLOSE));
+}
+
+/* Tell whether the axes in the parentheses at i are X, Y and Z, some of them or none. */
+static bool are_linear(Bytes text, int64_t i) {
+    i = behind_blanks(text, i);
+    for (const int64_t end = after_arguments(text, i); i < end; i++)
+        if (is_of_name(AT(text, i)) && (AT(text, i) & ~CH_CASE_BIT) < CH_LETTER_X)
+            return false;
+    return true;
+}
+
 /* Write what the statement makes whose name stands from i to end. */
 static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
@@ -212,6 +256,14 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
         return message(scan, end, line);
     case D_CODE: put(scan, CH_LETTER_G, kind / D_KIND_STEP, line); return end;
     case D_ENDS: put(scan, CH_LETTER_M, V_M30, line); return end;
+    case D_TIP:
+        put(scan, kind / D_KIND_STEP == 0 ? D_TIP_OFF : is_first_one(text, end) ? D_TIP_ON : D_OTHER_TIP, 0.0, line);
+        return after_harmless(text, end);
+    case D_FEED_AXES:
+        if (!are_linear(text, end))
+            return refuse(scan, e, i, line, DR_REASON_FEED_AXES);
+        put(scan, D_SKIPPED, 0.0, line);
+        return after_harmless(text, end);
     case D_SHIFT:
         put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
         return end;
@@ -238,9 +290,12 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
     const bool first_one = behind == i + 2 && AT(text, i + 1) == CH_DIGIT_1;
     if (letter == CH_LETTER_T)
         return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
-    if (letter == CH_LETTER_A + 1 || letter == CH_LETTER_A || letter == CH_LETTER_C)
-        if (numbered)
+    if (numbered && letter <= CH_LETTER_C) {
+        if (behind != i + 2 || AT(text, i + 1) != CH_DIGIT_3)
             return refuse(scan, e, i, line, DR_REASON_VECTORS);
+        put(scan, D_NEXT_VECTOR, 0.0, line);
+        return assigned(scan, e, letter, equals + 1, line, 0.0);
+    }
     if (letter == CH_LETTER_R && numbered)
         return e == NULL ? NEEDS_LINE : assign_r(e, i, behind, equals + 1);
     if (letter == CH_LETTER_R || letter == CH_LETTER_N || letter == CH_LETTER_O ||

@@ -4,9 +4,10 @@
 
 #include "gcode/cycles.h"
 #include "gcode/reporting.h"
+#include "gcode/rotary.h"
 #include "gcode/rows.h"
 
-static const double LEAST = 0.001, LEAST_INCH = 0.0001, TURNS = -1.0;
+static const double LEAST = 0.001, LEAST_INCH = 0.0001, TURNS = -1.0, FULL_TURN_DEG = 360.0;
 
 static bool refuse(Block *b, int reason, double code) {
     report(b, F_DIALECT_CODE, (Says){.a = reason, .b = code});
@@ -35,10 +36,35 @@ static void take_shift(Block *b, uint8_t c) {
     b->g[V_NON_MODAL] = V_G52;
 }
 
+/* TRAORI and TRAFOOF, where the cell declares a machine; without one they say nothing. */
+static void take_tip(Block *b, uint8_t c) {
+    if (c == D_OTHER_TIP)
+        refuse_statement(b, DR_REASON_OTHER_TIP);
+    else if (!b->machine->rotary_axes)
+        note(b, S_NOTE_STATEMENT, 0);
+    if (c != D_OTHER_TIP)
+        b->tip = c;
+}
+
+/* Take A3, B3 or C3, the component `axis` of the tool vector. */
+bool take_component(Block *b, int axis, double value) {
+    const bool repeated = b->vector_named >> axis & 1;
+    b->next_word = 0;
+    b->vector_named |= 1 << axis;
+    b->vector[axis] = value;
+    if (repeated)
+        report(b, F_REPEATED_WORD, (Says){.a = CH_LETTER_A + axis});
+    return !repeated;
+}
+
 /* Take what the scanner has marked: the next word, or something that says nothing. */
 void take_dialect_mark(Block *b, uint8_t c) {
     if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
         take_shift(b, c);
+    else if (c == D_TIP_ON || c == D_TIP_OFF || c == D_OTHER_TIP)
+        take_tip(b, c);
+    else if (b->next_word == D_NEXT_VECTOR) /* A3=AC(1) */
+        refuse_statement(b, DR_REASON_VALUES);
     else if (c == D_SKIPPED)
         note(b, S_NOTE_STATEMENT, 0);
     else
@@ -47,12 +73,15 @@ void take_dialect_mark(Block *b, uint8_t c) {
 
 /* Keep what has been said of the word of a letter before it. */
 void say_of_word(Block *b, int index) {
-    if (b->next_word == D_NEXT_POINTLESS)
-        b->pointless |= 1 << index;
-    else if (b->next_word == D_NEXT_ABSOLUTE)
-        b->absolute |= 1 << index;
-    else
-        b->incremental |= 1 << index;
+    const int32_t bit = 1 << index;
+    switch (b->next_word) {
+    case D_NEXT_POINTLESS: b->pointless |= bit; break;
+    case D_NEXT_ABSOLUTE: b->absolute |= bit; break;
+    case D_NEXT_SHORTEST: b->shortest |= bit; break;
+    case D_NEXT_FORWARD: b->forward |= bit; break;
+    case D_NEXT_BACKWARD: b->backward |= bit; break;
+    default: b->incremental |= bit;
+    }
     b->next_word = 0;
 }
 
@@ -188,6 +217,35 @@ static bool count_axis(Block *b, int axis) {
     return true;
 }
 
+/* Return a whole turn or none more than an angle from 0 to 360. */
+static double within_turn(double deg) { return deg - FULL_TURN_DEG * floor(deg / FULL_TURN_DEG); }
+
+/* C=AC(5), C=IC(5), and C=DC(5), C=ACP(5), C=ACN(5), which say by which way, become what the mode in force says. */
+static bool count_turn(Block *b, int k) {
+    const State *s = b->state;
+    const int index = V_WORD_A + k;
+    const int32_t bit = 1 << index, by_way = b->shortest | b->forward | b->backward;
+    const bool absolute = is_absolute_here(b) || b->g[V_NON_MODAL] == V_G53, counts = (by_way | (absolute ? b->incremental : b->absolute)) & bit;
+    if (!counts || !is_declared(b->machine, k))
+        return true;
+    const bool known = !(s->rotary_unknown >> k & 1);
+    if (!known && !(absolute && by_way & bit)) {
+        report(b, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + CH_LETTER_A});
+        return false;
+    }
+    const double here = s->rotary_deg[k];
+    double way = by_way & bit ? within_turn(b->word[index] - here) : b->word[index];
+    if (b->backward & bit && way > 0.0)
+        way -= FULL_TURN_DEG;
+    if (b->shortest & bit && way > FULL_TURN_DEG / 2.0)
+        way -= FULL_TURN_DEG;
+    if (by_way & bit && known)
+        b->word[index] = way + (absolute ? here : 0.0);
+    else if (!(by_way & bit))
+        b->word[index] += absolute ? here : -here;
+    return true;
+}
+
 /* I=AC(5) is a centre in the coordinates of the part. */
 static void count_centre(Block *b, int axis) {
     const State *s = b->state;
@@ -197,6 +255,28 @@ static void count_centre(Block *b, int axis) {
     programmed_of(b, here_mm, programmed_mm);
     if (b->absolute & 1 << index)
         b->word[index] -= programmed_mm[axis] / (in_inches(b) ? U_MM_PER_INCH : 1.0);
+}
+
+/* A tool vector is that of the tip's transformation, in straight blocks and in place of rotary words; the shift of the
+   zero may not outlive a change of what X, Y, Z are. */
+static bool read_vector(Block *b) {
+    const State *s = b->state;
+    const bool tip = b->tip ? b->tip == D_TIP_ON : s->traori != 0;
+    const bool shifted = s->shift_mm[0] != 0.0 || s->shift_mm[1] != 0.0 || s->shift_mm[2] != 0.0;
+    if (b->tip && tip != (s->traori != 0) && shifted && b->machine->rotary_axes)
+        return refuse_statement(b, DR_REASON_SHIFT_AND_TIP);
+    if (!b->vector_named)
+        return true;
+    const int32_t motion = b->g[V_MOTION] >= 0 ? b->g[V_MOTION] / V_TENFOLD : s->motion;
+    if (!b->machine->rotary_axes) {
+        report(b, F_VECTOR_NO_MACHINE, (Says){0});
+        return false;
+    }
+    if (!tip || (b->g[V_NON_MODAL] >= 0 && b->g[V_NON_MODAL] != V_G4))
+        return refuse_statement(b, DR_REASON_NO_TIP);
+    if (rotary_words(b))
+        return refuse_statement(b, DR_REASON_VECTOR_AND_ANGLE);
+    return motion <= V_MOTION_LINE || refuse_statement(b, DR_REASON_VECTOR_ARC);
 }
 
 /* Tell whether a block changes what its coordinates are counted from: zero, tool, or both for this block. */
@@ -212,7 +292,7 @@ static bool moves_zero(const Block *b) {
 /* --- all ------------------------------------------------------------------------------------------------ */
 
 static bool names_axis(const Block *b) {
-    return b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
+    return b->vector_named || b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
 }
 
 /* Codes that say nothing keep their own words; beside axis words nobody knows whose they are. */
@@ -248,6 +328,11 @@ bool to_core_words(Block *b) {
             good = count_axis(b, axis) && good;
             count_centre(b, axis);
         }
+    if (good && b->incremental | b->absolute | b->shortest | b->forward | b->backward)
+        for (int k = 0; k < V_ROTARY_AXES; k++)
+            good = count_turn(b, k) && good;
+    if (b->vector_named | b->tip)
+        good = read_vector(b) && good;
     if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
     if (b->harmless)

@@ -78,7 +78,7 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
 
 /* Tell whether a block has a word of any axis. */
 static bool names_axis(const Block *b) {
-    bool named = b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z] || is_polar(b);
+    bool named = b->vector_named || b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z] || is_polar(b);
     for (int k = 0; k < OTHER_AXES_COUNT; k++)
         named = named || b->has[OTHER_AXES[k]];
     return named;

@@ -26,15 +26,26 @@ int32_t rotary_words(const Block *b) {
     return bits;
 }
 
-static bool is_by_vector(const State *s) { return s->length_code == V_G43_5; }
+/* Tell whether I, J and K are a tool vector. */
+static bool takes_ijk(const State *s) { return s->length_code == V_G43_5; }
 
-static bool names_vector(const Block *b) {
-    return b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K];
+/* Tell whether tool vectors say how the tool stands: those of G43.5, or under TRAORI the last that was named. */
+static bool is_by_vector(const State *s) { return takes_ijk(s) || (s->traori && s->has_vector); }
+
+/* Find the tool vector of a block, a component that is left out being 0; return whether it names any. */
+static bool named_vector(const Block *b, double vector[3]) {
+    bool named = false;
+    for (int k = 0; k < 3; k++) {
+        const bool has = takes_ijk(b->state) ? b->has[V_WORD_I + k] : b->vector_named >> k & 1;
+        vector[k] = !has ? 0.0 : takes_ijk(b->state) ? b->word[V_WORD_I + k] : b->vector[k];
+        named = named || has;
+    }
+    return named;
 }
 
 /* I, J and K of a straight block are a tool vector under G43.5. */
 void use_vector(Block *b) {
-    if (is_by_vector(b->state))
+    if (takes_ijk(b->state))
         b->used[V_WORD_I] = b->used[V_WORD_J] = b->used[V_WORD_K] = true;
 }
 
@@ -54,15 +65,13 @@ bool may_cycle(Block *b) {
 /* Take a tool vector: a word that is left out is 0, as none of the three is where the tool stands as before. */
 static bool take_vector(Block *b) {
     State *s = b->state;
-    if (s->motion >= V_MOTION_ARC_CW) {
+    if (takes_ijk(s) && s->motion >= V_MOTION_ARC_CW) {
         report(b, F_VECTOR_ARC, (Says){0});
         return false;
     }
-    if (!names_vector(b))
-        return true;
     double vector[3];
-    for (int k = 0; k < 3; k++)
-        vector[k] = b->has[V_WORD_I + k] ? b->word[V_WORD_I + k] : 0.0;
+    if (!named_vector(b, vector))
+        return true;
     const double size = sqrt(squared(vector[0]) + squared(vector[1]) + squared(vector[2]));
     if (!(size > 1e-6 && size < 1e6)) {
         report(b, F_VECTOR_ZERO, (Says){vector[0], vector[1], vector[2]});
@@ -82,13 +91,16 @@ bool take_turn(Block *b, bool by_machine) {
     if (!b->machine->rotary_axes)
         return true;
     const int32_t named = rotary_words(b);
-    if (!by_machine && is_by_vector(s)) {
-        if (named)
-            report(b, F_VECTOR_AND_ANGLE, (Says){.a = named << V_WORD_A});
-        return !named && take_vector(b);
+    if (!by_machine && takes_ijk(s) && named) {
+        report(b, F_VECTOR_AND_ANGLE, (Says){.a = named << V_WORD_A});
+        return false;
     }
+    if (!by_machine && (b->vector_named || (is_by_vector(s) && !named)))
+        return take_vector(b);
     if (s->absolute || by_machine)
         s->rotary_unknown &= ~named;
+    if (s->traori && named)
+        s->has_vector = 0;
     if (!by_machine && s->rotary_unknown) {
         report(b, F_ROTARY_UNKNOWN, (Says){.a = s->rotary_unknown << V_WORD_A});
         s->rotary_unknown = 0;
@@ -136,6 +148,19 @@ bool take_length_code(Block *b, int32_t code) {
     if (has_tip != had_tip && is_turned(s))
         s->known_x = s->known_y = s->known_z = 0; /* X, Y, Z mean something else from here on */
     return true;
+}
+
+/* TRAORI and TRAFOOF: X, Y, Z are the tip from here on, or the machine's axes again. */
+void take_tip_code(Block *b) {
+    State *s = b->state;
+    const int8_t tip = b->tip == D_TIP_ON;
+    if (!b->tip || tip == s->traori || !b->machine->rotary_axes)
+        return;
+    const bool had_tip = turn_mode(b->machine) != V_TURN_MACHINE;
+    s->traori = tip;
+    s->has_vector = 0;
+    if (had_tip != (turn_mode(b->machine) != V_TURN_MACHINE) && is_turned(s))
+        s->known_x = s->known_y = s->known_z = 0;
 }
 
 /* Return the way of the rotary axes where they move alone, else 0. */

@@ -18,9 +18,9 @@ static inline bool is_turned(const State *s) {
 /* What X, Y, Z and the turn of the next row mean. */
 static inline int32_t turn_mode(const Machine *machine) {
     const State *s = machine->state.at;
-    if (s->length_code == V_G43_5 && s->has_vector)
+    if ((s->length_code == V_G43_5 || s->traori) && s->has_vector)
         return V_TURN_VECTOR;
-    const bool tip = machine->tcpm || s->length_code == V_G43_4 || s->length_code == V_G43_5;
+    const bool tip = machine->tcpm || s->traori || s->length_code == V_G43_4 || s->length_code == V_G43_5;
     return tip ? V_TURN_TIP : V_TURN_MACHINE;
 }
 
@@ -61,6 +61,7 @@ void follow_rotary(Block *b);
 void rotary_home(Block *b, bool any_axis);
 void use_vector(Block *b);
 bool may_cycle(Block *b);
+void take_tip_code(Block *b);
 bool take_length_code(Block *b, int32_t code);
 void check_turn_feed(Block *b, double length_mm);
 double feed_time_s(const Block *b, double length_mm, int64_t chords);

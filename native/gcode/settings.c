@@ -290,6 +290,7 @@ void apply_settings(Block *b) {
     plane_and_unit(b);
     cutter_compensation(b);
     length_offset(b);
+    take_tip_code(b);
     if (b->g[V_WORK_OFFSET] >= 0)
         select_offset(b, b->g[V_WORK_OFFSET]);
     if (b->g[V_PATH_CONTROL] >= 0)

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError, load_cell, read_gcode
-from gcode2krl.cell.sections import Machine
+from gcode2krl import Gcode2KrlError, read_gcode
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as marks
@@ -321,17 +320,3 @@ def test_times_and_angles_have_their_own_increments():
     inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
     assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
     assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
-
-
-def test_a_cell_with_rotary_axes_is_refused_for_sinumerik():
-    machine = Machine(
-        kind="table-head",
-        axes=("C", "A"),
-        signs=(-1, 1),
-        tcpm=False,
-        pivot_mm=150.0,
-        centre_mm=(0.0, 0.0, 0.0),
-    )
-    cell = load_cell().model_copy(update={"machine": machine})
-    with pytest.raises(NotUnderstoodError, match="rotary axes"):
-        read_stream(io.BytesIO(b"G710\nG0 X1 Y1 Z1\nM30\n"), "part.nc", cell, dialect="sinumerik")
