@@ -443,7 +443,10 @@ class _Interpreter:
         """Yield the events; ``dwell_s`` tells how much of the row's dwell lies before an event."""
         for row, kind, line, a, b, dwell_s, q, e in self.events[: self._count("events")].tolist():
             what, values = self._said(kind, line, a, b)
-            values |= {letter: word for letter, word in (("q", q), ("e", e)) if not math.isnan(word)}
+            if not math.isnan(q):
+                values["q"] = q
+            if not math.isnan(e):
+                values["e"] = e
             if dwell_s > 0:
                 values["dwell_s"] = dwell_s
             yield Event(row, what, values)
@@ -459,8 +462,7 @@ class _Interpreter:
                 spindle["cycle"] = f"G{cycle}"
             return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
         if kind == EVENT_COOLANT:
-            mist, flood = bool(int(b) & 1), bool(int(b) & 2)
-            return "coolant", {"mist": mist, "flood": flood, "m": int(a), "line": line}
+            return "coolant", {"mist": b in (1.0, 3.0), "flood": b >= 2.0, "m": int(a), "line": line}
         if kind == EVENT_M:
             values: dict[str, Any] = {"m": int(a), "text": "", "line": line}
             return "message", values if math.isnan(b) else {**values, "p": b}
