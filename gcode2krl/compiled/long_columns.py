@@ -11,13 +11,14 @@ import ctypes
 import mmap
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from weakref import WeakSet
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.compiled.core import INT, core_function
 
@@ -26,10 +27,12 @@ LONG_BYTES = 8 << 20
 MOST_RESIDENT_BYTES = 224 << 20
 """Pages of files beyond this are given back; it holds the field and what a stage works on."""
 _LOOKS_EVERY_S = 0.02
+_REGIONS = 16
 _NOTED: "WeakSet[mmap.mmap]" = WeakSet()
 _SET_HANDLER = 304
 """Place of PyDataMem_SetHandler in numpy's table of functions, part of its binary interface."""
 _HANDLER_NAME = b"mem_handler"
+Result = TypeVar("Result")
 
 _handler = core_function("long_columns_handler", ctypes.c_char_p, INT, returns=ctypes.c_void_p)
 _let_go = core_function("long_columns_let_go")
@@ -53,6 +56,21 @@ def long_columns_on_disk(least_bytes: int | None = None) -> Iterator[bool]:
         _set_handler()(before)
         done.set()
         watch.join()
+
+
+def by_regions(rows: NDArray[Any], work: Callable[[NDArray[Any]], Result]) -> list[Result]:
+    """Return ``work(part)`` of parts of rising rows of long columns that are far apart.
+
+    The system may map a file in pieces of megabytes: a look at 2000 rows then makes all between resident,
+    which the next look of `_give_back_pages` comes too late for. So the pages go after each part.
+    """
+    if not columns_on_disk():
+        return [work(rows)]
+    made = []
+    for part in np.array_split(rows, min(_REGIONS, len(rows))):
+        made.append(work(part))
+        _let_go()
+    return made
 
 
 def columns_on_disk() -> int:

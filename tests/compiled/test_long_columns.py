@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.compiled import long_columns
-from gcode2krl.compiled.long_columns import columns_on_disk, long_columns_on_disk
+from gcode2krl.compiled.long_columns import by_regions, columns_on_disk, long_columns_on_disk
 from tests.conftest import ROOT
 
 ROWS = 3000
@@ -78,7 +78,7 @@ def test_what_the_disk_refuses_lies_in_memory():
     code = f"""
 import resource
 import numpy as np
-from gcode2krl.compiled.long_columns import columns_on_disk, long_columns_on_disk
+from gcode2krl.compiled.long_columns import by_regions, columns_on_disk, long_columns_on_disk
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 with long_columns_on_disk({LEAST_BYTES}):
     column = np.arange({ROWS}.0)
@@ -131,3 +131,40 @@ def ran(code):
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
+
+
+def test_rows_far_apart_are_looked_at_in_parts_with_the_same_numbers():
+    rows = np.arange(0, ROWS, 7)
+    in_memory = by_regions(rows, lambda part: part * 2.0)
+    assert len(in_memory) == 1 or columns_on_disk()
+    with long_columns_on_disk(LEAST_BYTES):
+        column = np.arange(float(ROWS)) ** 2
+        parts = by_regions(rows, lambda part: column[part])
+        few = by_regions(rows[:3], lambda part: column[part])
+    assert len(parts) > 4
+    assert np.concatenate(parts).tolist() == (rows.astype(float) ** 2).tolist()
+    assert np.concatenate(few).tolist() == [0.0, 49.0, 196.0]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the system gives pages back")
+def test_a_look_at_rows_far_apart_leaves_nothing_resident():
+    """Of 400 MB in files, 2000 rows between them are read: without parts most of it may become resident."""
+    program = """
+import numpy as np
+from gcode2krl.compiled import long_columns
+long_columns.MOST_RESIDENT_BYTES = 1 << 40  # no help by the thread that looks now and then
+resident = lambda: int(open("/proc/self/statm").read().split()[2]) * 4096 >> 20
+with long_columns.long_columns_on_disk():
+    column = np.ones(50_000_000)
+    long_columns._let_go()
+    before, most = resident(), []
+    def work(part):
+        column[part].sum()
+        most.append(resident() - before)
+    long_columns.by_regions(np.arange(0, len(column), 25_000), work)
+    print(len(most), max(most))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    parts, most_mb = map(int, done.stdout.split())
+    assert parts == 16
+    assert most_mb < 60
