@@ -199,6 +199,16 @@ class Cell(Section):
         shift = fr.transform([0.0, 0.0, -longer_mm], np.eye(3))
         return frame.matrix() @ shift
 
+    def load_of(self, number: int) -> Load:
+        """Return what hangs on the flange with a tool: its own ``load``, else that of the cell.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().load_of(1).mass_kg
+        120.0
+        """
+        tool = self.tool.get(number)
+        return self.load if tool is None or tool.load is None else tool.load
+
     def missing_of_tool(self, number: int) -> tuple[str, ...]:
         """Return the missing keys that the position of a tool's tip depends on; empty if none is missing.
 

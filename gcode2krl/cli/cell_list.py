@@ -16,7 +16,7 @@ Row = tuple[str, str, str]
 
 def to_confirm(cell: Cell) -> Iterator[Row]:
     """Yield (what, value, how sure) of everything a person must confirm."""
-    robot, load = cell.robot, cell.load
+    robot = cell.robot
     yield "robot", robot.model or ("geometry given" if robot.geometry.known else MISSING), robot.geometry.sure
     yield "$TRAFONAME[] contains", robot.trafo_name or "not compared", "memory"
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
@@ -29,10 +29,7 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     if cell.frames.tool is not None or not cell.tool or any(one.frame is None for one in cell.tool.values()):
         yield "$TOOL (reference tool)", f"{_frame(cell.frames.tool)}, {length}", cell.frames.sure
     yield from _tools(cell)
-    centre = f"at X {load.x_mm:g} Y {load.y_mm:g} Z {load.z_mm:g}"
-    inertia = f"J {load.jx_kgm2:g} {load.jy_kgm2:g} {load.jz_kgm2:g} kgm2"
-    weight = f"{load.mass_kg:g} kg {centre}, {inertia}" if load.mass_kg is not None else MISSING
-    yield "$LOAD", weight, load.sure
+    yield from _loads(cell)
     yield "HOME", _list(cell.home.q_deg, "deg", MISSING), "assumption"
     plane = cell.clearance.z_mm
     place = MISSING if plane is None else f"Z {plane} mm in $BASE, free of obstacles all the way"
@@ -49,6 +46,17 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     )
 
 
+def _loads(cell: Cell) -> Iterator[Row]:
+    """Yield ``$LOAD``, and that of each tool that has its own."""
+    own = {f"$LOAD with T{number}": tool.load for number, tool in cell.tool.items() if tool.load is not None}
+    every = {"$LOAD": cell.load} if len(own) < len(cell.tool) or not cell.tool else {}
+    for name, load in {**every, **own}.items():
+        centre = f"at X {load.x_mm:g} Y {load.y_mm:g} Z {load.z_mm:g}"
+        inertia = f"J {load.jx_kgm2:g} {load.jy_kgm2:g} {load.jz_kgm2:g} kgm2"
+        weight = f"{load.mass_kg:g} kg {centre}, {inertia}" if load.mass_kg is not None else MISSING
+        yield name, weight, load.sure
+
+
 def missing_keys(cell: Cell) -> list[str]:
     """Return the keys that any program needs and the cell does not state."""
     stated = {
@@ -62,7 +70,7 @@ def missing_keys(cell: Cell) -> list[str]:
     keys = [key for key, value in stated.items() if value is None]
     for number in sorted(cell.tool):
         keys += cell.missing_of_tool(number)
-    if cell.load.mass_kg is None and any(tool.tool_data is None for tool in cell.tool.values()):
+    if any(tool.tool_data is None and cell.load_of(n).mass_kg is None for n, tool in cell.tool.items()):
         keys.append("load.mass_kg")
     if cell.spindle.max_rpm is None:
         keys.append("spindle.max_rpm")

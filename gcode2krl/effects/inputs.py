@@ -149,7 +149,7 @@ class Inputs:
         """(m, b, 3) weight and inertia of links and payload along ``$BASE``."""
         speed = [gradient(at, self.time_s) for at in np.moveaxis(self.bodies.centre_mm, 1, 0)]
         acceleration = np.stack([gradient(each, self.time_s) for each in speed], axis=1) / MM_PER_M
-        push_N: Floats = self.bodies.mass_kg[:, None] * (GRAVITY_M_S2 * self.gravity - acceleration)
+        push_N: Floats = self.bodies.mass_kg[..., None] * (GRAVITY_M_S2 * self.gravity - acceleration)
         return push_N
 
     @cached_property

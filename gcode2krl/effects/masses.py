@@ -22,7 +22,7 @@ class Bodies(NamedTuple):
     centre_mm: Floats
     """(m, b, 3) in ``$BASE``."""
     mass_kg: Floats
-    """(b,)"""
+    """(m, b)"""
     carried_by: Ints
     """(b,) number of the last axis, 0 to 5, that moves it."""
 
@@ -34,25 +34,30 @@ def bodies_of(cell: Cell, axes_mm: Floats, tip_mm: Floats, rotation: Floats, too
     if cell.robot.drives.link_mass_kg is not None:
         ends = np.concatenate([axes_mm[:, 1:], axes_mm[:, -1:]], axis=1)
         centres.append((axes_mm + ends) / 2.0)
-        masses += list(cell.robot.drives.link_mass_kg)
+        masses.append(np.tile(cell.robot.drives.link_mass_kg, (count, 1)))
         carried += list(range(_LINKS))
-    if cell.load.mass_kg is not None:
-        centres.append(_payload_mm(cell, tip_mm, rotation, tool)[:, None])
-        masses.append(cell.load.mass_kg)
+    payload_kg, payload_mm = _payload(cell, tip_mm, rotation, tool)
+    if payload_kg.any():
+        centres.append(payload_mm[:, None])
+        masses.append(payload_kg[:, None])
         carried.append(_LINKS - 1)
     centre_mm = np.concatenate([np.zeros((count, 0, 3)), *centres], axis=1)
-    return Bodies(centre_mm, np.array(masses, dtype=float), np.array(carried, dtype=int))
+    mass_kg = np.concatenate([np.zeros((count, 0)), *masses], axis=1)
+    return Bodies(centre_mm, mass_kg, np.array(carried, dtype=int))
 
 
-def _payload_mm(cell: Cell, tip_mm: Floats, rotation: Floats, tool: Ints32) -> Floats:
-    """Return the centre (m, 3) of the payload, which the cell states from the flange along its axes."""
-    centre_mm = np.empty_like(tip_mm)
-    flange = np.array([cell.load.x_mm, cell.load.y_mm, cell.load.z_mm])
+def _payload(cell: Cell, tip_mm: Floats, rotation: Floats, tool: Ints32) -> tuple[Floats, Floats]:
+    """Return mass (m,) and centre (m, 3) of the payload, stated from the flange; 0 kg where it is not."""
+    mass_kg, centre_mm = np.zeros(len(tip_mm)), np.array(tip_mm)
     for number in np.unique(tool):
-        rows, frame = tool == number, cell.tool_matrix(int(number))
+        rows, load = tool == number, cell.load_of(int(number))
+        if load.mass_kg is None:
+            continue
+        frame, flange = cell.tool_matrix(int(number)), np.array([load.x_mm, load.y_mm, load.z_mm])
         from_tip = frame[:3, :3].T @ (flange - frame[:3, 3])
+        mass_kg[rows] = load.mass_kg
         centre_mm[rows] = tip_mm[rows] + rotation[rows] @ from_tip
-    return centre_mm
+    return mass_kg, centre_mm
 
 
 def torque_Nm(bodies: Bodies, push_N: Floats, axes_mm: Floats, jacobian: Floats) -> Floats:

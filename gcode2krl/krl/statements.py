@@ -68,7 +68,7 @@ def tool_statements(cell: Cell, number: int) -> str:
     tool = cell.tool[number]
     if tool.tool_data is not None:
         return f"{w.BAS} (#TOOL,{tool.tool_data} )"
-    load = cell.load
+    load = cell.load_of(number)
     if load.mass_kg is None:
         raise missing("load.mass_kg")
     centre = (

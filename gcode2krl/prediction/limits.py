@@ -14,6 +14,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Deflection, Forces, Motion, lengths
 from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, NMM_PER_NM
@@ -119,13 +120,20 @@ class ForceLimits:
 
     def _take_load(self, forces: Forces, cut_N: Floats, line: Ints32) -> None:
         """Keep the largest load on the flange: the cut, or the cut and the weight."""
-        own_kg = self._cell.load.mass_kg or 0.0  # where the cell names no load, the cut alone is compared
+        own_kg = self._own_kg(forces.tool)
         down = -self._cell.base_in_world()[2, :3]  # the world's -z along the axes of $BASE
-        whole_N = lengths(forces.force_base_N + own_kg * GRAVITY_M_S2 * down)
+        whole_N = lengths(forces.force_base_N + own_kg[:, None] * GRAVITY_M_S2 * down)
         load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
         row = self.load.take(load_N, line, forces.tool)
         if row is not None:
             self._cut_N, self._whole_N = float(cut_N[row]), float(whole_N[row])
+
+    def _own_kg(self, tool: Ints32) -> Floats:
+        """Return the mass (m,) on the flange with the tools (m,); 0 where the cell names none."""
+        own_kg = np.empty(len(tool))
+        for number in distinct(tool):
+            own_kg[tool == number] = self._cell.load_of(int(number)).mass_kg or 0.0
+        return own_kg
 
     def issues(self, is_guessed: bool) -> Iterator[Issue]:
         """Yield what exceeds the limits: one finding, at the largest value, each."""
@@ -144,10 +152,10 @@ class ForceLimits:
             yield Issue("warning", "torque-high", torque.line, sentence, remedy.format(key="torque_Nm"))
 
     def _payload(self, is_guessed: bool) -> Issue | None:
-        rated_kg, own_kg = self._cell.robot.payload.mass_kg, self._cell.load.mass_kg or 0.0
+        rated_kg, load = self._cell.robot.payload.mass_kg, self.load
         if rated_kg is None:
             return None
-        load, rated_N = self.load, rated_kg * GRAVITY_M_S2
+        own_kg, rated_N = self._cell.load_of(load.tool).mass_kg or 0.0, rated_kg * GRAVITY_M_S2
         if load.value <= rated_N:
             return None
         with_own = (

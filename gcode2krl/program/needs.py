@@ -98,8 +98,8 @@ def _geometry_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
 
 def _other_keys(toolpath: Toolpath, cell: Cell) -> Iterator[tuple[str, str]]:
     """Yield (key, reason) of the other keys that the text of the program needs."""
-    tools = [cell.tool[number] for number in used_tools(toolpath) if number in cell.tool]
-    if cell.load.mass_kg is None and any(tool.tool_data is None for tool in tools):
+    tools = [number for number in used_tools(toolpath) if number in cell.tool]
+    if any(cell.tool[n].tool_data is None and cell.load_of(n).mass_kg is None for n in tools):
         yield "load.mass_kg", "$LOAD is written with $TOOL"
     if any(event.kind == "spindle" for event in toolpath.events) and cell.spindle.max_rpm is None:
         yield "spindle.max_rpm", "whether the spindle can turn at S is not known"

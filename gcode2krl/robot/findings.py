@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import ROWS
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.robot.branch import Branch, Path
 from gcode2krl.robot.lines import Line, sample_lines
@@ -57,7 +58,7 @@ def joint_findings(
         findings += _speed_findings(line, joints, bits, targets, cell)
         findings += _wrist_findings(line, joints, bits, targets)
     findings += _ptp_findings(targets, q, cell)
-    findings += _load_findings(cell)
+    findings += _load_findings(targets, cell)
     return tuple(sorted(findings, key=lambda issue: issue.line)[: 5 * MOST_PLACES])
 
 
@@ -157,16 +158,17 @@ def _cell_findings(cell: Cell) -> Iterator[Issue]:
         )
 
 
-def _load_findings(cell: Cell) -> Iterator[Issue]:
-    mass, rated = cell.load.mass_kg, cell.robot.payload.mass_kg
-    if rated is not None and mass is not None and mass > rated:
-        yield Issue(
-            "error",
-            "overload",
-            0,
-            f"the load of {mass:g} kg is above the rated {rated:g} kg",
-            "correct [load]",
-        )
+def _load_findings(targets: Targets, cell: Cell) -> Iterator[Issue]:
+    """Yield the loads of the program's tools that the robot is not rated for, the cell's once."""
+    rated = cell.robot.payload.mass_kg
+    loads = {id(load): (n, load) for n in distinct(targets.tool).tolist() for load in [cell.load_of(n)]}
+    for number, load in loads.values():
+        if rated is None or load.mass_kg is None or load.mass_kg <= rated:
+            continue
+        own = load is not cell.load
+        whose, key = (f" with T{number}", f"[tool.{number}] load") if own else ("", "[load]")
+        sentence = f"the load of {load.mass_kg:g} kg{whose} is above the rated {rated:g} kg"
+        yield Issue("error", "overload", 0, sentence, f"correct {key}")
 
 
 def _reach_findings(line: Line, bits: Bits, targets: Targets) -> Iterator[Issue]:

@@ -74,7 +74,7 @@ def _base_lines(cell: Cell) -> list[str]:
 def _tool_lines(cell: Cell, number: int) -> list[str]:
     """Return the same for ``$TOOL`` and ``$LOAD``."""
     text = st.tool_statements(cell, number)
-    data, load = cell.tool[number].tool_data, cell.load
+    data, load = cell.tool[number].tool_data, cell.load_of(number)
     if data is None:
         return text.split("\n")
     lines = [f"{text}: {w.TOOL_DATA}[{data}]={st.frame_text(st.written_tool(cell, number))}"]

@@ -19,6 +19,7 @@ from gcode2krl.cell.sections.fields import (
     SignalNumber,
     YesNo,
 )
+from gcode2krl.cell.sections.robot import Load
 from gcode2krl.cell.sections.surroundings import SpindleBody
 
 _ROUNDED_SHARE = 0.005
@@ -60,11 +61,15 @@ class Tool(Provenance):
     """TCP in the flange as the controller has it; without it from ``frames.tool`` and the length."""
     axis: Axis | None = None
     """Which axis of the controller's tool frame points from tip to holder."""
+    load: Load | None = None
+    """Everything on the flange with this tool; without it ``[load]`` of the cell."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._refuse_lengths()
         self._refuse_half_a_frame()
+        if self.load is not None and self.load.mass_kg is None:
+            raise ValueError("load needs mass_kg, that of everything on the flange with this tool")
         return self
 
     def _refuse_lengths(self) -> None:

@@ -107,10 +107,10 @@ class WrongLoad(Effect):
         """Return the load with the weight that is not accounted for."""
         if applied["mass_kg"] == 0.0:
             return load
-        stated = inputs.cell.load
-        centre_mm = np.array([stated.x_mm, stated.y_mm, stated.z_mm]) + applied.vector(_FURTHER)
         lever_mm = np.empty((len(inputs), 3))
         for number, rows in arm.tool_rows(inputs.tool):
+            stated = inputs.cell.load_of(int(number))
+            centre_mm = np.array([stated.x_mm, stated.y_mm, stated.z_mm]) + applied.vector(_FURTHER)
             from_tip_mm = centre_mm - inputs.cell.tool_matrix(number)[:3, 3]
             lever_mm[rows] = inputs.sensor_rotation[rows] @ from_tip_mm
         return with_weight(load, inputs, applied["mass_kg"], lever_mm)
