@@ -395,7 +395,8 @@
 #define DR_REASON_VECTOR_ARC 36
 #define DR_REASON_OTHER_TIP 37
 #define DR_REASON_SHIFT_AND_TIP 38
-#define DR_REASON_FEED_AXES 39
+#define DR_REASON_ZERO_AND_TIP 39
+#define DR_REASON_FEED_AXES 40
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -916,6 +917,7 @@ typedef struct {
     double tool_vector[3];
     int8_t has_vector;
     int8_t traori;
+    int8_t zero_in_doubt;
     int32_t length_code;
     double feed_word;
     int32_t arcs;
@@ -1027,6 +1029,7 @@ typedef char State_home_30_deg_stands_at_360[offsetof(State, home_30_deg) == 360
 typedef char State_tool_vector_stands_at_384[offsetof(State, tool_vector) == 384 ? 1 : -1];
 typedef char State_has_vector_stands_at_408[offsetof(State, has_vector) == 408 ? 1 : -1];
 typedef char State_traori_stands_at_409[offsetof(State, traori) == 409 ? 1 : -1];
+typedef char State_zero_in_doubt_stands_at_410[offsetof(State, zero_in_doubt) == 410 ? 1 : -1];
 typedef char State_length_code_stands_at_412[offsetof(State, length_code) == 412 ? 1 : -1];
 typedef char State_feed_word_stands_at_416[offsetof(State, feed_word) == 416 ? 1 : -1];
 typedef char State_arcs_stands_at_424[offsetof(State, arcs) == 424 ? 1 : -1];

@@ -61,6 +61,7 @@ STATE = np.dtype(
         ("tool_vector", "f8", 3),  # I, J, K under G43.5
         ("has_vector", "i1"),
         ("traori", "i1"),  # a Sinumerik's transformation is on: X, Y, Z are the tip
+        ("zero_in_doubt", "i1"),  # it was switched under a work offset, which the control may have dropped
         ("length_code", "i4"),  # G43, G43.4, G43.5 or G49, tenfold
         ("feed_word", "f8"),  # F as written: degrees a minute of a turn alone
         ("arcs", "i4"),

@@ -295,6 +295,14 @@ static bool names_axis(const Block *b) {
     return b->vector_named || b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
 }
 
+/* A control may drop its work offset where the transformation is switched; report the first block that needs it. */
+static bool is_zero_sure(Block *b) {
+    if (b->g[V_WORK_OFFSET] >= 0 || b->g[V_NON_MODAL] == V_G53)
+        return true;
+    b->state->zero_in_doubt = 0;
+    return refuse_statement(b, DR_REASON_ZERO_AND_TIP);
+}
+
 /* Codes that say nothing keep their own words; beside axis words nobody knows whose they are. */
 static bool use_harmless_words(Block *b) {
     static const int OWN[] = {V_WORD_P, V_WORD_Q, V_WORD_R, V_WORD_I, V_WORD_J, V_WORD_K, V_WORD_H};
@@ -333,6 +341,8 @@ bool to_core_words(Block *b) {
             good = count_turn(b, k) && good;
     if (b->vector_named | b->tip)
         good = read_vector(b) && good;
+    if (b->state->zero_in_doubt && names_axis(b))
+        good = is_zero_sure(b) && good;
     if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
     if (b->harmless)

@@ -235,6 +235,7 @@ static void plane_and_unit(Block *b) {
 /* G54 to G59.3 are offsets 0 to 8; a G54 that the cell does not state is zero, which is no finding. */
 static void select_offset(Block *b, int32_t code) {
     State *s = b->state;
+    s->zero_in_doubt = 0;
     s->work_offset = code <= V_G59 ? (code - V_G54) / V_TENFOLD : code - V_G59 + 5;
     if (!AT(b->machine->offset_known, s->work_offset) && s->work_offset > 0)
         report(b, F_OFFSET_UNKNOWN, (Says){.a = code});

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gcode2krl import Gcode2KrlError, load_cell
 from gcode2krl.gcode import read_stream
+from tests.cells import over_demonstration
 from tests.gcode.test_rotary import KINDS, PLACES, machine, tool_in_part
 
 HEAD = "G710 G90 G17 G94 F500\nT1 M6\nS1000 M3\nG0 X0 Y0 Z0\n"
@@ -153,6 +154,29 @@ def test_what_is_refused(text, found):
     code, line, message = refused(text, machine("table-head", tcpm=False))
     assert (code, line) == found[:2]
     assert found[2] in message
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("TRAORI\nG1 X1", 2),
+        ("TRAORI\nG54 G1 X1\nTRAFOOF\nG0 SUPA Z0\nG0 X2", 5),
+        ("TRAORI\nG0 B5 C=DC(3)\nG1 A3=1 C3=1", 3),
+        ("TRAORI\nG54\nG1 X1\nTRAFOOF\nG0 SUPA Z0\nG55\nG0 X2 Y2 Z2", None),
+        ("TRAFOOF\nG1 X1", None),
+    ],
+)
+def test_the_control_may_have_dropped_the_work_offset(text, line):
+    offset = dict(zip(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), [5.0, *[0.0] * 5], strict=True))
+    cell = over_demonstration({"work_offsets": {"G54": offset, "G55": offset}})
+    cell = cell.model_copy(update={"machine": machine("table-head", tcpm=False)})
+    program = io.BytesIO(f"{HEAD}{text}\nM30\n".encode())
+    if line is None:
+        read_stream(program, "part.mpf", cell, dialect="sinumerik")
+        return
+    with pytest.raises(Gcode2KrlError, match="work offset outlives") as caught:
+        read_stream(program, "part.mpf", cell, dialect="sinumerik")
+    assert caught.value.issues[0].line == line + HEAD.count("\n")
 
 
 def test_without_a_machine_zero_is_no_motion_and_the_rest_is_refused():
