@@ -5,8 +5,6 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 
-_NEARLY_ONE = 1.0 - 1e-12
-
 
 def tool_rotation(axis: Floats, spin_rad: Floats | float) -> Floats:
     """Return tool frames as quaternions (n, 4) whose z is ``axis`` (n, 3).
@@ -24,8 +22,10 @@ def tool_rotation(axis: Floats, spin_rad: Floats | float) -> Floats:
 
 def _rotation(axis: Floats, spin_rad: Floats) -> Floats:
     x, y, z = axis[:, 0], axis[:, 1], axis[:, 2]
-    upside_down = z < -_NEARLY_ONE
-    scale = np.sqrt(2.0 * np.where(upside_down, 1.0, 1.0 + z))
+    across = x * x + y * y
+    upside_down = (z < 0.0) & (across == 0.0)
+    one_and_z = np.where(z < 0.0, across / (1.0 + np.abs(z)), 1.0 + z)  # the same, without cancellation
+    scale = np.sqrt(2.0 * np.where(upside_down, 1.0, one_and_z))
     tilt = np.stack([-y / scale, x / scale, np.zeros_like(z), scale / 2.0], axis=1)
     tilt[upside_down] = [1.0, 0.0, 0.0, 0.0]
     half = spin_rad / 2.0
