@@ -67,7 +67,7 @@ def by_regions(rows: NDArray[Any], work: Callable[[NDArray[Any]], Result]) -> li
     if not columns_on_disk():
         return [work(rows)]
     made = []
-    for part in np.array_split(rows, min(_REGIONS, len(rows))):
+    for part in np.array_split(rows, min(_REGIONS, max(len(rows), 1))):
         made.append(work(part))
         _let_go()
     return made

@@ -141,7 +141,9 @@ def test_rows_far_apart_are_looked_at_in_parts_with_the_same_numbers():
         column = np.arange(float(ROWS)) ** 2
         parts = by_regions(rows, lambda part: column[part])
         few = by_regions(rows[:3], lambda part: column[part])
+        none = by_regions(rows[:0], lambda part: column[part])
     assert len(parts) > 4
+    assert [len(part) for part in none] == [0]
     assert np.concatenate(parts).tolist() == (rows.astype(float) ** 2).tolist()
     assert np.concatenate(few).tolist() == [0.0, 49.0, 196.0]
 
