@@ -209,7 +209,10 @@ class _Walk:
     def _is_plain_corner(self, row: Ints, end: Ints) -> Bools:
         """Tell whether nothing happens at the end of rows, and rows and ends of their ways are alike."""
         path = self.toolpath
-        plain = ~path.rapid[row] & ~path.rapid[end] & ~path.exact_stop[row] & ~self.happening[row]
+        # a row without a way has no stop of its own: the tool stands where the row before has led it
+        here, before = (np.rint(path.position_mm[rows] / _WRITTEN_MM) for rows in (row, row - 1))
+        stops = path.exact_stop[row] & (here != before).any(axis=1)
+        plain = ~path.rapid[row] & ~path.rapid[end] & ~stops & ~self.happening[row]
         plain &= path.dwell_s[row] == 0.0
         for column in (path.tool, path.spindle_rad_s, path.tolerance_mm, path.length_offset_mm):
             here, there = column[row], column[end]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, write_krl
@@ -223,6 +223,10 @@ _BLOCKS = st.one_of(
 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=80)
+@example(
+    ["G91 G1\n" + "X0.001 Z0.000\n" * 3 + "G90", "G61", "G91 G1\n" + "X0.001 Z0.000\n" * 2 + "G90"], 0.001
+)
+@example(["G1 X5", "G1 X6\nX7", "G61", "G1", "G64", "X8\nX9"], 0.01)
 @given(st.lists(_BLOCKS, min_size=2, max_size=14), st.sampled_from([0.001, 0.01, 0.05, 0.5]))
 def test_no_simplified_program_is_refused(blocks, simplify_mm):
     """Whatever stands between the moves, what merging leaves out passes the comparison with the G-code."""
