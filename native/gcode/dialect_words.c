@@ -217,7 +217,7 @@ static bool count_axis(Block *b, int axis) {
     return true;
 }
 
-/* Return a whole turn or none more than an angle from 0 to 360. */
+/* Return the angle from 0 to below 360 degrees that leads to the same place. */
 static double within_turn(double deg) { return deg - FULL_TURN_DEG * floor(deg / FULL_TURN_DEG); }
 
 /* C=AC(5), C=IC(5), and C=DC(5), C=ACP(5), C=ACN(5), which say by which way, become what the mode in force says. */
