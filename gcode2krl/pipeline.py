@@ -223,6 +223,11 @@ def forecast_toolpath(
     )
 
 
+def forecast_begun(toolpath: Toolpath, cell: Cell, targets: Targets) -> Forecast:
+    """Return what `forecast_toolpath` will complete: nothing is known of the motion yet."""
+    return Forecast(toolpath, targets, cell, targets.issues, np.nan, np.nan, None, None)
+
+
 def forecast_of(prediction: Prediction) -> Forecast:
     """Return what a program needs of a prediction that has a motion."""
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection

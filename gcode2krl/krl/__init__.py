@@ -2,9 +2,10 @@
 
 from gcode2krl.krl.names import suggested_name
 from gcode2krl.krl.pilot_check import PilotFigures
+from gcode2krl.krl.places import output_files, program_file
 from gcode2krl.krl.read import read_krl
 from gcode2krl.krl.verify import VerifyReport, verify_krl
-from gcode2krl.krl.write import WrittenProgram, output_files, program_file, write_krl
+from gcode2krl.krl.write import WrittenProgram, write_krl
 
 __all__ = [
     "PilotFigures",

@@ -1,7 +1,6 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -15,27 +14,23 @@ from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
-from gcode2krl.files import Staging, refuse_inputs
-from gcode2krl.files.program_names import program_stem
-from gcode2krl.files.stored import Stored, Texts, store
+from gcode2krl.files.stored import Stored, Texts
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.composition import Layout, compose
-from gcode2krl.krl.names import name_problem, suggested_name
-from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
+from gcode2krl.krl.composition import Layout
+from gcode2krl.krl.draft import Composer, Content
+from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
-from gcode2krl.krl.pilot_text import PilotText
-from gcode2krl.krl.read import read_texts
+from gcode2krl.krl.places import ProgramFiles, program_file, require_name
 from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import file_names
 from gcode2krl.krl.rsi_refusals import online_issues
-from gcode2krl.krl.verify import VerifyReport, compare
+from gcode2krl.krl.verify import VerifyReport
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
-_ALIKE = "; a controller needs file and DEF alike"
 PilotForm = Literal["index", "values", "none"]
 
 
@@ -107,6 +102,7 @@ def write_krl(
     online: str | None = None,
     inputs: Sequence[str | Path] = (),
     toolpath: Toolpath | None = None,
+    complete: Callable[[], Forecast] | None = None,
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
@@ -132,6 +128,8 @@ def write_krl(
         are written beside it. RSI is on from above the first cut to above the last.
     inputs : files and folders that must not be overwritten, beside those that the tables name.
     toolpath : needed with Targets that leave out corners of it; the others have their own.
+    complete : returns the Forecast that ``source`` becomes, for a program without pilot force: it is written
+        and read back while this runs, and again where what is found then changes it.
 
     Raises
     ------
@@ -157,35 +155,39 @@ def write_krl(
     if targets.simplified is not None and original is None:
         sentence = "the targets leave out corners, which only their Toolpath tells"
         raise input_error("option-value", sentence, "give write_krl the toolpath too")
-    file, issues = _named(path, name, targets.source, cell)
-    program_name = file.stem.upper() if file is not None else (name or "PART").upper()
+    file, of_name = _named(path, name, targets.source, cell)
     if online is not None:
         _refuse_name(online, file)
-        issues += online_issues(targets, cell)
-    header_allowed = header_words([*issues, *source.issues], allow)
-    issues = list(released([*issues, *source.issues], allow, strict))
+        of_name += online_issues(targets, cell)
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
-    plan = _pilot_plan(source, pilot, joints, file is not None)
-    give_back()
-    known = not isinstance(source, Targets) and source.has_forces
-    layout = Layout(
-        guard,
-        split if file is not None else "defs",
-        single_file=file is None,
-        options=options,
-        allowed=header_allowed,
-        forces=known,
-        online=online or "",
-        collisions=None if isinstance(source, Targets) else collision_scope(cell, _tools(targets)),
-    )
-    bare = _Content(targets, joints)
-    content = bare if plan is None or isinstance(plan, Issue) else _Content.of(plan)
-    with _Files(file, program_name, [*_inputs(targets, cell), *inputs]) as files:
-        report = _composed(content, cell, files, layout, original)
+
+    def layout(known: Targets | Prediction | Forecast) -> Layout:
+        return Layout(
+            guard,
+            split if file is not None else "defs",
+            single_file=file is None,
+            options=options,
+            allowed=header_words([*of_name, *known.issues], allow),
+            forces=not isinstance(known, Targets) and known.has_forces,
+            online=online or "",
+            collisions=None if isinstance(known, Targets) else collision_scope(cell, _tools(targets)),
+        )
+
+    program_name = file.stem.upper() if file is not None else (name or "PART").upper()
+    bare = Content(targets, joints)
+    with ProgramFiles(file, program_name, [*_inputs(targets, cell), *inputs]) as files:
+        composer = Composer(cell, files, original)
+        if complete is not None:
+            source = composer.composed_while(complete, bare, layout(source))
+        issues = list(released([*of_name, *source.issues], allow, strict))
+        plan = _pilot_plan(source, pilot, joints, file is not None)
+        give_back()
+        content = bare if plan is None or isinstance(plan, Issue) else Content.of(plan)
+        report = composer.composed(content, layout(source))
         failure = _pilot_failure(report) if pilot is None else None
         if failure is not None:
             plan, content = left_out(failure), bare
-            report = _composed(content, cell, files, layout, original)
+            report = composer.composed(content, layout(source))
         issues += released(_issues_of(plan), (), strict)
         issues += released(_size_issues(files.contents, content.targets, cell), (), strict)
         if not report.ok:
@@ -198,68 +200,6 @@ def write_krl(
 
 def _tools(targets: Targets) -> list[int]:
     return [int(number) for number in np.unique(targets.tool)]
-
-
-class _Files:
-    """The files of a program: beside their places until it is verified, or without any."""
-
-    def __init__(self, file: Path | None, name: str, inputs: Sequence[str | Path]) -> None:
-        self.file, self.name, self.inputs = file, name, inputs
-        self.staging = Staging()
-        self.contents: dict[str, Stored] = {}
-
-    def __enter__(self) -> "_Files":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.staging.discard()
-
-    def write(self, texts: Mapping[str, Iterable[bytes]]) -> None:
-        """Write the program piece by piece, in the place of what has been written before."""
-        self.staging.discard()
-        self.contents.clear()
-        if self.file is not None:
-            refuse_inputs([_place(self.file, part, self.name) for part in texts], self.inputs)
-        for part, pieces in texts.items():
-            if self.file is None:
-                self.contents[part] = store(pieces)
-            else:
-                place = _place(self.file, part, self.name)
-                self.contents[part] = Stored(self.staging.write(place, pieces))
-
-    def take_places(self) -> list[Path]:
-        """Put the files in their places and return these; none where there is no file."""
-        if self.file is None:
-            return []
-        self.staging.take_places()
-        places = {part: _place(self.file, part, self.name) for part in self.contents}
-        self.contents = {part: Stored(place) for part, place in places.items()}
-        return list(places.values())
-
-
-@dataclass(frozen=True)
-class _Content:
-    """What a program says: its motions, and a pilot force or none."""
-
-    targets: Targets
-    joints: Joints
-    text: PilotText | None = None
-    case: PilotCase | None = None
-
-    @classmethod
-    def of(cls, plan: PilotPlan) -> "_Content":
-        return cls(plan.targets, plan.joints, plan.text, plan.case)
-
-
-def _composed(
-    content: _Content, cell: Cell, files: _Files, layout: Layout, original: Toolpath | None
-) -> VerifyReport:
-    """Write the files of a program; return what reading them back finds."""
-    targets, joints = content.targets, content.joints
-    files.write(compose(targets, joints, cell, files.name, layout, content.text))
-    give_back()
-    program = read_texts(files.contents, f"{files.name}{w.SOURCE_SUFFIX}")
-    return compare(program, targets, joints, cell, pilot=content.case, original=original)
 
 
 def _pilot_plan(
@@ -292,7 +232,7 @@ def _named(
     if path is not None:
         return program_file(path, name, source, cell.program.externals)
     if name is not None:
-        _require_name(name, cell.program.externals)
+        require_name(name, cell.program.externals)
     return None, []
 
 
@@ -316,81 +256,6 @@ def _refuse_name(online: str, file: Path | None) -> None:
     if file is None:
         sentence = "--online needs the RSI files, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src")
-
-
-def output_files(file: Path, online: str | None) -> list[Path]:
-    """Return the files that a program may consist of, but for its parts."""
-    rsi = [file.with_name(name) for name in file_names(online)] if online is not None else []
-    return [file, file.with_suffix(w.DATA_SUFFIX), file.with_suffix(w.SIDECAR_SUFFIX), *rsi]
-
-
-def _place(file: Path, part: str, program_name: str) -> Path:
-    if part == f"{program_name}{w.SOURCE_SUFFIX}":
-        return file
-    for suffix in (w.DATA_SUFFIX, w.SIDECAR_SUFFIX):
-        if part == f"{program_name}{suffix}":
-            return file.with_suffix(suffix)
-    return file.with_name(part)
-
-
-def program_file(
-    path: str | Path, name: str | None, source: str, taken: Sequence[str] = ()
-) -> tuple[Path, list[Issue]]:
-    """Return the ``.src`` that a program becomes, and what there is to say about its name.
-
-    Where ``path`` is a folder the name is ``name``, or made from that of the source (G-code) so that a
-    controller takes it. A file must have a good name already, as a controller finds the program by it.
-
-    Raises
-    ------
-    NotUnderstoodError
-        Where file or name are no names for a program, or differ.
-    """
-    place = Path(path)
-    if name is not None:
-        _require_name(name, taken)
-    if place.is_dir() and place.suffix.lower() != w.SOURCE_SUFFIX:
-        return _file_in(place, name, program_stem(_last_step(source)), taken)
-    if place.suffix.lower() != w.SOURCE_SUFFIX:
-        sentence = f"the output {place.name!r} does not end in .src and is no folder"
-        raise input_error("option-value", sentence, "name it part.src, or create the folder first")
-    problem = name_problem(place.stem, taken)
-    good = suggested_name(name if name is not None else place.stem, taken)
-    if problem:
-        sentence = f"{place.stem!r} cannot be a program's name: {problem}{_ALIKE}"
-        raise input_error(
-            "krl-name", sentence, f"-o {place.with_name(good)}{w.SOURCE_SUFFIX}", source=place.name
-        )
-    if name is not None and name.upper() != place.stem.upper():
-        sentence = f"--name {name} and the file {place.name} differ{_ALIKE}"
-        remedy = f"-o {place.with_name(name)}.src, or leave out --name"
-        raise input_error("krl-name", sentence, remedy, source=place.name)
-    return place, []
-
-
-def _file_in(folder: Path, name: str | None, stem: str, taken: Sequence[str]) -> tuple[Path, list[Issue]]:
-    """Return the file in a folder, of a given name or of one made from a stem."""
-    if name is not None:
-        return folder / f"{name}{w.SOURCE_SUFFIX}", []
-    problem = name_problem(stem, taken)
-    if not problem:
-        return folder / f"{stem}{w.SOURCE_SUFFIX}", []
-    good = suggested_name(stem, taken)
-    sentence = f"the program is called {good}: {stem!r} cannot be a program's name ({problem})"
-    return folder / f"{good}{w.SOURCE_SUFFIX}", [
-        Issue("note", "krl-name", 0, sentence, "or choose a name with --name")
-    ]
-
-
-def _require_name(name: str, taken: Sequence[str]) -> None:
-    problem = name_problem(name, taken) if name else "is empty"
-    if problem:
-        remedy = f"--name {suggested_name(name, taken)}: at most 24 of A-Z, 0-9, _; not starting with a digit"
-        raise input_error("krl-name", f"--name {name!r}: {problem}", remedy)
-
-
-def _last_step(source: str) -> str:
-    return re.split(r"[\\/]", source)[-1]
 
 
 def _inputs(targets: Targets, cell: Cell) -> list[str]:

@@ -29,6 +29,8 @@ from gcode2krl.translation.page import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
@@ -90,9 +92,12 @@ def _translate(order: Order, known: _Known, begin: Begin) -> None:
     _read(order, ready, known, begin)
     begin("planning")
     _plan(order, ready.cell, known)
+    if order.no_forces and order.compensate is None and order.report is None:
+        known.written = _write_meanwhile(order, ready, known, begin)
+        return
     prediction = _predict(order, ready, known, begin)
     begin("writing and reading back")
-    written = _write(order, ready, known)
+    written = _write(order, ready, known, _done(known.forecast))
     known.written = written
     if prediction is not None and order.report is not None:
         page = Path(order.report)
@@ -177,7 +182,26 @@ def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Predi
     return prediction
 
 
-def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
+def _write_meanwhile(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "WrittenProgram":
+    """Write a program whose text does not depend on forces while its motion is planned."""
+    from gcode2krl.pipeline import forecast_begun
+
+    def complete() -> "Forecast":
+        _predict(order, ready, known, begin)
+        begin("writing and reading back")
+        return _done(known.forecast)
+
+    begun = forecast_begun(_done(known.toolpath), ready.cell, _done(known.targets))
+    return _write(order, ready, known, begun, complete)
+
+
+def _write(
+    order: Order,
+    ready: _Ready,
+    known: _Known,
+    forecast: "Forecast",
+    complete: "Callable[[], Forecast] | None" = None,
+) -> "WrittenProgram":
     """Write the program and read it back."""
     from gcode2krl.krl import suggested_name, write_krl
 
@@ -185,7 +209,7 @@ def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
     if ready.place is None and name is None and str(order.part) != STANDARD:
         name = suggested_name(program_stem(order.part), ready.cell.program.externals)
     return write_krl(
-        _done(known.forecast),
+        forecast,
         ready.place,
         joints=known.joints,
         name=name,
@@ -197,6 +221,7 @@ def _write(order: Order, ready: _Ready, known: _Known) -> "WrittenProgram":
         pilot=order.pilot,
         online=order.online,
         inputs=ready.inputs,
+        complete=complete,
     )
 
 
