@@ -1,12 +1,13 @@
 """The stages on a Motion, block after block, so that no stage keeps all samples."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gcode2krl import collision, compliance, cutting, krc4, program, robot
+from gcode2krl.arm_in_stock import ArmInStock, Inside
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.clearance import moves_watched_at_targets, watch_of
@@ -203,7 +204,7 @@ def _line_of_move(targets: Targets, chain: krc4.Chain) -> Ints32:
 
 Samples = tuple[Motion, Floats, Floats, bool]
 """The next samples (m) of a motion, angles and speeds of those of them and before them that are known, and
-whether the motion ends with them; see `Loads.take`."""
+whether the motion ends with them; see `Loads.along`."""
 
 
 class Block(NamedTuple):
@@ -246,6 +247,7 @@ class Loads:
         """
         self._toolpath, self._cell = toolpath, cell
         self._milling: cutting.Milling | None = None
+        self._arm: ArmInStock | None = None
         self._skipped: tuple[Issue, ...] = ()
         self._missing = compliance.missing_stiffness(cell)
         self._force_limits, self._deflection_limit = ForceLimits(cell), DeflectionLimit(cell)
@@ -259,41 +261,31 @@ class Loads:
             return
         try:
             self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s, has_peaks=has_peaks)
+            self._arm = ArmInStock.of(toolpath, cell, self._milling)
             give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
 
-    @property
-    def possible(self) -> bool:
-        """True where there are forces to take."""
-        return self._milling is not None
+    def along(self, samples: Iterable[Samples]) -> Generator[Block, None, None]:
+        """Yield the next samples once they are done: while a block is judged the next is cut, and so on.
 
-    def take(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, ends: bool) -> Block:
-        """Cut the next samples; return those that are done, which follow the ones returned before.
-
-        The joints may be those of fewer samples, as long as they follow each other. The motion ``ends`` with
-        these samples.
+        The joints may be those of fewer samples, as long as they follow each other. Whoever takes the blocks
+        closes this generator, whatever happens between: it has threads (`threads.ahead`).
         """
-        if self._milling is None:
-            raise ValueError("there are no forces")
-        return self._done((motion, q_rad, qd_rad_s, ends), self._milling.take(motion, ends))
-
-    def along(self, samples: Iterator[Samples]) -> Generator[Block, None, None]:
-        """Yield the blocks of `take`: while one is judged the next is cut, and the one behind it prepared.
-
-        Whoever takes them closes this generator, whatever happens between: it has threads (`threads.ahead`).
-        """
-        milling = self._milling
+        milling, arm = self._milling, self._arm
         if milling is None:
             return
 
-        def approached() -> Generator[tuple[Samples, cutting.Approach], None, None]:
+        def approached() -> Generator[tuple[Samples, Inside | None, cutting.Approach], None, None]:
             for block in samples:
-                yield block, milling.approached(block[0], block[3])
+                for part, inside in arm.divided(block) if arm is not None else [(block, None)]:
+                    yield part, inside, milling.approached(part[0], part[3])
 
         def touched() -> Generator[tuple[Samples, cutting.Contact], None, None]:
             with ahead(approached()) as blocks:
-                for block, approach in blocks:
+                for block, inside, approach in blocks:
+                    if arm is not None and inside is not None:
+                        arm.judge(inside)
                     yield block, milling.touched(approach)
 
         with ahead(touched()) as blocks:
@@ -330,6 +322,8 @@ class Loads:
         if self._milling is None:
             return Outcome(None, None, self._skipped)
         found = self._milling.issues()
+        if self._arm is not None:
+            found = (*found, *self._arm.issues())
         limits, bent = self._force_limits, self._deflection_limit
         if limits.absurd is not None:
             return Outcome(None, None, (*found, limits.absurd))
@@ -377,7 +371,7 @@ class PilotSamples:
 
 
 def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[Samples]:
-    """Yield the blocks of a motion with the joints and speeds that are known so far, see `Loads.take`."""
+    """Yield the blocks of a motion with the joints and speeds that are known so far, see `Loads.along`."""
     follower = follower_of(course, cell)
     for motion, ends in course.blocks():
         yield motion, *follower.take(motion, ends), ends

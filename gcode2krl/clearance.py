@@ -49,6 +49,7 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
     watch = watch_of(cell)
     if watch is None:
         return ()
+    first = int(np.flatnonzero(targets.move >= 0)[0])
     for added in _added(targets):
         before, after = q_rad[added.row - 1], q_rad[added.row]
         tool = int(targets.tool[added.row])
@@ -59,7 +60,8 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
             way = before + np.linspace(0.0, 1.0, steps + 1)[:, None] * (after - before)
         else:
             way = np.concatenate([before[None], robot.line_angles(targets, added.row, before, cell)])
-        watch.way(way, tool, added.line, added.words, is_ptp=bool(targets.ptp[added.row]))
+        is_ptp, is_uncut = bool(targets.ptp[added.row]), added.row <= first and targets.restart is None
+        watch.way(way, tool, added.line, added.words, is_ptp=is_ptp, against_raw=is_uncut)
     return watch.issues()
 
 

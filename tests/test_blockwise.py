@@ -1,6 +1,7 @@
 """Samples that pass the stages in blocks are the tables of `predict`; memory does not grow by them."""
 
 import tracemalloc
+from contextlib import closing
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -49,10 +50,15 @@ def test_motion_joints_forces_and_deflection_in_blocks_are_those_as_a_whole(part
     planned = plan_course(targets, cell, cell.controller.cycle_s)
     follower = follower_of(planned.course, cell)
     loads = Loads(toolpath, cell, planned.outlook, planned.course.dt_s)
-    angles, blocks = [], []
-    for motion, ends in planned.course.blocks(rows):
-        angles.append(follower.take(motion, ends))
-        blocks.append(loads.take(motion, *angles[-1], ends))
+    angles = []
+
+    def samples():
+        for motion, ends in planned.course.blocks(rows):
+            angles.append(follower.take(motion, ends))
+            yield motion, *angles[-1], ends
+
+    with closing(loads.along(samples())) as along:
+        blocks = list(along)
     same(joined(*(block.motion for block in blocks)), whole.motion)
     same(joined(*(block.forces for block in blocks)), whole.forces)
     bent_mm = np.concatenate([block.deflection.deflection_base_mm for block in blocks])

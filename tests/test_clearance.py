@@ -207,7 +207,7 @@ def test_without_a_motion_nothing_is_claimed(part):
 
 
 def test_a_cell_that_describes_nothing_keeps_the_sentence(part):
-    assert collision_scope(over_demonstration(), [1]) is None
+    assert collision_scope(over_demonstration(), [1], is_cut=True) is None
     text = write_krl(predict(part, over_demonstration(), forces=False), None).texts["PART.src"].decode()
     assert "NOT CHECKED: collision of arm, spindle and cables with fixtures" in text
 
@@ -215,7 +215,7 @@ def test_a_cell_that_describes_nothing_keeps_the_sentence(part):
 def test_a_robot_without_capsules_is_said_to_be_unchecked(part):
     cell = cell_with(box("vice", [-200.0, -200, -60], [-150, -150, 20]))
     bare = cell.model_copy(update={"robot": cell.robot.model_copy(update={"body": type(cell.robot.body)()})})
-    scope = collision_scope(bare, [1])
+    scope = collision_scope(bare, [1], is_cut=True)
     assert any(word.startswith("arm (") for word in scope.unchecked)
     assert not any(word.startswith("arm") for word in scope.movers)
 

@@ -25,8 +25,11 @@ def checks_collisions(cell: Cell) -> bool:
     return bool(cell.obstacle) or cell.table is not None or cell.spindle.body is not None
 
 
-def collision_scope(cell: Cell, tools: Collection[int]) -> CollisionScope | None:
-    """Return what is checked in a program with these tools; None where the cell describes nothing."""
+def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> CollisionScope | None:
+    """Return what is checked in a program with these tools; None where the cell describes nothing.
+
+    ``is_cut`` where the removal of the stock has been simulated.
+    """
     if not checks_collisions(cell):
         return None
     movers, unchecked = [], []
@@ -56,7 +59,19 @@ def collision_scope(cell: Cell, tools: Collection[int]) -> CollisionScope | None
         unchecked.append("table ([table] is not stated)")
     if arm.capsules:
         obstacles.append("arm itself (by wrist, spindle, tool)")
-    unchecked += ["cables", "part and stock by arm and spindle", "the way to the first HOME"]
+    carried = [word for word, is_stated in (("arm", arm.capsules), ("spindle", spindle)) if is_stated]
+    if carried and is_cut:
+        obstacles.append(f"stock as it stands (by {' and '.join(carried)})")
+        is_stated = cell.stock is not None and (cell.stock.box_mm is not None or cell.stock.mesh is not None)
+        way_in = "" if is_stated else "from HOME, "
+        unchecked.append(f"stock on the ways {way_in}from the last cut on, and on PTP between")
+    else:
+        unchecked.append("stock by arm and spindle")
+    if cell.cables is not None:
+        movers.append(f"cables ({len(cell.cables.capsules)} capsules, warnings only)")
+    else:
+        unchecked.append("cables ([cables] is not stated)")
+    unchecked.append("the way to the first HOME")
     return CollisionScope(tuple(movers), tuple(obstacles), tuple(unchecked))
 
 

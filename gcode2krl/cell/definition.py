@@ -25,6 +25,7 @@ from gcode2krl.cell.keys import meant_key
 from gcode2krl.cell.looks import cell_html, cell_words
 from gcode2krl.cell.sections import (
     Axis,
+    Cables,
     Clearance,
     Collision,
     Compliance,
@@ -105,6 +106,7 @@ class Cell(Section):
     obstacle: Annotated[tuple[Obstacle, ...], Field(max_length=100)] = ()
     """What stands in the cell."""
     collision: Collision = Collision()
+    cables: Cables | None = None
     limits: ResultLimits = ResultLimits()
     load: Load = Load()
     compliance: Compliance = Compliance()

@@ -50,12 +50,12 @@ def summary_lines(
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
     yield from load_lines(forecast.loads, cell)
-    yield from _collisions(cell, np.unique(targets.tool).tolist())
+    yield from _collisions(cell, np.unique(targets.tool).tolist(), is_cut=forecast.has_forces)
 
 
-def _collisions(cell: Cell, tools: list[int]) -> Iterator[str]:
+def _collisions(cell: Cell, tools: list[int], *, is_cut: bool) -> Iterator[str]:
     """Yield what was checked for collisions and what was not."""
-    scope = collision_scope(cell, tools)
+    scope = collision_scope(cell, tools, is_cut=is_cut)
     if scope is None:
         yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
         return

@@ -16,7 +16,8 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
 from gcode2krl.collision.scene import Bodies, bodies_of
 
-Kind = Literal["arm", "spindle", "holder", "cutter"]
+Kind = Literal["arm", "spindle", "cables", "holder", "cutter"]
+CABLES = "the cables"
 FOOT, UPPER_ARM, ELBOW, FOREARM, WRIST, FLANGE = 0, 2, 3, 4, 5, 6
 """Numbers of links; 1 turns with A1."""
 _LINKS = {"foot": 0, "A1": 1, "A2": 2, "A3": 3, "A4": 4, "A5": 5, "A6": 6}
@@ -38,17 +39,25 @@ class Part(NamedTuple):
     radius_mm: float
     is_face: bool = False
     """Across the flat end of a cylinder."""
+    second_link: int | None = None
+    """The link of the second end, where that is another one."""
 
 
 def parts_of(cell: Cell, tool: int) -> list[Part]:
-    """Return the capsules of the arm and of what is on its flange with a tool in the spindle."""
-    return [*_arm(cell), *_spindle(cell), *_tool(cell, tool)]
+    """Return the capsules of the arm, its cables, and what is on its flange with a tool in the spindle."""
+    return [*arm_and_spindle(cell), *_cables(cell), *_tool(cell, tool)]
+
+
+def arm_and_spindle(cell: Cell) -> list[Part]:
+    """Return the capsules of the arm and of what is on its flange whatever the tool."""
+    return [*_arm(cell), *_spindle(cell)]
 
 
 def capsules_of(parts: list[Part], geometry: Floats) -> Bodies:
     """Return capsules as the core takes them."""
     ends = np.array([part.ends_mm for part in parts]).reshape(-1, 6)
-    return bodies_of([part.link for part in parts], ends, [part.radius_mm for part in parts], geometry)
+    links = [(each.link, each.link if each.second_link is None else each.second_link) for each in parts]
+    return bodies_of(links, ends, [part.radius_mm for part in parts], geometry)
 
 
 def _arm(cell: Cell) -> Iterator[Part]:
@@ -62,6 +71,13 @@ def _spindle(cell: Cell) -> Iterator[Part]:
         for capsule in cell.spindle.body.capsules:
             ends = np.array([capsule.from_mm, capsule.to_mm])
             yield Part("spindle", "spindle", FLANGE, ends, capsule.radius_mm)
+
+
+def _cables(cell: Cell) -> Iterator[Part]:
+    if cell.cables is not None:
+        for capsule in cell.cables.capsules:
+            ends = np.array([capsule.from_mm, capsule.to_mm])
+            yield Part(CABLES, "cables", ELBOW, ends, capsule.radius_mm, second_link=FLANGE)
 
 
 def _tool(cell: Cell, number: int) -> Iterator[Part]:

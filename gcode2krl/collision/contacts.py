@@ -11,24 +11,40 @@ from gcode2krl.errors import MOST_PLACES, Issue
 
 
 @dataclass
-class _Place:
+class Touch:
     """The least gap of two things in a line of the G-code, or along an added motion."""
 
     gap_mm: float
     line: int
     base_mm: Floats
-    way: str
-    is_ptp: bool
+    way: str = ""
+    is_ptp: bool = False
 
 
 @dataclass
 class _Pair:
     """What is kept of two things: it does not grow with the lines, but for the first of the collisions."""
 
-    nearest: _Place | None = None
+    nearest: Touch | None = None
     first_line: int = 0
     last_line: int = 0
-    hits: dict[tuple[int, str], _Place] = field(default_factory=dict)
+    hits: dict[tuple[int, str], Touch] = field(default_factory=dict)
+
+    def take(self, touch: Touch) -> None:
+        """Note a place; of the hits the deepest of each line and way, the first `MOST_PLACES` of them."""
+        if self.nearest is None or touch.gap_mm < self.nearest.gap_mm:
+            self.nearest = touch
+        if touch.gap_mm > 0:
+            return
+        key = (touch.line, touch.way)
+        is_worse = key in self.hits and touch.gap_mm < self.hits[key].gap_mm
+        if is_worse or (key not in self.hits and len(self.hits) < MOST_PLACES):
+            self.hits[key] = touch
+
+    def spans(self, first_line: int, last_line: int) -> None:
+        """Note the lines between which the two come near."""
+        self.first_line = min(self.first_line or first_line, first_line)
+        self.last_line = max(self.last_line, last_line)
 
 
 @dataclass
@@ -36,6 +52,10 @@ class Contacts:
     """Gaps below the clearance, by who and what."""
 
     clearance_mm: float
+    only_hits: str = ""
+    """What the others are meant to come near."""
+    only_near: str = ""
+    """Who is an estimate, so that a hit is a warning."""
     pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
 
     def take(
@@ -52,49 +72,48 @@ class Contacts:
         base_mm = found.place_mm @ to_base[:3, :3].T + to_base[:3, 3]
         lines, gap_mm = line[found.row], found.note_gap_mm
 
-        def place(note: int) -> _Place:
-            return _Place(float(gap_mm[note]), int(lines[note]), base_mm[note], way, is_ptp)
-
         for number in np.unique(found.note_pair).tolist():
             notes = np.flatnonzero(found.note_pair == number)
             pair = self.pairs.setdefault(names[number], _Pair())
-            nearest = int(notes[np.argmin(gap_mm[notes])])
-            if pair.nearest is None or gap_mm[nearest] < pair.nearest.gap_mm:
-                pair.nearest = place(nearest)
-            low, high = int(lines[notes].min()), int(lines[notes].max())
-            pair.first_line = min(pair.first_line or low, low)
-            pair.last_line = max(pair.last_line, high)
             deepest = notes[np.lexsort((gap_mm[notes], lines[notes]))]
             _, first = np.unique(lines[deepest], return_index=True)
-            for note in deepest[first][gap_mm[deepest[first]] <= 0][:MOST_PLACES].tolist():
-                key = (int(lines[note]), way)
-                is_worse = key in pair.hits and gap_mm[note] < pair.hits[key].gap_mm
-                if is_worse or (key not in pair.hits and len(pair.hits) < MOST_PLACES):
-                    pair.hits[key] = place(note)
+            of_lines = deepest[first]
+            hits = of_lines[gap_mm[of_lines] <= 0][:MOST_PLACES]
+            nearest = notes[np.argmin(gap_mm[notes])]
+            for note in [int(nearest), *hits.tolist()]:
+                pair.take(Touch(float(gap_mm[note]), int(lines[note]), base_mm[note], way, is_ptp))
+            pair.spans(int(lines[notes].min()), int(lines[notes].max()))
+
+    def note(self, who: str, what: str, touch: Touch) -> None:
+        """Add a single place."""
+        pair = self.pairs.setdefault((who, what), _Pair())
+        pair.take(touch)
+        pair.spans(touch.line, touch.line)
 
     def issues(self) -> Iterator[Issue]:
         """Yield a collision for each line and pair, and one word for each pair that comes near only."""
         count = 0
         for (who, what), pair in self.pairs.items():
+            is_certain = who != self.only_near
             for _, place in sorted(pair.hits.items(), key=lambda hit: hit[0]):
-                count += 1
-                if count <= MOST_PLACES:
+                count += is_certain
+                if is_certain and count <= MOST_PLACES:
                     yield _collision(who, what, place)
-            if not pair.hits and pair.nearest is not None:
+            is_hit = bool(pair.hits) and is_certain
+            if not is_hit and pair.nearest is not None and what != self.only_hits:
                 yield self._near(who, what, pair, pair.nearest)
 
-    def _near(self, who: str, what: str, pair: _Pair, place: _Place) -> Issue:
+    def _near(self, who: str, what: str, pair: _Pair, place: Touch) -> Issue:
         span = f"; near from line {pair.first_line} to {pair.last_line}"
         others = span if pair.first_line != pair.last_line else ""
-        sentence = (
-            f"{who} comes within {place.gap_mm:.1f} mm of {what}{place.way}{_at(place)}: less than "
-            f"{self.clearance_mm:g} mm{others}"
-        )
+        nearness = f"comes within {place.gap_mm:.1f} mm of" if place.gap_mm > 0.05 else "may touch"
+        less = f": less than {self.clearance_mm:g} mm{others}"
+        sentence = f"{who} {nearness} {what}{place.way}{_at(place)}{less}"
         remedy = "move part or fixture, or lower [collision] clearance_mm if both are known well enough"
         return Issue("warning", "near", place.line, sentence, remedy)
 
 
-def _collision(who: str, what: str, place: _Place) -> Issue:
+def _collision(who: str, what: str, place: Touch) -> Issue:
     deep = f"by {-place.gap_mm:.1f} mm or more" if place.gap_mm < -0.05 else "just so"
     remedy = (
         "set [clearance] z_mm higher or HOME elsewhere, so that the straight way of the joints is free"
@@ -106,7 +125,7 @@ def _collision(who: str, what: str, place: _Place) -> Issue:
     )
 
 
-def _at(place: _Place) -> str:
+def _at(place: Touch) -> str:
     if not np.isfinite(place.base_mm).all():
         return ", from its inside"
     x, y, z = place.base_mm

@@ -30,9 +30,9 @@ class Bodies(NamedTuple):
     """Capsules of the arm and on its flange (b)."""
 
     link: Ints32
-    """(b,) number of the frame."""
+    """(b, 2) number of the frame of each end; cables are on two links."""
     ends_mm: Floats
-    """(b, 6) both ends in that frame."""
+    """(b, 6) both ends in their frames."""
     radius_mm: Floats
     lever_mm: Floats
     """(b, 6) how far an end can be from the axes A1 to A6 at most, 0 where the axis does not move it."""
@@ -57,17 +57,31 @@ BODIES = StructOf.record(Bodies)
 OBSTACLES = StructOf.record(Obstacles)
 
 
-def bodies_of(link: Sequence[int], ends_mm: Floats, radius_mm: Sequence[float], geometry: Floats) -> Bodies:
+def bodies_of(
+    link: Sequence[int] | Sequence[tuple[int, int]],
+    ends_mm: Floats,
+    radius_mm: Sequence[float],
+    geometry: Floats,
+) -> Bodies:
     """Return capsules with their levers.
 
-    ``link`` (b,) numbers of frames, ``ends_mm`` (b, 6), ``geometry`` as in `robot.kinematics`. A lever is the
-    sum of the lengths between an axis and the farther end, which no pose exceeds.
+    ``link`` (b,) numbers of frames, or (b, 2) where the ends are on two links, ``ends_mm`` (b, 6),
+    ``geometry`` as in `robot.kinematics`. A lever is the sum of the lengths between an axis and the farther
+    end, which no pose exceeds.
     """
-    links, ends = np.array(link, dtype=np.int32), np.array(ends_mm, dtype=float).reshape(-1, 6)
+    named = np.array(link, dtype=np.int32).reshape(len(link), -1)
+    links = np.ascontiguousarray(np.broadcast_to(named, (len(named), 2)))
+    ends = np.array(ends_mm, dtype=float).reshape(-1, 6)
     if len(links) > MOST_BODIES:
         raise ValueError(f"{len(links)} bodies, at most {MOST_BODIES} at once")
-    lever = np.array([_levers(k, e.reshape(2, 3), geometry) for k, e in zip(links, ends, strict=True)])
+    lever = np.array([_levers_of_both(*pair, geometry) for pair in zip(links.tolist(), ends, strict=True)])
     return Bodies(links, ends, np.array(radius_mm, dtype=float), lever.reshape(-1, 6))
+
+
+def _levers_of_both(links: Sequence[int], ends: Floats, geometry: Floats) -> Floats:
+    pair = zip(links, ends.reshape(2, 1, 3), strict=True)
+    lever: Floats = np.max([_levers(link, end, geometry) for link, end in pair], axis=0)
+    return lever
 
 
 def _levers(link: int, ends: Floats, geometry: Floats) -> Floats:

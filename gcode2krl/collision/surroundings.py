@@ -7,14 +7,15 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.cell.sections import Obstacle
+from gcode2krl.cell.sections import Plane
 from gcode2krl.collision import scene
 from gcode2krl.collision.bodies import ELBOW, FOOT, FOREARM, UPPER_ARM, WRIST, Part
 
 ReadMesh = Callable[[str], Floats]
 """File of a mesh → its triangles (t, 3, 3) in mm."""
-TABLE = "the table"
+TABLE, STOCK = "the table", "the stock"
 Pair = tuple[int, int, int]
+Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 class Surroundings(NamedTuple):
@@ -25,7 +26,7 @@ class Surroundings(NamedTuple):
 
 
 def surroundings_of(cell: Cell, read_mesh: ReadMesh) -> Surroundings:
-    """Return the table and all obstacles in the robot root; raises what reading a mesh raises."""
+    """Return table, obstacles and raw part in the robot root; raises what reading a mesh raises."""
     base = cell.base_matrix()
     names, shapes = [], []
     if cell.table is not None:
@@ -33,37 +34,63 @@ def surroundings_of(cell: Cell, read_mesh: ReadMesh) -> Surroundings:
         shapes.append(scene.plane((base @ [0.0, 0.0, cell.table.z_mm, 1.0])[:3], base[:3, 2]))
     for obstacle in cell.obstacle:
         names.append(obstacle.name)
-        shapes.append(_shape(obstacle, base if obstacle.frame == "base" else np.eye(4), read_mesh))
+        frame = base if obstacle.frame == "base" else np.eye(4)
+        shapes.append(_shape(obstacle.box_mm, obstacle.plane, obstacle.mesh, frame, read_mesh))
+    stock = cell.stock
+    if stock is not None and (stock.box_mm is not None or stock.mesh is not None):
+        names.append(STOCK)
+        shapes.append(_shape(stock.box_mm, None, stock.mesh, base, read_mesh))
     return Surroundings(tuple(names), scene.joined(shapes))
 
 
-def _shape(obstacle: Obstacle, frame: Floats, read_mesh: ReadMesh) -> scene.Obstacles:
-    if obstacle.box_mm is not None:
-        low, high = obstacle.box_mm
+def _shape(
+    box_mm: Corners | None, plane: Plane | None, mesh: str | None, frame: Floats, read_mesh: ReadMesh
+) -> scene.Obstacles:
+    if box_mm is not None:
+        low, high = box_mm
         return scene.box(np.array(low), np.array(high), frame)
-    if obstacle.plane is not None:
-        point = (frame @ [*obstacle.plane.point_mm, 1.0])[:3]
-        return scene.plane(point, frame[:3, :3] @ np.array(obstacle.plane.normal))
-    return scene.mesh(read_mesh(str(obstacle.mesh)) @ frame[:3, :3].T + frame[:3, 3])
+    if plane is not None:
+        point = (frame @ [*plane.point_mm, 1.0])[:3]
+        return scene.plane(point, frame[:3, :3] @ np.array(plane.normal))
+    return scene.mesh(read_mesh(str(mesh)) @ frame[:3, :3].T + frame[:3, 3])
 
 
 def pairs_of(parts: list[Part], names: tuple[str, ...]) -> list[Pair]:
     """Return who may hit what: (part, obstacle, 0), or (part, -1, other part) of the arm itself.
 
     The foot hits nothing, as it stands still. The table has no edge here, and parts of the arm may be beside
-    it: only wrist, spindle and holder are held against it; how deep a cutter goes is judged by its tip
-    (`below-table`). Of the arm itself the wrist may hit foot, A1 and A2, the forearm foot and A1; spindle,
-    holder and cutter may hit A3 too. The others are neighbours, kept apart by the limits of the joints.
+    it: only wrist, spindle, holder and cables are held against it; how deep a cutter goes is judged by its
+    tip (`below-table`). Of the arm itself the wrist may hit foot, A1 and A2, the forearm foot and A1;
+    spindle, holder and cutter may hit A3 too. The others are neighbours, kept apart by the limits of the
+    joints. Cables lie on the arm, and are held against what stands in the cell alone.
     """
     pairs = [
         (number, obstacle, 0)
         for number, part in enumerate(parts)
         for obstacle, name in enumerate(names)
-        if part.link != FOOT and (name != TABLE or (part.link >= WRIST and part.kind != "cutter"))
+        if part.link != FOOT
+        and (name != TABLE or part.kind == "cables" or (part.link >= WRIST and part.kind != "cutter"))
     ]
     for number, part in enumerate(parts):
-        if part.link < FOREARM or part.is_face:
+        if part.link < FOREARM or part.is_face or part.kind == "cables":
             continue
         last = UPPER_ARM - 1 if part.link == FOREARM else UPPER_ARM if part.kind == "arm" else ELBOW
-        pairs += [(number, -1, other) for other, each in enumerate(parts) if each.link <= last]
+        pairs += [
+            (number, -1, other)
+            for other, each in enumerate(parts)
+            if each.link <= last and each.kind == "arm"
+        ]
     return pairs
+
+
+def is_held(
+    pair: Pair, parts: list[Part], names: tuple[str, ...], *, against_raw: bool, is_ptp: bool
+) -> bool:
+    """Tell whether a pair counts on a way: those with the stock only where it is still the raw part.
+
+    Elsewhere it is judged as it stands, with the removal. So is the cutter on the lines of an approach,
+    which may go into it.
+    """
+    if pair[1] < 0 or names[pair[1]] != STOCK:
+        return True
+    return against_raw and (is_ptp or parts[pair[0]].kind != "cutter")

@@ -10,10 +10,18 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.collision.along import Clearances, Way
-from gcode2krl.collision.bodies import Part, capsules_of, parts_of
+from gcode2krl.collision.bodies import CABLES, Part, capsules_of, parts_of
 from gcode2krl.collision.contacts import Contacts
 from gcode2krl.collision.scene import Bodies
-from gcode2krl.collision.surroundings import Pair, ReadMesh, Surroundings, pairs_of, surroundings_of
+from gcode2krl.collision.surroundings import (
+    STOCK,
+    Pair,
+    ReadMesh,
+    Surroundings,
+    is_held,
+    pairs_of,
+    surroundings_of,
+)
 from gcode2krl.errors import Issue
 
 HORIZON_MM = 50.0
@@ -31,6 +39,12 @@ class _Setting(NamedTuple):
     places: Ints32
     """(p + 1, 2) of each pair the places of its names in `Watch.links` and `Watch.obstacles`, then -1, -1."""
 
+    def only(self, held: list[bool]) -> "_Setting":
+        """Return the setting with those pairs alone."""
+        rows = [row for row, is_held in enumerate(held) if is_held]
+        pairs, names = [self.pairs[row] for row in rows], [self.names[row] for row in rows]
+        return self._replace(pairs=pairs, names=names, places=self.places[[*rows, -1]])
+
 
 class Watch:
     """Whether arm, spindle and tool hit anything; see `collision.along` for what "along" means."""
@@ -40,7 +54,8 @@ class Watch:
         self._cell, self._read_mesh = cell, read_mesh
         self._geometry = cell.robot.geometry.array()
         self._settings: dict[int, _Setting] = {}
-        self._contacts = Contacts(cell.collision.clearance_mm)
+        self._of_ways: dict[tuple[int, bool, bool], _Setting] = {}
+        self._contacts = Contacts(cell.collision.clearance_mm, only_hits=STOCK, only_near=CABLES)
         self._horizon_mm = HORIZON_MM if tells else 0.0
         self._way: Way | None = None
         self._tool = -1
@@ -69,7 +84,7 @@ class Watch:
             if start == end:
                 continue
             rows, number = slice(start, end), int(tool[start])
-            setting = self._setting(number)
+            setting = self._held(number, against_raw=False, is_ptp=False)
             q, lines, skip = q_rad[rows], line[rows], 0
             if self._way is None or number != self._tool:
                 self._way, self._tool = self._new_way(setting, is_sampled=True), number
@@ -81,9 +96,14 @@ class Watch:
             self._last = q[-1:].copy()
         return gap, near
 
-    def way(self, q_rad: Floats, tool: int, line: int, words: str, *, is_ptp: bool) -> Clearances:
-        """Go along a way of its own, angles (n, 6) in rad; ``words`` say which, `` on the way to HOME``."""
-        setting = self._setting(tool)
+    def way(
+        self, q_rad: Floats, tool: int, line: int, words: str, *, is_ptp: bool, against_raw: bool = False
+    ) -> Clearances:
+        """Go along a way of its own, angles (n, 6) in rad; ``words`` say which, `` on the way to HOME``.
+
+        It is held ``against_raw`` where nothing has been cut yet: against the raw part, where that is stated.
+        """
+        setting = self._held(tool, against_raw=against_raw, is_ptp=is_ptp)
         found = self._new_way(setting, is_sampled=not is_ptp).take(q_rad)
         lines = np.full(len(q_rad), line, dtype=np.int32)
         self._contacts.take(found, setting.names, lines, self._to_base, words, is_ptp=is_ptp)
@@ -103,6 +123,17 @@ class Watch:
             horizon_mm=self._horizon_mm,
             is_sampled=is_sampled,
         )
+
+    def _held(self, tool: int, *, against_raw: bool, is_ptp: bool) -> _Setting:
+        key = (tool, against_raw, is_ptp)
+        if key not in self._of_ways:
+            whole, names = self._setting(tool), self._around.names
+            held = [
+                is_held(pair, whole.parts, names, against_raw=against_raw, is_ptp=is_ptp)
+                for pair in whole.pairs
+            ]
+            self._of_ways[key] = whole.only(held)
+        return self._of_ways[key]
 
     def _setting(self, tool: int) -> _Setting:
         if tool not in self._settings:

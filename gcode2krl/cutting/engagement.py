@@ -14,6 +14,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell.sections import Tool
+from gcode2krl.compiled.core import FLOATS, INTS, OUT_FLOATS, core_function
 from gcode2krl.compiled.threads import cores, in_threads
 from gcode2krl.cutting.cutter import Shape, bottom_of, shape_of, slices_of
 from gcode2krl.cutting.edge import BAND_COLUMNS, Cutters, new_work
@@ -28,7 +29,7 @@ from gcode2krl.cutting.reading import (
     number_walls,
 )
 from gcode2krl.cutting.records import taken
-from gcode2krl.cutting.sweep import BALL, FLAT, OTHER, Path, Samples
+from gcode2krl.cutting.sweep import BALL, FLAT, GRID, LANES, OTHER, Path, Samples
 from gcode2krl.cutting.way import Points, Way
 from gcode2krl.tables import chord_directions
 
@@ -52,6 +53,8 @@ _BEFORE = 2
 """Corners before the last sweep that was removed on which the next one depends."""
 _FEW_SAMPLES = 2000
 """Samples below which a second thread does not pay."""
+
+_bodies = core_function("cutting_bodies", GRID, FLOATS, FLOATS, INTS, OUT_FLOATS, OUT_FLOATS)
 
 
 class Engaged(NamedTuple):
@@ -202,6 +205,18 @@ class Engagement:
             number_walls(strip.grid, number)
             strip.progress[:2] = number[strip.progress[:2]]
 
+    def bodies_in(self, ends_mm: Floats, radius_mm: Floats) -> tuple[Floats, Floats]:
+        """Return how deep capsules (n) are in what stands now, 0 where they are not, and where (n, 3).
+
+        ``ends_mm`` (n, 6), in the frame of the field. The field lags a little behind the cutter.
+        """
+        ends, radius = np.ascontiguousarray(ends_mm), np.ascontiguousarray(radius_mm)
+        found = [strip.bodies_in(ends, radius, self._axis) for strip in self._strips]
+        deepest = np.argmax([depth for depth, _ in found], axis=0)
+        rows = np.arange(len(ends))
+        depth, place = (np.stack(columns) for columns in zip(*found, strict=True))
+        return depth[deepest, rows], place[deepest, rows]
+
     def write_back(self, field: HeightField) -> None:
         """Write what is left into the field that was cut."""
         for strip in self._strips:
@@ -223,6 +238,14 @@ class _Strip:
     def shown(self) -> int:
         """The last point of the path whose sweep has been removed."""
         return int(self.progress[1])
+
+    def bodies_in(self, ends_mm: Floats, radius_mm: Floats, axis: int) -> tuple[Floats, Floats]:
+        rows, columns = self.grid.height.shape
+        across = (self._skip + 1, self._skip + 1 + self._own[1] - self._own[0])
+        own = (1, rows - 1, *across) if axis == 0 else (*across, 1, columns - LANES)
+        depth, place = np.empty(len(ends_mm)), np.empty((len(ends_mm), 3))
+        _bodies(self.grid, ends_mm, radius_mm, np.array(own, dtype=np.int64), depth, place)
+        return depth, place
 
     def write_back(self, field: HeightField, axis: int) -> None:
         field.take_back(self.grid, axis, *self._own, self._skip)

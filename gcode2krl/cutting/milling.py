@@ -113,6 +113,17 @@ def remove(
     return Removal(replace(gathered.table(), issues=milling.issues()), milling.part(), outlook.to_field)
 
 
+class RawBox(NamedTuple):
+    """The box around a raw part."""
+
+    low_mm: Floats
+    """(3,) its low corner in the frame of the field."""
+    high_mm: Floats
+    to_field: Floats
+    """(3, 3) rotation from ``$BASE`` to the frame of the field."""
+    guessed: bool
+
+
 class _Rows(NamedTuple):
     """What is known of samples (m) before they are cut."""
 
@@ -234,6 +245,23 @@ class Milling:
     def issues(self) -> tuple[Issue, ...]:
         """Return what was found, by line."""
         return self._checks.issues() if self._checks is not None else ()
+
+    def raw_box(self) -> RawBox:
+        """Return the box around the material before the first cut."""
+        field = self._before
+        size = np.array(field.height_mm.shape[::-1]) * field.cell_mm
+        low = np.append(field.origin_mm, field.bottom_mm)
+        high = np.append(field.origin_mm + size, float(field.height_mm.max()))
+        return RawBox(low, high, self._to_field, field.guessed)
+
+    def bodies_in(self, ends_mm: Floats, radius_mm: Floats) -> tuple[Floats, Floats]:
+        """Return how deep capsules (n) are in what stands now, 0 where they are not, and where (n, 3).
+
+        ``ends_mm`` (n, 6) and the places in mm in ``$BASE``, ``radius_mm`` (n,).
+        """
+        ends = turned(ends_mm.reshape(-1, 3), self._to_field).reshape(-1, 6)
+        depth, place = self._engagement.bodies_in(ends, radius_mm)
+        return depth, turned(place, self._to_field.T)
 
     def part(self) -> HeightField:
         """Return the material that is left."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
-from gcode2krl.cell.checked_parts import collision_scope
+from gcode2krl.cell.checked_parts import CollisionScope, collision_scope
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
@@ -170,7 +170,7 @@ def write_krl(
             allowed=header_words([*of_name, *known.issues], allow),
             forces=not isinstance(known, Targets) and known.has_forces,
             online=online or "",
-            collisions=None if isinstance(known, Targets) else collision_scope(cell, _tools(targets)),
+            collisions=_scope(known, cell),
         )
 
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
@@ -198,8 +198,12 @@ def write_krl(
     )
 
 
-def _tools(targets: Targets) -> list[int]:
-    return [int(number) for number in np.unique(targets.tool)]
+def _scope(source: Targets | Prediction | Forecast, cell: Cell) -> CollisionScope | None:
+    """Return what has been checked for collisions."""
+    if isinstance(source, Targets):
+        return None
+    tools = [int(number) for number in np.unique(source.targets.tool)]
+    return collision_scope(cell, tools, is_cut=source.has_forces)
 
 
 def _pilot_plan(

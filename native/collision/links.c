@@ -50,11 +50,12 @@ static void link_frames(const double *q, const Arm *arm, LinkFrame *links) {
 }
 
 static void place(const LinkFrame *links, const Bodies *bodies, int64_t body, double *ends) {
-    const LinkFrame *frame = &links[AT(bodies->link, body)];
-    for (int end = 0; end < 2; end++)
+    for (int end = 0; end < 2; end++) {
+        const LinkFrame *frame = &links[CELL(bodies->link, body, end)];
         for (int row = 0; row < 3; row++)
             ends[3 * end + row] =
                 frame->origin[row] + dot3(&frame->turn[3 * row], &CELL(bodies->ends_mm, body, 3 * end));
+    }
 }
 
 void place_bodies(const double *q_rad, const Arm *arm, const Bodies *bodies, Ends *ends) {

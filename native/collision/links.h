@@ -1,4 +1,4 @@
-/* The bodies of the arm and on its flange: capsules, each in the frame of its link. */
+/* The bodies of the arm and on its flange: capsules, each end in the frame of its link. */
 
 #ifndef COLLISION_LINKS_H
 #define COLLISION_LINKS_H

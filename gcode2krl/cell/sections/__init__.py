@@ -49,6 +49,8 @@ from gcode2krl.cell.sections.robot import (
     VirtualJointName,
 )
 from gcode2krl.cell.sections.surroundings import (
+    CableCapsule,
+    Cables,
     Capsule,
     Collision,
     LinkCapsule,
@@ -61,6 +63,8 @@ from gcode2krl.cell.sections.surroundings import (
 __all__ = [
     "VIRTUAL_JOINTS",
     "Axis",
+    "CableCapsule",
+    "Cables",
     "Capsule",
     "Clearance",
     "Collision",

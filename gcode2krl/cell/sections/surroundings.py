@@ -36,6 +36,16 @@ class SpindleBody(Provenance):
     capsules: Annotated[tuple[Capsule, ...], Field(min_length=1, max_length=20)]
 
 
+class CableCapsule(Capsule):
+    """A stretch of cables: it begins on A3 (``from_mm`` in the frame of that link) and ends at the flange."""
+
+
+class Cables(Provenance):
+    """Cables and hoses from the forearm to the spindle, as stretched and as fat as they ever hang."""
+
+    capsules: Annotated[tuple[CableCapsule, ...], Field(min_length=1, max_length=4)]
+
+
 class Plane(Section):
     """A half-space: everything behind the plane is solid."""
 

@@ -297,7 +297,10 @@ def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
 def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
     """Return what is not checked for collisions; where something is, also what."""
     tools = [int(number) for number in np.unique(whole.tool)]
-    scope = collision_scope(cell, tools) if cell is not None and whole.q_rad is not None else None
+    scope = None
+    if cell is not None and whole.q_rad is not None:
+        is_cut = any(quantity.name == "force" for quantity in whole.quantities)
+        scope = collision_scope(cell, tools, is_cut=is_cut)
     if scope is None:
         return list(NO_COLLISIONS)
     return [

@@ -1,0 +1,146 @@
+"""Arm and spindle against the stock as it stands at that moment, which needs joints and removal together.
+
+Cutter, shank and holder in the stock are judged by the removal itself. Where arm or spindle comes into the
+box around the raw part, the samples are cut in short stretches, and the capsules are held against what
+stands before each: material that a stretch takes away counts as standing until its end, and so does what
+the field lags behind the cutter.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from gcode2krl import collision, cutting
+from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.cell import Cell
+from gcode2krl.cell.checked_parts import checks_collisions
+from gcode2krl.errors import Issue, Severity
+from gcode2krl.tables import Motion, Toolpath, rows_of
+
+_STRETCH_ROWS = 64
+"""Samples within the box that are judged against one state of the material: 0.8 s."""
+_MARGIN_MM = 1.0
+_STEP_MM = 0.5
+"""Between two samples the joints go straight, in steps in which no end of a capsule moves farther."""
+_MOST_STEPS = 200
+_CONTACT_MM = 0.1
+"""A capsule that is less deep in the material touches it by the rounding of cells."""
+
+Samples = tuple[Motion, Floats, Floats, bool]
+"""As in `blockwise.Loads.along`."""
+
+
+class Inside(NamedTuple):
+    """Rows of joints (k) within the box around the raw part."""
+
+    before_rad: Floats
+    """(k, 6) the rows before them."""
+    q_rad: Floats
+    line: Ints32
+
+
+class ArmInStock:
+    """Holds arm and spindle against the stock along a motion that comes block after block."""
+
+    def __init__(self, toolpath: Toolpath, cell: Cell, milling: cutting.Milling) -> None:
+        """Take what cuts the stock; arm and spindle are those of the cell."""
+        self._toolpath, self._milling, self._box = toolpath, milling, milling.raw_box()
+        frame = cell.base_matrix()
+        self._to_base = np.linalg.inv(frame)
+        to_root = np.eye(4)
+        to_root[:3, :3] = frame[:3, :3] @ self._box.to_field.T
+        to_root[:3, 3] = frame[:3, 3]
+        self._carried = collision.Carried(cell)
+        box = (self._box.low_mm, self._box.high_mm, to_root)
+        self._dips = collision.Dips(self._carried, *box, _MARGIN_MM)
+        self._contacts = collision.Contacts(0.0)
+        self._hit_lines: set[int] = set()
+        self._last_rad = np.zeros((0, 6))
+
+    @classmethod
+    def of(cls, toolpath: Toolpath, cell: Cell, milling: cutting.Milling) -> "ArmInStock | None":
+        """Return what watches them, None where the cell is not checked for collisions or states neither."""
+        stated = bool(cell.robot.body.capsules) or cell.spindle.body is not None
+        if not (stated and checks_collisions(cell) and cell.robot.geometry.known):
+            return None
+        return cls(toolpath, cell, milling)
+
+    def divided(self, samples: Samples) -> Iterator[tuple[Samples, Inside | None]]:
+        """Yield samples in stretches that are cut one after the other, each with its rows within the box.
+
+        Where no row is within it, that is one stretch.
+        """
+        motion, q_rad, qd_rad_s, ends = samples
+        before = np.concatenate([self._last_rad if len(self._last_rad) else q_rad[:1], q_rad])
+        self._last_rad = before[-1:].copy()
+        rows = self._rows_inside(motion, q_rad)
+        if not len(rows):
+            yield samples, None
+            return
+        line = self._lines(motion, len(q_rad))
+        last = min(int(rows[-1]) + 1, len(motion))  # there may be a row of joints more than samples
+        borders = sorted({0, *rows[::_STRETCH_ROWS].tolist(), last, len(motion)})
+        for start, end in pairwise(borders):
+            behind = None if end == len(motion) else end
+            own = rows[rows >= start] if behind is None else rows[(rows >= start) & (rows < end)]
+            part = rows_of(motion, start, end), q_rad[start:behind], qd_rad_s[start:behind]
+            inside = Inside(before[own], q_rad[own], line[own]) if len(own) else None
+            yield (*part, ends and behind is None), inside
+
+    def judge(self, inside: Inside) -> None:
+        """Hold rows against what stands now; to be called before the stretch they belong to is cut.
+
+        A line that has hit something in an earlier stretch is told already.
+        """
+        told = set(self._hit_lines)
+        for before, after, line in zip(*inside, strict=True):
+            if int(line) in told:
+                continue
+            ends = self._ends_mm(np.stack([before, after]))
+            chord_mm = np.sqrt(np.square(np.diff(ends.reshape(2, -1, 3), axis=0)).sum(axis=2).max())
+            steps = int(np.clip(np.ceil(chord_mm / _STEP_MM), 1, _MOST_STEPS))
+            way = before + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (after - before)
+            self._hold(self._ends_mm(way), int(line))
+
+    def issues(self) -> tuple[Issue, ...]:
+        """Return the collisions, as warnings where the stock is guessed."""
+        severity: Severity = "warning" if self._box.guessed else "error"
+        return tuple(replace(issue, severity=severity) for issue in self._contacts.issues())
+
+    def _rows_inside(self, motion: Motion, q_rad: Floats) -> Ints:
+        """Return the rows of joints within the box, but for ways that a Motion does not show as they are."""
+        if not len(q_rad):
+            return np.zeros(0, dtype=np.int64)
+        shown = ~self._toolpath.machine[self._moves(motion, len(q_rad))]
+        return np.flatnonzero(self._dips.take(q_rad) & shown)
+
+    def _lines(self, motion: Motion, count: int) -> Ints32:
+        lines: Ints32 = self._toolpath.source_line[self._moves(motion, count)]
+        return lines
+
+    def _moves(self, motion: Motion, count: int) -> Ints:
+        """Return the rows (count,) of the Toolpath that rows of joints belong to, to a sample."""
+        sample = np.minimum(np.arange(count), len(motion) - 1)
+        return np.clip(motion.move[sample], 0, len(self._toolpath) - 1)
+
+    def _ends_mm(self, q_rad: Floats) -> Floats:
+        """Return both ends (n, b, 6) of all capsules in ``$BASE``."""
+        ends = self._carried.ends_mm(q_rad)
+        base: Floats = ends.reshape(-1, 3) @ self._to_base[:3, :3].T + self._to_base[:3, 3]
+        return base.reshape(ends.shape)
+
+    def _hold(self, ends_mm: Floats, line: int) -> None:
+        """Hold capsules (n, b, 6) against the material, and note what is in it deepest."""
+        count, bodies, _ = ends_mm.shape
+        depth, place = self._milling.bodies_in(
+            ends_mm.reshape(-1, 6), np.tile(self._carried.radius_mm, count)
+        )
+        deepest = depth.reshape(count, bodies).argmax(axis=0) * bodies + np.arange(bodies)
+        for body, row in enumerate(deepest.tolist()):
+            if depth[row] > _CONTACT_MM:
+                touch = collision.Touch(-float(depth[row]), line, place[row])
+                self._contacts.note(self._carried.names[body], collision.STOCK, touch)
+                self._hit_lines.add(line)
