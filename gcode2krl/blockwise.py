@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gcode2krl import collision, compliance, cutting, krc4, program, robot
-from gcode2krl.arm_in_stock import ArmInStock, Inside
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.clearance import moves_watched_at_targets, watch_of
+from gcode2krl.clearance import ArmInStock, Inside, moves_watched_at_targets, watch_of
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError

@@ -1,11 +1,14 @@
 """Collisions of whole programs: refused at the right line, with what hits what, on every way of the robot."""
 
+import re
+
 import numpy as np
 import pytest
 
 from gcode2krl import plan_motion, predict, robot, set_targets, solve_joints, write_krl
 from gcode2krl.cell.checked_parts import collision_scope
-from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, shown_otherwise
+from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, shown_otherwise, watch_of
+from gcode2krl.clearance.proposals import ptp_way
 from gcode2krl.collision import scene
 from gcode2krl.collision.bodies import capsules_of, parts_of
 from gcode2krl.collision.gaps import obstacle_gaps, placed
@@ -117,7 +120,45 @@ def test_the_ptp_from_home_and_to_home_are_ways_of_the_joints(part):
     ways = {issue.message.partition(" hits ")[2].partition(",")[0] for issue in found}
     assert ways == {"beam on the PTP from HOME", "beam on the PTP to HOME"}
     assert {issue.line for issue in found} == {4, 10}
-    assert all("HOME" in issue.remedy for issue in found)
+    assert all("is free" in issue.remedy for issue in found)
+
+
+def ptp_hits(part, cell):
+    return [issue for issue in contacts(part, cell) if " on the PTP " in issue.message]
+
+
+def test_a_higher_clearance_plane_is_proposed_and_is_free(part):
+    block = box("block", [180.0, -100, 80], [260, 100, 420])
+    found = ptp_hits(part, cell_with(block))
+    assert {issue.line for issue in found} == {4, 10}
+    (remedy,) = {issue.remedy for issue in found}
+    z_mm = float(re.match(r"\[clearance\] z_mm = (\d+): ", remedy)[1])
+    assert ptp_hits(part, cell_with(block, clearance={"z_mm": z_mm})) == []
+
+
+def test_a_point_on_the_way_is_proposed_and_is_free(part, monkeypatch):
+    """Where no higher plane helps: A1 first, or the other axes first."""
+    monkeypatch.setattr("gcode2krl.clearance.proposals._HIGHER_MM", ())
+    home = {"q_deg": [60.0, -90, 90, 0, 60, 0]}
+    cell = cell_with(home=home)
+    _, joints = targets_and_joints(read_gcode(part, cell), cell)
+    from_home, above = joints.q_rad[0], joints.q_rad[1]
+    middle = robot.forward((from_home + above)[None] / 2, cell)[0][0]
+    cell = cell_with(box("post", (middle - 10).tolist(), (middle + 10).tolist()), home=home)
+    found = ptp_hits(part, cell)
+    assert {issue.line for issue in found} == {4, 10}
+    for line, ends in ((4, (from_home, above)), (10, (above, from_home))):
+        (remedy,) = {issue.remedy for issue in found if issue.line == line}
+        axes = [float(angle) for angle in re.findall(r"A\d (-?[\d.]+)", remedy)]
+        via = np.deg2rad(axes)
+        assert np.isclose(via, ends[0], atol=2e-3).any()
+        for one, other in ((ends[0], via), (via, ends[1])):
+            assert not watch_of(cell).way(ptp_way(one, other), 1, 0, "", is_ptp=True).hits
+
+
+def test_where_nothing_is_free_the_remedy_says_so(part):
+    found = ptp_hits(part, cell_with(box("wall", [-700.0, -300, -60], [-500, 300, 1200])))
+    assert all(issue.remedy.startswith("put HOME elsewhere, or move what is hit: ") for issue in found)
 
 
 def test_the_approach_is_watched(part):

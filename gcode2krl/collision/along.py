@@ -91,6 +91,11 @@ class Clearances:
     place_mm: Floats
     """(k, 3) the nearest point of the obstacle, in the robot root; NaN inside a mesh."""
 
+    @property
+    def hits(self) -> bool:
+        """True where something touches."""
+        return bool((self.note_gap_mm <= 0.0).any())
+
 
 class Way:
     """A way along which pairs of bodies and obstacles are watched."""

@@ -18,7 +18,7 @@ class Touch:
     line: int
     base_mm: Floats
     way: str = ""
-    is_ptp: bool = False
+    remedy: str = "move part or fixture, turn the tool by [frames] spin, or use a longer tool"
 
 
 @dataclass
@@ -65,8 +65,6 @@ class Contacts:
         line: Ints32,
         to_base: Floats,
         way: str = "",
-        *,
-        is_ptp: bool = False,
     ) -> None:
         """Add what was noted along rows (n): ``names`` of each pair, ``line`` (n,) of the G-code."""
         base_mm = found.place_mm @ to_base[:3, :3].T + to_base[:3, 3]
@@ -81,7 +79,7 @@ class Contacts:
             hits = of_lines[gap_mm[of_lines] <= 0][:MOST_PLACES]
             nearest = notes[np.argmin(gap_mm[notes])]
             for note in [int(nearest), *hits.tolist()]:
-                pair.take(Touch(float(gap_mm[note]), int(lines[note]), base_mm[note], way, is_ptp))
+                pair.take(Touch(float(gap_mm[note]), int(lines[note]), base_mm[note], way))
             pair.spans(int(lines[notes].min()), int(lines[notes].max()))
 
     def note(self, who: str, what: str, touch: Touch) -> None:
@@ -89,6 +87,12 @@ class Contacts:
         pair = self.pairs.setdefault((who, what), _Pair())
         pair.take(touch)
         pair.spans(touch.line, touch.line)
+
+    def advise(self, line: int, way: str, remedy: str) -> None:
+        """Say what helps against the hits of a line and a way."""
+        for pair in self.pairs.values():
+            if (line, way) in pair.hits:
+                pair.hits[line, way].remedy = remedy
 
     def issues(self) -> Iterator[Issue]:
         """Yield a collision for each line and pair, and one word for each pair that comes near only."""
@@ -115,13 +119,8 @@ class Contacts:
 
 def _collision(who: str, what: str, place: Touch) -> Issue:
     deep = f"by {-place.gap_mm:.1f} mm or more" if place.gap_mm < -0.05 else "just so"
-    remedy = (
-        "set [clearance] z_mm higher or HOME elsewhere, so that the straight way of the joints is free"
-        if place.is_ptp
-        else "move part or fixture, turn the tool by [frames] spin, or use a longer tool"
-    )
     return Issue(
-        "error", "collision", place.line, f"{who} hits {what}{place.way}, {deep}{_at(place)}", remedy
+        "error", "collision", place.line, f"{who} hits {what}{place.way}, {deep}{_at(place)}", place.remedy
     )
 
 

@@ -106,8 +106,12 @@ class Watch:
         setting = self._held(tool, against_raw=against_raw, is_ptp=is_ptp)
         found = self._new_way(setting, is_sampled=not is_ptp).take(q_rad)
         lines = np.full(len(q_rad), line, dtype=np.int32)
-        self._contacts.take(found, setting.names, lines, self._to_base, words, is_ptp=is_ptp)
+        self._contacts.take(found, setting.names, lines, self._to_base, words)
         return found
+
+    def advise(self, line: int, words: str, remedy: str) -> None:
+        """Say what helps against the collisions on a way."""
+        self._contacts.advise(line, words, remedy)
 
     def issues(self) -> tuple[Issue, ...]:
         """Return what was found so far, `collision` and `near`."""

@@ -10,6 +10,7 @@ from gcode2krl.robot.joints import (
     line_angles,
     motion_angles,
     ptp_joints,
+    rise_angles,
     target_angles,
     trial_rows,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "pose_quality",
     "ptp_joints",
     "raise_shares",
+    "rise_angles",
     "target_angles",
     "trial_rows",
 ]

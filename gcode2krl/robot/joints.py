@@ -85,6 +85,20 @@ def line_angles(targets: Targets, row: int, q_rad: Floats, cell: Cell) -> Floats
     return same_branch(_path(sample_lines(targets, cell, row, row + 1)), q_rad, cell)
 
 
+def rise_angles(
+    targets: Targets, row: int, q_rad: Floats, height_mm: float, step_mm: float, cell: Cell
+) -> Floats:
+    """Return the angles (s, 6) in rad straight up along z of ``$BASE`` from a target with the joints (6,).
+
+    Branch and turns are those of these joints, rows ``step_mm`` apart; NaN out of reach.
+    """
+    height = np.linspace(0.0, height_mm, max(2, int(np.ceil(height_mm / step_mm)) + 1))
+    position = targets.position_mm[row] + height[:, None] * np.array([0.0, 0.0, 1.0])
+    rotation = np.tile(targets.rotation[row], (len(height), 1))
+    tool = np.full(len(height), targets.tool[row], dtype=np.int32)
+    return same_branch(Path(position, rotation, tool, np.zeros(len(height), dtype=np.bool_)), q_rad, cell)
+
+
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
     """Return angles (m, 6) in rad and speeds (m, 6) in rad/s of a Motion; speeds are central differences."""
     rows = trial_rows(len(motion))

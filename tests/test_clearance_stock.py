@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import predict, write_krl
-from gcode2krl.arm_in_stock import ArmInStock
+from gcode2krl.clearance import ArmInStock
 from gcode2krl.cutting import Milling, outlook_of
 from gcode2krl.errors import RefusedError
 from gcode2krl.gcode import read_gcode

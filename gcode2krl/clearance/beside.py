@@ -1,4 +1,4 @@
-"""Collisions along all that a program does, which needs joints, targets and the stage `collision` together.
+"""Collisions on the ways that a Motion does not show.
 
 A Motion is watched while its samples pass by. The ways that are not in it, or that it models otherwise, are
 watched at the targets: PTP as straight ways of the joints, and beside each PTP the lines up to the programmed
@@ -16,14 +16,11 @@ from gcode2krl import collision, robot
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import checks_collisions
+from gcode2krl.clearance.proposals import Ptp, proposal, ptp_way
 from gcode2krl.compiled.inputs import locked
 from gcode2krl.cutting.raw_part import load_mesh
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Targets
-from gcode2krl.units import RAD_PER_DEG
-
-_PTP_STEP_RAD = 2.0 * RAD_PER_DEG
-"""Rows along a PTP; what is between them is checked too, so this decides only what it costs."""
 
 
 class _Added(NamedTuple):
@@ -56,13 +53,31 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
         if np.isnan(before).any() or np.isnan(after).any():
             continue  # out of reach, which is a finding of its own
         if targets.ptp[added.row]:
-            steps = max(1, int(np.ceil(np.abs(after - before).max() / _PTP_STEP_RAD)))
-            way = before + np.linspace(0.0, 1.0, steps + 1)[:, None] * (after - before)
+            way = ptp_way(before, after)
         else:
             way = np.concatenate([before[None], robot.line_angles(targets, added.row, before, cell)])
         is_ptp, is_uncut = bool(targets.ptp[added.row]), added.row <= first and targets.restart is None
-        watch.way(way, tool, added.line, added.words, is_ptp=is_ptp, against_raw=is_uncut)
+        found = watch.way(way, tool, added.line, added.words, is_ptp=is_ptp, against_raw=is_uncut)
+        if is_ptp and found.hits:
+            ptp = Ptp(targets, added.row, before, after)
+            watch.advise(added.line, added.words, _advice(ptp, cell, against_raw=is_uncut))
     return watch.issues()
+
+
+def _advice(ptp: Ptp, cell: Cell, *, against_raw: bool) -> str:
+    """Return what would be free instead of a PTP."""
+    tool = int(ptp.targets.tool[ptp.row])
+
+    def is_free(way: Floats) -> bool:
+        watch = watch_of(cell)
+        if watch is None:
+            return True
+        return not watch.way(way, tool, 0, "", is_ptp=True, against_raw=against_raw).hits
+
+    found = proposal(ptp, cell, is_free)
+    at_home = ptp.targets.home[ptp.row] or ptp.targets.home[ptp.row - 1]
+    other = "put HOME elsewhere" if at_home else "cut in another order"
+    return found or f"{other}, or move what is hit: no higher [clearance] z_mm or turn of A1 alone is free"
 
 
 def _added(targets: Targets) -> Iterator[_Added]:
