@@ -178,6 +178,7 @@ def _content(
         "passes": [{"name": one.name, "tool": one.tool} for one in passes],
         "tools": tools,
         "robot": robot_sketch(cell, tools) if shown.q_rad is not None else None,
+        "near": _near(shown, cell),
         "stock": None if stock_mm is None else stock_mm.tolist(),
         "palette": _palette(),
     }
@@ -222,6 +223,14 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> 
     return replace(content, head=head, solids=solids, compared=compared)
 
 
+def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:
+    """Return who may be near what, and up to which distance that is a warning."""
+    if shown.near is None or cell is None:
+        return None
+    names = {"links": shown.near.links, "obstacles": shown.near.obstacles}
+    return {**names, "clearance": cell.collision.clearance_mm}
+
+
 def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:
     """Return the columns that the page carries, with the steps to which they are rounded."""
     columns: dict[str, tuple[Any, float]] = {"time": (shown.time_s, 1e-4)}
@@ -230,6 +239,9 @@ def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:
     columns |= {"line": (shown.line, 1.0), "pass": (number, 1.0), "tool": (shown.tool, 1.0)}
     if shown.q_rad is not None:
         columns |= {f"q{k + 1}": (shown.q_rad[:, k], 1e-5) for k in range(6)}
+    if shown.near is not None:
+        columns |= {"nearLink": (shown.near.clearance_link, 1.0)}
+        columns |= {"nearObstacle": (shown.near.clearance_obstacle, 1.0)}
     return columns
 
 
@@ -248,8 +260,8 @@ def _on_page(window: Window, rows: Ints) -> Window:
 
 def _worst(quantity: Quantity, whole: Samples, rows: Ints) -> Worst:
     sign = -1.0 if quantity.is_low_bad else 1.0
-    considered = np.where(whole.rapid & (quantity.name != "margin"), np.nan, sign * quantity.values)
-    if quantity.name != "margin":
+    considered = np.where(whole.rapid & (not quantity.is_margin), np.nan, sign * quantity.values)
+    if not quantity.is_margin:
         considered = np.where(considered > 0.0, considered, np.nan)
     places = worst_places(considered, whole.time_s, whole.line)
     own = [Place(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]

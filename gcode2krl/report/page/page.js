@@ -46,9 +46,9 @@ class Page {
       scene.scene.add(this.stock);
     }
     if (head.robot) {
-      this.robot = new Robot(head.robot, this.columns);
+      this.robot = new Robot(head.robot, this.columns, head.near);
       this.robot.wanted = true;
-      scene.scene.add(this.robot.root);
+      scene.scene.add(this.robot.root, this.robot.obstacles);
       this.robot.show(this.firstFeed());
       scene.scene.updateMatrixWorld(true);
       scene.robotBox = new THREE.Box3().setFromObject(this.robot.root);
@@ -59,6 +59,7 @@ class Page {
     }
     byId("show-stock").parentElement.hidden = !this.stock;
     byId("show-robot").parentElement.hidden = !this.robot;
+    byId("show-cell").parentElement.hidden = !head.robot?.obstacles.length;
     document.querySelector('[data-view="robot"]').hidden = !this.robot;
     let down = null;
     scene.canvas.addEventListener("pointerdown", (event) => { down = [event.clientX, event.clientY]; });
@@ -106,9 +107,11 @@ class Page {
     const parts = [`${columns.time[row].toFixed(2)} s`];
     if (columns.line[row] > 0) parts.push(`line ${columns.line[row]}`);
     parts.push(["x", "y", "z"].map((axis) => `${axis.toUpperCase()} ${columns[axis][row].toFixed(2)}`).join(" "));
-    head.quantities.forEach(({ name, label, unit }) => {
+    const near = this.robot?.nearest(row);
+    head.quantities.filter(({ name }) => name !== "clearance").forEach(({ name, label, unit }) => {
       parts.push(`${name === "margin" ? "margin" : label} ${rounded(columns[name][row])}${unit === "°" ? "" : " "}${unit}`);
     });
+    if (near) parts.push(near.gap <= 0 ? `${near.who} hits ${near.what}` : `${near.who} ${rounded(near.gap)} mm from ${near.what}`);
     if (this.robot && !this.robot.reached) parts.push("out of the robot's reach");
     return parts.join("  ·  ");
   }
@@ -190,7 +193,7 @@ class Page {
     byId("legend-low").textContent = quantity ? rounded(quantity.low) : "";
     byId("legend-high").textContent = quantity ? rounded(quantity.high) : "";
     const beyond = quantity && quantity.beyond !== null;
-    byId("legend-note").textContent = beyond ? `${quantity.name === "margin" ? "smallest" : "largest"} ${rounded(quantity.beyond)} ${quantity.unit}` : "";
+    byId("legend-note").textContent = beyond ? `${quantity.lowIsBad && quantity.name !== "speed" ? "smallest" : "largest"} ${rounded(quantity.beyond)} ${quantity.unit}` : "";
   }
 
   // ---- what is shown
@@ -241,6 +244,7 @@ class Page {
     byId("show-rapids").addEventListener("change", () => this.paint());
     byId("show-stock").addEventListener("change", (event) => { this.stock.visible = event.target.checked; this.scene.changed(false); });
     byId("show-solids")?.addEventListener("change", (event) => { this.solids.visible = event.target.checked; this.scene.changed(false); });
+    byId("show-cell").addEventListener("change", (event) => { this.robot.obstacles.visible = event.target.checked; this.scene.changed(false); });
     byId("show-robot").addEventListener("change", (event) => {
       this.robot.wanted = event.target.checked;
       this.select(this.row);

@@ -1,7 +1,7 @@
 // Plots over time, one below the other: peaks are kept when many samples share a pixel.
 
 const NEAR_PX = 4;
-const PLOT_COLOURS = { speed: "#0072b2", force: "#b34700", deflection: "#00795a", margin: "#8a4b78" };
+const PLOT_COLOURS = { speed: "#0072b2", force: "#b34700", deflection: "#00795a", margin: "#8a4b78", clearance: "#8c6d1f" };
 
 class Plots {
   constructor(place, columns, onPick, onStretch) {
@@ -51,7 +51,7 @@ class Plots {
   }
 
   ends(quantity, low, high) {
-    const bottom = quantity.name === "margin" ? Math.min(0, low ?? 0) : 0;
+    const bottom = quantity.lowIsBad && quantity.name !== "speed" ? Math.min(0, low ?? 0) : 0;
     return [bottom, Math.max((high ?? 1) * 1.08, bottom + 1e-6)];
   }
 

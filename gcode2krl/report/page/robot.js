@@ -1,10 +1,13 @@
-// Stock, gouges, rest and robot: capsules that turn about the joint axes, one group within the other.
+// Stock, gouges, rest, what stands in the cell, and the robot: capsules that turn about the joint axes.
 
 const LINK_COLOUR = 0xe8a468, FOOT_COLOUR = 0x70777f, SPINDLE_COLOUR = 0x4a5560, CUTTER_COLOUR = 0xb8c0c8;
+const OBSTACLE_COLOUR = 0x8f9aa5, HIT_COLOUR = 0xd00000, NEAR_COLOUR = 0xe69f00;
 
 class Robot {
-  constructor(sketch, columns) {
+  constructor(sketch, columns, near) {
     this.columns = columns;
+    this.near = near;
+    this.named = new Map();
     this.axes = sketch.axes.map(({ point, along }) => ({
       point: new THREE.Vector3(...point),
       along: new THREE.Vector3(...along),
@@ -20,27 +23,46 @@ class Robot {
       this.links.push(link);
     }
     sketch.links.forEach((one) => {
-      const colour = one.link === 0 || one.link === 6 ? FOOT_COLOUR : LINK_COLOUR;
-      this.links[one.link].add(capsule(new THREE.Vector3(...one.from), new THREE.Vector3(...one.to), one.radius, colour));
+      const colour = one.name === "spindle" ? SPINDLE_COLOUR : one.link === 0 || one.link === 6 ? FOOT_COLOUR : LINK_COLOUR;
+      const mesh = capsule(new THREE.Vector3(...one.from), new THREE.Vector3(...one.to), one.radius, colour);
+      this.links[one.link].add(this.keep(one.name, mesh));
     });
+    this.obstacles = new THREE.Group();
+    sketch.obstacles.forEach((one) => this.obstacles.add(this.keep(one.name, obstacle(one))));
     this.tools = {};
     Object.entries(sketch.tools).forEach(([number, tool]) => tool && this.addTool(number, tool));
   }
 
+  // Remember what is drawn of a name, so that it can turn red.
+  keep(name, mesh) {
+    if (!this.named.has(name)) this.named.set(name, []);
+    this.named.get(name).push(mesh);
+    mesh.userData.colour = mesh.material.color.getHex();
+    return mesh;
+  }
+
   addTool(number, tool) {
     const tip = new THREE.Vector3(...tool.tip), axis = new THREE.Vector3(...tool.axis);
-    const face = tip.clone().addScaledVector(axis, tool.length);
     const group = new THREE.Group();
-    const cutter = new THREE.Mesh(
-      new THREE.CylinderGeometry(tool.diameter / 2, tool.diameter / 2, tool.length, 20),
-      new THREE.MeshLambertMaterial({ color: CUTTER_COLOUR }),
-    );
-    cutter.position.copy(tip).addScaledVector(axis, tool.length / 2);
-    cutter.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis);
-    const back = face.clone().addScaledVector(axis, 4 * tool.radius);
-    group.add(cutter, capsule(face.clone().addScaledVector(axis, tool.radius), back, tool.radius, SPINDLE_COLOUR));
-    const middle = face.clone().lerp(back, 0.6);
-    group.add(capsule(middle, new THREE.Vector3(...tool.flange), 0.6 * tool.radius, SPINDLE_COLOUR));
+    const cylinder = (name, from, to, diameter, colour) => {
+      const mesh = new THREE.Mesh(
+        new THREE.CylinderGeometry(diameter / 2, diameter / 2, to - from, 20),
+        new THREE.MeshLambertMaterial({ color: colour }),
+      );
+      mesh.position.copy(tip).addScaledVector(axis, (from + to) / 2);
+      mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis);
+      group.add(this.keep(name, mesh));
+    };
+    cylinder(tool.cutter, 0, tool.length, tool.diameter, CUTTER_COLOUR);
+    const { holder } = tool;
+    if (holder && holder.to > tool.length) cylinder(holder.name, tool.length, holder.to, holder.diameter, SPINDLE_COLOUR);
+    if (tool.radius) {
+      const face = tip.clone().addScaledVector(axis, tool.length);
+      const back = face.clone().addScaledVector(axis, 4 * tool.radius);
+      group.add(capsule(face.clone().addScaledVector(axis, tool.radius), back, tool.radius, SPINDLE_COLOUR));
+      const middle = face.clone().lerp(back, 0.6);
+      group.add(capsule(middle, new THREE.Vector3(...tool.flange), 0.6 * tool.radius, SPINDLE_COLOUR));
+    }
     group.userData.tip = tip;
     this.links[6].add(group);
     this.tools[number] = group;
@@ -63,6 +85,25 @@ class Robot {
     Object.entries(this.tools).forEach(([name, group]) => { group.visible = name === number; });
     this.root.visible = this.wanted && this.reached;
     this.shown = this.tools[number];
+    this.colour(row);
+  }
+
+  // What is nearest to something at a row, by name, with the distance; null where nothing is near.
+  nearest(row) {
+    const link = this.near && this.columns.nearLink[row];
+    if (!this.near || !(link >= 0)) return null;
+    const who = this.near.links[link], what = this.near.obstacles[this.columns.nearObstacle[row]];
+    return { who, what, gap: this.columns.clearance[row] };
+  }
+
+  // What hits something at this row is red, and so is what it hits.
+  colour(row) {
+    this.named.forEach((meshes) => meshes.forEach((mesh) => mesh.material.color.setHex(mesh.userData.colour)));
+    const found = this.nearest(row);
+    if (!found || found.gap > this.near.clearance) return;
+    const names = [found.who, found.what.replace(/ of the arm itself$/, "")];
+    const colour = found.gap <= 0 ? HIT_COLOUR : NEAR_COLOUR;
+    names.forEach((name) => this.named.get(name)?.forEach((mesh) => mesh.material.color.setHex(colour)));
   }
 
   // Where the drawn tool's tip is, in $BASE.
@@ -81,6 +122,18 @@ function capsule(from, to, radius, colour) {
   );
   mesh.position.copy(from).addScaledVector(along, 0.5);
   if (length > 0) mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
+  return mesh;
+}
+
+function obstacle({ frame, low, high }) {
+  const size = high.map((value, k) => value - low[k]);
+  const opacity = size.some((side) => side <= 1) ? 0.15 : 0.45;  // a table or a fence must not hide the work
+  const mesh = new THREE.Mesh(
+    new THREE.BoxGeometry(...size),
+    new THREE.MeshLambertMaterial({ color: OBSTACLE_COLOUR, transparent: true, opacity, depthWrite: false, side: THREE.DoubleSide }),
+  );
+  mesh.matrixAutoUpdate = false;
+  mesh.matrix.fromArray(frame).multiply(new THREE.Matrix4().makeTranslation(...low.map((value, k) => (value + high[k]) / 2)));
   return mesh;
 }
 

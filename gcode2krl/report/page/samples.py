@@ -7,7 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.prediction import Prediction
-from gcode2krl.tables import Toolpath
+from gcode2krl.tables import Clearance, Toolpath, rows_at
 from gcode2krl.units import DEG_PER_RAD
 
 MOST_SAMPLES = 400_000
@@ -30,6 +30,11 @@ class Quantity:
     """To which the page rounds it."""
     is_low_bad: bool = False
 
+    @property
+    def is_margin(self) -> bool:
+        """True where the least value is the worst, below zero too."""
+        return self.is_low_bad and self.name != "speed"
+
     def described(self, rapid: Bools) -> dict[str, Any]:
         """Return name, unit, the colour scale's ends, and what exceeds it.
 
@@ -40,14 +45,14 @@ class Quantity:
         values = self.values[rows] if rows.any() else np.zeros(1)
         low, high = (float(end) for end in np.percentile(values, (100.0 - _TOP, _TOP)))
         least, most = float(values.min()), float(values.max())
-        if not self.is_low_bad or self.name == "speed":
+        if not self.is_margin:
             low = 0.0
         if most <= _ALMOST_ALL * high:
             high = most
         beyond = None
-        if self.name == "margin" and least < low - 0.02 * (high - low):
+        if self.is_margin and least < low - 0.02 * (high - low):
             beyond = least
-        elif self.name != "margin" and most > high:
+        elif not self.is_margin and most > high:
             beyond = most
         return {
             "name": self.name,
@@ -75,6 +80,8 @@ class Samples:
     quantities: tuple[Quantity, ...]
     cutting: Bools | None = None
     q_rad: Floats | None = None
+    near: Clearance | None = None
+    """What comes near what, None where nothing is watched."""
     is_timed: bool = True
     """False where no motion is planned: the time is length over programmed feed."""
 
@@ -89,7 +96,8 @@ class Samples:
             name: one[rows] for name, one in vars(self).items() if isinstance(one, np.ndarray)
         }
         quantities = tuple(replace(one, values=one.values[rows]) for one in self.quantities)
-        return replace(self, quantities=quantities, **columns)
+        near = None if self.near is None else rows_at(self.near, rows)
+        return replace(self, quantities=quantities, near=near, **columns)
 
 
 def samples_of(prediction: Prediction) -> Samples | None:
@@ -109,6 +117,10 @@ def samples_of(prediction: Prediction) -> Samples | None:
     if joints is not None and np.isfinite(joints.limit_margin_rad).any():
         margin_deg = joints.limit_margin_rad * DEG_PER_RAD
         quantities.append(Quantity("margin", "joint limit margin", "°", margin_deg, 1e-3, is_low_bad=True))
+    near = prediction.clearance
+    if near is not None:
+        label = "least distance"
+        quantities.append(Quantity("clearance", label, "mm", near.clearance_mm, 1e-2, is_low_bad=True))
     return Samples(
         time_s=motion.time_s,
         position_mm=motion.position_mm,
@@ -120,6 +132,7 @@ def samples_of(prediction: Prediction) -> Samples | None:
         quantities=tuple(quantities),
         cutting=np.isfinite(forces.phi_rad[:, 0]) if forces is not None else None,
         q_rad=joints.q_rad if joints is not None else None,
+        near=near,
     )
 
 

@@ -1,16 +1,19 @@
-"""The robot as the page draws it: capsules between its joint centres, and the axes that they turn about.
+"""The robot as the page draws it: its capsules, the axes that they turn about, and what stands in the cell.
 
-No robot of the library states the shape of its links, so the thickness is a sketch; the joint centres are
-those of the kinematics. Everything is stated in the robot root with all joints at zero; from there the turns
-about axes 1 to k, the last first, move link k (a product of exponentials), which is all that the page needs.
+The capsules are those by which collisions are checked; where the cell states none, they are a sketch between
+the joint centres of the kinematics. Everything is stated in the robot root with all joints at zero; from
+there the turns about axes 1 to k, the last first, move link k (a product of exponentials), which is all that
+the page needs. Cables, which lie on two links, and meshes are not drawn.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.sections import Capsule, Plane, Tool
 from gcode2krl.errors import RefusedError
 
 _THICKNESS = (0.10, 0.095, 0.07, 0.065, 0.05, 0.042, 0.035)
@@ -18,6 +21,9 @@ _THICKNESS = (0.10, 0.095, 0.07, 0.065, 0.05, 0.042, 0.035)
 _SPINDLE = 0.035
 _FORWARD = np.array([1.0, 0.0, 0.0])
 _FALLBACK_CUTTER_MM = 50.0
+_PLANE_MM = 750.0
+"""Half the side of the square that is drawn of a plane."""
+LINKS = ("foot", "A1", "A2", "A3", "A4", "A5", "A6")
 
 
 def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
@@ -31,12 +37,69 @@ def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
         "model": cell.robot.model,
         "root": np.linalg.inv(cell.base_matrix()).T.reshape(-1).tolist(),
         "axes": [{"point": p.tolist(), "along": d.tolist()} for p, d in joint_axes(geometry)],
-        "links": [
-            {"link": link, "from": a.tolist(), "to": b.tolist(), "radius": _THICKNESS[link] * reach_mm}
-            for link, a, b in _capsules(geometry)
-        ],
+        "links": list(_links(cell, geometry, flange)),
         "tools": {str(number): _tool(cell, number, flange, reach_mm) for number in tools},
+        "obstacles": list(_obstacles(cell)),
     }
+
+
+def _links(cell: Cell, geometry: Floats, flange: Floats) -> Iterator[dict[str, Any]]:
+    """Yield the capsules of arm and spindle: number of the link, name, ends and radius."""
+    frames = [np.eye(4) for _ in LINKS]
+    for frame, point in zip(frames[2:6], _centres(geometry), strict=True):
+        frame[:3, 3] = point
+    frames[6] = flange
+    for capsule in cell.robot.body.capsules:
+        yield _capsule(LINKS.index(capsule.link), capsule.link, capsule, frames)
+    if not cell.robot.body.capsules:
+        reach_mm = float(geometry[3] + geometry[4])
+        for link, a, b in _sketched(geometry):
+            ends = {"from": a.tolist(), "to": b.tolist(), "radius": _THICKNESS[link] * reach_mm}
+            yield {"link": link, "name": LINKS[link], **ends}
+    for stretch in cell.spindle.body.capsules if cell.spindle.body is not None else ():
+        yield _capsule(6, "spindle", stretch, frames)
+
+
+def _capsule(link: int, name: str, capsule: Capsule, frames: list[Floats]) -> dict[str, Any]:
+    start, end = ((frames[link] @ [*point, 1.0])[:3].tolist() for point in (capsule.from_mm, capsule.to_mm))
+    return {"link": link, "name": name, "from": start, "to": end, "radius": capsule.radius_mm}
+
+
+def _obstacles(cell: Cell) -> Iterator[dict[str, Any]]:
+    """Yield table, boxes and planes: a name, the frame they are stated in (4, 4), and two corners."""
+    base, flat = np.eye(4), [-_PLANE_MM, -_PLANE_MM, -1.0, _PLANE_MM, _PLANE_MM, 0.0]
+    root = np.asarray(np.linalg.inv(cell.base_matrix()), dtype=np.float64)
+    if cell.table is not None:
+        at = base.copy()
+        at[2, 3] = cell.table.z_mm
+        yield _box("the table", at, flat)
+    for each in cell.obstacle:
+        frame: Floats = base if each.frame == "base" else root
+        if each.box_mm is not None:
+            yield _box(each.name, frame, [*each.box_mm[0], *each.box_mm[1]])
+        elif each.plane is not None:
+            yield _box(each.name, frame @ _across(each.plane), flat)
+
+
+def _box(name: str, frame: Floats, corners: list[float]) -> dict[str, Any]:
+    return {"name": name, "frame": frame.T.reshape(-1).tolist(), "low": corners[:3], "high": corners[3:]}
+
+
+def _across(plane: Plane) -> Floats:
+    """Return a frame (4, 4) on a plane whose z is its normal."""
+    z = np.array(plane.normal) / np.linalg.norm(plane.normal)
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = x, np.cross(z, x), z, plane.point_mm
+    return frame
+
+
+def _centres(geometry: Floats) -> list[Floats]:
+    """Return where the frames of A2 to A5 begin, all joints at zero."""
+    a1, _, c1, c2, _, _ = geometry
+    wrist = _wrist(geometry)
+    return [np.array([a1, 0.0, c1]), np.array([a1 + c2, 0.0, c1]), wrist, wrist]
 
 
 def joint_axes(geometry: Floats) -> list[tuple[Floats, Floats]]:
@@ -64,7 +127,7 @@ def _flange_at_zero(geometry: Floats) -> Floats:
     return flange
 
 
-def _capsules(geometry: Floats) -> list[tuple[int, Floats, Floats]]:
+def _sketched(geometry: Floats) -> list[tuple[int, Floats, Floats]]:
     """Return link (0 = the foot), start and end (3,) of each capsule."""
     a1, a2, c1, c2, c3, c4 = geometry
     shoulder, elbow = np.array([a1, 0.0, c1]), np.array([a1 + c2, 0.0, c1])
@@ -92,7 +155,17 @@ def _tool(cell: Cell, number: int, flange: Floats, reach_mm: float) -> dict[str,
         "tip": frame[:3, 3].tolist(),
         "axis": frame[:3, 2].tolist(),
         "flange": flange[:3, 3].tolist(),
+        "cutter": f"the cutter of T{number}",
         "diameter": tool.diameter_mm,
         "length": length_mm,
-        "radius": _SPINDLE * reach_mm,
+        "holder": _holder(tool, number),
+        "radius": None if cell.spindle.body is not None else _SPINDLE * reach_mm,
     }
+
+
+def _holder(tool: Tool, number: int) -> dict[str, Any] | None:
+    """Return name, diameter and upper end of a holder, None where it is not stated."""
+    if tool.stick_out_mm is None or tool.holder_diameter_mm is None or tool.length_mm is None:
+        return None
+    name, end_mm = f"the holder of T{number}", max(tool.length_mm, tool.stick_out_mm)
+    return {"name": name, "diameter": tool.holder_diameter_mm, "to": end_mm}

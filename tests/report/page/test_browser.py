@@ -11,6 +11,7 @@ from gcode2krl.report.page import content_of, content_of_refused, write_page
 from gcode2krl.report.page.one_file import HERE
 from tests.conftest import ROOT
 from tests.report.page.browser import opened_browser, opened_page
+from tests.test_clearance import PART, box, cell_with
 
 pytestmark = pytest.mark.browser
 PIECE = ROOT / "examples" / "test_piece.nc"
@@ -330,6 +331,25 @@ def test_gouges_and_rest_are_drawn_where_they_are(browser, prediction, tmp_path)
     assert window.evaluate("report.solids.visible") is False
     window.locator("#compared button.go").first.click()
     assert row(window) == 900
+    assert window.said == []
+    window.context.close()
+
+
+def test_what_hits_something_is_red_at_that_moment(browser, tmp_path):
+    part = tmp_path / "part.nc"
+    part.write_text(PART)
+    predicted = predict(part, cell_with(box("beam", [105.0, -200, 110], [120, 40, 150])))
+    write_page(content_of(predicted, verdict="refused", text=PART), tmp_path / "hit.html")
+    window = opened_page(browser, tmp_path / "hit.html")
+    colour = "name => report.robot.named.get(name).map((mesh) => mesh.material.color.getHex())"
+    gap_mm = predicted.clearance.clearance_mm
+    for row, is_hit in ((int(np.argmin(gap_mm)), True), (int(np.argmax(gap_mm)), False)):
+        window.evaluate("row => report.select(row)", row)
+        for name in ("spindle", "beam"):
+            assert ({0xD00000} == set(window.evaluate(colour, name))) == is_hit
+        assert 0xD00000 not in window.evaluate(colour, "A3")
+        assert ("spindle hits beam" in window.inner_text("#readout")) == is_hit
+    assert window.is_visible("#show-cell")
     assert window.said == []
     window.context.close()
 

@@ -6,8 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import load_cell
 from gcode2krl.cell.definition import resolve_cell
+from gcode2krl.collision import Carried
 from gcode2krl.report.page.sketch import joint_axes, robot_sketch
 from gcode2krl.robot.kinematics import flange_pose
+from tests.cells import over_demonstration
 
 
 def moved(point, q_rad, axes):
@@ -24,7 +26,8 @@ def cell():
 
 def test_the_last_link_goes_where_the_kinematics_say(cell):
     geometry = cell.robot.geometry.array()
-    axes, last = joint_axes(geometry), robot_sketch(cell, [1])["links"][-1]
+    bare = cell.model_copy(update={"robot": cell.robot.model_copy(update={"body": type(cell.robot.body)()})})
+    axes, last = joint_axes(geometry), robot_sketch(bare, [1])["links"][-1]
     q_rad = np.random.default_rng(2).uniform(-2.0, 2.0, (50, 6))
     position, _ = flange_pose(q_rad, geometry)
     for one, wanted in zip(q_rad, position, strict=True):
@@ -42,11 +45,58 @@ def test_the_tip_goes_where_the_tool_is(cell):
 
 
 def test_the_links_hang_together(cell):
-    """Each joint centre lies in the links on both of its sides."""
-    links = robot_sketch(cell, [1])["links"]
+    """Where no capsules are stated each joint centre lies in the links on both of its sides."""
+    bare = cell.model_copy(update={"robot": cell.robot.model_copy(update={"body": type(cell.robot.body)()})})
+    links = robot_sketch(bare, [1])["links"]
     ends = {one["link"]: (np.array(one["from"]), np.array(one["to"])) for one in links}
     for k in (2, 3, 4, 5):
         assert ends[k][0] == pytest.approx(ends[k - 1][1])
+
+
+def test_the_capsules_go_where_they_are_checked():
+    """All that the page turns about its axes, against the ends by which collisions are found."""
+    cell = over_demonstration(
+        {
+            "spindle": {
+                "body": {
+                    "capsules": [
+                        {"from_mm": [75.0, 0, 250], "to_mm": [-150.0, 0, 250], "radius_mm": 75},
+                    ]
+                }
+            }
+        }
+    )
+    sketch, carried = robot_sketch(cell, [1]), Carried(cell)
+    axes = joint_axes(cell.robot.geometry.array())
+    links = [one for one in sketch["links"] if one["link"] > 0]
+    assert [one["name"] for one in links] == carried.names
+    q_rad = np.random.default_rng(4).uniform(-2.0, 2.0, (10, 6))
+    for q, ends in zip(q_rad, carried.ends_mm(q_rad), strict=True):
+        for one, wanted in zip(links, ends, strict=True):
+            own = axes[: one["link"]]
+            for end, at in (("from", wanted[:3]), ("to", wanted[3:])):
+                assert moved(np.array(one[end]), q[: one["link"]], own) == pytest.approx(at, abs=1e-8)
+
+
+def test_what_stands_in_the_cell_is_drawn_where_it_is():
+    cell = over_demonstration(
+        {
+            "table": {"z_mm": -60.0},
+            "obstacle": [
+                {"name": "vice", "box_mm": [[1.0, 2, 3], [4, 6, 8]], "frame": "robroot"},
+                {"name": "fence", "plane": {"point_mm": [0.0, -900, 0], "normal": [0.0, 2, 0]}},
+            ],
+        }
+    )
+    table, vice, fence = robot_sketch(cell, [1])["obstacles"]
+    frames = [np.array(one["frame"]).reshape(4, 4).T for one in (table, vice, fence)]
+    assert frames[0][:3, 3].tolist() == [0.0, 0.0, -60.0]
+    assert frames[1] @ cell.base_matrix() == pytest.approx(np.eye(4), abs=1e-12)
+    assert (vice["low"], vice["high"]) == ([1.0, 2.0, 3.0], [4.0, 6.0, 8.0])
+    assert frames[2][:3, 2].tolist() == [0.0, 1.0, 0.0]
+    assert frames[2][:3, 3].tolist() == [0.0, -900.0, 0.0]
+    assert np.linalg.det(frames[2][:3, :3]) == pytest.approx(1.0)
+    assert fence["high"][2] == 0.0
 
 
 def test_the_root_lies_where_the_base_is_not(cell):
