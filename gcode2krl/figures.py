@@ -16,6 +16,7 @@ _NEEDS = {
     "path": ("motion",),
     "kinematics": ("motion",),
     "joints": ("motion", "joints"),
+    "spin": ("motion", "joints"),
     "force": ("motion", "forces"),
     "force_path": ("motion", "forces"),
     "deflection": ("motion", "deflection"),
@@ -40,6 +41,7 @@ def figure_of(prediction: Prediction, name: str) -> "Figure":
         "path": _path,
         "kinematics": _kinematics,
         "joints": _joints,
+        "spin": _spin,
         "force": _force,
         "force_path": _force_path,
         "deflection": _deflection,
@@ -82,6 +84,15 @@ def _joints(prediction: Prediction) -> "Figure":
     limits = np.array(robot.limits.q_deg) if robot.limits.q_deg is not None else None
     speeds = np.array(robot.speeds.qd_deg_s) if robot.speeds.qd_deg_s is not None else None
     return joints_figure(prediction.motion, prediction.joints, limits, speeds, prediction.toolpath)
+
+
+def _spin(prediction: Prediction) -> "Figure":
+    from gcode2krl.clearance import spin_map
+    from gcode2krl.report.spins import spin_map_figure
+
+    assert prediction.motion is not None
+    assert prediction.joints is not None
+    return spin_map_figure(*spin_map(prediction.motion, prediction.joints, prediction.cell))
 
 
 def _force(prediction: Prediction) -> "Figure":

@@ -17,7 +17,7 @@ from gcode2krl import compliance, cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.clearance import collisions_beside
+from gcode2krl.clearance import collisions_beside, freedom
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
@@ -42,6 +42,8 @@ from gcode2krl.version import __version__
 if TYPE_CHECKING:
     from gcode2krl.effects import Applied
 
+_HITS = -2.0
+"""Added to the quality of a pose that hits something: where all do, the most comfortable is taken."""
 _ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
@@ -504,9 +506,14 @@ def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
             raise NotUnderstoodError(missing, source=cell.name)
 
     def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
-        def quality(rows: Ints, spin_rad: float) -> Floats:
+        def comfort(rows: Ints, spin_rad: float) -> Floats:
             rotation = program.tool_rotation(axis[rows], spin_rad)
             return robot.pose_quality(position[rows], rotation, tool[rows], cell)
+
+        def quality(rows: Ints, spin_rad: float) -> Floats:
+            plain, rotation = comfort(rows, spin_rad), program.tool_rotation(axis[rows], spin_rad)
+            free = freedom(position[rows], rotation, tool[rows], cell, plain)
+            return np.where(free < 0.0, plain + _HITS, np.minimum(plain, free))
 
         def bending(rows: Ints, spin_rad: float) -> Floats:
             rotation = program.tool_rotation(axis[rows], spin_rad)

@@ -7,12 +7,16 @@ from gcode2krl.clearance.beside import (
     shown_otherwise,
     watch_of,
 )
+from gcode2krl.clearance.spins import SpinMap, freedom, spin_map
 
 __all__ = [
     "ArmInStock",
     "Inside",
+    "SpinMap",
     "collisions_beside",
+    "freedom",
     "moves_watched_at_targets",
     "shown_otherwise",
+    "spin_map",
     "watch_of",
 ]

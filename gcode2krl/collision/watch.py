@@ -109,6 +109,30 @@ class Watch:
         self._contacts.take(found, setting.names, lines, self._to_base, words)
         return found
 
+    def poses(self, q_rad: Floats, tool: int, horizon_mm: float) -> Floats:
+        """Return the least distance (n,) at single poses, angles (n, 6) in rad, at most the horizon.
+
+        Of what is round about the tool axis, cutter and holder, only the distance to the arm itself counts.
+        """
+        whole = self._held(tool, against_raw=False, is_ptp=False)
+        kinds = [whole.parts[pair[0]].kind for pair in whole.pairs]
+        setting = whole.only(
+            [pair[1] < 0 or kind in ("arm", "spindle") for pair, kind in zip(whole.pairs, kinds, strict=True)]
+        )
+        way = Way(
+            setting.bodies,
+            self._around.shapes,
+            setting.pairs,
+            self._geometry,
+            near_mm=self._cell.collision.clearance_mm,
+            horizon_mm=horizon_mm,
+            is_sampled=False,
+        )
+        apart = np.full((2 * len(q_rad), 6), np.nan)  # behind a row of NaN another way begins
+        apart[::2] = q_rad
+        gap_mm: Floats = way.take(apart).gap_mm[::2]
+        return gap_mm
+
     def advise(self, line: int, words: str, remedy: str) -> None:
         """Say what helps against the collisions on a way."""
         self._contacts.advise(line, words, remedy)

@@ -45,6 +45,14 @@ class Plots:
         """
         return self._draw("joints")
 
+    def spin(self) -> "Figure":
+        """Draw the turn about the tool axis along the path, and where others would be or hit something.
+
+        >>> from gcode2krl import Prediction
+        >>> Prediction.load("prediction").plot.spin().savefig("spin.png")
+        """
+        return self._draw("spin")
+
     def force(self) -> "Figure":
         """Draw force and engagement over time.
 
@@ -90,6 +98,7 @@ FIGURES = (
     "path",
     "kinematics",
     "joints",
+    "spin",
     "force",
     "force_path",
     "deflection",

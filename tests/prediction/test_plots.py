@@ -47,7 +47,7 @@ def test_the_command_draws_the_same(prediction, run, tmp_path):
     [
         ("forces", ("force", "force_path", "deflection_joints")),
         ("deflection", ("deflection", "deflection_path", "deflection_joints")),
-        ("joints", ("joints", "deflection_joints")),
+        ("joints", ("joints", "spin", "deflection_joints")),
         ("motion", FIGURES),
     ],
 )

@@ -1,0 +1,120 @@
+"""The turn about the tool axis keeps clear of what stands in the cell."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gcode2krl import predict, set_targets
+from gcode2krl.clearance import freedom, spin_map
+from gcode2krl.collision import HORIZON_MM, scene
+from gcode2krl.collision.bodies import capsules_of, parts_of
+from gcode2krl.collision.gaps import obstacle_gaps, placed, segment_distances
+from gcode2krl.collision.surroundings import pairs_of
+from gcode2krl.gcode import read_gcode
+from gcode2krl.program import tool_rotation
+from gcode2krl.report.spins import spin_map_figure
+from gcode2krl.robot import inverse, pose_quality
+from gcode2krl.tables import rows_of
+from tests.test_clearance import PART, box, cell_with
+
+POST = box("post", [-260.0, -60, 60], [-190, 60, 500])
+"""Where the wrist is at a spin of 0."""
+
+
+def searching(*obstacles, **more):
+    cell = cell_with(*obstacles, **more)
+    return cell.model_copy(update={"frames": cell.frames.model_copy(update={"spin": "auto"})})
+
+
+@pytest.fixture
+def part(tmp_path):
+    file = tmp_path / "part.nc"
+    file.write_text(PART)
+    return file
+
+
+def spins_deg(targets):
+    turns = Rotation.from_quat(targets.rotation[2:-2]).as_euler("ZYX", degrees=True)[:, 0]
+    return np.unique(turns.round(6))
+
+
+def least_distance(cell, q_rad):
+    """Return the least of all distances (n,) that the turn of the tool may change."""
+    parts, post = parts_of(cell, 1), scene.box(*map(np.array, POST["box_mm"]), cell.base_matrix())
+    ends = placed(q_rad, cell.robot.geometry.array(), capsules_of(parts, cell.robot.geometry.array()))
+    gaps = []
+    for body, obstacle, other in pairs_of(parts, ("post",)):
+        if obstacle < 0:
+            radii = parts[body].radius_mm + parts[other].radius_mm
+            gaps.append(segment_distances(ends[:, body], ends[:, other]) - radii)
+        elif parts[body].kind in ("arm", "spindle"):
+            gaps.append(obstacle_gaps(ends[:, body], parts[body].radius_mm, post)[0])
+    return np.min(gaps, axis=0)
+
+
+def hits_on_the_cut(part, cell):
+    issues = predict(part, cell, forces=False).issues
+    return [each for each in issues if each.code == "collision" and " on the " not in each.message]
+
+
+def test_a_post_behind_the_tool_turns_it(part):
+    assert spins_deg(set_targets(read_gcode(part, searching()), searching())).tolist() == [0.0]
+    assert hits_on_the_cut(part, cell_with(POST))
+    (spin,) = spins_deg(set_targets(read_gcode(part, searching(POST)), searching(POST)))
+    assert abs(spin) > 20
+    assert hits_on_the_cut(part, searching(POST)) == []
+
+
+def test_where_every_turn_hits_the_collision_is_told(part):
+    room = box("room", [-2000.0, -2000, 200], [2000, 2000, 2000])
+    assert hits_on_the_cut(part, searching(room))
+
+
+def test_the_cutter_in_an_obstacle_does_not_spoil_the_choice(part):
+    """What is round about the axis hits at every turn: the others still decide."""
+    clamp = box("clamp", [60.0, -20, -10], [70, 20, 20])
+    (spin,) = spins_deg(set_targets(read_gcode(part, searching(POST, clamp)), searching(POST, clamp)))
+    assert abs(spin) > 20
+
+
+def test_the_map_is_what_single_poses_are(part):
+    cell = searching(POST)
+    prediction = predict(part, cell, forces=False)
+    found = spin_map(prediction.motion, prediction.joints, cell)
+    assert found.comfort.shape == found.free.shape == (72, len(found.path_mm))
+    chosen = np.rad2deg(found.chosen_rad)
+    assert chosen == pytest.approx(spins_deg(prediction.targets)[0], abs=1e-6)
+    near = np.abs(found.spin_rad[:, None] - found.chosen_rad).argmin(axis=0)
+    on_it = np.minimum(found.comfort, found.free)[near, np.arange(len(near))]
+    assert (on_it >= 0.3).all()
+    at_zero = np.abs(found.spin_rad).argmin()
+    assert (found.free[at_zero] < 0.0).any()
+
+
+def test_freedom_is_the_least_distance_in_clearances():
+    """Poses beside a box, against the distances of all capsules one by one."""
+    cell = searching(POST)
+    draw = np.random.default_rng(2)
+    position = draw.uniform([-50, -100, 0], [200, 150, 100], (60, 3))
+    rotation = tool_rotation(np.tile([0.0, 0.0, 1.0], (60, 1)), draw.uniform(-2.5, 2.5, 60))
+    tool = np.ones(60, dtype=np.int32)
+    comfort = pose_quality(position, rotation, tool, cell)
+    free = freedom(position, rotation, tool, cell, comfort)
+    assert (free[comfort <= 0.0] == 1.0).all()
+    rows, branches = np.nonzero(comfort > 0.0)
+    q_rad = inverse(position, rotation, cell, 1)[rows, branches]
+    gap_mm = least_distance(cell, q_rad)
+    enough_mm = 3.0 * cell.collision.clearance_mm
+    wanted = np.where(gap_mm <= 0.0, -1.0, np.minimum(gap_mm / enough_mm, 1.0))
+    np.testing.assert_allclose(free[rows, branches], wanted, atol=1e-6)
+    assert {-1.0, 1.0} < set(wanted.tolist())
+    assert enough_mm < HORIZON_MM
+
+
+def test_a_prediction_of_one_sample_has_a_map(part, tmp_path):
+    cell = searching(POST)
+    prediction = predict(part, cell, forces=False)
+    one = rows_of(prediction.motion, 0, 1)
+    assert len(spin_map(one, prediction.joints, cell).path_mm) == 1
+    figure = spin_map_figure(*spin_map(one, prediction.joints, cell))
+    figure.savefig(tmp_path / "spin.png")
