@@ -12,6 +12,9 @@ def _words(text: str) -> frozenset[str]:
 # --- motions ---------------------------------------------------------------------------------------
 
 LIN, PTP, C_DIS = "LIN", "PTP", "C_DIS"
+CIRC = "CIRC"
+CIRC_TYPE = "$CIRC_TYPE=#BASE"
+"""The orientation along an arc is that of its ends in `$BASE`, not carried along by the path."""
 """The motions that are written, and the word that blends one."""
 POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
 STATUS_TURN = ("S", "T")
@@ -125,6 +128,7 @@ such controllers show them. What an option package adds is not known here."""
 
 KIND_LIN, KIND_PTP, KIND_VEL_CP, KIND_APO_CDIS = range(4)
 KIND_WAIT_SEC, KIND_OTHER, KIND_PTP_AXES, KIND_TRIGGER = range(4, 8)
+KIND_CIRC = 8
 MALFORMED = -1
 """Stands for the blending of a statement that cannot be read."""
 ASSIGNS, CALLS = 1, 2

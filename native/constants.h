@@ -78,6 +78,8 @@
 #define W_LIN "LIN"
 #define W_PTP "PTP"
 #define W_C_DIS "C_DIS"
+#define W_CIRC "CIRC"
+#define W_CIRC_TYPE "$CIRC_TYPE=#BASE"
 #define W_BRAKE "BRAKE"
 #define W_WAIT "WAIT"
 #define W_SEC "SEC"
@@ -144,6 +146,7 @@
 #define W_KIND_OTHER 5
 #define W_KIND_PTP_AXES 6
 #define W_KIND_TRIGGER 7
+#define W_KIND_CIRC 8
 #define W_MALFORMED (-1)
 #define W_ASSIGNS 1
 #define W_CALLS 2

@@ -17,6 +17,7 @@ from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import statements as st
+from gcode2krl.krl.arcs import Arc
 from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
@@ -47,6 +48,7 @@ _LOOK_BACK = 0.2
 _NOTHING_IN_FORCE = (-1.0, -1.0, 0.0)
 """The state of `motion_lines` at the beginning of a program or a part."""
 _MESSAGE = b"GK_MSG"
+_LIN = f"{w.LIN} {{".encode("ascii")
 PIECE_ROWS = 262_144
 """Motions whose text is made at a time, some 25 MB of it: enough for all cores."""
 
@@ -75,6 +77,8 @@ class Layout:
     """Name of the RSI files of a program that is corrected online."""
     collisions: CollisionScope | None = None
     """What was checked for collisions; None: nothing."""
+    arcs: tuple[Arc, ...] = ()
+    """Rows that are written as CIRC."""
 
 
 def compose(
@@ -121,6 +125,8 @@ class _Composer:
         self.rsi = self._rsi(layout.online) if layout.online else None
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         self.event_rows = np.array(sorted(rows), dtype=np.int64)
+        self.arcs: list[Arc] = []
+        self.arc_firsts: Ints = np.zeros(0, dtype=np.int64)
 
     def _rsi(self, name: str) -> RsiText:
         on, off = rsi_rows(self.targets)
@@ -133,6 +139,12 @@ class _Composer:
         count = len(self.targets)
         is_one = count <= most and self.layout.split == "defs"
         chunks = [(0, count, False)] if is_one else self._chunks(most)
+        starts, ends = np.array([(start, end) for start, end, _ in chunks]).T
+        of_chunk = np.searchsorted(starts, [arc.first for arc in self.layout.arcs], side="right") - 1
+        self.arcs = [  # an arc over the end of a part stays chords
+            arc for arc, k in zip(self.layout.arcs, of_chunk, strict=True) if arc.end < ends[k]
+        ]
+        self.arc_firsts = np.array([arc.first for arc in self.arcs], dtype=np.int64)
         whole = [(start, end) for start, end, is_part in chunks if is_part]
         parts = [_Part(part_name(self.name, k), *rows) for k, rows in enumerate(whole, start=1)]
         files: dict[str, Iterable[bytes]] = {f"{self.name}{w.SOURCE_SUFFIX}": self._main(chunks, parts)}
@@ -234,11 +246,33 @@ class _Composer:
         at = start
         for row in [*(np.flatnonzero(special) + start).tolist(), end]:
             stop = row + 1 if row < end and not ptp[row] else row
-            for first in range(at, stop, PIECE_ROWS):
-                yield from self._lines(first, min(first + PIECE_ROWS, stop), state)
+            yield from self._ways(at, stop, state)
             if row < end:
                 yield self._around(row)
             at = row + 1
+
+    def _ways(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
+        """Yield the text of rows that follow each other without anything between them, arcs as CIRC."""
+        at = start
+        for arc in self.arcs[slice(*np.searchsorted(self.arc_firsts, (start, end)))]:
+            if arc.first < at or arc.end >= end:
+                continue
+            yield from self._straight(at, arc.first, state)
+            yield self._arc(arc, state)
+            at = arc.end + 1
+        yield from self._straight(at, end, state)
+
+    def _straight(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
+        for first in range(start, end, PIECE_ROWS):
+            yield from self._lines(first, min(first + PIECE_ROWS, end), state)
+
+    def _arc(self, arc: Arc, state: Floats) -> bytes:
+        """Return the CIRC to the end of an arc, with what is set before it as before a LIN."""
+        head, _, end = b"".join(self._lines(arc.end, arc.end + 1, state)).rpartition(_LIN)
+        via = ",".join(
+            f"{key} {fixed(v, 3)}" for key, v in zip(w.POSE_KEYS, self.position[arc.via], strict=False)
+        )
+        return head + f"{w.CIRC} {{{via}}},{{".encode("ascii") + end
 
     def _lines(self, start: int, end: int, state: Floats) -> list[bytes]:
         rows = slice(start, end)
@@ -319,7 +353,9 @@ class _Composer:
             name=self.name,
             version=__version__,
             cell=self.cell,
-            motions=len(self.targets),
+            motions=len(self.targets) - sum(arc.end - arc.first for arc in self.arcs),
+            arcs=len(self.arcs),
+            circ_type=w.CIRC_TYPE if self.arcs else "",
             options=st.ascii_text(self.layout.options, 200),
             allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
             guard=self.layout.guard,

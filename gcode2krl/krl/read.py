@@ -27,6 +27,7 @@ _DECLARATION = re.compile(rf"(?:{'|'.join(w.DECLARING)})\b", re.IGNORECASE)
 _EXT = w.EXT.encode("ascii")
 _EXTERNAL = re.compile(rb"\s*%b\s+([A-Z_][A-Z0-9_]*)\s*\(" % _EXT, re.IGNORECASE)
 _COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
+_COMPONENT = re.compile(r"\b([XYZ])\s+([-+.\d]+(?:E[-+]?\d+)?)", re.IGNORECASE)
 _COUNTED = ("WHILE", "IF", "FOR", "LOOP")
 """Blocks whose ends are counted in a file."""
 
@@ -69,6 +70,10 @@ class KrlProgram:
     """(j,) motions to joint targets."""
     joint_deg: Floats
     """(j, 6) A1 to A6 of these motions, NaN where absent."""
+    circ_rows: Ints
+    """(c,) motions along an arc."""
+    circ_via_mm: Floats
+    """(c, 3) a point that each passes."""
     ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
@@ -200,6 +205,7 @@ class _Reader:
         ptp, speed, cdis, line = motion_columns(kind, executed.blend, executed.line, first_number)
         dwells = np.flatnonzero((other_kind == w.KIND_WAIT_SEC) & (executed.blend[others] == 1))
         joint_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_PTP_AXES))
+        circ_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_CIRC))
         pose, joint_deg = executed.pose, executed.pose[joint_rows, :6]
         pose[joint_rows] = np.nan
         heads = b"".join(text[:6000].tobytes() for text in self.texts.values())
@@ -208,6 +214,8 @@ class _Reader:
             pose=pose,
             joint_rows=joint_rows,
             joint_deg=joint_deg,
+            circ_rows=circ_rows,
+            circ_via_mm=self._via_mm(executed, len(circ_rows)),
             ptp=ptp,
             speed_mm_s=speed,
             cdis_mm=cdis,
@@ -227,6 +235,17 @@ class _Reader:
             guard=w.NO_GUARD.encode("ascii") not in heads,
             def_line=self.def_lines[main[1]],
         )
+
+    def _via_mm(self, executed: Executed, count: int) -> Floats:
+        """Return the points (c, 3) that arcs pass; NaN where one cannot be read."""
+        rows = np.flatnonzero(executed.kind == w.KIND_CIRC)
+        via_mm = np.full((count, 3), np.nan)
+        for number, place in enumerate(
+            zip(*(column.tolist() for column in executed.places(rows)), strict=True)
+        ):
+            for key, value in _COMPONENT.findall(self._statement(*place).partition("}")[0]):
+                via_mm[number, "XYZ".index(key.upper())] = float(value)
+        return via_mm
 
     def _statements(self, executed: Executed) -> tuple[Statement, ...]:
         """Return what is neither motion nor setting nor a trigger that is understood."""

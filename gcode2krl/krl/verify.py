@@ -11,11 +11,12 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
 from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
+from gcode2krl.krl.arcs import arcs_of, unrolled
 from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
@@ -150,7 +151,8 @@ def verify_krl(
         program = _without_pilot(program, cell)
     alone = declares_itself(program)
     online = rsi_name(program, Path(path).parent)
-    layout = Layout(guard=program.guard, online=online, single_file=alone)
+    arcs = tuple(arcs_of(targets)) if len(program.circ_rows) else ()
+    layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
     expected = {name: store(pieces) for name, pieces in composed.items()}
     if not alone:
@@ -212,9 +214,12 @@ def compare(
     With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force; with
     ``original``, where corners are left out, also with every move of the G-code.
     """
+    program = unrolled(program, targets)
+    intended = unrolled(intended, targets) if intended is not None else None
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
     issues += _start_issues(program, targets)
+    issues += _arc_issues(program)
     paired = len(program.ptp) == len(targets)
     count = len(targets)
     if not paired:  # behind the first difference every motion would be compared with another
@@ -302,6 +307,20 @@ def _start_issues(program: KrlProgram, targets: Targets) -> list[Issue]:
     text = f"{file}the first programmed position is passed by C_DIS; the prediction starts there at rest"
     remedy = "translate again; a prediction of an older version must be made again"
     return [Issue("error", "verify-start", int(program.line[first]), text, remedy)]
+
+
+def _arc_issues(program: KrlProgram) -> list[Issue]:
+    """Return the arcs that could not be unrolled."""
+    return [
+        Issue(
+            "error",
+            "krl-motion-unknown",
+            int(program.line[row]),
+            f"{in_file(program, program.file[program.file_of[row]])}CIRC goes another way than the targets",
+            REMEDY,
+        )
+        for row in program.circ_rows[:MOST_PLACES].tolist()
+    ]
 
 
 def _own_declarations(declarations: tuple[Statement, ...]) -> tuple[Statement, ...]:

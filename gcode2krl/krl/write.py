@@ -16,6 +16,7 @@ from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files.stored import Stored, Texts
 from gcode2krl.krl.announce import PilotPlan
+from gcode2krl.krl.arcs import Arc, arcs_of
 from gcode2krl.krl.composition import Layout
 from gcode2krl.krl.draft import Composer, Content
 from gcode2krl.krl.pilot_check import PilotFigures
@@ -31,6 +32,8 @@ from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
+_CHORD_BYTES = 66
+"""What a LIN takes, more or less."""
 PilotForm = Literal["index", "values", "none"]
 
 
@@ -161,6 +164,9 @@ def write_krl(
         of_name += online_issues(targets, cell)
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
 
+    arcs, about_arcs = _arcs(targets, cell, pilot, is_online=online is not None)
+    of_name += about_arcs
+
     def layout(known: Targets | Prediction | Forecast) -> Layout:
         return Layout(
             guard,
@@ -171,6 +177,7 @@ def write_krl(
             forces=not isinstance(known, Targets) and known.has_forces,
             online=online or "",
             collisions=_scope(known, cell),
+            arcs=tuple(arcs),
         )
 
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
@@ -180,7 +187,7 @@ def write_krl(
         if complete is not None:
             source = composer.composed_while(complete, bare, layout(source))
         issues = list(released([*of_name, *source.issues], allow, strict))
-        plan = _pilot_plan(source, pilot, joints, file is not None)
+        plan = _pilot_plan(source, "none" if arcs else pilot, joints, file is not None)
         give_back()
         content = bare if plan is None or isinstance(plan, Issue) else Content.of(plan)
         report = composer.composed(content, layout(source))
@@ -196,6 +203,33 @@ def write_krl(
     return WrittenProgram(
         program_name, tuple(written), files.contents, report, tuple(issues), content.targets
     )
+
+
+def _arcs(
+    targets: Targets, cell: Cell, pilot: PilotForm | None, *, is_online: bool
+) -> tuple[list[Arc], list[Issue]]:
+    """Return the arcs that become CIRC, and what there is to say of them where the cell asks for them.
+
+    The triggers of a pilot force and RSI count on motions as they are predicted, so they need the chords: a
+    pilot force that is asked for by name keeps them, the default one is left out instead.
+    """
+    if not cell.controller.circ:
+        return [], []
+    why = "RSI" if is_online else "a pilot force" if pilot in ("index", "values") else ""
+    why = "--simplify" if targets.simplified is not None else why
+    if why:
+        sentence = f"arcs stay LIN: {why} needs the motions as they are predicted"
+        return [], [Issue("note", "circ-left-out", 0, sentence, "leave out one of them")]
+    arcs = arcs_of(targets)
+    if not arcs:
+        return [], []
+    chords = sum(arc.end - arc.first + 1 for arc in arcs)
+    saved_kB = (chords - len(arcs)) * _CHORD_BYTES / 1e3
+    sentence = (
+        f"{len(arcs)} CIRC instead of {chords} LIN, about {saved_kB:.0f} kB less, without a pilot force; "
+        "their time is that of the chords (assumed)"
+    )
+    return arcs, [Issue("note", "circ", 0, sentence, "measure one with the controller's trace")]
 
 
 def _scope(source: Targets | Prediction | Forecast, cell: Cell) -> CollisionScope | None:

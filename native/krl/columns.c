@@ -3,7 +3,7 @@
 #include "constants.h"
 
 static inline bool is_motion_kind(uint8_t kind) {
-    return kind == W_KIND_LIN || kind == W_KIND_PTP || kind == W_KIND_PTP_AXES;
+    return kind == W_KIND_LIN || kind == W_KIND_PTP || kind == W_KIND_PTP_AXES || kind == W_KIND_CIRC;
 }
 
 /* Take over a setting of the path speed in m/s or of the approximation in mm; one that has no number is none. */
@@ -43,7 +43,7 @@ EXPORT void krl_motions(Bytes kind, Bytes blend, Ints32 line, Floats number, Flo
             set(AT(kind, row), AT(number, other++), &speed, &cdis);
             continue;
         }
-        const bool is_ptp = AT(kind, row) != W_KIND_LIN;
+        const bool is_ptp = AT(kind, row) == W_KIND_PTP || AT(kind, row) == W_KIND_PTP_AXES;
         AT(ptp, motion) = is_ptp;
         AT(speed_mm_s, motion) = is_ptp ? NAN : speed;
         AT(cdis_mm, motion) = AT(blend, row) == 1 ? cdis : 0.0;

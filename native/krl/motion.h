@@ -1,4 +1,4 @@
-/* A LIN or PTP by its components. */
+/* A LIN, PTP or CIRC by its components. */
 
 #ifndef KRL_MOTION_H
 #define KRL_MOTION_H
@@ -8,7 +8,7 @@
 enum { NO_COMPONENT = -1 };
 enum { COLUMN_X = 0, COLUMN_A = 3, COLUMN_S = 6, COLUMN_T = 7 };
 /* Components A1 to A6 have the bits from here on, the others those of their columns. */
-enum { AXIS_BITS = W_STATEMENT_COLUMNS, CARTESIAN = (1 << W_STATEMENT_COLUMNS) - 1 };
+enum { AXIS_BITS = W_STATEMENT_COLUMNS, CARTESIAN = (1 << W_STATEMENT_COLUMNS) - 1, PLACE_BITS = 7 };
 
 /* Read the name of a component; return the place behind it. */
 static inline Place component(Place at, Place end, int *bit) {
@@ -55,17 +55,41 @@ static inline Place components(Place at, Place end, double *value, int *found) {
     }
 }
 
-/* Tell whether a statement is a motion, whether or not it can be read. */
-static inline bool is_motion(Place begin, Place end) {
-    return STANDS(begin, end, W_LIN) || STANDS(begin, end, W_PTP);
+/* Tell whether a statement is a CIRC, and not a name that begins with it. */
+static inline bool is_circ(Place begin, Place end) {
+    const Place behind = begin + sizeof(W_CIRC) - 1;
+    return STANDS(begin, end, W_CIRC) && behind < end && (is_blank(HERE(behind, end)) || is(behind, end, CH_BRACE_OPEN));
 }
 
-/* Read a motion into value. */
-static inline Statement motion(Place begin, Place end, double *value) {
-    Statement read = {STANDS(begin, end, W_LIN) ? W_KIND_LIN : W_KIND_PTP, W_MALFORMED};
+/* Tell whether a statement is a motion, whether or not it can be read. */
+static inline bool is_motion(Place begin, Place end) {
+    return STANDS(begin, end, W_LIN) || STANDS(begin, end, W_PTP) || is_circ(begin, end);
+}
+
+/* Read the point that a CIRC passes, which is asked for again by whoever needs it; return where its end begins. */
+static inline Place passed_point(Place at, Place end, double *value) {
     int found;
-    Place at = components(blank(begin + sizeof(W_LIN) - 1, end), end, value, &found);
-    const bool axes = found > CARTESIAN, linear = read.kind == W_KIND_LIN;
+    at = components(at, end, value, &found);
+    if (at == NULL || (found & PLACE_BITS) != PLACE_BITS || found > CARTESIAN)
+        return NULL;
+    at = blank(at, end);
+    return is(at, end, CH_COMMA) ? blank(at + 1, end) : NULL;
+}
+
+/* Read a motion into value; of a CIRC its end. */
+static inline Statement motion(Place begin, Place end, double *value) {
+    const bool arc = is_circ(begin, end);
+    Statement read = {arc ? W_KIND_CIRC : STANDS(begin, end, W_LIN) ? W_KIND_LIN : W_KIND_PTP, W_MALFORMED};
+    int found;
+    Place at = blank(begin + (arc ? sizeof(W_CIRC) : sizeof(W_LIN)) - 1, end);
+    if (arc) {
+        double passed[W_STATEMENT_COLUMNS];
+        at = passed_point(at, end, passed);
+        if (at == NULL)
+            return read;
+    }
+    at = components(at, end, value, &found);
+    const bool axes = found > CARTESIAN, linear = read.kind != W_KIND_PTP;
     if (axes && !linear)
         read.kind = W_KIND_PTP_AXES;
     if (at == NULL || (axes && (linear || found & CARTESIAN)))

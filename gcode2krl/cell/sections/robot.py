@@ -125,6 +125,8 @@ class Controller(Provenance):
     acc_ori_deg_s2: Positive = 100.0
     ptp_percent: Annotated[int, Field(strict=True, ge=1, le=100)] = 20
     law: Literal["averages", "trapezoid"] = "averages"
+    circ: bool = False
+    """Arcs of the G-code become CIRC."""
 
 
 class Frames(Provenance):
