@@ -99,6 +99,7 @@ class ArmInStock:
         for before, after, line in zip(*inside, strict=True):
             if int(line) in told:
                 continue
+            before = before if np.isfinite(before).all() else after  # behind what is out of reach
             ends = self._ends_mm(np.stack([before, after]))
             chord_mm = np.sqrt(np.square(np.diff(ends.reshape(2, -1, 3), axis=0)).sum(axis=2).max())
             steps = int(np.clip(np.ceil(chord_mm / _STEP_MM), 1, _MOST_STEPS))

@@ -25,6 +25,8 @@ OFF_MM = 0.0015
 """How far a target may be from the circle of the points as they are written."""
 SAGITTA_MM = 0.02
 """How far the circle may go beside the chords of its targets."""
+CHORD_OFF_MM = 0.005
+"""How far chords may be beside an arc that is made of them again."""
 _STEP_MM = 1e-3
 """What positions are written in."""
 _AT_END_MM = 0.002
@@ -45,6 +47,11 @@ class _Circle(NamedTuple):
     """Unit vector to its first point."""
     y: Floats
     radius: float
+
+    def at(self, angle: Floats) -> Floats:
+        """Return the points (n, 3) at angles (n, 1) from the first point on."""
+        points: Floats = self.centre + self.radius * (np.cos(angle) * self.x + np.sin(angle) * self.y)
+        return points
 
     def seen(self, points: Floats) -> tuple[Floats, Floats]:
         """Return angle (n,) from the first point on, 0 to 2 pi, and distance (n,) from the circle."""
@@ -147,18 +154,41 @@ def unrolled(program: KrlProgram, targets: Targets) -> KrlProgram:
     if not len(program.circ_rows):
         return program
     rows, poses, own = _rows_of_arcs(program, targets)
-    more = np.array([len(pose) for pose in poses], dtype=np.int64)
+    return _with_rows(program, rows, poses, [targets.cdis_mm[each] for each in own])
+
+
+def in_chords(program: KrlProgram) -> KrlProgram:
+    """Return a program whose arcs are chords, up to `CHORD_OFF_MM` beside them and blended as it blends."""
+    blended = np.where(program.cdis_mm > 0.0, np.arange(len(program.cdis_mm)), 0)
+    last_blended = np.maximum.accumulate(blended)
+    rows, poses, cdis = [], [], []
+    for row, via in zip(program.circ_rows.tolist(), program.circ_via_mm, strict=True):
+        circle = _circle(program.position_mm[row - 1], via, program.position_mm[row]) if row else None
+        if circle is None:
+            continue
+        whole = float(circle.seen(program.position_mm[row][None])[0][0])
+        step = 2.0 * np.arccos(max(1.0 - CHORD_OFF_MM / circle.radius, 0.0))
+        angle = np.linspace(0.0, whole, int(np.ceil(whole / step)) + 1)[1:-1, None]
+        rows.append(row)
+        poses.append(circle.at(angle))
+        cdis.append(np.full(len(angle), program.cdis_mm[last_blended[row]]))
+    return _with_rows(program, rows, poses, cdis)
+
+
+def _with_rows(
+    program: KrlProgram, rows: list[int], poses: list[Floats], cdis_mm: list[Floats]
+) -> KrlProgram:
+    """Return a program with places (k, 3) before the ends of some of its arcs, which are then LIN."""
     at = np.array(rows, dtype=np.int64)
     done = np.isin(program.circ_rows, at)
     count = np.ones(len(program.ptp), dtype=np.int64)
-    count[at] += more
+    count[at] += np.array([len(pose) for pose in poses], dtype=np.int64)
     order = np.repeat(np.arange(len(count)), count)
     added = np.ones(len(order), dtype=np.bool_)
     added[np.cumsum(count) - 1] = False
-    pose, cdis_mm, wait_s = program.pose[order], program.cdis_mm[order], program.wait_s[order]
+    pose, cdis, wait_s = program.pose[order], program.cdis_mm[order], program.wait_s[order]
     if len(at):
-        pose[added, :3] = np.concatenate(poses)
-        cdis_mm[added] = targets.cdis_mm[np.concatenate(own)]
+        pose[added, :3], cdis[added] = np.concatenate(poses), np.concatenate(cdis_mm)
         wait_s[added] = 0.0
     before = np.concatenate([[0], np.cumsum(count - 1)])
 
@@ -177,7 +207,7 @@ def unrolled(program: KrlProgram, targets: Targets) -> KrlProgram:
         circ_via_mm=program.circ_via_mm[~done],
         ptp=program.ptp[order],
         speed_mm_s=program.speed_mm_s[order],
-        cdis_mm=cdis_mm,
+        cdis_mm=cdis,
         wait_s=wait_s,
         line=program.line[order],
         file_of=program.file_of[order],
@@ -217,6 +247,4 @@ def _along(program: KrlProgram, targets: Targets, row: int, first: int, via: Flo
     points = targets.position_mm[first - 1 : last + 1]
     if circle is None or not _is_along(circle, points, end):
         return None
-    angle = circle.seen(points[1:-1])[0][:, None]
-    places: Floats = circle.centre + circle.radius * (np.cos(angle) * circle.x + np.sin(angle) * circle.y)
-    return places
+    return circle.at(circle.seen(points[1:-1])[0][:, None])

@@ -48,7 +48,7 @@ def _defaults(cell: Cell, tools: list[int], pilot: bool, online: bool) -> Iterat
 
 
 def default_values(cell: Cell) -> dict[str, str]:
-    """Return key → value of the documented defaults that nobody stated; what is empty is left out."""
+    """Return key → value of the documented defaults that nobody stated; what is empty or off is left out."""
     record = cell.model_dump(mode="json")
     found = {}
     for key in cell.defaults:
@@ -58,7 +58,7 @@ def default_values(cell: Cell) -> dict[str, str]:
         if key.endswith(".axis"):
             value = "+z"
         whose = " (library)" if key.endswith(".length_mm") else ""
-        if value not in ("", [], None):
+        if value not in ("", [], None) and value is not False:
             found[key] = f"{value}{whose}"
     return found
 

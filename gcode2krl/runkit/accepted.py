@@ -17,6 +17,7 @@ from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl import statements as st
+from gcode2krl.krl.arcs import in_chords
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG
 from gcode2krl.krl.read import KrlProgram, read_krl
 from gcode2krl.tables import Event, Targets, Toolpath
@@ -27,7 +28,7 @@ _RESTART = re.compile(r"^; \*\* RESTART AT G-CODE LINE (\d+)", re.MULTILINE)
 _LINE = re.compile(r"^; line (\d+)")
 _CODE = re.compile(r"^; (?:line (\d+)|end of the program): (M\d+)(?: (S[\d.]+|T\d+))?$")
 _NO_SWITCH = re.compile(
-    r"(?:PTP|LIN|TRIGGER|END|BAS|\$VEL|\$APO|\$TOOL|\$LOAD|GK_)\b|\$(?:VEL|APO|TOOL|LOAD)", re.IGNORECASE
+    r"(?:PTP|LIN|CIRC|TRIGGER|END|BAS|\$VEL|\$APO|\$TOOL|\$LOAD|GK_)\b|\$(?:VEL|APO|TOOL|LOAD)", re.IGNORECASE
 )
 _REMEDY = "name the cell that it was made with: --cell cell.toml; or translate again"
 
@@ -65,7 +66,7 @@ def read_program(path: Path, cell: Cell) -> Accepted:
     Raises `NotUnderstoodError` where a file cannot be read, `RefusedError` where the program is broken, not
     written by gcode2krl, or made for another cell.
     """
-    program = read_krl(path)
+    program = in_chords(read_krl(path))
     text = program.texts[program.file[0]].decode("ascii", "replace").replace("\r\n", "\n")
     made = _MADE_BY.search(text)
     if made is None:

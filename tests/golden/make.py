@@ -13,6 +13,6 @@ for part in PROGRAMS:
         program = write_krl(
             set_targets(read_gcode(part, cell), cell), Path(folder) / f"{part.stem}.src", cell
         )
-    for name, text in program.texts.items():
-        (HERE / "krl").mkdir(exist_ok=True)
-        (HERE / "krl" / name).write_bytes(text)
+        for name, text in program.texts.items():
+            (HERE / "krl").mkdir(exist_ok=True)
+            (HERE / "krl" / name).write_bytes(text)

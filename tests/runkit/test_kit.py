@@ -2,13 +2,15 @@
 
 import re
 import tomllib
+from itertools import pairwise
 
 import numpy as np
 import polars as pl
 import pytest
 
-from gcode2krl import load_cell, load_run
+from gcode2krl import load_cell, load_run, read_gcode, set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
+from gcode2krl.krl.arcs import in_chords
 from gcode2krl.krl.read import read_krl
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit import make_kit
@@ -189,3 +191,30 @@ def test_a_split_program_is_read_whole(run, tmp_path):
     itself, air = read_krl(tmp_path / "PART.src"), read_krl(tmp_path / "kit" / "PART_AIR.src")
     assert len(itself.file) > 3
     assert np.allclose((air.position_mm - itself.position_mm)[1:-1, 2], LIFT_MM)
+
+
+def test_arcs_are_the_same_path_in_chords(tmp_path):
+    """Of a program with CIRC: full circles and halves, and what is switched between them is not lost."""
+    cell = over_demonstration({"controller": {"circ": True}})
+    part = tmp_path / "part.nc"
+    arcs = "G1 Z-2 F600\nG2 X40 Y0 I20 J0 F1500\nM8\nG3 X40 Y0 I0 J15\nM9\n"
+    part.write_text(f"G21 G90 G17\nT1 M6\nS12000 M3\nG0 X0 Y0\nG0 G43 H1 Z50\nG0 Z5\n{arcs}G0 Z50\nM5\nM30\n")
+    file = write_krl(set_targets(read_gcode(part, cell), cell), tmp_path / "PART.src", cell).files[0]
+    make_kit(file, tmp_path / "kit", cell)
+    assert len(read_krl(file).circ_rows) == 5
+    air = in_chords(read_krl(tmp_path / "kit" / "PART_AIR.src"))
+    cutting = np.flatnonzero(np.abs(air.position_mm[:, 2] - LIFT_MM + 2.0) < 1e-6)
+    path = np.concatenate(
+        [
+            one + np.linspace(0, 1, 20)[:, None] * (other - one)
+            for one, other in pairwise(air.position_mm[cutting, :2])
+        ]
+    )
+    off = np.minimum(
+        np.abs(np.hypot(*(path - [20.0, 0.0]).T) - 20.0), np.abs(np.hypot(*(path - [40.0, 15.0]).T) - 15.0)
+    )
+    assert off.max() < 0.0065
+    angle = np.unwrap(np.arctan2(*(path - [40.0, 15.0])[len(path) // 2 :, ::-1].T))
+    assert angle[-1] - angle[0] > 1.5 * np.pi  # around, and to the left
+    assert {switch.code for switch in read_program(file, cell).switches} >= {"M8", "M9"}
+    np.testing.assert_allclose(air.speed_mm_s[cutting[1:]], 25.0)
