@@ -17,6 +17,7 @@ NOSE_MM = 100.0
 """The spindle of these cells begins so far above the tip, with a round end of 75 mm."""
 BESIDE = "G0 X12 Y-40\nG0 Z5\nG1 Z0 F2000\nG1 Y60\n"
 POST = [[0.0, -5, -10], [20, 13, 120]]
+CAPSULES = 60
 PASSES = "G0 X-30 Y-25\nG0 Z0\nG1 X60 F3000\nG0 Z200\n"
 """Beside the post: the cutter clears it by 12 mm, the spindle does not."""
 
@@ -113,14 +114,14 @@ def test_depths_are_those_of_every_cell_tried_by_hand(found, tmp_path):
     milling = Milling(toolpath, cell, outlook_of([motion]), 0.012, threads=2)
     milling.take(motion, ends=True)
     draw = np.random.default_rng(5)
-    ends = np.concatenate([draw.uniform([-40, -40, -40], [60, 60, 200], (200, 3)) for _ in "ab"], axis=1)
-    radius = draw.uniform(3.0, 60.0, 200)
+    ends = np.concatenate([draw.uniform([-40, -40, -40], [60, 60, 200], (CAPSULES, 3)) for _ in "ab"], axis=1)
+    radius = draw.uniform(3.0, 60.0, CAPSULES)
     depth, place = milling.bodies_in(ends, radius)
     part = milling.part()
     by_hand = np.array([deepest(part, *pair) for pair in zip(ends, radius, strict=True)])
     assert (depth >= by_hand - 1e-6).all()
-    np.testing.assert_allclose(depth, by_hand, atol=0.03)  # the steps by hand are up to 0.1 mm wide
-    assert 30 < np.count_nonzero(depth > 0) < 195
+    np.testing.assert_allclose(depth, by_hand, atol=0.05)  # the steps by hand are up to 0.2 mm wide
+    assert 0.2 * CAPSULES < np.count_nonzero(depth > 0) < 0.95 * CAPSULES
     assert np.isfinite(place[depth > 0]).all()
 
 
@@ -129,7 +130,7 @@ def deepest(part, ends, radius):
     top = part.height_mm[rows, columns].astype(float)
     x = part.origin_mm[0] + (columns + 0.5) * part.cell_mm[0]
     y = part.origin_mm[1] + (rows + 0.5) * part.cell_mm[1]
-    steps = np.linspace(0.0, 1.0, 2001)[:, None]
+    steps = np.linspace(0.0, 1.0, 1001)[:, None]
     way = ends[:3] + steps * (ends[3:] - ends[:3])
     least = np.inf
     for at in way:

@@ -78,7 +78,9 @@ def translated(tmp_path):
     return translated
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize(
+    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 50))]
+)
 def test_random_arcs_go_where_the_g_code_goes(translated, seed):
     text, arcs = random_arcs(np.random.default_rng(seed))
     program, toolpath, cell = translated(text, cell_with_arcs(clearance={"z_mm": 400}))
