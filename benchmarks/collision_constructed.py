@@ -295,7 +295,7 @@ def cell_of(**more: object) -> Cell:
         **{"kind": "flat", "diameter_mm": CUTTER_MM, "teeth": 3, "flute_length_mm": 30.0},
         **{"stick_out_mm": STICK_OUT_MM, "holder_diameter_mm": HOLDER_MM, "length_mm": LENGTH_MM},
     }
-    spindle = {"body": {"capsules": SPINDLE}, **more.pop("spindle", {})}  # type: ignore[dict-item]
+    spindle = {"body": {"capsules": SPINDLE}}
     return resolve_cell({"based_on": "demonstration", "tool": {"1": tool}, "spindle": spindle, **more})
 
 
