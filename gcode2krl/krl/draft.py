@@ -68,6 +68,10 @@ class Composer:
         context = contextvars.copy_context()  # its long columns lie on disk too
         with ThreadPoolExecutor(1) as writer:
             coming = writer.submit(context.run, self.composed, content, layout)
-            result = work()
+            try:
+                result = work()
+            except BaseException:  # Ctrl+C too
+                self._files.give_up()
+                raise
         self._draft = content, layout, coming
         return result

@@ -1,7 +1,7 @@
 """The files of a program: what they are called, and how they come into their places together."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from gcode2krl import krl_words as w
@@ -15,6 +15,10 @@ from gcode2krl.krl.rsi_files import file_names
 _ALIKE = "; a controller needs file and DEF alike"
 
 
+class GivenUpError(Exception):
+    """Nobody waits for the program any more."""
+
+
 class ProgramFiles:
     """The files of a program: beside their places until it is verified, or without any."""
 
@@ -22,6 +26,7 @@ class ProgramFiles:
         self.file, self.name, self.inputs = file, name, inputs
         self.staging = Staging()
         self.contents: dict[str, Stored] = {}
+        self._is_given_up = False
 
     def __enter__(self) -> "ProgramFiles":
         return self
@@ -37,10 +42,20 @@ class ProgramFiles:
             refuse_inputs([_place(self.file, part, self.name) for part in texts], self.inputs)
         for part, pieces in texts.items():
             if self.file is None:
-                self.contents[part] = store(pieces)
+                self.contents[part] = store(self._wanted(pieces))
             else:
                 place = _place(self.file, part, self.name)
-                self.contents[part] = Stored(self.staging.write(place, pieces))
+                self.contents[part] = Stored(self.staging.write(place, self._wanted(pieces)))
+
+    def give_up(self) -> None:
+        """Let a thread that writes end before its next piece, by a `GivenUpError` there."""
+        self._is_given_up = True
+
+    def _wanted(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
+        for piece in pieces:
+            if self._is_given_up:
+                raise GivenUpError
+            yield piece
 
     def take_places(self) -> list[Path]:
         """Put the files in their places and return these; none where there is no file."""
