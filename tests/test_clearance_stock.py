@@ -162,3 +162,13 @@ def test_cables_that_touch_are_a_warning(found):
     near = [issue for issue in prediction.issues if issue.code == "near"]
     assert any(issue.message.startswith("the cables ") for issue in near)
     assert {issue.severity for issue in near} == {"warning"}
+
+
+def test_cables_in_the_raw_part_are_a_warning(found):
+    """On the way in, where nothing else comes."""
+    cables = {"capsules": [{"from_mm": [0.0, 900, 0], "to_mm": [0.0, 900, 0], "radius_mm": 50}]}
+    wall = [[-2000.0, 850, 0], [1000, 880, 2000]]
+    prediction, issues = found(BESIDE, stock={"box_mm": wall, "resolution_mm": 2.0}, cables=cables)
+    assert issues == []
+    near = [issue.message for issue in prediction.issues if issue.code == "near"]
+    assert any(message.startswith("the cables may touch the stock on the PTP from HOME") for message in near)

@@ -104,7 +104,8 @@ class Contacts:
                 if is_certain and count <= MOST_PLACES:
                     yield _collision(who, what, place)
             is_hit = bool(pair.hits) and is_certain
-            if not is_hit and pair.nearest is not None and what != self.only_hits:
+            is_meant = what == self.only_hits and not pair.hits
+            if not is_hit and pair.nearest is not None and not is_meant:
                 yield self._near(who, what, pair, pair.nearest)
 
     def _near(self, who: str, what: str, pair: _Pair, place: Touch) -> Issue:
