@@ -3,10 +3,8 @@
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import click
 
@@ -120,14 +118,16 @@ def command(
     make_folder(out)
     workers = crew_for(processes) if scheduler is None else cluster_at(scheduler)
     earlier, batch, stopped = earlier_files(out), Told(len(planned)), False
-    with shown(console, batch) as show, _stopped_by_the_system():
+    with _Stops() as stops:
         try:
-            for line in run_batch(planned, out, workers, cache):
-                remove_outdated(out, earlier.get(line.record["part"], {}), line.record)
-                show(line)
+            with shown(console, batch) as show:
+                for line in run_batch(planned, out, workers, cache):
+                    remove_outdated(out, earlier.get(line.record["part"], {}), line.record)
+                    show(line)
+            stops.are_heeded = False
         except KeyboardInterrupt:
-            stopped = True
-    files = write_results(out, batch.records, before)
+            stops.are_heeded, stopped = False, True
+        files = write_results(out, batch.records, before)
     seconds = time.perf_counter() - began_s
     code = INTERRUPTED if stopped else batch.exit_code
     if as_json:
@@ -138,18 +138,25 @@ def command(
     return code
 
 
-@contextmanager
-def _stopped_by_the_system() -> Iterator[None]:
-    """Take the signal with which a CI service ends a job for a Ctrl-C."""
+class _Stops:
+    """Ctrl-C, and the signal with which a CI service ends a job: they stop the batch, not its results."""
 
-    def stop(_number: int, _frame: object) -> None:
-        raise KeyboardInterrupt
+    def __init__(self) -> None:
+        self.are_heeded = True
+        self._before: dict[int, Any] = {}
 
-    if threading.current_thread() is not threading.main_thread():  # only that one may
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    def __enter__(self) -> Self:
+        if threading.current_thread() is not threading.main_thread():  # only that one may
+            return self
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell leaves it in the background
+                self._before[number] = signal.signal(number, self._stop)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def _stop(self, _number: int, _frame: object) -> None:
+        if self.are_heeded:
+            raise KeyboardInterrupt

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from gcode2krl.batch import results
 from gcode2krl.batch.cache import FOLDER_VARIABLE
 from gcode2krl.result.model import Record
 from tests.conftest import HEEDS_CTRL_C, ROOT
@@ -373,6 +374,24 @@ def test_ctrl_c_leaves_what_is_finished_and_the_next_call_goes_on(parts, run, tm
     assert run("batch", parts, "-o", "out").code == 0
     assert cached("out") == finished
     assert programs("out") == programs("undisturbed")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends the signal of Ctrl-C")
+def test_ctrl_c_after_the_last_part_does_not_cost_the_results(parts, run, monkeypatch):
+    wrote = results.write_results
+
+    def interrupted(*given):
+        os.kill(os.getpid(), signal.SIGINT)
+        return wrote(*given)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background shell ignores it
+    monkeypatch.setattr(results, "write_results", interrupted)
+    try:
+        assert run("batch", parts, "-o", "out").code == 0
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(records("out")) == 3
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
