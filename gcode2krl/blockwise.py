@@ -122,6 +122,7 @@ def _seen_along(
     follower = follower_of(course, cell) if judges_joints or guard is not None else None
     share = np.zeros(len(line)) if judges_joints else None
     gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
+    carried = np.zeros((0, 6))
     angles = np.empty((2, course.count if keeps and follower is not None else 0, 6))
     solved = 0
     with ahead(course.blocks()) as blocks:
@@ -132,11 +133,12 @@ def _seen_along(
                 q, qd = follower.take(motion, ends)
                 waiting = np.concatenate([waiting, [motion.move, motion.tool]], axis=1)
                 move, tool = waiting[:, : len(q)]
-                waiting = waiting[:, len(q) :]
+                waiting, around = waiting[:, len(q) :], np.concatenate([carried, motion.external])
+                carried = around[len(q) :]
                 if share is not None:
                     robot.raise_shares(share, qd, move, cell)
                 if guard is not None:
-                    guard.take(q, move, tool)
+                    guard.take(q, move, tool, around[: len(q)])
                 if keeps:
                     angles[:, solved : solved + len(q)] = q, qd
                     solved += len(q)
@@ -164,13 +166,13 @@ class _Guard:
             return None
         return cls(watch, line, moves_watched_at_targets(targets), keeps=keeps)
 
-    def take(self, q_rad: Floats, move: Ints32, tool: Ints32) -> None:
-        """Go on along samples (m) with their joints."""
+    def take(self, q_rad: Floats, move: Ints32, tool: Ints32, external: Floats) -> None:
+        """Go on along samples (m) with their joints and external axes."""
         elsewhere = np.isin(move, self._elsewhere)
         if elsewhere.any():
             q_rad = np.where(elsewhere[:, None], np.nan, q_rad)
         if len(q_rad):
-            told = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move])
+            told = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move], external)
             if self._kept is not None:
                 self._kept.append(told)
 
@@ -311,7 +313,7 @@ class Loads:
         deflection = None
         if self._missing is None and self._force_limits.absurd is None:
             with np.errstate(all="ignore"):  # an absurd result becomes a finding
-                deflection = compliance.deflect_at(q_rad, qd_rad_s, forces, self._cell)
+                deflection = compliance.deflect_at(q_rad, qd_rad_s, motion.external, forces, self._cell)
             reached = np.asarray(np.isfinite(q_rad).all(axis=1))
             self._deflection_limit.take(deflection, reached, line)
         return Block(motion, line, forces, deflection)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.cell.carried import vectors_turned
 from gcode2krl.errors import input_error
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.plots import FIGURES
@@ -146,14 +147,13 @@ def _shares(prediction: Prediction) -> tuple[tuple[str, ...], Floats]:
     joints, forces, deflection = prediction.joints, prediction.forces, prediction.deflection
     if joints is None or forces is None or deflection is None:
         raise AssertionError("a deflection is known only of joints and forces")
-    base = prediction.cell.base_matrix()[:3, :3]
-    shares = joint_shares(
-        joints.q_rad,
-        forces.force_base_N @ base.T,
-        forces.moment_base_Nmm @ base.T,
-        prediction.cell,
-        forces.tool,
+    base = prediction.cell.base_in_root(joints.external[:1])
+    if prediction.cell.external:
+        base = prediction.cell.base_in_root(joints.external)
+    force, moment, total = (
+        vectors_turned(vector, base)
+        for vector in (forces.force_base_N, forces.moment_base_Nmm, deflection.deflection_base_mm)
     )
-    total = deflection.deflection_base_mm @ base.T
+    shares = joint_shares(joints.q_rad, force, moment, prediction.cell, forces.tool)
     size = np.linalg.norm(total, axis=1, keepdims=True)
     return VIRTUAL_JOINTS, np.einsum("mjk,mk->mj", shares, total / np.where(size > 0.0, size, 1.0))

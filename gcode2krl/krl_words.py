@@ -19,6 +19,7 @@ CIRC_TYPE = "$CIRC_TYPE=#BASE"
 POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
 STATUS_TURN = ("S", "T")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
+EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 MOTIONS_NOT_WRITTEN = _words("CIRC SPLINE ENDSPLINE SLIN SPTP SCIRC LIN_REL PTP_REL CIRC_REL SPL")
 """Motions that a program of this package never has."""
 MOTIONS = MOTIONS_NOT_WRITTEN | _words(
@@ -67,6 +68,8 @@ RSI_SLOW_CYCLE_S = 0.012
 VEL_CP, APO_CDIS = "$VEL.CP", "$APO.CDIS"
 BASE, TOOL, LOAD, ACT_BASE, ACT_TOOL = "$BASE", "$TOOL", "$LOAD", "$ACT_BASE", "$ACT_TOOL"
 BASE_DATA, TOOL_DATA, ROBROOT = "BASE_DATA", "TOOL_DATA", "$ROBROOT"
+ROBROOT_NOW, MACHINE_DEF = "$ROBROOT_C", "MACHINE_DEF"
+"""The robot root as a rail has moved it, and the machines of a cell, tables among them."""
 OUT = "$OUT"
 OWN_PREFIX = "GK_"
 """Of the subprograms and variables inside our programs."""
@@ -138,6 +141,8 @@ ASSIGNS, CALLS = 1, 2
 
 STATEMENT_COLUMNS = len(POSE_KEYS) + len(STATUS_TURN)
 """X, Y, Z, A, B, C, S, T, or A1 to A6; a lone number stands in column 0."""
+EXTERNAL_COLUMNS = len(EXTERNAL_KEYS)
+"""E1 to E6 of a motion, which are read apart: most programs have none."""
 TRIGGER_DISTANCE, TRIGGER_DELAY, TRIGGER_WRITTEN, TRIGGER_NAME = 0, 1, 2, 6
 """Of a trigger: distance, delay, the numbers it writes, first byte and length of the name."""
 TRIGGER_NUMBERS = 4

@@ -13,18 +13,19 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl import compliance, cutting, gcode, krc4, program, robot
-from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl import cutting, gcode, krc4, program, robot
+from gcode2krl.arrays import Floats
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.clearance import collisions_beside, freedom
+from gcode2krl.clearance import collisions_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
-from gcode2krl.errors import Issue, NotUnderstoodError, input_error
+from gcode2krl.errors import Issue, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
 from gcode2krl.progress import Begin, Progress, unheard, unseen
+from gcode2krl.redundancy import posed_targets
 from gcode2krl.tables import (
     Clearance,
     Deflection,
@@ -36,15 +37,11 @@ from gcode2krl.tables import (
     Toolpath,
     blocks_of,
 )
-from gcode2krl.units import RAD_PER_DEG
 from gcode2krl.version import __version__
 
 if TYPE_CHECKING:
     from gcode2krl.effects import Applied
 
-_HITS = -2.0
-"""Added to the quality of a pose that hits something: where all do, the most comfortable is taken."""
-_ACROSS_N = 100.0
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
 _CLEARANCE_KNOWN: WeakKeyDictionary[Motion, Clearance] = WeakKeyDictionary()
@@ -312,7 +309,7 @@ def targets_and_joints(
     if tolerance_mm is not None and not (np.isfinite(tolerance_mm) and tolerance_mm > 0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive")
     program.require_geometry(toolpath, cell)
-    planned = program.plan_targets(toolpath, cell, _home_pose(cell), _spin_of(cell), tolerance_mm)
+    planned = posed_targets(toolpath, cell, tolerance_mm)
     if simplify_mm is not None:
         planned = _simplified(planned, toolpath, cell, simplify_mm, tolerance_mm)
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
@@ -486,61 +483,3 @@ def _motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
         known = (cell, *robot.motion_angles(motion, cell))
         _ANGLES_KNOWN[motion] = known
     return known[1], known[2]
-
-
-def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
-    def home_pose(tool: int) -> tuple[Floats, Floats]:
-        position, rotation = robot.forward(cell.home_q_rad(), cell, tool)
-        return position[0], rotation[0]
-
-    return home_pose
-
-
-def _spin_of(cell: Cell) -> Callable[[Floats, Floats, Ints32], Floats | float]:
-    spin = cell.frames.spin
-    if not isinstance(spin, str):
-        return lambda position, axis, tool: float(spin) * RAD_PER_DEG
-    if spin == "stiffest":
-        missing = compliance.missing_stiffness(cell)
-        if missing is not None:
-            raise NotUnderstoodError(missing, source=cell.name)
-
-    def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
-        def comfort(rows: Ints, spin_rad: float) -> Floats:
-            rotation = program.tool_rotation(axis[rows], spin_rad)
-            return robot.pose_quality(position[rows], rotation, tool[rows], cell)
-
-        def quality(rows: Ints, spin_rad: float) -> Floats:
-            plain, rotation = comfort(rows, spin_rad), program.tool_rotation(axis[rows], spin_rad)
-            free = freedom(position[rows], rotation, tool[rows], cell, plain)
-            return np.where(free < 0.0, plain + _HITS, np.minimum(plain, free))
-
-        def bending(rows: Ints, spin_rad: float) -> Floats:
-            rotation = program.tool_rotation(axis[rows], spin_rad)
-            return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
-
-        if spin == "stiffest":
-            return program.stiffest_spin(position, quality, bending, axis)
-        return program.smooth_spin(position, quality, axis)
-
-    return searched
-
-
-def _bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, cell: Cell) -> Floats:
-    """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
-
-    The root mean square over all directions across the axis; NaN where a branch has no solution.
-    """
-    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    result = np.full((len(position), 8), np.nan)
-    for number in np.unique(tool):
-        rows = np.flatnonzero(tool == number)
-        q = robot.inverse(position[rows], rotation[rows], cell, int(number)).reshape(-1, 6)
-        square = np.zeros(len(q))
-        for direction in (across[rows], np.cross(axis[rows], across[rows])):
-            load_N = np.repeat(_ACROSS_N * direction, 8, axis=0)
-            bent_mm, _ = compliance.deflection_of(q, load_N, np.zeros(3), np.zeros(3), cell, int(number))
-            square += np.einsum("ij,ij->i", bent_mm, bent_mm)
-        result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
-    return result

@@ -224,6 +224,8 @@ class Targets(Table):
     """(p,) line of the G-code, 0 = added."""
     tool: Ints32 = column(np.int32)
     """(p,) tool number whose frame moves."""
+    external: Floats = derived_column(np.float64, 6, on_disk="e")
+    """(p, 6) E1 to E6 in mm and degrees, 0 without the axis."""
     events: tuple[Event, ...] = ()
     source: str = ""
     restart: Restart | None = None
@@ -232,6 +234,10 @@ class Targets(Table):
     """None: every corner of the G-code is a target."""
     correction_mm: float = 0.0
     """How far targets are moved at most, by offline compensation."""
+
+    def __post_init__(self) -> None:
+        _without_external(self, len(self.tool))
+        super().__post_init__()
 
     def facts(self) -> str:
         """Return how many motions there are, and the program's name."""
@@ -264,8 +270,11 @@ class Motion(Table):
     direction: Floats = derived_column(np.float64, 3)
     """(m, 3) unit tangent of the path at the sample, zero in a turn on the spot; where it is not given, that
     of the chords beside the sample."""
+    external: Floats = derived_column(np.float64, 6, on_disk="e")
+    """(m, 6) E1 to E6 in mm and degrees, 0 without the axis."""
 
     def __post_init__(self) -> None:
+        _without_external(self, len(self.tool))
         if self.direction is None:
             object.__setattr__(self, "direction", chord_directions(np.asarray(self.position_mm, np.float64)))
         super().__post_init__()
@@ -273,6 +282,12 @@ class Motion(Table):
     def facts(self) -> str:
         """Return how many samples there are, and the time they take."""
         return f"{len(self)} samples" + (f", {self.time_s[-1]:.1f} s" if len(self) else "")
+
+
+def _without_external(table: Table, rows: int) -> None:
+    """Let the external axes of a table that does not state them stand at 0, one row for all."""
+    if getattr(table, "external", 0) is None:
+        object.__setattr__(table, "external", np.broadcast_to(0.0, (rows, 6)))
 
 
 def lengths(vectors: Floats) -> Floats:
@@ -318,6 +333,12 @@ class Joints(Table):
     """(m,) KUKA's S bits."""
     turn: Ints32 = column(np.int32)
     """(m,) KUKA's T bits."""
+    external: Floats = derived_column(np.float64, 6, on_disk="e")
+    """(m, 6) E1 to E6 in mm and degrees, 0 without the axis."""
+
+    def __post_init__(self) -> None:
+        _without_external(self, len(self.status))
+        super().__post_init__()
 
     def facts(self) -> str:
         """Return how many rows there are, and how near a limit comes."""

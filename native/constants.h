@@ -119,6 +119,8 @@
 #define W_BASE_DATA "BASE_DATA"
 #define W_TOOL_DATA "TOOL_DATA"
 #define W_ROBROOT "$ROBROOT"
+#define W_ROBROOT_NOW "$ROBROOT_C"
+#define W_MACHINE_DEF "MACHINE_DEF"
 #define W_OUT "$OUT"
 #define W_OWN_PREFIX "GK_"
 #define W_PILOT_SUBPROGRAM "GK_PILOT"
@@ -151,6 +153,7 @@
 #define W_ASSIGNS 1
 #define W_CALLS 2
 #define W_STATEMENT_COLUMNS 8
+#define W_EXTERNAL_COLUMNS 6
 #define W_TRIGGER_DISTANCE 0
 #define W_TRIGGER_DELAY 1
 #define W_TRIGGER_WRITTEN 2
@@ -863,6 +866,7 @@
 #define DIFF_JOINT_LIMIT_DEG 0.001
 #define DIFF_CDIS_LIMIT_MM 0.0006
 #define DIFF_WAIT_LIMIT_S 0.0006
+#define DIFF_EXTERNAL_LIMIT 0.0006
 #define DIFF_REMEDY "translate again"
 #define DIFF_OTHER_KIND 0
 #define DIFF_POSITION 1
@@ -874,6 +878,7 @@
 #define DIFF_CDIS 7
 #define DIFF_WAIT 8
 #define DIFF_OTHER_BRANCH 9
+#define DIFF_EXTERNAL 10
 
 typedef struct {
     double x;

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import require_still
 from gcode2krl.errors import input_error
 from gcode2krl.identify.trial_program import most_rpm, mounted_tool, origin_of
 
@@ -49,6 +50,7 @@ def place_of(
     NotUnderstoodError
         Where the place lies above the clearance plane, or size or speed are out of range.
     """
+    require_still(cell, "a test program")
     if not _LEAST_SIZE_MM <= size_mm <= _MOST_SIZE_MM:
         allowed = f"{_LEAST_SIZE_MM:g} to {_MOST_SIZE_MM:g} mm"
         raise input_error(

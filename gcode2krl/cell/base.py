@@ -196,6 +196,7 @@ def _is_frame(path: tuple[str, ...]) -> bool:
         path in (("frames", "base"), ("frames", "tool"), ("frames", "robroot"))
         or (len(path) == 3 and path[0] == "tool" and path[2] == "frame")
         or (len(path) == 2 and path[0] == "work_offsets")
+        or (len(path) == 3 and path[0] == "external" and path[2] == "origin")
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from gcode2krl.cell.carriers import rails_of, tables_of
 from gcode2krl.cell.definition import Cell
 
 _ESTIMATES = ("assumption", "memory", "unknown")
@@ -71,8 +72,17 @@ def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> Coll
         movers.append(f"cables ({len(cell.cables.capsules)} capsules, warnings only)")
     else:
         unchecked.append("cables ([cables] is not stated)")
+    unchecked += _carriers(cell)
     unchecked.append("the way to the first HOME")
     return CollisionScope(tuple(movers), tuple(obstacles), tuple(unchecked))
+
+
+def _carriers(cell: Cell) -> list[str]:
+    """Return what is not checked of rails and tables."""
+    rails = [name for name in rails_of(cell.external) if cell.external[name].moves]
+    words = [f"carriage and foot of the robot on {name}" for name in rails]
+    tables = [name for name in tables_of(cell.external, cell.frames.base_on) if cell.external[name].moves]
+    return [*words, *(f"what {name} carries, while it turns" for name in tables)]
 
 
 def _estimated(sure: str) -> str:

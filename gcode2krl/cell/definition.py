@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
-from gcode2krl.cell import library
+from gcode2krl.cell import carriers, library
 from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base, split_pairs, stated_keys
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE, described_schema
 from gcode2krl.cell.key_lines import with_lines
@@ -54,6 +54,7 @@ from gcode2krl.cell.sections import (
     Verified,
     missing,
 )
+from gcode2krl.cell.sections.external import EXTERNAL_NAMES, ExternalAxis, ExternalName
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.units import RAD_PER_DEG
@@ -98,6 +99,8 @@ class Cell(Section):
     work_offsets: dict[
         Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Frame
     ] = Field(default_factory=dict)
+    external: dict[ExternalName, ExternalAxis] = Field(default_factory=dict)
+    """Axes beside A1 to A6."""
     home: Home = Home()
     clearance: Clearance = Clearance()
     material: Material | None = None
@@ -158,28 +161,70 @@ class Cell(Section):
         return np.array(self.home.q_deg) * RAD_PER_DEG
 
     def base_matrix(self) -> Floats:
-        """Return ``$BASE`` in the robot root (4, 4); raises `RefusedError` where it is not stated.
+        """Return ``$BASE`` in the robot root (4, 4), the external axes at rest.
+
+        Raises `RefusedError` where it is not stated.
 
         >>> from gcode2krl import load_cell
         >>> float(load_cell().base_matrix()[0, 3])
         1500.0
         """
+        if self.external:
+            at_rest: Floats = self.base_in_root(self.external_rest()[None])[0]
+            return at_rest
         base = self.base_in_world()
         robroot = self.frames.robroot
         return base if robroot is None else fr.invert(robroot.matrix()) @ base
 
-    def base_in_world(self) -> Floats:
-        """Return ``$BASE`` in ``$WORLD`` (4, 4), as KRL states it; raises `RefusedError` where it is missing.
+    def base_in_root(self, external: Floats) -> Floats:
+        """Return ``$BASE`` in the robot root (n, 4, 4), E1 to E6 at (n, 6) in mm and degrees.
 
-        The z of ``$WORLD`` points upwards, however the robot is mounted.
+        >>> from gcode2krl import load_cell
+        >>> cell = load_cell()
+        >>> cell.base_in_root(cell.external_rest()[None]).shape
+        (1, 4, 4)
+        """
+        robroot = self.frames.robroot
+        root = carriers.root_in_world(
+            self.external, external, np.eye(4) if robroot is None else robroot.matrix()
+        )
+        base = carriers.base_in_world(self.external, external, self.stated_base(), self.frames.base_on)
+        return np.asarray(fr.invert(root) @ base)
+
+    def base_in_world(self) -> Floats:
+        """Return ``$BASE`` in ``$WORLD`` (4, 4), the external axes at rest.
+
+        The z of ``$WORLD`` points upwards, however the robot is mounted. Raises `RefusedError` where it is
+        not stated.
 
         >>> from gcode2krl import load_cell
         >>> load_cell().base_in_world().shape
         (4, 4)
         """
+        at = self.external_rest()[None]
+        base: Floats = carriers.base_in_world(self.external, at, self.stated_base(), self.frames.base_on)[0]
+        return base
+
+    def stated_base(self) -> Floats:
+        """Return ``$BASE`` (4, 4) as it is stated: in ``$WORLD``, or in the table that carries it.
+
+        >>> from gcode2krl import load_cell
+        >>> float(load_cell().stated_base()[0, 3])
+        1500.0
+        """
         if self.frames.base is None:
             raise missing("frames.base")
         return self.frames.base.matrix()
+
+    def external_rest(self) -> Floats:
+        """Return E1 to E6 (6,) in mm and degrees where nobody says where they are; 0 without the axis.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().external_rest().tolist()
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        """
+        known = self.external
+        return np.array([known[name].rest() if name in known else 0.0 for name in EXTERNAL_NAMES])
 
     def tool_matrix(self, number: int) -> Floats:
         """Return the tool frame (4, 4) in the flange whose z points from tip to holder.
@@ -416,6 +461,9 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     if cell.mounted_tool is not None and cell.mounted_tool not in cell.tool:
         number = cell.mounted_tool
         yield _key_issue("mounted_tool", f"found {number}, and the cell has no [tool.{number}]")
+    base_on = cell.frames.base_on
+    if base_on is not None and (base_on not in cell.external or cell.external[base_on].is_rail):
+        yield _key_issue("frames.base_on", f"found {base_on}, and there is no table [external.{base_on}]")
     yield from _obstacle_issues(cell)
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from gcode2krl.errors import Issue
 
 _ANGLES = re.compile(
-    r"((?:frames\.(?:base|tool|robroot)|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
+    r"((?:frames\.(?:base|tool|robroot)|external\.E\d\.origin|work_offsets\..+|tool\.\d+\.frame)\.)[abc]_deg|home\.q_deg|frames\.spin"
 )
 _EIGHTH_TURN_RAD = math.pi / 4
 _NEAR_RAD = 2e-4
@@ -72,6 +72,7 @@ def _number(key: str) -> int:
 def general(key: str) -> str:
     """Return a dotted key with ``*`` for the number of a tool and the names of offsets and joints."""
     key = re.sub(r"^tool\.\d+\.", "tool.*.", key)
+    key = re.sub(r"^external\.E\d\.", "external.*.", key)
     key = re.sub(r"^work_offsets\.(G59\.\d|G\d+)\.", "work_offsets.*.", key)
     return re.sub(r"^compliance\.virtual_joints\.\w+\.", "compliance.virtual_joints.*.", key)
 

@@ -30,6 +30,14 @@ def motion_starts(targets: Targets, cell: Cell, rows: Rows = slice(None)) -> tup
     return position, rotation
 
 
+def external_starts(targets: Targets, rows: Rows = slice(None)) -> Floats:
+    """Return E1 to E6 (p, 6) at which each motion begins; row 0 where it ends."""
+    if targets.external.strides[0] == 0:
+        return targets.external[rows]
+    _, before = _with_predecessors(rows, len(targets))
+    return targets.external[before]
+
+
 def _with_predecessors(rows: Rows, count: int) -> tuple[Rows, Rows]:
     """Return an index of the rows and one of those before them, as slices (no copy) where possible."""
     if not isinstance(rows, slice):

@@ -16,8 +16,10 @@ import numpy as np
 from gcode2krl import collision, cutting
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import points_moved, to_rest
 from gcode2krl.cell.checked_parts import checks_collisions
 from gcode2krl.errors import Issue, Severity
+from gcode2krl.frames import invert
 from gcode2krl.tables import Motion, Toolpath, rows_of
 
 _STRETCH_ROWS = 64
@@ -39,6 +41,9 @@ class Inside(NamedTuple):
     before_rad: Floats
     """(k, 6) the rows before them."""
     q_rad: Floats
+    before_external: Floats
+    """(k, 6) E1 to E6."""
+    external: Floats
     line: Ints32
 
 
@@ -54,11 +59,12 @@ class ArmInStock:
         to_root[:3, :3] = frame[:3, :3] @ self._box.to_field.T
         to_root[:3, 3] = frame[:3, 3]
         self._carried = collision.Carried(cell)
-        box = (self._box.low_mm, self._box.high_mm, to_root)
-        self._dips = collision.Dips(self._carried, *box, _MARGIN_MM)
+        self._dips = self._dips_in(to_root)
         self._contacts = collision.Contacts(0.0)
         self._hit_lines: set[int] = set()
-        self._last_rad = np.zeros((0, 6))
+        self._last_rad, self._last_external = np.zeros((0, 6)), np.zeros((0, 6))
+        self._cell, self._dips_at = cell, cell.external_rest()
+        self._frame, self._to_root = frame, to_root
 
     @classmethod
     def of(cls, toolpath: Toolpath, cell: Cell, milling: cutting.Milling) -> "ArmInStock | None":
@@ -75,7 +81,9 @@ class ArmInStock:
         """
         motion, q_rad, qd_rad_s, ends = samples
         before = np.concatenate([self._last_rad if len(self._last_rad) else q_rad[:1], q_rad])
-        self._last_rad = before[-1:].copy()
+        external = motion.external[np.minimum(np.arange(len(q_rad)), len(motion) - 1)]
+        stood = np.concatenate([self._last_external if len(self._last_external) else external[:1], external])
+        self._last_rad, self._last_external = before[-1:].copy(), stood[-1:].copy()
         rows = self._rows_inside(motion, q_rad)
         if not len(rows):
             yield samples, None
@@ -87,7 +95,8 @@ class ArmInStock:
             behind = None if end == len(motion) else end
             own = rows[rows >= start] if behind is None else rows[(rows >= start) & (rows < end)]
             part = rows_of(motion, start, end), q_rad[start:behind], qd_rad_s[start:behind]
-            inside = Inside(before[own], q_rad[own], line[own]) if len(own) else None
+            columns = before[own], q_rad[own], stood[own], external[own], line[own]
+            inside = Inside(*columns) if len(own) else None
             yield (*part, ends and behind is None), inside
 
     def judge(self, inside: Inside) -> None:
@@ -96,15 +105,16 @@ class ArmInStock:
         A line that has hit something in an earlier stretch is told already.
         """
         told = set(self._hit_lines)
-        for before, after, line in zip(*inside, strict=True):
+        for before, after, stood, stands, line in zip(*inside, strict=True):
             if int(line) in told:
                 continue
             before = before if np.isfinite(before).all() else after  # behind what is out of reach
-            ends = self._ends_mm(np.stack([before, after]))
+            ends = self._ends_mm(np.stack([before, after]), np.stack([stood, stands]))
             chord_mm = np.sqrt(np.square(np.diff(ends.reshape(2, -1, 3), axis=0)).sum(axis=2).max())
             steps = int(np.clip(np.ceil(chord_mm / _STEP_MM), 1, _MOST_STEPS))
-            way = before + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (after - before)
-            self._hold(self._ends_mm(way), int(line))
+            share = np.linspace(0.0, 1.0, steps + 1)[1:, None]
+            at = np.array([stands]) if (stood == stands).all() else stood + share * (stands - stood)
+            self._hold(self._ends_mm(before + share * (after - before), at), int(line))
 
     def issues(self) -> tuple[Issue, ...]:
         """Return the collisions, as warnings where the stock is guessed."""
@@ -116,7 +126,19 @@ class ArmInStock:
         if not len(q_rad):
             return np.zeros(0, dtype=np.int64)
         shown = ~self._toolpath.machine[self._moves(motion, len(q_rad))]
+        if (motion.external != motion.external[0]).any():
+            self._dips_at = np.full(6, np.nan)  # another box with each row: all of them are looked at
+            return np.flatnonzero(shown)
+        if not np.array_equal(motion.external[0], self._dips_at):
+            by = to_rest(motion.external[:1], self._cell)
+            moved = np.eye(4) if by is None else by[0]
+            self._dips = self._dips_in(self._frame @ moved @ invert(self._frame) @ self._to_root)
+            self._dips_at = motion.external[0].copy()
         return np.flatnonzero(self._dips.take(q_rad) & shown)
+
+    def _dips_in(self, to_root: Floats) -> collision.Dips:
+        """Return what tells when a capsule comes into the box, which stands in a frame (4, 4) of the root."""
+        return collision.Dips(self._carried, self._box.low_mm, self._box.high_mm, to_root, _MARGIN_MM)
 
     def _lines(self, motion: Motion, count: int) -> Ints32:
         lines: Ints32 = self._toolpath.source_line[self._moves(motion, count)]
@@ -127,10 +149,14 @@ class ArmInStock:
         sample = np.minimum(np.arange(count), len(motion) - 1)
         return np.clip(motion.move[sample], 0, len(self._toolpath) - 1)
 
-    def _ends_mm(self, q_rad: Floats) -> Floats:
-        """Return both ends (n, b, 6) of all capsules in ``$BASE``."""
+    def _ends_mm(self, q_rad: Floats, external: Floats) -> Floats:
+        """Return both ends (n, b, 6) of all capsules in ``$BASE``, E1 to E6 at (n, 6) or (1, 6)."""
         ends = self._carried.ends_mm(q_rad)
         base: Floats = ends.reshape(-1, 3) @ self._to_base[:3, :3].T + self._to_base[:3, 3]
+        by = to_rest(external, self._cell)
+        if by is not None:
+            points = len(base) // len(q_rad)
+            base = points_moved(base, invert(np.repeat(by, points, axis=0) if len(by) > 1 else by))
         return base.reshape(ends.shape)
 
     def _hold(self, ends_mm: Floats, line: int) -> None:

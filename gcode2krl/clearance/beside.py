@@ -15,6 +15,7 @@ import numpy as np
 from gcode2krl import collision, robot
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import standing
 from gcode2krl.cell.checked_parts import checks_collisions
 from gcode2krl.clearance.proposals import Ptp, proposal, ptp_way
 from gcode2krl.compiled.inputs import locked
@@ -56,8 +57,11 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
             way = ptp_way(before, after)
         else:
             way = np.concatenate([before[None], robot.line_angles(targets, added.row, before, cell)])
+        stood, stands = targets.external[added.row - 1 : added.row + 1]
+        external = stood + np.linspace(0.0, 1.0, len(way))[:, None] * (stands - stood)
         is_ptp, is_uncut = bool(targets.ptp[added.row]), added.row <= first and targets.restart is None
-        found = watch.way(way, tool, added.line, added.words, is_ptp=is_ptp, against_raw=is_uncut)
+        held = {"is_ptp": is_ptp, "against_raw": is_uncut, "external": external}
+        found = watch.way(way, tool, added.line, added.words, **held)
         if is_ptp and found.hits:
             ptp = Ptp(targets, added.row, before, after)
             watch.advise(added.line, added.words, _advice(ptp, cell, against_raw=is_uncut))
@@ -67,14 +71,16 @@ def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issu
 def _advice(ptp: Ptp, cell: Cell, *, against_raw: bool) -> str:
     """Return what would be free instead of a PTP."""
     tool = int(ptp.targets.tool[ptp.row])
+    there = standing(cell, ptp.targets.external[ptp.row]) if cell.external else cell
 
     def is_free(way: Floats) -> bool:
-        watch = watch_of(cell)
+        watch = watch_of(there)
         if watch is None:
             return True
         return not watch.way(way, tool, 0, "", is_ptp=True, against_raw=against_raw).hits
 
-    found = proposal(ptp, cell, is_free)
+    stays = (ptp.targets.external[ptp.row] == ptp.targets.external[ptp.row - 1]).all()
+    found = proposal(ptp, cell, is_free) if stays else ""
     at_home = ptp.targets.home[ptp.row] or ptp.targets.home[ptp.row - 1]
     other = "put HOME elsewhere" if at_home else "cut in another order"
     return found or f"{other}, or move what is hit: no higher [clearance] z_mm or turn of A1 alone is free"

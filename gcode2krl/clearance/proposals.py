@@ -43,7 +43,7 @@ def ptp_way(before_rad: Floats, after_rad: Floats) -> Floats:
 def proposal(ptp: Ptp, cell: Cell, is_free: IsFree) -> str:
     """Return what would be free, as a remedy; empty where nothing that is tried is."""
     for words, ways in (*_higher(ptp, cell), *_via(ptp)):
-        if all(_is_within_limits(way, ptp, cell) and is_free(way) for way in ways):
+        if all(_is_within_limits(way, cell) and is_free(way) for way in ways):
             return words
     return ""
 
@@ -76,6 +76,5 @@ def _via(ptp: Ptp) -> Iterator[tuple[str, list[Floats]]]:
         yield words, [ptp_way(before, via), ptp_way(via, after)]
 
 
-def _is_within_limits(way: Floats, ptp: Ptp, cell: Cell) -> bool:
-    tool = np.full(len(way), ptp.targets.tool[ptp.row], dtype=np.int32)
-    return bool(robot.joints_at(way, tool, cell, conditioning=False).limit_margin_rad.min() > 0.0)
+def _is_within_limits(way: Floats, cell: Cell) -> bool:
+    return bool(robot.limit_margin(way, cell).min() > 0.0)

@@ -18,6 +18,8 @@ bodies, or a body and an obstacle. Its gap is computed where it has to be, and b
   enough the way is halved, the joints at its middle solved, and each half judged likewise, until it is
   enough, something touches, or the chord is `SHORT_MM`: then the bound itself counts.
 
+A rail moves the root along a straight line evenly, which adds to the chord and to no second derivative.
+
 The samples of a Motion lie on the controller's way, which between them is not quite that of the joints: by an
 eighth of the second difference of an end's last three rows, which is added to s (a controller that filters
 its speeds has no larger ones in between; an estimate, some 0.04 mm at 12 ms and 2 m/s2). A PTP needs none.
@@ -48,6 +50,7 @@ EXACT_MM, EXACT_SHARE = 0.05, 0.25
 below the clearance: a warning states a figure, and a finer one would cost a hundred poses for each row."""
 SHORT_MM = 0.01
 """A way on which nothing moves farther is not halved again."""
+AT_REST = np.zeros((1, 3))
 _STATE = 16
 _NOTES = 4096
 
@@ -70,7 +73,7 @@ WATCHED = StructOf.record(Watched, written=("known", "states", "ends_mm", "steps
 
 _along = core_function(
     "collision_along",
-    *(FLOATS, INT, FLOATS, BODIES, OBSTACLES, WATCHED, FLOAT, FLOAT, INT),
+    *(FLOATS, FLOATS, INT, FLOATS, BODIES, OBSTACLES, WATCHED, FLOAT, FLOAT, INT),
     *(OUT_FLOATS, OUT_INTS32, OUT_INTS, OUT_FLOATS, OUT_INTS),
     returns=INT,
 )
@@ -126,11 +129,16 @@ class Way:
             np.zeros((len(bodies.link), 13)),
             np.zeros(1, dtype=np.int64),
         )
-        self._last = np.zeros((0, 6))
+        self._last, self._last_shift = np.zeros((0, 6)), np.zeros((0, 3))
 
-    def take(self, q_rad: Floats) -> Clearances:
-        """Go on along rows of angles (n, 6) in rad; behind a row of NaN another way begins."""
+    def take(self, q_rad: Floats, shift_mm: Floats = AT_REST) -> Clearances:
+        """Go on along rows of angles (n, 6) in rad; behind a row of NaN another way begins.
+
+        ``shift_mm`` (n, 3) or (1, 3) is how far a rail has taken the robot root, along its own axes.
+        """
         q = np.concatenate([self._last, shaped("q_rad", q_rad, -1, 6)])
+        shifted = np.empty((len(q), 3))
+        shifted[: len(self._last_shift)], shifted[len(self._last_shift) :] = self._last_shift, shift_mm
         first = begin = len(self._last)
         gap, pair = np.empty(len(q)), np.empty(len(q), dtype=np.int32)
         size = max(_NOTES, len(self._watched.pairs))
@@ -139,12 +147,12 @@ class Way:
             notes, values = np.empty((size, 2), dtype=np.int64), np.empty((size, 4))
             noted = np.zeros(1, dtype=np.int64)
             first = _along(
-                *(q, first, self._geometry, self._bodies, self._obstacles, self._watched),
+                *(q, shifted, first, self._geometry, self._bodies, self._obstacles, self._watched),
                 *(self._horizon_mm, self._near_mm, int(self._is_sampled)),
                 *(gap, pair, notes, values, noted),
             )
             found.append((notes[: noted[0]].copy(), values[: noted[0]].copy()))
-        self._last = q[-1:].copy()
+        self._last, self._last_shift = q[-1:].copy(), shifted[-1:].copy()
         notes = np.concatenate([np.zeros((0, 2), np.int64), *(each for each, _ in found)])
         values = np.concatenate([np.zeros((0, 4)), *(each for _, each in found)])
         return Clearances(

@@ -1,14 +1,15 @@
 """The watch over everything that a program does: its samples, and the ways between."""
 
 import itertools
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from gcode2krl import frames as fr
-from gcode2krl.arrays import Floats, Ints32
-from gcode2krl.cell import Cell
+from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.cell import Cell, carriers
+from gcode2krl.cell.carried import standing
+from gcode2krl.cell.sections.external import EXTERNAL_NAMES
 from gcode2krl.collision.along import Clearances, Way
 from gcode2krl.collision.bodies import CABLES, Part, capsules_of, parts_of
 from gcode2krl.collision.contacts import Contacts
@@ -20,6 +21,7 @@ from gcode2krl.collision.surroundings import (
     Surroundings,
     is_held,
     pairs_of,
+    root_of,
     surroundings_of,
 )
 from gcode2krl.errors import Issue
@@ -46,6 +48,13 @@ class _Setting(NamedTuple):
         return self._replace(pairs=pairs, names=names, places=self.places[[*rows, -1]])
 
 
+class _Stand(NamedTuple):
+    """What stands around the robot root at rest, and what takes its places to ``$BASE``."""
+
+    around: Surroundings
+    to_base: Floats
+
+
 class Watch:
     """Whether arm, spindle and tool hit anything; see `collision.along` for what "along" means."""
 
@@ -54,59 +63,109 @@ class Watch:
         self._cell, self._read_mesh = cell, read_mesh
         self._geometry = cell.robot.geometry.array()
         self._settings: dict[int, _Setting] = {}
-        self._of_ways: dict[tuple[int, bool, bool], _Setting] = {}
+        self._of_ways: dict[tuple[int, bool, bool, bool], _Setting] = {}
+        self._stands: dict[bytes, _Stand] = {}
         self._contacts = Contacts(cell.collision.clearance_mm, only_hits=STOCK, only_near=CABLES)
         self._horizon_mm = HORIZON_MM if tells else 0.0
         self._way: Way | None = None
-        self._tool = -1
+        self._where = (-1, b"")
         self.links: list[str] = []
         """Names of what may hit, as far as tools have come up."""
         self.obstacles: list[str] = []
-        self._last: Floats = np.zeros((0, 6))
+        self._last: tuple[Floats, Floats] = (np.zeros((0, 6)), np.zeros((0, 6)))
+        at_rest = cell.external_rest()
+        self._from_rest = fr.invert(root_of(cell, at_rest))
+        tables = carriers.tables_of(cell.external, cell.frames.base_on)
+        self._table_columns = [EXTERNAL_NAMES.index(name) for name in tables]
 
-    @cached_property
-    def _around(self) -> Surroundings:
-        return surroundings_of(self._cell, self._read_mesh)
+    def _stand(self, external: Floats) -> "_Stand":
+        """Return what stands around while the tables are where E1 to E6 (6,) say."""
+        key = external[self._table_columns].tobytes()
+        if key not in self._stands:
+            at = self._cell.external_rest()
+            at[self._table_columns] = external[self._table_columns]
+            cell = standing(self._cell, at)
+            around = surroundings_of(cell, self._read_mesh)
+            self._stands[key] = _Stand(around, fr.invert(cell.base_matrix()))
+        return self._stands[key]
 
-    @cached_property
-    def _to_base(self) -> Floats:
-        return fr.invert(self._cell.base_matrix())
+    def _shift_mm(self, external: Floats) -> Floats:
+        """Return how far rails have taken the robot root (n, 3) with E1 to E6 at (n, 6), along its axes."""
+        if external.strides[0] == 0 or not self._cell.external:
+            external = external[:1]
+        robroot = self._cell.frames.robroot
+        root = np.eye(4) if robroot is None else robroot.matrix()
+        moved = self._from_rest @ carriers.root_in_world(self._cell.external, external, root)
+        shift: Floats = np.ascontiguousarray(moved[:, :3, 3])
+        return shift
 
-    def samples(self, q_rad: Floats, tool: Ints32, line: Ints32) -> tuple[Floats, Ints32]:
-        """Go on along the samples of a Motion: angles (n, 6) in rad, tools (n,) and lines (n,).
+    def samples(
+        self, q_rad: Floats, tool: Ints32, line: Ints32, external: Floats | None = None
+    ) -> tuple[Floats, Ints32]:
+        """Go on along the samples of a Motion: angles (n, 6) in rad, tools (n,), lines (n,), E1 to E6 (n, 6).
 
         Returns the clearance (n,) in mm, and who is near what (n, 2): places in `links` and `obstacles`, -1
         where nothing is. Both are of use only where the watch ``tells``.
         """
         gap, near = np.full(len(q_rad), np.nan), np.full((len(q_rad), 2), -1, dtype=np.int32)
-        borders = [0, *(np.flatnonzero(np.diff(tool)) + 1).tolist(), len(tool)]
+        if external is None:
+            external = np.broadcast_to(self._cell.external_rest(), (len(q_rad), 6))
+        turns = self._turning(external)
+        changes = (tool[1:] != tool[:-1]) | (turns[1:] != turns[:-1])
+        borders = [0, *(np.flatnonzero(changes) + 1).tolist(), len(tool)]
         for start, end in itertools.pairwise(borders):
             if start == end:
                 continue
-            rows, number = slice(start, end), int(tool[start])
-            setting = self._held(number, against_raw=False, is_ptp=False)
-            q, lines, skip = q_rad[rows], line[rows], 0
-            if self._way is None or number != self._tool:
-                self._way, self._tool = self._new_way(setting, is_sampled=True), number
-                skip = len(self._last)  # the new tool's way begins where the old one's ended
-                q, lines = np.concatenate([self._last, q]), np.concatenate([lines[:skip], lines])
-            found = self._way.take(q)
-            self._contacts.take(found, setting.names, lines, self._to_base)
+            rows, number, is_turning = slice(start, end), int(tool[start]), bool(turns[start])
+            stand = self._stand(external[start])
+            setting = self._held(number, against_raw=False, is_ptp=False, turns=is_turning)
+            q, at, lines, skip = q_rad[rows], external[rows], line[rows], 0
+            where = number, b"turns" if is_turning else external[start, self._table_columns].tobytes()
+            if self._way is None or where != self._where:
+                self._way, self._where = self._new_way(setting, stand, is_sampled=True), where
+                skip = len(self._last[0])  # the new way begins where the old one ended
+                q, at = (np.concatenate(pair) for pair in zip(self._last, (q, at), strict=True))
+                lines = np.concatenate([lines[:skip], lines])
+            found = self._way.take(q, self._shift_mm(at))
+            self._contacts.take(found, setting.names, lines, stand.to_base)
             gap[rows], near[rows] = found.gap_mm[skip:], setting.places[found.pair[skip:]]
-            self._last = q[-1:].copy()
+            self._last = q[-1:].copy(), at[-1:].copy()
         return gap, near
 
+    def _turning(self, external: Floats) -> Bools:
+        """Mark the rows (n,) into which a table turns."""
+        if not self._table_columns or (external.strides[0] == 0 and not len(self._last[1])):
+            return np.zeros(len(external), dtype=np.bool_)
+        before = np.concatenate([self._last[1] if len(self._last[1]) else external[:1], external[:-1]])
+        columns = self._table_columns
+        turns: Bools = (external[:, columns] != before[:, columns]).any(axis=1)
+        return turns
+
     def way(
-        self, q_rad: Floats, tool: int, line: int, words: str, *, is_ptp: bool, against_raw: bool = False
+        self,
+        q_rad: Floats,
+        tool: int,
+        line: int,
+        words: str,
+        *,
+        is_ptp: bool,
+        against_raw: bool = False,
+        external: Floats | None = None,
     ) -> Clearances:
         """Go along a way of its own, angles (n, 6) in rad; ``words`` say which, `` on the way to HOME``.
 
+        ``external`` (n, 6) is where E1 to E6 are, at rest by default.
+
         It is held ``against_raw`` where nothing has been cut yet: against the raw part, where that is stated.
         """
-        setting = self._held(tool, against_raw=against_raw, is_ptp=is_ptp)
-        found = self._new_way(setting, is_sampled=not is_ptp).take(q_rad)
+        if external is None:
+            external = np.broadcast_to(self._cell.external_rest(), (len(q_rad), 6))
+        columns, stand = self._table_columns, self._stand(external[-1])
+        turns = bool((external[:, columns] != external[-1, columns]).any())
+        setting = self._held(tool, against_raw=against_raw, is_ptp=is_ptp, turns=turns)
+        found = self._new_way(setting, stand, is_sampled=not is_ptp).take(q_rad, self._shift_mm(external))
         lines = np.full(len(q_rad), line, dtype=np.int32)
-        self._contacts.take(found, setting.names, lines, self._to_base, words)
+        self._contacts.take(found, setting.names, lines, stand.to_base, words)
         return found
 
     def poses(self, q_rad: Floats, tool: int, horizon_mm: float) -> Floats:
@@ -121,7 +180,7 @@ class Watch:
         )
         way = Way(
             setting.bodies,
-            self._around.shapes,
+            self._stand(self._cell.external_rest()).around.shapes,
             setting.pairs,
             self._geometry,
             near_mm=self._cell.collision.clearance_mm,
@@ -141,10 +200,10 @@ class Watch:
         """Return what was found so far, `collision` and `near`."""
         return tuple(self._contacts.issues())
 
-    def _new_way(self, setting: _Setting, *, is_sampled: bool) -> Way:
+    def _new_way(self, setting: _Setting, stand: "_Stand", *, is_sampled: bool) -> Way:
         return Way(
             setting.bodies,
-            self._around.shapes,
+            stand.around.shapes,
             setting.pairs,
             self._geometry,
             near_mm=self._cell.collision.clearance_mm,
@@ -152,12 +211,12 @@ class Watch:
             is_sampled=is_sampled,
         )
 
-    def _held(self, tool: int, *, against_raw: bool, is_ptp: bool) -> _Setting:
-        key = (tool, against_raw, is_ptp)
+    def _held(self, tool: int, *, against_raw: bool, is_ptp: bool, turns: bool = False) -> _Setting:
+        key = (tool, against_raw, is_ptp, turns)
         if key not in self._of_ways:
-            whole, names = self._setting(tool), self._around.names
+            whole, around = self._setting(tool), self._stand(self._cell.external_rest()).around
             held = [
-                is_held(pair, whole.parts, names, against_raw=against_raw, is_ptp=is_ptp)
+                is_held(pair, whole.parts, around, against_raw=against_raw, is_ptp=is_ptp, turns=turns)
                 for pair in whole.pairs
             ]
             self._of_ways[key] = whole.only(held)
@@ -166,10 +225,10 @@ class Watch:
     def _setting(self, tool: int) -> _Setting:
         if tool not in self._settings:
             parts = parts_of(self._cell, tool)
-            pairs = pairs_of(parts, self._around.names)
+            around = self._stand(self._cell.external_rest()).around
+            pairs = pairs_of(parts, around.names)
             names = [
-                (parts[a].name, self._around.names[o] if o >= 0 else parts[b].name + ITSELF)
-                for a, o, b in pairs
+                (parts[a].name, around.names[o] if o >= 0 else parts[b].name + ITSELF) for a, o, b in pairs
             ]
             places = [(_place(who, self.links), _place(what, self.obstacles)) for who, what in names]
             numbers = np.array([*places, (-1, -1)], dtype=np.int32)

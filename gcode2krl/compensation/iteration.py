@@ -16,7 +16,7 @@ from gcode2krl import compliance, robot
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints32, Rows
 from gcode2krl.cell import Cell
-from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.compensation.correction import SETTLED_MM, Contact, Shift, interpolated, wanted_correction
 from gcode2krl.compensation.intended_path import Deviation, Evaluated, Placed, Ways, deviation_from
 from gcode2krl.errors import Issue, RefusedError, input_error
@@ -217,11 +217,12 @@ def _with_rows(targets: Targets, ways: Ways, shift: Shift, cell: Cell) -> tuple[
     fraction = shift.along_mm / ways.length_mm[shift.row]
     _, from_rotation = motion_starts(targets, cell, shift.row)
     rotation[new] = fr.slerp(np.asarray(from_rotation), targets.rotation[shift.row], fraction)
+    begins, external = external_starts(targets, shift.row), targets.external[order]
+    external[new] = begins + fraction[:, None] * (targets.external[shift.row] - begins)
     cdis[new], wait[new] = ways.piece_cdis_mm[shift.row], 0.0
     events = tuple(event._replace(row=int(intended_rows[event.row])) for event in targets.events)
-    plain = replace(
-        targets, position_mm=position, rotation=rotation, cdis_mm=cdis, wait_s=wait, events=events, **columns
-    )
+    columns |= {"position_mm": position, "rotation": rotation, "cdis_mm": cdis, "wait_s": wait}
+    plain = replace(targets, external=external, events=events, **columns)
     shifted = position.copy()
     shifted[intended_rows], shifted[new] = moved, position[new] + shift.piece_mm
     return plain, replace(plain, position_mm=shifted)

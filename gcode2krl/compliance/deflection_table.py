@@ -2,10 +2,12 @@
 
 import math
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compliance.deflection import deflection_of, feed_direction
-from gcode2krl.tables import Deflection, Forces, Joints
+from gcode2krl.cell.carried import points_moved, to_rest, vectors_turned
+from gcode2krl.compliance.deflection import deflection_of, feed_direction, tip_position
+from gcode2krl.frames import invert
+from gcode2krl.tables import Deflection, Forces, Joints, chord_directions
 
 
 def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
@@ -35,17 +37,34 @@ def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
     """
     if len(joints) != len(forces):
         raise ValueError(f"joints have {len(joints)} rows, forces {len(forces)}")
-    return deflect_at(joints.q_rad, joints.qd_rad_s, forces, cell)
+    return deflect_at(joints.q_rad, joints.qd_rad_s, joints.external, forces, cell)
 
 
-def deflect_at(q_rad: Floats, qd_rad_s: Floats, forces: Forces, cell: Cell) -> Deflection:
-    """Return what `deflect` returns, from joints (m, 6) in rad and their speeds (m, 6) in rad/s."""
+def deflect_at(q_rad: Floats, qd_rad_s: Floats, external: Floats, forces: Forces, cell: Cell) -> Deflection:
+    """Return what `deflect` returns, from joints (m, 6), their speeds (m, 6) and E1 to E6 (m, 6)."""
     feed = feed_direction(q_rad, qd_rad_s, cell, forces.tool)
-    deflection, correction = deflection_of(
-        q_rad, forces.force_base_N, forces.moment_base_Nmm, feed, cell, forces.tool
-    )
+    force, moment = forces.force_base_N, forces.moment_base_Nmm
+    by = to_rest(external, cell)
+    if by is None:
+        deflection, correction = deflection_of(q_rad, force, moment, feed, cell, forces.tool)
+    else:
+        if len(by) > 1:  # the tip goes along the part otherwise than along the arm's root
+            feed = vectors_turned(_feed_on_part(q_rad, by, forces.tool, cell), by)
+        load = vectors_turned(force, by), vectors_turned(moment, by)
+        bent = deflection_of(q_rad, *load, feed, cell, forces.tool)
+        deflection, correction = (vectors_turned(vector, invert(by)) for vector in bent)
     return Deflection(
         deflection_base_mm=deflection,
         correction_base_mm=correction,
         relative_band=math.hypot(forces.relative_band, cell.compliance.relative_band),
     )
+
+
+def _feed_on_part(q_rad: Floats, by: Floats, tool: Ints32, cell: Cell) -> Floats:
+    """Return the directions (m, 3) in which the tip goes along ``$BASE``, from the chords of its positions.
+
+    ``by`` (m, 4, 4) as from `to_rest`.
+    """
+    base = cell.base_matrix()
+    seen_mm = (tip_position(q_rad, cell, tool) - base[:3, 3]) @ base[:3, :3]
+    return chord_directions(points_moved(seen_mm, invert(by)))

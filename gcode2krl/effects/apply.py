@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl import compliance, krc4, robot
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import stays
 from gcode2krl.effects.chain import simulate
 from gcode2krl.effects.effect import Applied
 from gcode2krl.effects.inputs import Cut, Inputs, Plan
@@ -36,6 +37,8 @@ def inputs_of(
         raise input_error(
             "prediction-empty", "the prediction has no motion and joints", "predict the part again"
         )
+    cell = stays(prediction.cell, motion.external, "effects and a diagnosis")
+    prediction = replace(prediction, cell=cell)
     if prediction.added:  # the tables hold what effects have made of them: back to the nominal ones
         motion = plan(prediction.targets, prediction.cell)
         joints = robot.follow_motion(motion, prediction.cell)

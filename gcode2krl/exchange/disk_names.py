@@ -34,7 +34,7 @@ def names_of_parts(spec: Field[Any], width: int) -> list[str]:
     One whose width the data decide is counted from 0: ``phi_0_rad`` ….
     """
     if spec.metadata["tail"] != (None,):
-        return column_names(spec.name, width)
+        return column_names(spec.metadata.get("on_disk", spec.name), width)
     unit = suffix_of(spec.name)
     return [f"{spec.name.removesuffix(unit)}_{number}{unit}" for number in range(width)]
 
@@ -52,6 +52,8 @@ def split_columns(table: Any) -> dict[str, NDArray[Any]]:
         if "tail" not in spec.metadata:
             continue
         values = getattr(table, spec.name)
+        if "on_disk" in spec.metadata and not values.any():
+            continue
         parts = values.T if values.ndim == 2 else [values]
         names = names_of_parts(spec, values.shape[1] if values.ndim == 2 else 0)
         columns |= {name: np.ascontiguousarray(part) for name, part in zip(names, parts, strict=True)}

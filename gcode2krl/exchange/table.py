@@ -19,9 +19,13 @@ def column(dtype: DTypeLike, *tail: int | None) -> Any:
     return field(metadata={"dtype": np.dtype(dtype), "tail": tail})
 
 
-def derived_column(dtype: DTypeLike, *tail: int) -> Any:
-    """Declare a column that the table derives from the others where it is not given."""
-    return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail})
+def derived_column(dtype: DTypeLike, *tail: int, on_disk: str = "") -> Any:
+    """Declare a column that the table derives from the others where it is not given.
+
+    With a name ``on_disk`` its parts are called by that, and left out of files where all of them are 0.
+    """
+    names = {"on_disk": on_disk} if on_disk else {}
+    return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail, **names})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -42,6 +42,7 @@ class Course:
             self._move, self._tool = chain.move, chain.tool
             self._from, self._to = chain.from_rotation, chain.to_rotation
             self._turns = not one_orientation(self._from, self._to)
+            self._from_external, self._to_external = chain.from_external, chain.to_external
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Generator[tuple[Motion, bool], None, None]:
         """Yield the Motion in blocks of rows, and whether it ends with each."""
@@ -90,8 +91,16 @@ class Course:
             corner=samples.corner,
             direction=samples.direction,
             tool=self._tool[samples.move],
+            external=self._external(samples),
         )
         return motion, int(samples.move[-1])
+
+    def _external(self, samples: Samples) -> Floats:
+        """Interpolate E1 to E6 with the position along each move."""
+        if self._to_external.strides[0] == 0:
+            return np.broadcast_to(self._to_external[0], (len(samples.move), 6))
+        begins, ends = self._from_external[samples.move], self._to_external[samples.move]
+        return np.asarray(begins + (ends - begins) * samples.part[:, None])
 
     def _rotations(self, samples: Samples) -> Floats:
         """Interpolate the orientation with the position along each move (``$ORI_TYPE = #VAR``)."""
@@ -119,4 +128,5 @@ def _standstill(targets: Targets, row: int) -> Motion:
         move=targets.move[row : row + 1],
         corner=np.zeros(1, dtype=np.bool_),
         tool=targets.tool[row : row + 1],
+        external=targets.external[row : row + 1],
     )

@@ -7,7 +7,8 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.cell.carriers import most_of
+from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.errors import Issue
 from gcode2krl.krc4.laws import parabola_distance
@@ -59,6 +60,9 @@ class Chain:
     """(n,) unit of length of each move: 1, but after a corner that makes a change of speed v1 to v2 it is
     v2/v1 times the unit before. In these units such a corner has one speed and equal distances, which is a
     constant acceleration vector between v1 and v2 with d1/d2 = v1/v2."""
+    from_external: Floats
+    """(n, 6) E1 to E6 at which each move begins."""
+    to_external: Floats
 
     def corner_error_mm(self) -> Floats:
         """Return the corner errors (n,): the distance of the vertex to the parabola."""
@@ -80,6 +84,10 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     rapid = cell.controller.rapid_m_s * MM_PER_M
     speed = np.where(targets.ptp[rows], rapid, targets.speed_mm_s[rows])
     length, speed, acceleration, angle = _with_orientation(size, speed, from_rotation, to_rotation, cell)
+    from_external, to_external = external_starts(targets, rows), targets.external[rows]
+    if cell.external:
+        way = np.abs(to_external - from_external)
+        length, speed, acceleration = _with_external(length, speed, acceleration, way, cell)
     d, cos_half = _blends(start, end, size, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
     d[stop | _goes_straight_on(d, cos_half)] = 0.0
@@ -102,6 +110,8 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
         tool=targets.tool[rows],
         cos_half=cos_half,
         scale=scale,
+        from_external=from_external,
+        to_external=to_external,
     )
 
 
@@ -237,6 +247,27 @@ def _with_orientation(
         np.where(on_spot, a_ori, np.minimum(a_cp, a_ori)),
         angle,
     )
+
+
+def _with_external(
+    length: Floats, speed: Floats, acceleration: Floats, way: Floats, cell: Cell
+) -> tuple[Floats, Floats, Floats]:
+    """Return length, speed and acceleration (n,) of moves, limited by the external axes that go ways (n, 6).
+
+    As with the orientation, position and external axes share one time law, along which E1 to E6 go evenly:
+    a way e over a length l limits the speed to its largest speed times l/e, and the acceleration likewise
+    (assumption). Where nothing but external axes moves, the length is the one that takes as much time.
+    """
+    most, most_2 = (most_of(cell.external, what) for what in ("speed", "acceleration"))
+    times_s = (way / most).max(axis=1)  # 0 where no speed is stated
+    moves = way.max(axis=1) > 0.0
+    on_spot = moves & (length < 1e-9)
+    length = np.where(on_spot, np.maximum(times_s, 1e-3) * speed, length)
+    with np.errstate(divide="ignore"):
+        limited = np.where(moves, np.minimum(speed, length / times_s), speed)
+        per_mm = np.where(moves, (way / most_2).max(axis=1) / np.where(moves, length, 1.0), 0.0)
+        slower = np.where(moves, np.minimum(acceleration, 1.0 / per_mm), acceleration)
+    return length, limited, slower
 
 
 def _blends(start: Floats, end: Floats, size: Floats, length: Floats, cdis: Floats) -> tuple[Floats, Floats]:

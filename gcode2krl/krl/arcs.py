@@ -73,6 +73,8 @@ def _runs(targets: Targets) -> Iterator[tuple[int, int]]:
     same &= ~targets.ptp[1:] & ~targets.ptp[:-1] & (targets.move[1:] >= 0) & (targets.move[:-1] >= 0)
     same &= (targets.speed_mm_s[1:] == targets.speed_mm_s[:-1]) & (targets.tool[1:] == targets.tool[:-1])
     same &= (targets.rotation[1:] == targets.rotation[:-1]).all(axis=1)
+    if targets.external.strides[0] != 0:
+        same &= (targets.external[1:] == targets.external[:-1]).all(axis=1)
     same &= (targets.cdis_mm[:-1] > 0.0) & (targets.wait_s[:-1] == 0.0)
     standing = [event.row for event in targets.events if event.row < len(same)]
     same[standing] = False
@@ -205,6 +207,7 @@ def _with_rows(
         joint_rows=moved(program.joint_rows),
         circ_rows=moved(program.circ_rows[~done]),
         circ_via_mm=program.circ_via_mm[~done],
+        external=program.external[order],
         ptp=program.ptp[order],
         speed_mm_s=program.speed_mm_s[order],
         cdis_mm=cdis,

@@ -19,6 +19,7 @@ from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.arcs import Arc
 from gcode2krl.krl.collision_words import collision_lines
+from gcode2krl.krl.external_words import external_lines
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
 from gcode2krl.krl.pilot_text import PilotText, checksum
@@ -285,6 +286,7 @@ class _Composer:
             state,
             self.cell.program.comment_every,
             self.pilot.before(start, end) if self.pilot is not None else NOTHING_BEFORE,
+            (self.targets.external[rows], st.external_bits(self.cell)),
         )
 
     def _checksum(self, pilot: PilotText) -> int:
@@ -301,6 +303,7 @@ class _Composer:
             targets.cdis_mm,
             pilot.rows,
             targets.home,
+            targets.external,
         )
 
     def _around(self, row: int) -> bytes:
@@ -315,7 +318,15 @@ class _Composer:
             if not targets.home[row] and self.layout.guard and not self.guarded_pose:
                 self.guarded_pose = True
                 q_deg = self.joints.q_rad[row] * DEG_PER_RAD
-                lines.append(st.environment().get_template("pose_guard.j2").render(q_deg=q_deg))
+                external = zip(w.EXTERNAL_KEYS, targets.external[row], strict=True)
+                template = st.environment().get_template("pose_guard.j2")
+                lines.append(
+                    template.render(
+                        q_deg=q_deg,
+                        external={key: at for key, at in external if key in self.cell.external},
+                        root=st.root_check(self.cell, targets.external[row]),
+                    )
+                )
         if self.rsi is not None and row == self.rsi.off:
             lines.append(self.rsi.end)
         waited_s = 0.0
@@ -329,22 +340,26 @@ class _Composer:
         return _text("\n".join(lines))
 
     def _ptp(self, row: int) -> str:
+        external = st.external_text(self.targets.external[row], self.cell)
         if self.targets.home[row]:
-            return f"{w.PTP} {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD)}"
+            return f"{w.PTP} {st.axes_text(self.joints.q_rad[row] * DEG_PER_RAD, external)}"
         values = [*(fixed(v, 3) for v in self.position[row]), *(fixed(v, 4) for v in self.abc_deg[row])]
         pose = ",".join(f"{key} {value}" for key, value in zip(w.POSE_KEYS, values, strict=True))
         turn = turn_bits(self.joints.q_rad[row])
-        return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}}}"
+        return f"{w.PTP} {{{pose},S {int(self.joints.status[row])},T {turn}{external}}}"
 
     def _head(self, parts: list[_Part]) -> bytes:
         tools = [int(number) for number in distinct(self.targets.tool)]
-        checks = st.frame_checks(self.cell, tools) if self.layout.guard else []
+        standing = self.targets.external[np.argmin(self.targets.home)]
+        checks = st.frame_checks(self.cell, tools, standing) if self.layout.guard else []
         declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
             declarations += [f"{w.EXT} {part.name}( )" for part in parts]
         declarations.append(DECLARATIONS)
-        if checks:
+        if checks or (self.layout.guard and st.has_coupled_rail(self.cell)):
             declarations.append(FRAME_DECLARATIONS)
+        if st.coupled_table(self.cell) is not None and self.cell.frames.base_data is None:
+            declarations.append("DECL FRAME GK_BASE")
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
         template = st.environment().get_template("head.src.j2")
@@ -372,7 +387,9 @@ class _Composer:
             no_guard=w.NO_GUARD,
             declarations="\n".join(declarations),
             message_setup=MESSAGE_SETUP,
-            base=st.base_statement(self.cell),
+            base=st.base_statement(self.cell, standing),
+            external_lines=external_lines(self.targets, self.cell),
+            external_axes=max((int(name[1]) for name in self.cell.external), default=0),
             tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
         return _text(text) + _text(st.render(self.cell, "program.prologue"))

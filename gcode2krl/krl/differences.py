@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl import frames as fr
+from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
@@ -32,10 +33,12 @@ SPEED_LIMIT_MM_S = 0.1 / S_PER_MIN
 JOINT_LIMIT_DEG = 0.001
 CDIS_LIMIT_MM = 0.0006
 WAIT_LIMIT_S = 0.0006
+EXTERNAL_LIMIT = 0.0006
+"""In mm or degrees."""
 REMEDY = "translate again"
 _MOST_WORST = 10
 OTHER_KIND, POSITION, NO_POSITION, ROTATION, NO_ROTATION = range(5)
-SPEED, NO_SPEED, CDIS, WAIT, OTHER_BRANCH = range(5, 10)
+SPEED, NO_SPEED, CDIS, WAIT, OTHER_BRANCH, EXTERNAL = range(5, 11)
 """What is checked of a motion; a row of `_CHECKS` each."""
 _CHECKS = (
     ("verify-motion", "PTP and LIN exchanged"),
@@ -48,6 +51,7 @@ _CHECKS = (
     ("verify-cdis", "approximation {:.3f} mm off"),
     ("verify-wait", "dwell {:.3f} s off"),
     ("verify-status", "S or T differs from the predicted branch"),
+    ("verify-external", "an external axis is {:.4f} off, or is missing"),
 )
 """Code and sentence of each check."""
 
@@ -151,6 +155,7 @@ def differences_of(
     position, rotation, speed = np.array([part.largest for part in parts]).reshape(-1, 3).max(0, initial=0.0)
     wrong = [_joined([part.wrong(check) for part in parts]) for check in range(len(_CHECKS))]
     wrong[OTHER_BRANCH] = _other_branches(program, targets, joints, count)
+    wrong[EXTERNAL] = _external_off(program, targets, cell, count)
     worst = _furthest(_joined([part.furthest() for part in parts]))
     return Differences(
         largest=(float(position), float(rotation), float(speed)),
@@ -181,6 +186,16 @@ def _other_branches(program: KrlProgram, targets: Targets, joints: Joints, count
         if (program.status_turn[row] != (joints.status[row], turn_bits(joints.q_rad[row]))).any()
     ]
     return _Rows(np.array(other[:MOST_PLACES], dtype=np.int64), np.zeros(len(other[:MOST_PLACES])))
+
+
+def _external_off(program: KrlProgram, targets: Targets, cell: Cell, count: int) -> _Rows:
+    """Return the first motions whose external axes stand elsewhere, NaN where one of the cell is missing."""
+    if not cell.external:
+        return _Rows(np.zeros(0, dtype=np.int64), np.zeros(0))
+    axes = [w.EXTERNAL_KEYS.index(name) for name in sorted(cell.external)]
+    off = np.abs(program.external[:count, axes] - targets.external[:count, axes]).max(axis=1)
+    rows = np.flatnonzero(~(off <= EXTERNAL_LIMIT))[:MOST_PLACES]
+    return _Rows(rows, off[rows])
 
 
 def _furthest(found: _Rows) -> _Rows:

@@ -37,6 +37,8 @@ class Executed(NamedTuple):
     """(m, 8)"""
     value: Floats
     """(k - m, 8)"""
+    external: Floats
+    """(m, 6) one row in memory where no motion has any."""
 
     def places(self, rows: Ints) -> tuple[Ints32, Ints]:
         """Return the file of each of the statements (s,), and its number there."""
@@ -71,6 +73,11 @@ def executed_in(runs: Sequence[Block], scanned: Sequence[Scanned], others: Seque
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     kind = joined("kind", statements)
+    count = sum(end - start for start, end in motions)
+    external = np.broadcast_to(np.nan, (count, w.EXTERNAL_COLUMNS))
+    if any(len(each.external) for each in scanned):
+        known = [_external_of(scanned[run.file], rows) for run, rows in zip(runs, motions, strict=True)]
+        external = np.concatenate(known)
     return Executed(
         files=np.array(files, dtype=np.int32),
         starts=np.array([start for start, _ in statements]),
@@ -81,7 +88,16 @@ def executed_in(runs: Sequence[Block], scanned: Sequence[Scanned], others: Seque
         others=np.flatnonzero(~is_motion(kind)),
         pose=joined("pose", motions),
         value=joined("value", no_motions),
+        external=external,
     )
+
+
+def _external_of(scanned: Scanned, motions: tuple[int, int]) -> Floats:
+    """Return E1 to E6 of some motions of a file, NaN where none of that file has any."""
+    start, end = motions
+    if len(scanned.external):
+        return scanned.external[start:end]
+    return np.full((end - start, w.EXTERNAL_COLUMNS), np.nan)
 
 
 def _merged(files: Sequence[int], rows: Sequence[tuple[int, int]]) -> list[tuple[int, int, int]]:

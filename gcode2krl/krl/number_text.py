@@ -25,7 +25,7 @@ from gcode2krl.compiled.core import (
     core_function,
 )
 
-BYTES_PER_TARGET = 240
+BYTES_PER_TARGET = 360
 NOTHING_BEFORE = (np.zeros(0, dtype=np.uint8), np.zeros(0, dtype=np.int64))
 _OF_THREAD = threading.local()
 
@@ -33,7 +33,7 @@ _fixed = core_function("krl_fixed", OUT_BYTES, FLOAT, INT, returns=INT)
 _in_decimals = core_function("krl_in_decimals", FLOATS, INT, OUT_INTS)
 _lines = core_function(
     "krl_motion_lines",
-    *(FLOATS, FLOATS, FLOATS, FLOATS, INTS32, OUT_FLOATS, INT, BYTES, INTS, OUT_BYTES),
+    *(FLOATS, FLOATS, FLOATS, FLOATS, INTS32, FLOATS, INT, OUT_FLOATS, INT, BYTES, INTS, OUT_BYTES),
     returns=INT,
 )
 
@@ -47,17 +47,20 @@ def motion_lines(
     state: Floats,
     comment_every: int,
     before: tuple[NDArray[np.uint8], Ints] = NOTHING_BEFORE,
+    external: tuple[Floats, int] = (np.zeros((0, 6)), 0),
 ) -> list[bytes]:
     """Return the KRL text (CRLF) of a run of LIN motions in pieces of whole lines, made at once.
 
     Before a motion stand ``; line N`` (every ``comment_every`` motions), ``$VEL.CP`` and ``$APO.CDIS``, each
     only where it changes. ``state`` (3,) = speed and CDIS in force (negative = unknown) and motions since the
     last comment; it is updated. ``before`` is text to stand right before motions, and where in it that of
-    each motion begins (p + 1,).
+    each motion begins (p + 1,). ``external`` is E1 to E6 (p, 6), and which of them are written as bits.
     """
     text, begins = before
     borders = chunk_borders(len(position_mm))
     position, abc = np.ascontiguousarray(position_mm), np.ascontiguousarray(abc_deg)
+    at_external, axes = external
+    carried = np.ascontiguousarray(at_external) if axes else np.zeros((0, 6))
     in_force = {0: state.copy()}
     for start, end in pairwise(borders):
         part = slice(start, end)
@@ -76,6 +79,8 @@ def motion_lines(
             speed_m_s[part],
             cdis_mm[part],
             source_line[part],
+            carried[part] if axes else carried,
+            axes,
             in_force[start],
             comment_every,
             own,

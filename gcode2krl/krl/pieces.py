@@ -8,7 +8,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
-from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.tables import Joints, Table, Targets
 
@@ -50,6 +50,9 @@ def split(targets: Targets, joints: Joints, pieces: Pieces, cell: Cell) -> tuple
     rows = _taken(targets, order)
     rows["position_mm"][new] = start + pieces.share[:, None] * way
     rows["rotation"][new] = fr.slerp(from_rotation, targets.rotation[pieces.row], pieces.share)
+    if cell.external:
+        begins = external_starts(targets)[pieces.row]
+        rows["external"][new] = begins + pieces.share[:, None] * (targets.external[pieces.row] - begins)
     rows["cdis_mm"][new], rows["wait_s"][new], rows["move"][new] = pieces.cdis_mm, 0.0, -1
     events = tuple(event._replace(row=int(own[event.row])) for event in targets.events)
     return replace(targets, events=events, **rows), replace(joints, **_taken(joints, order)), own

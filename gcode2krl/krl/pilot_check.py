@@ -100,6 +100,7 @@ def checksum_of(program: KrlProgram, rows: bytes) -> int:
         program.speed_mm_s,
         program.cdis_mm,
         rows,
+        external=program.external,
     )
 
 

@@ -130,12 +130,14 @@ def checksum(
     cdis_mm: Floats,
     rows: bytes,
     home: Bools | None = None,
+    external: Floats | None = None,
 ) -> int:
     """Return 31 bits over the targets and knots as written; what is not stated of a motion is NaN.
 
     Targets count as the decimals they are written in, so the text's layout does not matter; ``joint_deg``
     (j, 6) are the joint targets of the motions ``joint_rows`` (j,), ``rows`` those of the sidecar. With
-    ``home`` (p,), whatever the columns say, positions count only where it is not.
+    ``home`` (p,), whatever the columns say, positions count only where it is not. ``external`` (p, 6) counts
+    where there is any.
     """
     count = len(ptp)
 
@@ -159,9 +161,21 @@ def checksum(
         lambda part: in_decimals(speed_mm_s[part] / MM_PER_M, 7),
         lambda part: in_decimals(cdis_mm[part], 3),
     ]
+    if external is not None and _are_carried(external):
+        columns += [partial(_thousandths, column) for column in external.T]
     value = 0
     for column in columns:
         for start, end in pairwise(chunk_borders(count)):
             whole = column(slice(start, end))
             value = zlib.crc32(np.ascontiguousarray(whole, dtype="<i8").data, value)
     return zlib.crc32(rows, value) & _CHECKSUM_BITS
+
+
+def _are_carried(external: Floats) -> bool:
+    """Tell whether any external axis is anywhere but at 0."""
+    rows = external[:1] if external.strides[0] == 0 else external
+    return bool(np.nan_to_num(rows).any())
+
+
+def _thousandths(column: Floats, part: slice) -> Ints:
+    return in_decimals(column[part], 3)

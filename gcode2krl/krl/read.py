@@ -74,6 +74,8 @@ class KrlProgram:
     """(c,) motions along an arc."""
     circ_via_mm: Floats
     """(c, 3) a point that each passes."""
+    external: Floats
+    """(p, 6) E1 to E6, NaN where absent; one row in memory where no motion has any."""
     ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
@@ -216,6 +218,7 @@ class _Reader:
             joint_deg=joint_deg,
             circ_rows=circ_rows,
             circ_via_mm=self._via_mm(executed, len(circ_rows)),
+            external=executed.external,
             ptp=ptp,
             speed_mm_s=speed,
             cdis_mm=cdis,

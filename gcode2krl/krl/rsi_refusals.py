@@ -8,6 +8,8 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carriers import tables_of
+from gcode2krl.cell.sections.external import EXTERNAL_NAMES
 from gcode2krl.errors import Issue
 from gcode2krl.krl.rsi_text import rsi_rows
 from gcode2krl.krl.statements import event_statements
@@ -35,6 +37,7 @@ def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
     yield from _tools(targets, on, off)
     yield from _homes(targets, on, off)
     yield from _halts(targets, cell, on, off)
+    yield from _tables(targets, cell)
     address = IPv4Address(cell.online.link.address)
     if address.is_unspecified:
         sentence = f"the controller cannot look for the server at {address}"
@@ -42,6 +45,14 @@ def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
     if address.is_loopback:
         sentence = f"the controller will look for the server at itself, {cell.online.link.address}"
         yield Issue("warning", "online-address", 0, sentence, "give [online.link] address of the PC")
+
+
+def _tables(targets: Targets, cell: Cell) -> Iterator[Issue]:
+    """Yield the tables that turn: the online side does not know how the part lies then."""
+    for name in tables_of(cell.external, cell.frames.base_on):
+        if np.ptp(targets.external[:, EXTERNAL_NAMES.index(name)]) > 0.0:
+            sentence = f"{name} turns the part, which the online compensation does not know of"
+            yield Issue("error", "external-moves", 0, sentence, f"state [external.{name}] position and home")
 
 
 def _tools(targets: Targets, on: int, off: int) -> Iterator[Issue]:

@@ -84,10 +84,24 @@ def _motion_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
     incomplete, not_allowed = (np.concatenate(rows)[:MOST_PLACES] for rows in zip(*parts, strict=True))
     for row in incomplete:
         yield Issue("error", "krl-incomplete", int(program.line[row]), "the target lacks a component")
+    yield from _external_issues(program, cell)
     for row in not_allowed:
         speed_m_s = program.speed_mm_s[row] / MM_PER_M
         sentence = f"$VEL.CP is {speed_m_s:g} m/s, allowed above 0 to {fastest_m_s:g}"
         yield Issue("error", "krl-velocity", int(program.line[row]), sentence)
+
+
+def _external_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
+    """Yield targets without an external axis of the cell, or with one that it has not."""
+    if program.external.strides[0] == 0 and not cell.external:
+        return
+    for column, key in enumerate(w.EXTERNAL_KEYS):
+        stated = ~np.isnan(program.external[:, column])
+        known = key in cell.external
+        wrong = np.flatnonzero(stated != known)[:MOST_PLACES]
+        text = f"the target lacks {key}" if known else f"{key} is no external axis of the cell"
+        for row in wrong.tolist():
+            yield Issue("error", "krl-external", int(program.line[row]), text)
 
 
 def _lacks(*columns: Floats) -> Bools:

@@ -20,6 +20,7 @@ CHUNK_BYTES = 1 << 20
 _SEARCHED_BYTES = 4096
 
 _count = core_function("krl_count", BYTES, INT, INT, OUT_INTS)
+_external = core_function("krl_external", BYTES, INT, INT, OUT_FLOATS)
 _scan = core_function(
     "krl_scan",
     *(BYTES, INT, INT, INT),
@@ -47,6 +48,8 @@ class Scanned(NamedTuple):
     """First line with a character that is not ASCII, 0 = none."""
     open_folds: int
     """``;FOLD`` less ``;ENDFOLD``."""
+    external: Floats
+    """(m, 6) E1 to E6 of a motion, NaN where absent; (0, 6) where no motion has any."""
 
 
 def scan_krl(text: bytes | NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) -> Scanned:
@@ -75,13 +78,17 @@ def scan_krl(text: bytes | NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) ->
             slice(motion, last_motion),
             slice(first - motion, behind - last_motion),
         )
-        found = np.zeros(3, dtype=np.int64)
+        found = np.zeros(4, dtype=np.int64)
         columns = kinds[rows], blends[rows], line[rows], pose[own], span[others], value[others]
         _scan(data, start, end, lines, *columns, found)
         return found
 
-    too_long, not_ascii, folds = np.transpose(in_chunks(scanned, borders)).tolist()
-    return Scanned(kind, blend, line, pose, span, value, _first(too_long), _first(not_ascii), sum(folds))
+    too_long, not_ascii, folds, carried = np.transpose(in_chunks(scanned, borders)).tolist()
+    external = np.empty((motions if sum(carried) else 0, w.EXTERNAL_COLUMNS))
+    if len(external):
+        in_chunks(lambda a, b: _external(data, a, b, external[begins[a][2] : begins[b][2]]), borders)
+    firsts = _first(too_long), _first(not_ascii)
+    return Scanned(kind, blend, line, pose, span, value, *firsts, sum(folds), external)
 
 
 def _borders(data: NDArray[np.uint8], chunk_bytes: int) -> list[int]:

@@ -5,11 +5,12 @@ from functools import lru_cache
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
-from gcode2krl.cell import Cell, controller_axes, plain_view, template_rules
+from gcode2krl.cell import Cell, carriers, controller_axes, plain_view, template_rules
 from gcode2krl.cell import templates as cell_templates
 from gcode2krl.cell.sections import missing, missing_key
 from gcode2krl.cell.switching import template_issue
@@ -28,13 +29,21 @@ def frame_text(matrix: Floats) -> str:
     return "{" + ",".join(f"{key} {value}" for key, value in zip(w.POSE_KEYS, values, strict=True)) + "}"
 
 
-def axes_text(q_deg: Floats) -> str:
-    """Return joint angles (6,) in degrees as a KRL axis target."""
-    return (
-        "{"
-        + ",".join(f"{key} {fixed(angle, 4)}" for key, angle in zip(w.AXIS_KEYS, q_deg, strict=True))
-        + "}"
-    )
+def axes_text(q_deg: Floats, external: str = "") -> str:
+    """Return joint angles (6,) in degrees, and what `external_text` returns, as a KRL axis target."""
+    angles = ",".join(f"{key} {fixed(angle, 4)}" for key, angle in zip(w.AXIS_KEYS, q_deg, strict=True))
+    return f"{{{angles}{external}}}"
+
+
+def external_text(external: Floats, cell: Cell) -> str:
+    """Return the external axes of a cell at E1 to E6 (6,) as further components of a target."""
+    axes = zip(w.EXTERNAL_KEYS, external, strict=True)
+    return "".join(f",{key} {fixed(at, 3)}" for key, at in axes if key in cell.external)
+
+
+def external_bits(cell: Cell) -> int:
+    """Return the external axes of a cell as bits, bit 0 = E1."""
+    return sum(1 << k for k, key in enumerate(w.EXTERNAL_KEYS) if key in cell.external)
 
 
 def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
@@ -42,12 +51,45 @@ def ascii_text(text: str, most: int = _MESSAGE_CHARACTERS) -> str:
     return re.sub(r"[^ !#$%&\'()*+,\-./0-9:;<=>?@A-Z\[\]^_a-z~]", "?", text)[:most]
 
 
-def base_statement(cell: Cell) -> str:
-    """Return the statement that sets ``$BASE``."""
-    number = cell.frames.base_data
+def base_statement(cell: Cell, external: Floats) -> str:
+    """Return the statements that set ``$BASE``, E1 to E6 at (6,).
+
+    A table that the controller couples is named by EK, which lets ``$BASE`` move with it (KUKA's BAS.SRC).
+    """
+    number, table = cell.frames.base_data, coupled_table(cell)
+    if table is not None:
+        offset = "GK_BASE" if number is None else f"{w.BASE_DATA}[{number}]"
+        own = f"GK_BASE={frame_text(cell.stated_base())}\n" if number is None else ""
+        return f"{own}{w.BASE}=EK({table}.ROOT,{table}.MECH_TYPE,{offset})"
     if number is not None:
         return f"{w.BAS} (#BASE,{number} )"
-    return f"{w.BASE}={frame_text(cell.base_in_world())}"
+    return f"{w.BASE}={frame_text(base_of_controller(cell, external))}"
+
+
+def coupled_table(cell: Cell) -> str | None:
+    """Return the machine of the table that carries ``$BASE``, ``MACHINE_DEF[2]``; None without one."""
+    tables = carriers.tables_of(cell.external, cell.frames.base_on)
+    number = cell.external[tables[-1]].machine_def if tables else None
+    return None if number is None else f"{w.MACHINE_DEF}[{number}]"
+
+
+def base_of_controller(cell: Cell, external: Floats) -> Floats:
+    """Return ``$BASE`` (4, 4) as the controller must have it, the external axes at E1 to E6 (6,).
+
+    In ``$WORLD``, or in the table that the controller couples. A rail that it does not couple leaves
+    ``$ROBROOT`` where it is: to the controller the part has moved instead.
+    """
+    if coupled_table(cell) is not None:
+        return cell.stated_base()
+    rails = carriers.rails_of(cell.external)
+    if rails and not cell.external[rails[0]].is_coupled:
+        robroot = cell.frames.robroot
+        in_root: Floats = cell.base_in_root(external[None])[0]
+        return in_root if robroot is None else robroot.matrix() @ in_root
+    in_world: Floats = carriers.base_in_world(
+        cell.external, external[None], cell.stated_base(), cell.frames.base_on
+    )[0]
+    return in_world
 
 
 def unnumbered(cell: Cell, tools: list[int]) -> str:
@@ -57,7 +99,7 @@ def unnumbered(cell: Cell, tools: list[int]) -> str:
     them at what ``BAS(#INITMOV,0)`` or the last number set (KUKA's BAS.SRC of KSS 8).
     """
     by_value = {
-        w.ACT_BASE: cell.frames.base_data is None,
+        w.ACT_BASE: cell.frames.base_data is None or coupled_table(cell) is not None,
         w.ACT_TOOL: any(cell.tool[number].tool_data is None for number in tools),
     }
     return ", ".join(name for name, stale in by_value.items() if stale)
@@ -84,20 +126,21 @@ def written_tool(cell: Cell, number: int) -> Floats:
     return cell.tool_matrix(number) @ fr.invert(controller_axes(cell.tool[number].axis or "+z"))
 
 
-def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
+def frame_checks(cell: Cell, tools: list[int], external: Floats) -> list[dict[str, str]]:
     """Return what the guard compares: the mounting where the cell states it, and frames set by number.
 
-    Each with the inverse of what it should be.
+    Each with the inverse of what it should be. A rail that the controller couples takes the place of
+    ``$ROBROOT``, which it then ignores (KUKA's machine data, ``$ERSYSROOT``): `root_check`.
     """
     checks = []
-    if cell.frames.robroot is not None:
+    if cell.frames.robroot is not None and not has_coupled_rail(cell):
         inverse = frame_text(fr.invert(cell.frames.robroot.matrix()))
         checks.append({"variable": w.ROBROOT, "inverse": inverse})
     if cell.frames.base_data is not None:
         checks.append(
             {
                 "variable": f"{w.BASE_DATA}[{cell.frames.base_data}]",
-                "inverse": frame_text(fr.invert(cell.base_in_world())),
+                "inverse": frame_text(fr.invert(base_of_controller(cell, external))),
             }
         )
     for number in tools:
@@ -110,6 +153,21 @@ def frame_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
                 }
             )
     return checks
+
+
+def has_coupled_rail(cell: Cell) -> bool:
+    """Tell whether the controller knows of a rail under the robot."""
+    rails = carriers.rails_of(cell.external)
+    return bool(rails) and cell.external[rails[0]].is_coupled
+
+
+def root_check(cell: Cell, external: Floats) -> dict[str, str] | None:
+    """Return what the guard compares once E1 to E6 are at (6,): where a rail has put the robot."""
+    if not has_coupled_rail(cell):
+        return None
+    robroot = np.eye(4) if cell.frames.robroot is None else cell.frames.robroot.matrix()
+    root = carriers.root_in_world(cell.external, external[None], robroot)[0]
+    return {"variable": w.ROBROOT_NOW, "inverse": frame_text(fr.invert(root))}
 
 
 def event_statements(event: Event, cell: Cell) -> str:

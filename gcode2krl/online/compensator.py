@@ -15,6 +15,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.cell.carried import require_still
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of, missing_stiffness
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
@@ -146,7 +147,11 @@ def build_compensator(
 
 
 def start(device: Compensator) -> State:
-    """Return the state before the first cycle: no force known, no correction."""
+    """Return the state before the first cycle: no force known, no correction.
+
+    Raises `RefusedError` where a table may turn: then forces would be along other axes than they seem to be.
+    """
+    require_still(device.cell, "the online compensation", rails=False)
     return State(
         filter_start(device.settings),
         gate_start(),

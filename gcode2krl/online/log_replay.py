@@ -10,6 +10,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import require_still
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import project_normal, tip_position
 from gcode2krl.compliance.sensor import Calibration
@@ -59,8 +60,10 @@ def replay(
     ``run.toml`` puts its tables. ``calibration`` is that of forces recorded in the sensor's axes. ``world``
     has the delays of the robot. An error is the tip minus its command.
 
-    Raises `NotUnderstoodError` where the run has no forces, no joints, or ends at once.
+    Raises `NotUnderstoodError` where the run has no forces, no joints, or ends at once, `RefusedError` where
+    external axes of the cell may move.
     """
+    require_still(cell, "a replay")
     controller, force = run.controller, run.force
     if controller is None or force is None:
         missing = "controller" if controller is None else "force"

@@ -3,6 +3,7 @@
 from gcode2krl.program.blending import asked_tolerance
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
+from gcode2krl.program.following import following_deg
 from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.restart import (
@@ -13,11 +14,13 @@ from gcode2krl.program.restart import (
     state_words,
 )
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
+from gcode2krl.program.stations import Range, plan_stations
 from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
 from gcode2krl.program.tilts import tilt_issues
 
 __all__ = [
+    "Range",
     "approached_row",
     "asked_tolerance",
     "begun_at",
@@ -26,8 +29,10 @@ __all__ = [
     "check_toolpath",
     "doubtful",
     "feeds_per_tooth",
+    "following_deg",
     "merged",
     "merging_note",
+    "plan_stations",
     "plan_targets",
     "require_geometry",
     "row_before",

@@ -1,11 +1,11 @@
 """Robot kinematics: closed-form forward and inverse, Jacobian, branch, limits, singularities."""
 
+from gcode2krl.cell.carried import at_rest, from_rest, to_rest
 from gcode2krl.robot.joints import (
     Follower,
     angles_near,
     follow,
     follow_motion,
-    joints_at,
     joints_from_angles,
     line_angles,
     motion_angles,
@@ -16,19 +16,21 @@ from gcode2krl.robot.joints import (
 )
 from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
 from gcode2krl.robot.quality import pose_quality
-from gcode2krl.robot.standing import raise_shares
+from gcode2krl.robot.standing import limit_margin, raise_shares
 
 __all__ = [
     "Follower",
     "angles_near",
+    "at_rest",
     "flange_frames",
     "follow",
     "follow_motion",
     "forward",
+    "from_rest",
     "inverse",
     "jacobian",
-    "joints_at",
     "joints_from_angles",
+    "limit_margin",
     "line_angles",
     "motion_angles",
     "pose_quality",
@@ -36,5 +38,6 @@ __all__ = [
     "raise_shares",
     "rise_angles",
     "target_angles",
+    "to_rest",
     "trial_rows",
 ]

@@ -5,16 +5,18 @@ sampled again, so that a message can state the place and the angle.
 """
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import from_rest
 from gcode2krl.compiled.chunks import ROWS
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.robot.branch import Branch, Path
-from gcode2krl.robot.lines import Line, sample_lines
+from gcode2krl.robot.branch import Branch
+from gcode2krl.robot.lines import Line, path_of, sample_lines
 from gcode2krl.robot.poses import forward
 from gcode2krl.robot.standing import (
     ALL_BITS,
@@ -70,8 +72,7 @@ def _sampled(
     for start, end in spans:
         line = sample_lines(targets, cell, start, end)
         starts = np.isnan(line.duration_s)
-        path = Path(line.position_mm, line.rotation, line.tool, starts)
-        q_span = branch.joints(path, cell, _last_reached(q, start))
+        q_span = branch.joints(path_of(line, cell), cell, _last_reached(q, start))
         line.duration_s[:1] = np.nan  # the sample before is another span's
         bits = what_is_wrong(q_span, line.duration_s, cell)
         if not starts[:1].any():  # the start of a span is not the start of a stretch
@@ -79,7 +80,7 @@ def _sampled(
         lines.append(line)
         joints.append(q_span)
         wrong.append(bits)
-    names = ("position_mm", "rotation", "tool", "target", "duration_s", "is_target")
+    names = [spec.name for spec in fields(Line)]
     columns = {name: np.concatenate([getattr(line, name) for line in lines]) for name in names}
     return Line(**columns), np.concatenate(joints), np.concatenate(wrong)
 
@@ -249,7 +250,9 @@ def _ptp_findings(targets: Targets, q: Floats, cell: Cell) -> list[Issue]:
         path = q[row - 1] + (q[row] - q[row - 1]) * part
         if np.isnan(path).any():
             continue
-        lowest = forward(path, cell, int(targets.tool[row]))[0][:, 2].min()
+        external = targets.external[row - 1] + (targets.external[row] - targets.external[row - 1]) * part
+        seen = forward(path, cell, int(targets.tool[row]))
+        lowest = from_rest(*seen, external, cell)[0][:, 2].min()
         if lowest < clearance - _PTP_TOLERANCE_MM:
             sentence = f"PTP comes down to Z {lowest:.1f}, below the clearance plane at {clearance:g}"
             return [Issue("error", "ptp-below-clearance", int(targets.source_line[row]), sentence, remedy)]

@@ -12,13 +12,14 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import at_rest
 from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
 from gcode2krl.robot.findings import joint_findings
 from gcode2krl.robot.kinematics import status_turn
-from gcode2krl.robot.lines import Line, count_samples, sample_lines, samples_at
+from gcode2krl.robot.lines import Line, count_samples, path_of, sample_lines, samples_at
 from gcode2krl.robot.standing import Bits, limit_margin, what_is_wrong
 from gcode2krl.robot.velocity_kinematics import smallest_singular_value
 from gcode2krl.tables import Joints, Motion, Targets, blocks_of, joined, rows_at, rows_of
@@ -34,7 +35,7 @@ def follow(targets: Targets, cell: Cell, conditioning: bool = True) -> tuple[Joi
     ``conditioning`` the column ``sigma_min`` is NaN, which saves its time.
     """
     q, findings = target_angles(targets, cell)
-    return joints_at(q, targets.tool, cell, conditioning), findings
+    return joints_at(q, targets, cell, conditioning), findings
 
 
 def target_angles(targets: Targets, cell: Cell) -> tuple[Floats, tuple[Issue, ...]]:
@@ -45,9 +46,9 @@ def target_angles(targets: Targets, cell: Cell) -> tuple[Floats, tuple[Issue, ..
     return q, joint_findings(targets, q, wrong, counts, branch, cell)
 
 
-def joints_at(q_rad: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:
-    """Return the table of angles (p, 6) at targets that move the tools (p,); speeds are NaN."""
-    return _joints(q_rad, np.broadcast_to(np.nan, q_rad.shape), tool, cell, conditioning)
+def joints_at(q_rad: Floats, targets: Targets, cell: Cell, conditioning: bool = True) -> Joints:
+    """Return the table of angles (p, 6) at targets; speeds are NaN."""
+    return _joints(q_rad, np.broadcast_to(np.nan, q_rad.shape), targets, cell, conditioning)
 
 
 def ptp_joints(targets: Targets, cell: Cell) -> Joints:
@@ -58,7 +59,7 @@ def ptp_joints(targets: Targets, cell: Cell) -> Joints:
     rows = np.flatnonzero(targets.ptp & ~targets.home)
     q[rows] = branch.q_rad[np.searchsorted(branch.samples, counts[rows] - 1)]
     q[targets.home] = cell.home_q_rad()
-    return joints_at(q, targets.tool, cell, conditioning=False)
+    return joints_at(q, targets, cell, conditioning=False)
 
 
 def follow_motion(motion: Motion, cell: Cell) -> Joints:
@@ -72,8 +73,8 @@ def angles_near(motion: Motion, q_rad: Floats, cell: Cell) -> Floats:
     Branch and turns are those of these joints; limits are not checked.
     """
     starts = np.zeros(len(motion), dtype=np.bool_)
-    path = Path(motion.position_mm, motion.rotation, motion.tool, starts)
-    return same_branch(path, q_rad, cell)
+    poses = at_rest(motion.position_mm, motion.rotation, motion.external, cell)
+    return same_branch(Path(*poses, motion.tool, starts), q_rad, cell)
 
 
 def line_angles(targets: Targets, row: int, q_rad: Floats, cell: Cell) -> Floats:
@@ -82,7 +83,7 @@ def line_angles(targets: Targets, row: int, q_rad: Floats, cell: Cell) -> Floats
     Branch and turns are those of these joints; the samples are those at which lines are checked, the target
     the last of them.
     """
-    return same_branch(_path(sample_lines(targets, cell, row, row + 1)), q_rad, cell)
+    return same_branch(path_of(sample_lines(targets, cell, row, row + 1), cell), q_rad, cell)
 
 
 def rise_angles(
@@ -96,7 +97,9 @@ def rise_angles(
     position = targets.position_mm[row] + height[:, None] * np.array([0.0, 0.0, 1.0])
     rotation = np.tile(targets.rotation[row], (len(height), 1))
     tool = np.full(len(height), targets.tool[row], dtype=np.int32)
-    return same_branch(Path(position, rotation, tool, np.zeros(len(height), dtype=np.bool_)), q_rad, cell)
+    external = np.broadcast_to(targets.external[row], (len(height), 6))
+    poses = at_rest(position, rotation, external, cell)
+    return same_branch(Path(*poses, tool, np.zeros(len(height), dtype=np.bool_)), q_rad, cell)
 
 
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
@@ -122,7 +125,8 @@ class Follower:
         self._cell, self._window_s = cell, 2.0 * dt_s
         starts = np.zeros(len(trial), dtype=np.bool_)
         starts[0] = True
-        self._branch = best_branch(Path(trial.position_mm, trial.rotation, trial.tool, starts), rows, cell)
+        poses = at_rest(trial.position_mm, trial.rotation, trial.external, cell)
+        self._branch = best_branch(Path(*poses, trial.tool, starts), rows, cell)
         self._before: Motion | None = None
         self._row = 0
         self._reached = cell.home_q_rad()
@@ -151,7 +155,9 @@ class Follower:
         q = np.concatenate([self._q[-1:], np.empty((len(motion), 6))])
 
         def path(rows: slice) -> Path:
-            return Path(whole.position_mm[rows], whole.rotation[rows], whole.tool[rows], starts[rows])
+            external = whole.external[rows]
+            poses = at_rest(whole.position_mm[rows], whole.rotation[rows], external, self._cell)
+            return Path(*poses, whole.tool[rows], starts[rows])
 
         def solve(start: int, end: int, before: Floats | None) -> Floats:
             first = max(start - 1, 0)
@@ -184,17 +190,13 @@ class Follower:
 
 def joints_from_angles(motion: Motion, q_rad: Floats, qd_rad_s: Floats, cell: Cell) -> Joints:
     """Return the table of angles and speeds from `motion_angles`."""
-    return _joints(q_rad, qd_rad_s, motion.tool, cell)
+    return _joints(q_rad, qd_rad_s, motion, cell)
 
 
 def _branch_of(targets: Targets, counts: Ints, cell: Cell) -> Branch:
     starts = counts[targets.ptp & ~targets.home] - 1
     samples = thinned(starts, int(counts[-1]))
-    return best_branch(_path(samples_at(targets, cell, counts, samples)), samples, cell)
-
-
-def _path(line: Line) -> Path:
-    return Path(line.position_mm, line.rotation, line.tool, np.isnan(line.duration_s))
+    return best_branch(path_of(samples_at(targets, cell, counts, samples), cell), samples, cell)
 
 
 def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> tuple[Floats, Bits]:
@@ -205,7 +207,7 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
         q[start:end], wrong[start:end] = np.nan, 0
         line, shared = _with_row_before(targets, counts, start, end, cell)
         guess = branch.guess(int(counts[start]) - 1) if before is None else before
-        found = branch.joints(_path(line), cell, guess)
+        found = branch.joints(path_of(line, cell), cell, guess)
         bits = what_is_wrong(found, line.duration_s, cell)[shared:]
         target, found_own = line.target[shared:], found[shared:]
         hits = np.flatnonzero(bits)
@@ -246,8 +248,8 @@ def _solve_parts(
     return last
 
 
-def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool = True) -> Joints:
-    geometry = cell.robot.geometry.array()
+def _joints(q: Floats, qd: Floats, along: Targets | Motion, cell: Cell, conditioning: bool = True) -> Joints:
+    geometry, tool = cell.robot.geometry.array(), along.tool
     count = len(q)
     margin = np.empty(count)
     sigma = np.empty(count) if conditioning else np.broadcast_to(np.nan, count)
@@ -263,4 +265,12 @@ def _joints(q: Floats, qd: Floats, tool: Ints32, cell: Cell, conditioning: bool 
             sigma[with_tool] = smallest_singular_value(q[with_tool], geometry, tip)
 
     in_chunks(part, chunk_borders(count, ROWS))
-    return Joints(q_rad=q, qd_rad_s=qd, limit_margin_rad=margin, sigma_min=sigma, status=status, turn=turn)
+    return Joints(
+        q_rad=q,
+        qd_rad_s=qd,
+        limit_margin_rad=margin,
+        sigma_min=sigma,
+        status=status,
+        turn=turn,
+        external=along.external,
+    )

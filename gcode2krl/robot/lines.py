@@ -8,15 +8,20 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.cell.tool_tips import Rows, motion_starts
+from gcode2krl.cell.carried import at_rest
+from gcode2krl.cell.carriers import most_of
+from gcode2krl.cell.tool_tips import Rows, external_starts, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.long_columns import by_regions
+from gcode2krl.robot.branch import Path
 from gcode2krl.tables import Targets
 from gcode2krl.units import RAD_PER_DEG
 
 STEP_MM, STEP_RAD = 10.0, 2.0 * RAD_PER_DEG
 """Largest step between the samples of a line that are checked."""
+_STEP_EXTERNAL = 10.0
+"""The same of E1 to E6, in mm or degrees."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,8 @@ class Line:
     duration_s: Floats
     """(m,) time from the sample before, NaN at the start of a chain."""
     is_target: Bools
+    external: Floats
+    """(m, 6) E1 to E6 in mm and degrees."""
 
     def from_sample(self, first: int) -> "Line":
         """Return the line without the samples before ``first``."""
@@ -42,7 +49,19 @@ class Line:
             self.target[rows],
             self.duration_s[rows],
             self.is_target[rows],
+            self.external[rows],
         )
+
+
+def path_of(line: Line, cell: Cell) -> Path:
+    """Return the poses of a line as the arm sees them."""
+    poses = at_rest(line.position_mm, line.rotation, line.external, cell)
+    return Path(*poses, line.tool, np.isnan(line.duration_s))
+
+
+def external_times(way: Floats, cell: Cell) -> Floats:
+    """Return the time (p,) in s that E1 to E6 need at least for ways (p, 6); 0 where no speed is stated."""
+    return np.asarray((np.abs(way) / most_of(cell.external, "speed")).max(axis=1))
 
 
 @dataclass(frozen=True)
@@ -57,6 +76,10 @@ class _Motions:
     angle_rad: Floats
     steps: Ints
     """(p,) samples of each: none for HOME, one for a PTP."""
+    start_external: Floats
+    end_external: Floats
+    external_s: Floats
+    """(p,) time that the external axes need at least."""
 
 
 def _motions(targets: Targets, cell: Cell, rows: Rows) -> _Motions:
@@ -72,10 +95,18 @@ def _motions(targets: Targets, cell: Cell, rows: Rows) -> _Motions:
     if not np.array_equal(start_rotation, end_rotation):
         turning = functools.reduce(np.logical_or, (start_rotation != end_rotation).T)
         angle[turning] = fr.angle_between(end_rotation[turning], start_rotation[turning])
-    steps = np.maximum(1, np.ceil(np.maximum(length / STEP_MM, angle / STEP_RAD))).astype(np.int64)
+    way = np.maximum(length / STEP_MM, angle / STEP_RAD)
+    start_external, end_external = external_starts(targets, rows), targets.external[rows]
+    needed_s = np.broadcast_to(0.0, len(length))
+    if cell.external:
+        needed_s = external_times(end_external - start_external, cell)
+        carried = np.abs(end_external - start_external).max(axis=1) / _STEP_EXTERNAL
+        way = np.maximum(way, np.where(ptp, 0.0, carried))
+    steps = np.maximum(1, np.ceil(way)).astype(np.int64)
     steps[ptp] = 1
     steps[home] = 0
-    return _Motions(start, start_rotation, end, end_rotation, length, angle, steps)
+    poses = start, start_rotation, end, end_rotation
+    return _Motions(*poses, length, angle, steps, start_external, end_external, needed_s)
 
 
 def count_samples(targets: Targets, cell: Cell) -> Ints:
@@ -122,6 +153,7 @@ def samples_at(targets: Targets, cell: Cell, counts: Ints, samples: Ints) -> Lin
 def _line(targets: Targets, motions: _Motions, rows: Rows, target: Ints, which: Rows, part: Floats) -> Line:
     """Return the samples at the fractions ``part`` (m,) of the motions ``which``."""
     position, rotation = motions.end_mm[which], motions.end_rotation[which]
+    external = motions.end_external[which]
     on_the_way = np.flatnonzero(part < 1.0)
     if len(on_the_way):
         way = which[on_the_way] if not isinstance(which, slice) else on_the_way
@@ -131,6 +163,12 @@ def _line(targets: Targets, motions: _Motions, rows: Rows, target: Ints, which: 
         rotation[on_the_way[turned]] = fr.slerp(
             motions.start_rotation[way[turned]], motions.end_rotation[way[turned]], share[turned]
         )
-    time_s = np.maximum(motions.length_mm, 1e-9) / targets.speed_mm_s[rows] / np.maximum(motions.steps, 1)
+        if motions.end_external.any() or motions.start_external.any():
+            begins = motions.start_external[way]
+            external = np.array(external)
+            external[on_the_way] = begins + (motions.end_external[way] - begins) * share[:, None]
+    time_s = np.maximum(motions.length_mm, 1e-9) / targets.speed_mm_s[rows]
+    time_s = np.maximum(time_s, motions.external_s) / np.maximum(motions.steps, 1)
     time_s[targets.ptp[rows]] = np.nan
-    return Line(position, rotation, targets.tool[rows][which], target, time_s[which], part == 1.0)
+    tool = targets.tool[rows][which]
+    return Line(position, rotation, tool, target, time_s[which], part == 1.0, external)

@@ -15,6 +15,7 @@ from gcode2krl import frames as fr
 from gcode2krl import robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.cell.carried import require_still
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.arcs import in_chords
@@ -76,6 +77,7 @@ def read_program(path: Path, cell: Cell) -> Accepted:
     broken = [issue for issue in program.issues if issue.severity == "error"]
     if broken:
         raise RefusedError(broken, path.name)
+    require_still(cell, "a run kit")
     _refuse_other_cell(path, program, cell)
     restart = _RESTART.search(text)
     return Accepted(
@@ -146,6 +148,7 @@ def _targets(program: KrlProgram, path: Path, cell: Cell) -> Targets:
         move=np.where(home, -1, move),
         source_line=_source_lines(program),
         tool=tool,
+        external=np.broadcast_to(cell.external_rest(), (len(home), 6)),
         events=events,
         source=path.name,
     )
@@ -203,9 +206,13 @@ def _tool_texts(cell: Cell, number: int) -> set[str]:
     return {_normal(text) for text in st.tool_statements(cell, number).split("\n")}
 
 
+def _base_texts(cell: Cell) -> set[str]:
+    return {_normal(text) for text in st.base_statement(cell, cell.external_rest()).split("\n")}
+
+
 def _refuse_other_cell(path: Path, program: KrlProgram, cell: Cell) -> None:
     stated = {_normal(s.text) for s in program.statements if s.motion == 0}
-    if cell.frames.base is None or _normal(st.base_statement(cell)) not in stated:
+    if cell.frames.base is None or not _base_texts(cell) <= stated:
         raise _other_cell(path, "$BASE")
     home = program.q_deg[~np.isnan(program.q_deg).any(axis=1)]
     if cell.home.q_deg is None or (np.abs(home - np.array(cell.home.q_deg)) > JOINT_LIMIT_DEG).any():

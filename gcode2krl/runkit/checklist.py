@@ -65,10 +65,11 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
 
 def _base_lines(cell: Cell) -> list[str]:
     """Return the statement that sets ``$BASE``, with what stands in the controller's table under a number."""
-    number = cell.frames.base_data
+    number, at = cell.frames.base_data, cell.external_rest()
     if number is None:
-        return [st.base_statement(cell)]
-    return [f"{st.base_statement(cell)}: {w.BASE_DATA}[{number}]={st.frame_text(cell.base_matrix())}"]
+        return st.base_statement(cell, at).split("\n")
+    frame = st.frame_text(st.base_of_controller(cell, at))
+    return [f"{st.base_statement(cell, at)}: {w.BASE_DATA}[{number}]={frame}"]
 
 
 def _tool_lines(cell: Cell, number: int) -> list[str]:

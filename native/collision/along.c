@@ -18,7 +18,7 @@ typedef struct {
     const Obstacles *obstacles;
     Arm arm;
     Ends now[SCENE_MOST_BODIES], before[SCENE_MOST_BODIES];
-    double q_now[AXES], q_before[AXES];
+    Stance stands, stood;            /* now, and in the row before */
     double bulge[SCENE_MOST_BODIES]; /* how far the real way may be from the way of the joints */
     double slack[SCENE_MOST_BODIES]; /* and from the chord */
     double gone[SCENE_MOST_BODIES];  /* no end has moved farther, since the way began */
@@ -169,11 +169,11 @@ static Gap least_between(const Walk *walk, const int32_t *pair, const Pair *stat
         const double clearly = greater(ADVANCE_EXACT_MM, ADVANCE_EXACT_SHARE * least.mm);
         if (bound > allowed || (bound > 0.0 && least.mm <= allowed && bound > least.mm - clearly))
             continue;
-        double q[AXES];
+        Stance between;
         Ends ends[2] = {{0.0}, {0.0}};
-        for (int j = 0; j < AXES; j++)
-            q[j] = walk->q_before[j] + (first->u + 0.5 * first->wide) * (walk->q_now[j] - walk->q_before[j]);
-        place_two(q, &walk->arm, walk->bodies, pair, ends);
+        for (int j = 0; j < STANCE; j++)
+            between[j] = walk->stood[j] + (first->u + 0.5 * first->wide) * (walk->stands[j] - walk->stood[j]);
+        place_two(between, &walk->arm, walk->bodies, pair, ends);
         Gap middle = gap_at(walk, pair, state, ends[0], ends[1], false);
         const double gap = middle.mm;
         middle.mm -= bulge;
@@ -251,11 +251,11 @@ static Gap judged(const Walk *walk, const int32_t *pair, const Pair *state, bool
     return gap;
 }
 
-/* Walk along rows of angles (n, 6) from `first` on, until the notes are full; return the row that comes next.
+/* Walk along rows of angles (n, 6), and of shifts of the robot root (n, 3), from `first` on, until the notes are full; return the row that comes next.
 
    Writes the least gap (n) up to `horizon_mm` since the row before, and of which pair (n), -1: none is as near.
    Gaps up to `near_mm` are noted with row and pair, and with gap and place. A row of NaN begins a new way. */
-EXPORT int64_t collision_along(Floats q_rad, int64_t first, Floats geometry, const Bodies *bodies,
+EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Floats geometry, const Bodies *bodies,
                                const Obstacles *obstacles, const Watched *watched, double horizon_mm, double near_mm,
                                int64_t is_sampled, Floats gap_mm, Ints32 nearest, Ints notes, Floats note_values,
                                Ints noted) {
@@ -278,12 +278,14 @@ EXPORT int64_t collision_along(Floats q_rad, int64_t first, Floats geometry, con
             AT(gap_mm, i) = NAN;
             continue;
         }
-        for (int j = 0; j < AXES; j++) {
-            walk.q_now[j] = CELL(q_rad, i, j);
-            walk.q_before[j] = steps > 0 ? CELL(q_rad, i - 1, j) : walk.q_now[j];
+        for (int j = 0; j < STANCE; j++) {
+            const Floats from = j < AXES ? q_rad : shift_mm;
+            const int column = j < AXES ? j : j - AXES;
+            walk.stands[j] = CELL(from, i, column);
+            walk.stood[j] = steps > 0 ? CELL(from, i - 1, column) : walk.stands[j];
         }
-        place_bodies(walk.q_now, &walk.arm, bodies, walk.now);
-        sagitta_shares(walk.q_before, walk.q_now, walk.share);
+        place_bodies(walk.stands, &walk.arm, bodies, walk.now);
+        sagitta_shares(walk.stood, walk.stands, walk.share);
         for (int64_t body = 0; body < count; body++) {
             walk.bulge[body] = 0.0;
             double square[2] = {0.0, 0.0};

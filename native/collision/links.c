@@ -28,7 +28,7 @@ static void turn(LinkFrame *frame, int from, int to, double angle) {
 
 static void link_frames(const double *q, const Arm *arm, LinkFrame *links) {
     enum { X, Y, Z };
-    LinkFrame frame = {{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}, {0.0, 0.0, 0.0}};
+    LinkFrame frame = {{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}, {q[AXES], q[AXES + 1], q[AXES + 2]}};
     links[0] = frame;
     turn(&frame, X, Y, -q[0]);
     links[1] = frame;
@@ -58,16 +58,16 @@ static void place(const LinkFrame *links, const Bodies *bodies, int64_t body, do
     }
 }
 
-void place_bodies(const double *q_rad, const Arm *arm, const Bodies *bodies, Ends *ends) {
+void place_bodies(const double *stance, const Arm *arm, const Bodies *bodies, Ends *ends) {
     LinkFrame links[LINKS];
-    link_frames(q_rad, arm, links);
+    link_frames(stance, arm, links);
     for (int64_t body = 0; body < bodies->link.rows; body++)
         place(links, bodies, body, ends[body]);
 }
 
-void place_two(const double *q_rad, const Arm *arm, const Bodies *bodies, const int32_t *pair, Ends *ends) {
+void place_two(const double *stance, const Arm *arm, const Bodies *bodies, const int32_t *pair, Ends *ends) {
     LinkFrame links[LINKS];
-    link_frames(q_rad, arm, links);
+    link_frames(stance, arm, links);
     place(links, bodies, pair[0], ends[0]);
     if (pair[1] < 0)
         place(links, bodies, pair[2], ends[1]);
@@ -79,7 +79,10 @@ EXPORT void collision_bodies(Floats q_rad, Floats geometry, const Bodies *bodies
     const int64_t count = bodies->link.rows;
     for (int64_t i = 0; i < q_rad.rows; i++) {
         Ends ends[SCENE_MOST_BODIES];
-        place_bodies(&CELL(q_rad, i, 0), &arm, bodies, ends);
+        Stance stance = {0.0};
+        for (int j = 0; j < AXES; j++)
+            stance[j] = CELL(q_rad, i, j);
+        place_bodies(stance, &arm, bodies, ends);
         for (int64_t k = 0; k < 6 * count; k++)
             CELL(ends_mm, i, k) = ends[k / 6][k % 6];
     }

@@ -9,10 +9,14 @@
 
 typedef double Ends[6];
 
-/* Write where the ends of all bodies are in the robot root; `ends` has a row for each body. */
-void place_bodies(const double *q_rad, const Arm *arm, const Bodies *bodies, Ends *ends);
+/* Angles of the joints, then how far a rail has taken the robot root, along the axes of the root at rest. */
+enum { STANCE = AXES + 3 };
+typedef double Stance[STANCE];
+
+/* Write where the ends of all bodies are in the robot root at rest; `ends` has a row for each body. */
+void place_bodies(const double *stance, const Arm *arm, const Bodies *bodies, Ends *ends);
 
 /* Write where the ends of a pair of bodies are, one row for each; the second where it is no obstacle. */
-void place_two(const double *q_rad, const Arm *arm, const Bodies *bodies, const int32_t *pair, Ends *ends);
+void place_two(const double *stance, const Arm *arm, const Bodies *bodies, const int32_t *pair, Ends *ends);
 
 #endif

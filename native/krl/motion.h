@@ -9,6 +9,8 @@ enum { NO_COMPONENT = -1 };
 enum { COLUMN_X = 0, COLUMN_A = 3, COLUMN_S = 6, COLUMN_T = 7 };
 /* Components A1 to A6 have the bits from here on, the others those of their columns. */
 enum { AXIS_BITS = W_STATEMENT_COLUMNS, CARTESIAN = (1 << W_STATEMENT_COLUMNS) - 1, PLACE_BITS = 7 };
+/* Components E1 to E6 have the bits behind those of A1 to A6. */
+enum { EXTERNAL_BITS = AXIS_BITS + 6, AXES = ((1 << 6) - 1) << AXIS_BITS };
 
 /* Read the name of a component; return the place behind it. */
 static inline Place component(Place at, Place end, int *bit) {
@@ -18,6 +20,9 @@ static inline Place component(Place at, Place end, int *bit) {
         *bit = COLUMN_X + letter - CH_LETTER_X;
     else if (letter == CH_LETTER_A && at < end && is_axis(HERE(at, end))) {
         *bit = AXIS_BITS + HERE(at, end) - CH_DIGIT_1;
+        at++;
+    } else if (letter == CH_LETTER_E && at < end && is_axis(HERE(at, end))) {
+        *bit = EXTERNAL_BITS + HERE(at, end) - CH_DIGIT_1;
         at++;
     } else if (letter >= CH_LETTER_A && letter <= CH_LETTER_C)
         *bit = COLUMN_A + letter - CH_LETTER_A;
@@ -29,7 +34,7 @@ static inline Place component(Place at, Place end, int *bit) {
 }
 
 /* Read `{X 1.0,Y 2.0,…}`, the components found as bits; return the place behind the brace, else NULL. */
-static inline Place components(Place at, Place end, double *value, int *found) {
+static inline Place components(Place at, Place end, double *value, double *external, int *found) {
     *found = 0;
     if (!is(at, end, CH_BRACE_OPEN))
         return NULL;
@@ -46,7 +51,10 @@ static inline Place components(Place at, Place end, double *value, int *found) {
         if (at == NULL || *found & (1 << bit))
             return NULL;
         *found |= 1 << bit;
-        SLOT(value, bit >= AXIS_BITS ? bit - AXIS_BITS : bit) = read;
+        if (bit >= EXTERNAL_BITS)
+            external[INSIDE(bit - EXTERNAL_BITS, W_EXTERNAL_COLUMNS)] = read;
+        else
+            SLOT(value, bit >= AXIS_BITS ? bit - AXIS_BITS : bit) = read;
         at = blank(at, end);
         if (is(at, end, CH_BRACE_CLOSE))
             return at + 1;
@@ -69,18 +77,20 @@ static inline bool is_motion(Place begin, Place end) {
 /* Read the point that a CIRC passes, which is asked for again by whoever needs it; return where its end begins. */
 static inline Place passed_point(Place at, Place end, double *value) {
     int found;
-    at = components(at, end, value, &found);
+    double none[W_EXTERNAL_COLUMNS];
+    at = components(at, end, value, none, &found);
     if (at == NULL || (found & PLACE_BITS) != PLACE_BITS || found > CARTESIAN)
         return NULL;
     at = blank(at, end);
     return is(at, end, CH_COMMA) ? blank(at + 1, end) : NULL;
 }
 
-/* Read a motion into value; of a CIRC its end. */
-static inline Statement motion(Place begin, Place end, double *value) {
+/* Read a motion into value and external; of a CIRC its end. Tell in has_external whether there are any. */
+static inline Statement motion(Place begin, Place end, double *value, double *external, bool *has_external) {
     const bool arc = is_circ(begin, end);
     Statement read = {arc ? W_KIND_CIRC : STANDS(begin, end, W_LIN) ? W_KIND_LIN : W_KIND_PTP, W_MALFORMED};
     int found;
+    *has_external = false;
     Place at = blank(begin + (arc ? sizeof(W_CIRC) : sizeof(W_LIN)) - 1, end);
     if (arc) {
         double passed[W_STATEMENT_COLUMNS];
@@ -88,8 +98,9 @@ static inline Statement motion(Place begin, Place end, double *value) {
         if (at == NULL)
             return read;
     }
-    at = components(at, end, value, &found);
-    const bool axes = found > CARTESIAN, linear = read.kind != W_KIND_PTP;
+    at = components(at, end, value, external, &found);
+    *has_external = found >> EXTERNAL_BITS != 0;
+    const bool axes = (found & AXES) != 0, linear = read.kind != W_KIND_PTP;
     if (axes && !linear)
         read.kind = W_KIND_PTP_AXES;
     if (at == NULL || (axes && (linear || found & CARTESIAN)))

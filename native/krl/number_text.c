@@ -58,13 +58,27 @@ static uint8_t *put_pose(uint8_t *to, const double *position_mm, const double *a
     return put_fixed(PUT(to, ",C "), abc_deg[2], DEG_DECIMALS);
 }
 
+/* Write the external axes of a motion, those of the bits of `axes`. */
+static uint8_t *put_external(uint8_t *to, Floats external, int64_t row, int64_t axes) {
+    for (int64_t k = 0; axes >> k; k++) {
+        if (!(axes >> k & 1))
+            continue;
+        to = PUT(to, ",E");
+        *to++ = (uint8_t)(CH_DIGIT_1 + k);
+        *to++ = CH_SPACE;
+        to = put_fixed(to, CELL(external, row, k), MM_DECIMALS);
+    }
+    return to;
+}
+
 /* Write the lines of LIN motions; return the length of the text.
 
    state: speed and CDIS in force, motions since the last comment. before: text that stands right before
-   motions, that of motion i from start[i] to start[i + 1]. */
+   motions, that of motion i from start[i] to start[i + 1]. external: E1 to E6, of which those in `axes` are
+   written, bit 0 = E1. */
 EXPORT int64_t krl_motion_lines(Floats position_mm, Floats abc_deg, Floats speed_m_s, Floats cdis_mm,
-                                Ints32 source_line, Floats state, int64_t comment_every, Bytes before,
-                                Ints start, Bytes text) {
+                                Ints32 source_line, Floats external, int64_t axes, Floats state,
+                                int64_t comment_every, Bytes before, Ints start, Bytes text) {
     uint8_t *to = text.at;
     double *speed = &AT(state, 0), *cdis = &AT(state, 1), *uncommented = &AT(state, 2);
     for (int64_t i = 0; i < position_mm.rows; i++) {
@@ -84,6 +98,8 @@ EXPORT int64_t krl_motion_lines(Floats position_mm, Floats abc_deg, Floats speed
         if (before.rows > 0)
             to = put(to, before.at + AT(start, i), (size_t)(AT(start, i + 1) - AT(start, i)));
         to = put_pose(to, &CELL(position_mm, i, 0), &CELL(abc_deg, i, 0));
+        if (axes)
+            to = put_external(to, external, i, axes);
         to = AT(cdis_mm, i) > 0 ? PUT(to, "} " W_C_DIS "\r\n") : PUT(to, "}\r\n");
     }
     return to - text.at;

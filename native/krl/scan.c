@@ -78,13 +78,13 @@ static double *nothing_known(double *value) {
 /* Write a row for each statement in the whole lines from a byte up to another: kind, blending and line of
    each, the components of a motion into pose, span and numbers of any other into span and value.
 
-   lines: those before them. found: first line that is too long, first that is not ASCII (0 = none), and the
-   folds that are opened less those that are closed. */
+   lines: those before them. found: first line that is too long, first that is not ASCII (0 = none), the
+   folds that are opened less those that are closed, and the motions with E1 to E6. */
 EXPORT void krl_scan(Bytes text, int64_t from, int64_t up_to, int64_t lines, Bytes kind, Bytes blend,
                      Ints32 line_of, Floats pose, Ints span, Floats value, Ints found) {
     const Place end = place(text, up_to), not_ascii = foreign(place(text, from), end);
     int64_t *too_long = &AT(found, 0), *foreign_line = &AT(found, 1), *folds = &AT(found, 2);
-    int64_t row = 0, motions = 0, others = 0;
+    int64_t row = 0, motions = 0, others = 0, *carried = &AT(found, 3);
     for (Place at = place(text, from); at < end;) {
         const Line line = line_at(at, end);
         lines++;
@@ -98,9 +98,12 @@ EXPORT void krl_scan(Bytes text, int64_t from, int64_t up_to, int64_t lines, Byt
             continue;
         }
         Statement read;
-        if (is_motion(line.begin, line.end))
-            read = motion(line.begin, line.end, nothing_known(&CELL(pose, motions++, 0)));
-        else {
+        if (is_motion(line.begin, line.end)) {
+            double external[W_EXTERNAL_COLUMNS];
+            bool has_external;
+            read = motion(line.begin, line.end, nothing_known(&CELL(pose, motions++, 0)), external, &has_external);
+            *carried += has_external;
+        } else {
             CELL(span, others, 0) = line.begin - text.at;
             CELL(span, others, 1) = line.end - text.at;
             read = other_statement(line.begin, line.end, text.at, nothing_known(&CELL(value, others++, 0)));
@@ -109,5 +112,23 @@ EXPORT void krl_scan(Bytes text, int64_t from, int64_t up_to, int64_t lines, Byt
         AT(blend, row) = (uint8_t)read.blend;
         AT(line_of, row) = (int32_t)lines;
         row++;
+    }
+}
+
+/* Write E1 to E6 of each motion in the whole lines from a byte up to another, NaN where they are not stated. */
+EXPORT void krl_external(Bytes text, int64_t from, int64_t up_to, Floats external) {
+    const Place end = place(text, up_to);
+    int64_t motions = 0;
+    for (Place at = place(text, from); at < end;) {
+        const Line line = line_at(at, end);
+        at = line.next;
+        if (is_bare(line) || !is_motion(line.begin, line.end))
+            continue;
+        double value[W_STATEMENT_COLUMNS];
+        bool has_external;
+        double *own = &CELL(external, motions++, 0);
+        for (int k = 0; k < W_EXTERNAL_COLUMNS; k++)
+            own[k] = NAN;
+        motion(line.begin, line.end, value, own, &has_external);
     }
 }

@@ -50,7 +50,9 @@ def test_the_state_is_that_of_the_kernel():
         *columns, state, every, _ = random_run(seed)
         by_kernel = state.copy()
         buffer = np.empty(number_text.BYTES_PER_TARGET * len(columns[0]), dtype=np.uint8)
-        number_text._lines(*columns, by_kernel, every, *number_text.NOTHING_BEFORE, buffer)
+        number_text._lines(
+            *columns, np.zeros((0, 6)), 0, by_kernel, every, *number_text.NOTHING_BEFORE, buffer
+        )
         behind = number_text._state_behind(*columns[2:], state, every)
         assert behind.tolist() == by_kernel.tolist()
 

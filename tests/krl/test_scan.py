@@ -126,4 +126,5 @@ def test_chunks_change_nothing(chunk_bytes, end):
 def test_a_text_without_a_line():
     scanned = scan_krl(b"")
     assert len(scanned.kind) == 0
-    assert scanned[6:] == (0, 0, 0)
+    assert scanned[6:9] == (0, 0, 0)
+    assert len(scanned.external) == 0

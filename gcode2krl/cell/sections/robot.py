@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from gcode2krl.arrays import Floats
+from gcode2krl.cell.sections.external import ExternalName
 from gcode2krl.cell.sections.fields import (
     DataNumber,
     Finite,
@@ -136,6 +137,8 @@ class Frames(Provenance):
     """``$ROBROOT`` in ``$WORLD``, of a robot that hangs or stands on a slope; None: zero."""
     base: Frame | None = None
     """``$BASE`` in ``$WORLD``, as the controller has it: in ``$ROBROOT`` where `robroot` is not stated."""
+    base_on: ExternalName | None = None
+    """The table that carries ``$BASE``; by default that of the highest number."""
     base_data: DataNumber | None = None
     """Number of ``BASE_DATA`` on the controller; without it ``$BASE`` is written as a frame."""
     tool: Frame | None = None

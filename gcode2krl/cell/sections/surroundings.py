@@ -64,8 +64,8 @@ class Obstacle(Section):
     """Something that stands in the cell: one of `box_mm`, `mesh` and `plane`."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.+\-]{0,39}$")]
-    frame: Literal["base", "robroot"] = "base"
-    """``$BASE``, or the robot root."""
+    frame: Literal["base", "robroot", "world"] = "base"
+    """``$BASE``, the robot root with its rails at 0, or ``$WORLD``."""
     box_mm: tuple[Point, Point] | None = None
     mesh: str | None = None
     """STL, PLY or 3MF in mm, relative to the cell file."""

@@ -8,6 +8,7 @@ from gcode2krl import frames as fr
 from gcode2krl import robot
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.cell.carried import require_still
 from gcode2krl.effects import Inputs
 from gcode2krl.effects.operators import play
 from gcode2krl.gap.beside.decimals import resolution
@@ -24,6 +25,7 @@ def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:
     """Return a pair for each run that has a controller's table, or poses."""
     first, known_robot = first_start(runs), cell is not None
     cell = load_cell() if cell is None else cell
+    require_still(cell, "a diagnosis of logs")
     pairs = []
     for number, run in enumerate(runs):
         if is_of_poses(run):

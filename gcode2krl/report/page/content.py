@@ -9,8 +9,11 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import standing
+from gcode2krl.cell.carriers import base_in_world, root_in_world
 from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
+from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.columns import packed, packed_text
 from gcode2krl.report.page.losses import (
@@ -165,7 +168,8 @@ def _content(
     shown = whole.at(rows)
     number, passes = passes_of(shown.position_mm[:, 2], shown.rapid, shown.tool, shown.line)
     tools = sorted({int(tool) for tool in np.unique(shown.tool)})
-    data, columns = packed(_columns(shown, number))
+    drawn, moving = _carried(whole, shown, cell)
+    data, columns = packed(_columns(shown, number) | moving)
     lost_s = lost_time(whole.time_s, whole.speed_mm_s, whole.feed_mm_s)
     is_timed = whole.is_timed
     windows = worst_windows(whole.time_s, lost_s, whole.line) if is_timed else []
@@ -177,7 +181,7 @@ def _content(
         "quantities": [quantity.described(shown.rapid) for quantity in shown.quantities],
         "passes": [{"name": one.name, "tool": one.tool} for one in passes],
         "tools": tools,
-        "robot": robot_sketch(cell, tools) if shown.q_rad is not None else None,
+        "robot": robot_sketch(drawn, tools) if shown.q_rad is not None else None,
         "near": _near(shown, cell),
         "stock": None if stock_mm is None else stock_mm.tolist(),
         "palette": _palette(),
@@ -221,6 +225,28 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> 
     }
     compared = Compared(found, sum(nominal["left_out"].values()), nominal["volume_mm3"])
     return replace(content, head=head, solids=solids, compared=compared)
+
+
+def _carried(
+    whole: Samples, shown: Samples, cell: Cell | None
+) -> tuple[Cell | None, dict[str, tuple[Any, float]]]:
+    """Return the cell as it is drawn, and columns with what external axes move: robot root and ``$WORLD``.
+
+    Where they stay, the cell stands there and nothing moves.
+    """
+    if cell is None or not cell.external or whole.external is None or shown.external is None:
+        return cell, {}
+    if (whole.external == whole.external[0]).all():
+        return standing(cell, whole.external[0]), {}
+    robroot = np.eye(4) if cell.frames.robroot is None else cell.frames.robroot.matrix()
+    base = base_in_world(cell.external, shown.external, cell.stated_base(), cell.frames.base_on)
+    root = invert(base) @ root_in_world(cell.external, shown.external, robroot)
+    columns: dict[str, tuple[Any, float]] = {}
+    for name, frame in (("root", root), ("world", invert(base))):
+        turned = quaternion_from_rotation(frame[:, :3, :3])
+        columns |= {f"{name}{k}": (frame[:, k, 3], 1e-2) for k in range(3)}
+        columns |= {f"{name}{k + 3}": (turned[:, k], 1e-7) for k in range(4)}
+    return cell, columns
 
 
 def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:

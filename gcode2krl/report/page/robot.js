@@ -15,6 +15,9 @@ class Robot {
     this.root = new THREE.Group();
     this.root.matrixAutoUpdate = false;
     this.root.matrix.fromArray(sketch.root);
+    this.world = new THREE.Group();
+    this.world.matrixAutoUpdate = false;
+    this.world.matrix.fromArray(sketch.world);
     this.links = [this.root];
     for (let k = 0; k < 6; k++) {
       const link = new THREE.Group();
@@ -28,7 +31,8 @@ class Robot {
       this.links[one.link].add(this.keep(one.name, mesh));
     });
     this.obstacles = new THREE.Group();
-    sketch.obstacles.forEach((one) => this.obstacles.add(this.keep(one.name, obstacle(one))));
+    this.obstacles.add(this.world);
+    sketch.obstacles.forEach((one) => (one.stands ? this.world : this.obstacles).add(this.keep(one.name, obstacle(one))));
     this.tools = {};
     Object.entries(sketch.tools).forEach(([number, tool]) => tool && this.addTool(number, tool));
   }
@@ -81,11 +85,21 @@ class Robot {
       this.links[k + 1].matrix.copy(there).multiply(turn).multiply(back);
       this.links[k + 1].matrixWorldNeedsUpdate = true;
     });
+    this.carry("root", row);
+    this.carry("world", row);
     const number = String(this.columns.tool[row]);
     Object.entries(this.tools).forEach(([name, group]) => { group.visible = name === number; });
     this.root.visible = this.wanted && this.reached;
     this.shown = this.tools[number];
     this.colour(row);
+  }
+
+  // Put the robot root or $WORLD where the external axes have it at a row; they stay without such columns.
+  carry(name, row) {
+    if (!this.columns[`${name}0`]) return;
+    const [x, y, z, ...turn] = [0, 1, 2, 3, 4, 5, 6].map((k) => this.columns[`${name}${k}`][row]);
+    this[name].matrix.compose(new THREE.Vector3(x, y, z), new THREE.Quaternion(...turn), new THREE.Vector3(1, 1, 1));
+    this[name].matrixWorldNeedsUpdate = true;
   }
 
   // What is nearest to something at a row, by name, with the distance; null where nothing is near.

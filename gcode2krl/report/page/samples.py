@@ -80,6 +80,8 @@ class Samples:
     quantities: tuple[Quantity, ...]
     cutting: Bools | None = None
     q_rad: Floats | None = None
+    external: Floats | None = None
+    """(m, 6) E1 to E6 in mm and degrees, None where no motion is planned."""
     near: Clearance | None = None
     """What comes near what, None where nothing is watched."""
     is_timed: bool = True
@@ -132,6 +134,7 @@ def samples_of(prediction: Prediction) -> Samples | None:
         quantities=tuple(quantities),
         cutting=np.isfinite(forces.phi_rad[:, 0]) if forces is not None else None,
         q_rad=joints.q_rad if joints is not None else None,
+        external=motion.external,
         near=near,
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carriers import root_in_world
 from gcode2krl.cell.sections import Capsule, Plane, Tool
 from gcode2krl.errors import RefusedError
 
@@ -27,7 +28,7 @@ LINKS = ("foot", "A1", "A2", "A3", "A4", "A5", "A6")
 
 
 def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
-    """Return root, axes, links and tools of the robot as plain numbers in mm; None where it is not known."""
+    """Return root and world in ``$BASE``, axes, links and tools as plain numbers in mm; None where unknown."""
     if cell is None or not cell.robot.geometry.known or cell.frames.base is None:
         return None
     geometry = cell.robot.geometry.array()
@@ -36,6 +37,7 @@ def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
     return {
         "model": cell.robot.model,
         "root": np.linalg.inv(cell.base_matrix()).T.reshape(-1).tolist(),
+        "world": np.linalg.inv(cell.base_in_world()).T.reshape(-1).tolist(),
         "axes": [{"point": p.tolist(), "along": d.tolist()} for p, d in joint_axes(geometry)],
         "links": list(_links(cell, geometry, flange)),
         "tools": {str(number): _tool(cell, number, flange, reach_mm) for number in tools},
@@ -66,23 +68,29 @@ def _capsule(link: int, name: str, capsule: Capsule, frames: list[Floats]) -> di
 
 
 def _obstacles(cell: Cell) -> Iterator[dict[str, Any]]:
-    """Yield table, boxes and planes: a name, the frame they are stated in (4, 4), and two corners."""
+    """Yield table, boxes and planes: a name, a frame (4, 4) and two corners in it.
+
+    The frame stands in ``$BASE``, or in ``$WORLD`` where external axes do not carry what is drawn.
+    """
     base, flat = np.eye(4), [-_PLANE_MM, -_PLANE_MM, -1.0, _PLANE_MM, _PLANE_MM, 0.0]
-    root = np.asarray(np.linalg.inv(cell.base_matrix()), dtype=np.float64)
+    robroot = np.eye(4) if cell.frames.robroot is None else cell.frames.robroot.matrix()
+    frames = {"world": base, "robroot": root_in_world(cell.external, np.zeros((1, 6)), robroot)[0]}
     if cell.table is not None:
         at = base.copy()
         at[2, 3] = cell.table.z_mm
         yield _box("the table", at, flat)
     for each in cell.obstacle:
-        frame: Floats = base if each.frame == "base" else root
+        frame: Floats = frames.get(each.frame, base)
+        stands = each.frame != "base"
         if each.box_mm is not None:
-            yield _box(each.name, frame, [*each.box_mm[0], *each.box_mm[1]])
+            yield _box(each.name, frame, [*each.box_mm[0], *each.box_mm[1]], stands=stands)
         elif each.plane is not None:
-            yield _box(each.name, frame @ _across(each.plane), flat)
+            yield _box(each.name, frame @ _across(each.plane), flat, stands=stands)
 
 
-def _box(name: str, frame: Floats, corners: list[float]) -> dict[str, Any]:
-    return {"name": name, "frame": frame.T.reshape(-1).tolist(), "low": corners[:3], "high": corners[3:]}
+def _box(name: str, frame: Floats, corners: list[float], *, stands: bool = False) -> dict[str, Any]:
+    place = frame.T.reshape(-1).tolist()
+    return {"name": name, "frame": place, "low": corners[:3], "high": corners[3:], "stands": stands}
 
 
 def _across(plane: Plane) -> Floats:

@@ -88,10 +88,13 @@ def test_what_stands_in_the_cell_is_drawn_where_it_is():
             ],
         }
     )
-    table, vice, fence = robot_sketch(cell, [1])["obstacles"]
+    sketch = robot_sketch(cell, [1])
+    world = np.array(sketch["world"]).reshape(4, 4).T
+    table, vice, fence = sketch["obstacles"]
+    assert [one["stands"] for one in (table, vice, fence)] == [False, True, False]
     frames = [np.array(one["frame"]).reshape(4, 4).T for one in (table, vice, fence)]
     assert frames[0][:3, 3].tolist() == [0.0, 0.0, -60.0]
-    assert frames[1] @ cell.base_matrix() == pytest.approx(np.eye(4), abs=1e-12)
+    assert world @ frames[1] @ cell.base_matrix() == pytest.approx(np.eye(4), abs=1e-12)
     assert (vice["low"], vice["high"]) == ([1.0, 2.0, 3.0], [4.0, 6.0, 8.0])
     assert frames[2][:3, 2].tolist() == [0.0, 1.0, 0.0]
     assert frames[2][:3, 3].tolist() == [0.0, -900.0, 0.0]

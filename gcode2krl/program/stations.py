@@ -1,0 +1,254 @@
+"""Where the external axes stand along a program: one place for all of it, one for each pass, or moving along.
+
+A station is a place of E1 to E6. It changes on the clearance plane only, where nothing is cut: one station
+for the whole program is the first choice, one for each pass the second. Where a pass is longer than the arm
+reaches, the axis moves along, as little and as evenly as the reach allows (the shortest line through the
+corridor of places from which the arm reaches).
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.arrays import Bools, Floats, Ints
+
+Quality = Callable[[Ints, Floats], Floats]
+"""Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
+singularities and obstacles, 0 = at one, -1 = impossible."""
+
+GOOD = 0.3
+"""Quality (1 = 30 degrees from limits and singularities) from which a place is as good as any better one."""
+LEAST = 0.05
+"""Quality below which a place is not taken."""
+STEPS = 49
+"""Places that are tried on an axis, so that a rail of 5 m has one every 100 mm."""
+_MOST_PLACES = 2500
+_MOST_ROWS = 300
+_ROWS_A_PASS = 24
+_MOVES = 0.5
+"""What a way over the whole range between two passes costs, against a place of no quality at all."""
+_STARTS = 0.05
+"""What any way between two passes costs, so that there are few."""
+_WHOLE = 5.0
+"""Places that are farther from each other are whole numbers, where the limits are."""
+_DECIMALS = 3
+"""Those of the program's text."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A free axis: its column in E1 to E6, and its limits."""
+
+    column: int
+    low: float
+    high: float
+
+    def places(self, steps: int) -> Floats:
+        """Return places evenly over the range."""
+        step = (self.high - self.low) / max(steps - 1, 1)
+        places = np.round(np.linspace(self.low, self.high, steps), 0 if step > _WHOLE else _DECIMALS)
+        return np.clip(places, self.low, self.high)
+
+
+def plan_stations(
+    position_mm: Floats, is_free: Bools, quality: Quality, ranges: list[Range], start: Floats
+) -> Floats:
+    """Return E1 to E6 (p, 6) at targets, one row in memory where they stay.
+
+    Parameters
+    ----------
+    position_mm : (p, 3)
+    is_free : (p,) True where the motion to the target is on the clearance plane, or a PTP.
+    quality : of rows at a place.
+    ranges : the axes that may be put somewhere else.
+    start : (6,) where all axes are that may not, and that others are preferred to be near.
+    """
+    if not ranges:
+        return np.broadcast_to(start, (len(position_mm), 6))
+    places = _places(ranges, start)
+    rows = _spread(np.arange(len(position_mm)), position_mm, _MOST_ROWS)
+    table = np.stack([quality(rows, place) for place in places])  # (places, rows, branches)
+    worst = table.min(axis=1).max(axis=1)
+    if worst.max() >= LEAST:
+        return np.broadcast_to(places[_best(worst, places, ranges, start)], (len(position_mm), 6))
+    passes = np.cumsum(is_free, dtype=np.int64)
+    return _by_pass(position_mm, passes, quality, places, ranges)
+
+
+def _places(ranges: list[Range], start: Floats) -> Floats:
+    """Return the places (k, 6) that are tried: a grid over all free axes."""
+    steps = STEPS
+    while steps ** len(ranges) > _MOST_PLACES:
+        steps -= 2
+    grids = [axis.places(steps) for axis in ranges]
+    places = np.tile(start, (int(np.prod([len(grid) for grid in grids])), 1))
+    for axis, column in zip(ranges, np.array(list(itertools.product(*grids))).T, strict=True):
+        places[:, axis.column] = column
+    return places
+
+
+def _best(worst: Floats, places: Floats, ranges: list[Range], start: Floats) -> int:
+    """Return the place of the best quality; of those that are good, the one nearest to where the axes are."""
+    far = np.zeros(len(places))
+    for axis in ranges:
+        far += np.abs(places[:, axis.column] - start[axis.column]) / (axis.high - axis.low)
+    return int(np.lexsort((far, -np.minimum(np.round(worst, 2), GOOD)))[0])
+
+
+def _by_pass(
+    position_mm: Floats, passes: Ints, quality: Quality, places: Floats, ranges: list[Range]
+) -> Floats:
+    """Return E1 to E6 (p, 6) with a station for each pass, or moving along in it."""
+    borders = np.flatnonzero(np.diff(passes, prepend=-1, append=passes[-1] + 1))
+    runs = [np.arange(a, b) for a, b in itertools.pairwise(borders)]
+    judged = [_spread(run, position_mm, _ROWS_A_PASS) for run in runs]
+    rows = np.concatenate(judged)
+    table = np.stack([quality(rows, place) for place in places])
+    ends = np.cumsum([0, *map(len, judged)])
+    worst = np.stack([table[:, a:b].min(axis=1) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
+    branch = _branch(worst, table, ends)
+    external = np.empty((len(position_mm), 6))
+    has_station = worst[:, :, branch].max(axis=1) >= LEAST
+    for number in np.flatnonzero(~has_station).tolist():
+        run, own = runs[number], table[:, ends[number] : ends[number + 1], branch]
+        external[run] = _along(position_mm, run, judged[number], own, places, ranges)
+    ways = [
+        None if known else (external[run[0]], external[run[-1]])
+        for known, run in zip(has_station, runs, strict=True)
+    ]
+    for run, way, place in zip(runs, ways, _track(worst[:, :, branch], ways, places, ranges), strict=True):
+        if way is None:
+            external[run] = places[place]
+    return np.asarray(np.round(external, _DECIMALS) + 0.0)
+
+
+def _branch(worst: Floats, table: Floats, ends: Ints) -> int:
+    """Return the branch with the most passes that have a place, then the most rows that have one."""
+    with_station = (worst.max(axis=1) >= LEAST).sum(axis=0)
+    reached = (table.max(axis=0) >= LEAST).sum(axis=0)
+    best = worst.max(axis=1).clip(0.0, GOOD).sum(axis=0)
+    return int(np.lexsort((-best, -reached, -with_station))[0])
+
+
+def _track(
+    worst: Floats, ways: list[tuple[Floats, Floats] | None], places: Floats, ranges: list[Range]
+) -> Ints:
+    """Return the place of each pass (n,) that is cheapest over all: poor places and ways between cost.
+
+    ``ways`` has the first and the last place of a pass that the axes move along in.
+    """
+    cost = np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, 1e3)
+    total, came_from = cost[0], np.zeros(cost.shape, dtype=np.int64)
+    for number in range(1, len(cost)):
+        before, here = ways[number - 1], ways[number]
+        leaves = places if before is None else np.broadcast_to(before[1], places.shape)
+        enters = places if here is None else np.broadcast_to(here[0], places.shape)
+        through = total[None, :] + _cost_of_moves(leaves, enters, ranges)
+        came_from[number] = np.argmin(through, axis=1)
+        total = through[np.arange(len(places)), came_from[number]] + cost[number]
+    track = np.empty(len(cost), dtype=np.int64)
+    track[-1] = int(np.argmin(total))
+    for number in range(len(cost) - 1, 0, -1):
+        track[number - 1] = came_from[number, track[number]]
+    return track
+
+
+def _cost_of_moves(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:
+    """Return what it costs (e, l) to go to places from places."""
+    far = np.zeros((len(enters), len(leaves)))
+    for axis in ranges:
+        way = np.abs(enters[:, axis.column, None] - leaves[None, :, axis.column])
+        far += way / (axis.high - axis.low)
+    return np.asarray(np.where(far > 0.0, _STARTS + _MOVES * far, 0.0))
+
+
+def _along(
+    position_mm: Floats, run: Ints, judged: Ints, table: Floats, places: Floats, ranges: list[Range]
+) -> Floats:
+    """Return E1 to E6 (r, 6) along a pass: the axis of the widest range moves, the others help.
+
+    ``table`` (places, judged) is the quality of the judged rows.
+    """
+    widest = max(ranges, key=lambda axis: axis.high - axis.low)
+    others = [axis.column for axis in ranges if axis is not widest]
+    choices = np.unique(places[:, others], axis=0) if others else np.zeros((1, 0))
+
+    def of(choice: Floats) -> Ints:
+        return np.flatnonzero((places[:, others] == choice).all(axis=1))
+
+    own = max(
+        (of(choice) for choice in choices), key=lambda rows: int((table[rows].max(axis=0) >= LEAST).sum())
+    )
+    column = places[own, widest.column]
+    low, high = np.array([_corridor(column, table[own, k]) for k in range(len(judged))]).T
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm[run], axis=0), axis=1))])
+    at = way[np.searchsorted(run, judged)]
+    external = np.tile(places[own[0]], (len(run), 1))
+    external[:, widest.column] = np.interp(way, at, taut(at, low, high))
+    return external
+
+
+def _corridor(places: Floats, quality: Floats) -> tuple[float, float]:
+    """Return the first and the last place around the best one from which a row is reached."""
+    best = int(np.argmax(np.minimum(quality, GOOD) - 1e-6 * np.abs(np.arange(len(places)) - len(places) / 2)))
+    first = last = best
+    while first > 0 and quality[first - 1] >= LEAST:
+        first -= 1
+    while last + 1 < len(places) and quality[last + 1] >= LEAST:
+        last += 1
+    return float(places[first]), float(places[last])
+
+
+def taut(at: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the shortest line (n,) over rising ``at`` (n,) that keeps between ``low`` and ``high`` (n,).
+
+    From each knot it goes as far as it can be seen, which is where the bound that closes the view is touched.
+    """
+    value = np.empty(len(at))
+    start, here = 0, _level(low, high)
+    value[0] = here
+    while start < len(at) - 1:
+        steepest, flattest = np.inf, -np.inf
+        by_high = by_low = start
+        end = len(at)
+        for k in range(start + 1, len(at)):
+            span = max(at[k] - at[start], 1e-9)
+            up, down = (high[k] - here) / span, (low[k] - here) / span
+            if down > steepest or up < flattest:
+                end = by_high if down > steepest else by_low
+                slope = steepest if down > steepest else flattest
+                break
+            if up <= steepest:
+                steepest, by_high = up, k
+            if down >= flattest:
+                flattest, by_low = down, k
+        else:  # the end is in sight: level if that is within it, else to the bound that is in the way
+            slope = min(max(0.0, flattest), steepest)
+            end = by_low if slope > 0.0 else by_high if slope < 0.0 else end
+        last = min(end, len(at) - 1)
+        value[start + 1 : last + 1] = here + slope * (at[start + 1 : last + 1] - at[start])
+        here, start = float(value[last]), last
+    return value
+
+
+def _level(low: Floats, high: Floats) -> float:
+    """Return where a level line begins that stays between the bounds as long as it can."""
+    bottom, top = -np.inf, np.inf
+    for lowest, highest in zip(low, high, strict=True):
+        if lowest > top:
+            return float(top)
+        if highest < bottom:
+            return float(bottom)
+        bottom, top = max(bottom, lowest), min(top, highest)
+    return float((bottom + top) / 2.0)
+
+
+def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:
+    """Return rows spread over a run, its outermost points among them."""
+    if len(rows) <= most:
+        return rows
+    evenly = rows[np.linspace(0, len(rows) - 1, most - 6).astype(np.int64)]
+    extremes = [op(position_mm[rows, k]) for k in range(3) for op in (np.argmin, np.argmax)]
+    return np.unique(np.concatenate([evenly, rows[extremes]]))

@@ -1,0 +1,276 @@
+"""What a program leaves to the robot: the turn about the tool axis, and where the external axes stand."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gcode2krl import compliance, program, robot
+from gcode2krl import frames as fr
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import at_rest, from_rest, points_moved, standing, to_rest, vectors_turned
+from gcode2krl.cell.sections.external import EXTERNAL_NAMES
+from gcode2krl.clearance import freedom
+from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.tables import Targets, Toolpath
+from gcode2krl.units import RAD_PER_DEG
+
+_HITS = -2.0
+"""Added to the quality of a pose that hits something: where all do, the most comfortable is taken."""
+_ACROSS_N = 100.0
+_TRIED_SPINS = np.arange(-180.0, 180.0, 30.0) * RAD_PER_DEG
+_SAME_HEIGHT_MM = 1e-6
+_ROUNDING = 1e-3
+"""The last decimal of an external axis in the program's text."""
+
+SpinOf = Callable[[Floats, Floats, Ints32], Floats | float]
+
+
+def posed_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None) -> Targets:
+    """Return the targets of a program with the turn about the tool axis and the external axes chosen.
+
+    See `program.plan_targets` for the errors it raises.
+    """
+    home = _home_pose(cell)
+    if not cell.external:
+        return program.plan_targets(toolpath, cell, home, _spin_of(cell), tolerance_mm)
+    searched = isinstance(cell.frames.spin, str)
+    untouched: SpinOf = (lambda *_: 0.0) if searched else _spin_of(cell)
+    planned = program.plan_targets(toolpath, cell, home, untouched, tolerance_mm)
+    external = _stations(planned, toolpath, cell)
+    stops = _stops(external, _free_motions(planned, toolpath))
+    planned = replace(
+        planned,
+        rotation=_rotations(planned, external, cell),
+        external=external,
+        cdis_mm=np.where(stops, 0.0, planned.cdis_mm),
+        issues=(*planned.issues, *_uncoupled(planned, external, cell), *_beyond(planned, external, cell)),
+    )
+    return _with_home(planned, cell)
+
+
+def _rotations(targets: Targets, external: Floats, cell: Cell) -> Floats:
+    """Return the quaternions (p, 4) of targets whose external axes are at (p, 6).
+
+    Where they move and the turn about the tool axis is searched, or a table follows the tool, the turn is
+    that which the robot sees, with the external axes at rest; else it is that in ``$BASE``.
+    """
+    rows = np.flatnonzero(~targets.home)
+    position, rotation, tool = targets.position_mm[rows], targets.rotation[rows], targets.tool[rows]
+    at, searched = external[rows], isinstance(cell.frames.spin, str)
+    if not searched and not _is_following(at, cell):
+        return targets.rotation
+    axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
+    if _is_one(at):
+        turned = program.tool_rotation(axis, _spin_of(standing(cell, at[0]))(position, axis, tool))
+    else:
+        by = to_rest(at, cell)
+        seen, seen_axis = (
+            (position, axis) if by is None else (points_moved(position, by), vectors_turned(axis, by))
+        )
+        spin = _spin_of(cell)(seen, seen_axis, tool)
+        turned = from_rest(seen, program.tool_rotation(seen_axis, spin), at, cell)[1]
+    result = np.array(targets.rotation)
+    result[rows] = turned
+    return result
+
+
+def _is_following(external: Floats, cell: Cell) -> bool:
+    """Tell whether a table follows the tool, with E1 to E6 at (r, 6)."""
+    return not _is_one(external) and any(axis.follows is not None for axis in cell.external.values())
+
+
+def _stops(external: Floats, is_free: Bools) -> Bools:
+    """Mark the targets (p,) at which the robot stops: before and behind a motion to another station."""
+    moves = (external != np.roll(external, 1, axis=0)).any(axis=1) & is_free
+    return np.asarray(moves | np.roll(moves, -1))
+
+
+def _uncoupled(targets: Targets, external: Floats, cell: Cell) -> Iterator[Issue]:
+    """Yield the axes that would have to move in a program although ``$BASE`` does not move with them."""
+    cut = ~targets.home
+    for column, name in enumerate(EXTERNAL_NAMES):
+        axis = cell.external.get(name)
+        other = np.flatnonzero(cut & (external[:, column] != external[cut][0, column]))
+        if axis is None or axis.is_coupled or not len(other):
+            continue
+        key = f"[external.{name}] " + ("coupled = true" if axis.is_rail else "machine_def")
+        sentence = f"{name} would have to move here, and the controller does not move $BASE along with it"
+        remedy = f"give {key} where the controller couples it, or split the part"
+        yield Issue("error", "external-uncoupled", int(targets.source_line[other[0]]), sentence, remedy)
+
+
+def _beyond(targets: Targets, external: Floats, cell: Cell) -> Iterator[Issue]:
+    """Yield the axes that leave their limits, as a table may that follows the tool."""
+    for column, name in enumerate(EXTERNAL_NAMES):
+        axis = cell.external.get(name)
+        if axis is None:
+            continue
+        low, high = axis.limits
+        wrong = np.flatnonzero(
+            (external[:, column] < low - _ROUNDING) | (external[:, column] > high + _ROUNDING)
+        )
+        if len(wrong):
+            row = int(wrong[0])
+            sentence = f"{name} at {external[row, column]:.1f} {axis.unit}, allowed {low:g}..{high:g}"
+            remedy = f"leave out [external.{name}] follows, or state a position"
+            yield Issue("error", "external-limit", int(targets.source_line[row]), sentence, remedy)
+
+
+def _is_one(external: Floats) -> bool:
+    return external.strides[0] == 0 or bool((external == external[0]).all())
+
+
+def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
+    """Return E1 to E6 (p, 6) at targets, at HOME as stated, else as at its neighbour."""
+    rows = np.flatnonzero(~targets.home)
+    followed = _followed(targets, rows, cell)
+    ranges = [
+        program.Range(column, *_room(cell.external[name].limits, followed[:, column]))
+        for column, name in enumerate(EXTERNAL_NAMES)
+        if name in cell.external and cell.external[name].moves
+    ]
+
+    def quality(at: Ints, place: Floats) -> Floats:
+        return _quality_at(targets, rows[at], place + followed[at], cell)
+
+    is_free = _free_motions(targets, toolpath)[rows]
+    found = program.plan_stations(targets.position_mm[rows], is_free, quality, ranges, cell.external_rest())
+    if followed.any():
+        found = np.round(found + followed, 3)
+    homes = np.flatnonzero(targets.home)
+    stated = [(k, cell.external[n].home) for k, n in enumerate(EXTERNAL_NAMES) if n in cell.external]
+    if _is_one(found) and all(value is None or value == found[0, k] for k, value in stated):
+        return np.broadcast_to(found[0], (len(targets), 6))
+    external = np.empty((len(targets), 6))
+    external[rows] = found
+    external[homes] = found[np.minimum(np.searchsorted(rows, homes), len(rows) - 1)]
+    for column, value in stated:
+        if value is not None:
+            external[homes, column] = value
+    return external
+
+
+def _followed(targets: Targets, rows: Ints, cell: Cell) -> Floats:
+    """Return how far E1 to E6 turn with the program (r, 6), from their places at its first row on."""
+    followed = np.broadcast_to(0.0, (len(rows), 6))
+    for column, name in enumerate(EXTERNAL_NAMES):
+        axis = cell.external.get(name)
+        if axis is None or axis.follows is None:
+            continue
+        tool_axis = fr.rotation_from_quaternion(targets.rotation[rows])[:, :, 2]
+        in_base = cell.stated_base()[:3, :3].T @ axis.direction()
+        followed = np.array(followed)
+        followed[:, column] = program.following_deg(tool_axis, in_base)
+    return followed
+
+
+def _room(limits: tuple[float, float], followed: Floats) -> tuple[float, float]:
+    """Return between which places an axis may begin that turns with the program."""
+    low, high = limits[0] - float(followed.min()), limits[1] - float(followed.max())
+    return (low, high) if low <= high else (sum(limits) / 2.0, sum(limits) / 2.0)
+
+
+def _free_motions(targets: Targets, toolpath: Toolpath) -> Bools:
+    """Mark the motions (p,) during which external axes may move: PTP, and rapids above all that is cut."""
+    row = np.maximum(targets.move, 0)
+    rapid = (targets.move < 0) | toolpath.rapid[row] | toolpath.machine[row]
+    height = targets.position_mm[:, 2]
+    cut = ~rapid & ~targets.ptp
+    above = height >= (height[cut].max() if cut.any() else -np.inf) - _SAME_HEIGHT_MM
+    free: Bools = targets.ptp | (rapid & above & np.roll(above, 1))
+    return free
+
+
+def _quality_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> Floats:
+    """Return the quality (r, 8) of targets with the external axes at (r, 6), in the best turn.
+
+    Where they differ from row to row, what may be hit does not count.
+    """
+    position, rotation, tool = targets.position_mm[rows], targets.rotation[rows], targets.tool[rows]
+    if _is_one(external):
+        there, judge = standing(cell, external[0]), _comfort_and_freedom
+    else:
+        there, judge = cell, _comfort
+        position, rotation = at_rest(position, rotation, external, cell)
+    spin = cell.frames.spin
+    if not isinstance(spin, str) and not _is_following(external, cell):
+        return judge(position, rotation, tool, there)
+    axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
+    tried = _TRIED_SPINS if isinstance(spin, str) else np.array([spin * RAD_PER_DEG])
+    turned = (program.tool_rotation(axis, float(each)) for each in tried)
+    best: Floats = np.max([judge(position, each, tool, there) for each in turned], axis=0)
+    return best
+
+
+def _comfort(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
+    return robot.pose_quality(position, rotation, tool, cell)
+
+
+def _comfort_and_freedom(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
+    plain = robot.pose_quality(position, rotation, tool, cell)
+    free = freedom(position, rotation, tool, cell, plain)
+    return np.where(free < 0.0, plain + _HITS, np.minimum(plain, free))
+
+
+def _with_home(targets: Targets, cell: Cell) -> Targets:
+    """Return targets whose HOME is where its joints are, as the external axes stand there."""
+    position, rotation = np.array(targets.position_mm), np.array(targets.rotation)
+    rows = np.flatnonzero(targets.home)
+    moved = from_rest(position[rows], rotation[rows], targets.external[rows], cell)
+    position[rows], rotation[rows] = moved
+    return replace(targets, position_mm=position, rotation=rotation)
+
+
+def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
+    def home_pose(tool: int) -> tuple[Floats, Floats]:
+        position, rotation = robot.forward(cell.home_q_rad(), cell, tool)
+        return position[0], rotation[0]
+
+    return home_pose
+
+
+def _spin_of(cell: Cell) -> SpinOf:
+    spin = cell.frames.spin
+    if not isinstance(spin, str):
+        return lambda position, axis, tool: float(spin) * RAD_PER_DEG
+    if spin == "stiffest":
+        missing = compliance.missing_stiffness(cell)
+        if missing is not None:
+            raise NotUnderstoodError(missing, source=cell.name)
+
+    def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
+        def quality(rows: Ints, spin_rad: float) -> Floats:
+            rotation = program.tool_rotation(axis[rows], spin_rad)
+            return _comfort_and_freedom(position[rows], rotation, tool[rows], cell)
+
+        def bending(rows: Ints, spin_rad: float) -> Floats:
+            rotation = program.tool_rotation(axis[rows], spin_rad)
+            return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
+
+        if spin == "stiffest":
+            return program.stiffest_spin(position, quality, bending, axis)
+        return program.smooth_spin(position, quality, axis)
+
+    return searched
+
+
+def _bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, cell: Cell) -> Floats:
+    """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
+
+    The root mean square over all directions across the axis; NaN where a branch has no solution.
+    """
+    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    result = np.full((len(position), 8), np.nan)
+    for number in np.unique(tool):
+        rows = np.flatnonzero(tool == number)
+        q = robot.inverse(position[rows], rotation[rows], cell, int(number)).reshape(-1, 6)
+        square = np.zeros(len(q))
+        for direction in (across[rows], np.cross(axis[rows], across[rows])):
+            load_N = np.repeat(_ACROSS_N * direction, 8, axis=0)
+            bent_mm, _ = compliance.deflection_of(q, load_N, np.zeros(3), np.zeros(3), cell, int(number))
+            square += np.einsum("ij,ij->i", bent_mm, bent_mm)
+        result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
+    return result

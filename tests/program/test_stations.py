@@ -1,0 +1,103 @@
+"""Where external axes stand: nowhere else than needed, and as evenly as the reach allows."""
+
+import numpy as np
+import pytest
+
+from gcode2krl.program.following import following_deg
+from gcode2krl.program.stations import LEAST, Range, plan_stations, taut
+
+REACH_MM = 1000.0
+
+
+def reached(position):
+    """A robot on a rail along x: 1 where it stands beside the tool, 0 where the tool is out of reach."""
+
+    def quality(rows, place):
+        off = np.abs(position[rows, 0] - place[0]) / REACH_MM
+        return np.tile(np.where(off < 1.0, 1.0 - off, -1.0)[:, None], (1, 8))
+
+    return quality
+
+
+def planned(x, is_free, low=-5000.0, high=15000.0, start=0.0):
+    position = np.zeros((len(x), 3))
+    position[:, 0] = x
+    at = np.zeros(6)
+    at[0] = start
+    return plan_stations(position, np.array(is_free), reached(position), [Range(0, low, high)], at)[
+        :, 0
+    ], position
+
+
+def test_one_station_where_one_is_enough():
+    external, _ = planned(np.linspace(0.0, 900.0, 50), [True] + [False] * 49)
+    assert len(np.unique(external)) == 1
+    assert abs(external[0] - 450.0) < 500.0
+
+
+def test_of_good_places_the_nearest_to_where_the_rail_is():
+    external, _ = planned(np.full(20, 400.0), [True] + [False] * 19, start=900.0)
+    assert abs(external[0] - 900.0) < 250.0
+
+
+def test_passes_have_stations_and_nothing_moves_within_one():
+    x = np.concatenate([np.linspace(start, start + 1200.0, 30) for start in (0.0, 4000.0, 8000.0)])
+    is_free = np.zeros(len(x), dtype=bool)
+    is_free[[0, 30, 60]] = True
+    external, _ = planned(x, is_free)
+    assert len(np.unique(external)) == 3
+    assert set(np.flatnonzero(np.diff(external))) == {29, 59}
+    assert (np.abs(x - external) < REACH_MM * (1.0 - LEAST)).all()
+
+
+def test_single_free_rows_on_the_way_do_not_stop_the_rail_between():
+    x = np.concatenate([np.full(10, 0.0), np.linspace(500.0, 7500.0, 8), np.full(10, 8000.0)])
+    is_free = np.zeros(len(x), dtype=bool)
+    is_free[[0, *range(10, 19)]] = True
+    external, _ = planned(x, is_free)
+    assert (np.abs(x - external) < REACH_MM).all()
+    assert np.count_nonzero(np.diff(external)) <= 7
+
+
+def test_a_pass_that_is_too_long_takes_the_rail_along():
+    x = np.linspace(0.0, 9000.0, 400)
+    external, _ = planned(x, [True] + [False] * 399)
+    assert (np.abs(x - external) < REACH_MM).all()
+    assert (np.diff(external) >= 0.0).all()
+    assert external.max() - external.min() < 9000.0 - 2.0 * REACH_MM + 1100.0  # places are 417 mm apart
+    assert np.ptp(np.diff(external)[100:300]) < 2.0  # evenly
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_taut_line_is_the_shortest_in_its_corridor(seed):
+    """Beside it a linear program: no line between the bounds has a shorter way in e than the taut one."""
+    from scipy.optimize import linprog
+
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 25))
+    at = np.cumsum(random.uniform(0.1, 3.0, count))
+    middle = np.cumsum(random.normal(0.0, 2.0, count))
+    half = random.uniform(0.1, 3.0, count)
+    low, high = middle - half, middle + half
+    line = taut(at, low, high)
+    assert (line >= low - 1e-9).all()
+    assert (line <= high + 1e-9).all()
+    # least sum of |differences|: variables e and the differences d >= |e[k + 1] - e[k]|
+    steps = np.diff(np.eye(count), axis=0)
+    rows = np.block([[steps, -np.eye(count - 1)], [-steps, -np.eye(count - 1)]])
+    cost = np.concatenate([np.zeros(count), np.ones(count - 1)])
+    bounds = [*zip(low, high, strict=True), *[(0.0, None)] * (count - 1)]
+    best = linprog(cost, A_ub=rows, b_ub=np.zeros(len(rows)), bounds=bounds).fun
+    assert np.abs(np.diff(line)).sum() == pytest.approx(best, abs=1e-6)
+
+
+def test_a_table_that_follows_keeps_the_tool_in_one_plane():
+    azimuth = np.linspace(0.3, 0.3 + 5.0 * np.pi, 200)
+    tilt = 0.4 + 0.1 * np.sin(azimuth)
+    axis = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)], axis=1)
+    angle = np.radians(following_deg(axis, np.array([0.0, 0.0, 1.0])))
+    turned = np.cos(angle) * axis[:, 0] - np.sin(angle) * axis[:, 1]
+    across = np.sin(angle) * axis[:, 0] + np.cos(angle) * axis[:, 1]
+    assert np.allclose(np.arctan2(across, turned), 0.3)
+    assert angle[-1] == pytest.approx(-5.0 * np.pi)  # no jump of a full turn
+    assert not following_deg(np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([0.0, 0.0, 1.0])).any()
