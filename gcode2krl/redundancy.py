@@ -16,8 +16,8 @@ from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.tables import Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
 
-_HITS = -2.0
-"""Added to the quality of a pose that hits something: where all do, the most comfortable is taken."""
+_HITS = -0.9
+"""Quality of a pose that hits something, but for half its comfort: above that of one that is out of reach."""
 _ACROSS_N = 100.0
 _TRIED_SPINS = np.arange(-180.0, 180.0, 30.0) * RAD_PER_DEG
 _SAME_HEIGHT_MM = 1e-6
@@ -211,7 +211,7 @@ def _comfort(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Fl
 def _comfort_and_freedom(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
     plain = robot.pose_quality(position, rotation, tool, cell)
     free = freedom(position, rotation, tool, cell, plain)
-    return np.where(free < 0.0, plain + _HITS, np.minimum(plain, free))
+    return np.where((free < 0.0) & (plain >= 0.0), _HITS + 0.5 * plain, np.minimum(plain, free))
 
 
 def _with_home(targets: Targets, cell: Cell) -> Targets:

@@ -16,7 +16,7 @@ from gcode2krl.arrays import Bools, Floats, Ints
 
 Quality = Callable[[Ints, Floats], Floats]
 """Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
-singularities and obstacles, 0 = at one, -1 = impossible."""
+singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
 
 GOOD = 0.3
 """Quality (1 = 30 degrees from limits and singularities) from which a place is as good as any better one."""
@@ -24,9 +24,16 @@ LEAST = 0.05
 """Quality below which a place is not taken."""
 STEPS = 49
 """Places that are tried on an axis, so that a rail of 5 m has one every 100 mm."""
-_MOST_PLACES = 2500
-_MOST_ROWS = 300
+_REACHED = -0.99
+"""Quality above which a place is reached, if only to hit something: that is a finding of its own."""
+_MOST_PLACES = 1000
+_MOST_ROWS, _FEWEST_ROWS = 300, 3
 _ROWS_A_PASS = 24
+_MOST_POSES = 500_000
+"""Poses that are judged for passes, some 20 us each; with more passes fewer rows of each are judged, and all
+axes but the widest stay."""
+_HITS_COST = 50.0
+"""What a place costs at which something is hit, or nearly out of reach."""
 _MOVES = 0.5
 """What a way over the whole range between two passes costs, against a place of no quality at all."""
 _STARTS = 0.05
@@ -74,6 +81,8 @@ def plan_stations(
     if worst.max() >= LEAST:
         return np.broadcast_to(places[_best(worst, places, ranges, start)], (len(position_mm), 6))
     passes = np.cumsum(is_free, dtype=np.int64)
+    if len(places) * (int(passes[-1]) + 1) * _FEWEST_ROWS > _MOST_POSES:
+        places = places[_with_others_best(table, places, ranges)]
     return _by_pass(position_mm, passes, quality, places, ranges)
 
 
@@ -103,14 +112,15 @@ def _by_pass(
     """Return E1 to E6 (p, 6) with a station for each pass, or moving along in it."""
     borders = np.flatnonzero(np.diff(passes, prepend=-1, append=passes[-1] + 1))
     runs = [np.arange(a, b) for a, b in itertools.pairwise(borders)]
-    judged = [_spread(run, position_mm, _ROWS_A_PASS) for run in runs]
+    most = int(np.clip(_MOST_POSES // (len(places) * len(runs)), _FEWEST_ROWS, _ROWS_A_PASS))
+    judged = [_spread(run, position_mm, most) for run in runs]
     rows = np.concatenate(judged)
     table = np.stack([quality(rows, place) for place in places])
     ends = np.cumsum([0, *map(len, judged)])
     worst = np.stack([table[:, a:b].min(axis=1) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
     branch = _branch(worst, table, ends)
     external = np.empty((len(position_mm), 6))
-    has_station = worst[:, :, branch].max(axis=1) >= LEAST
+    has_station = worst[:, :, branch].max(axis=1) > _REACHED
     for number in np.flatnonzero(~has_station).tolist():
         run, own = runs[number], table[:, ends[number] : ends[number + 1], branch]
         external[run] = _along(position_mm, run, judged[number], own, places, ranges)
@@ -126,7 +136,7 @@ def _by_pass(
 
 def _branch(worst: Floats, table: Floats, ends: Ints) -> int:
     """Return the branch with the most passes that have a place, then the most rows that have one."""
-    with_station = (worst.max(axis=1) >= LEAST).sum(axis=0)
+    with_station = (worst.max(axis=1) > _REACHED).sum(axis=0)
     reached = (table.max(axis=0) >= LEAST).sum(axis=0)
     best = worst.max(axis=1).clip(0.0, GOOD).sum(axis=0)
     return int(np.lexsort((-best, -reached, -with_station))[0])
@@ -139,7 +149,8 @@ def _track(
 
     ``ways`` has the first and the last place of a pass that the axes move along in.
     """
-    cost = np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, 1e3)
+    poor = np.where(worst > _REACHED, _HITS_COST - worst, 1e3)
+    cost = np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
     total, came_from = cost[0], np.zeros(cost.shape, dtype=np.int64)
     for number in range(1, len(cost)):
         before, here = ways[number - 1], ways[number]
@@ -171,16 +182,7 @@ def _along(
 
     ``table`` (places, judged) is the quality of the judged rows.
     """
-    widest = max(ranges, key=lambda axis: axis.high - axis.low)
-    others = [axis.column for axis in ranges if axis is not widest]
-    choices = np.unique(places[:, others], axis=0) if others else np.zeros((1, 0))
-
-    def of(choice: Floats) -> Ints:
-        return np.flatnonzero((places[:, others] == choice).all(axis=1))
-
-    own = max(
-        (of(choice) for choice in choices), key=lambda rows: int((table[rows].max(axis=0) >= LEAST).sum())
-    )
+    own, widest = _with_others_best(table[:, :, None], places, ranges), _widest(ranges)
     column = places[own, widest.column]
     low, high = np.array([_corridor(column, table[own, k]) for k in range(len(judged))]).T
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm[run], axis=0), axis=1))])
@@ -188,6 +190,27 @@ def _along(
     external = np.tile(places[own[0]], (len(run), 1))
     external[:, widest.column] = np.interp(way, at, taut(at, low, high))
     return external
+
+
+def _widest(ranges: list[Range]) -> Range:
+    return max(ranges, key=lambda axis: axis.high - axis.low)
+
+
+def _with_others_best(table: Floats, places: Floats, ranges: list[Range]) -> Ints:
+    """Return the places at which all axes but the widest are where the most rows can be reached.
+
+    ``table`` (places, rows, branches) is the quality of rows.
+    """
+    others = [axis.column for axis in ranges if axis is not _widest(ranges)]
+    choices = np.unique(places[:, others], axis=0) if others else np.zeros((1, 0))
+
+    def of(choice: Floats) -> Ints:
+        return np.flatnonzero((places[:, others] == choice).all(axis=1))
+
+    def reached(rows: Ints) -> int:
+        return int((table[rows].max(axis=0) >= LEAST).sum(axis=0).max())
+
+    return max((of(choice) for choice in choices), key=reached)
 
 
 def _corridor(places: Floats, quality: Floats) -> tuple[float, float]:
@@ -246,9 +269,11 @@ def _level(low: Floats, high: Floats) -> float:
 
 
 def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:
-    """Return rows spread over a run, its outermost points among them."""
+    """Return at most so many rows spread over a run, its outermost points among them where there is room."""
     if len(rows) <= most:
         return rows
-    evenly = rows[np.linspace(0, len(rows) - 1, most - 6).astype(np.int64)]
     extremes = [op(position_mm[rows, k]) for k in range(3) for op in (np.argmin, np.argmax)]
-    return np.unique(np.concatenate([evenly, rows[extremes]]))
+    evenly = np.linspace(0, len(rows) - 1, max(most - len(extremes), 2)).astype(np.int64)
+    chosen = np.unique(np.concatenate([evenly, extremes]))
+    picked = np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(np.int64)
+    return np.asarray(rows[chosen[picked]])

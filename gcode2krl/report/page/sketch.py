@@ -28,7 +28,7 @@ LINKS = ("foot", "A1", "A2", "A3", "A4", "A5", "A6")
 
 
 def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
-    """Return root and world in ``$BASE``, axes, links and tools as plain numbers in mm; None where unknown."""
+    """Return root and world in ``$BASE``, axes, links and tools as plain numbers in mm; None if unknown."""
     if cell is None or not cell.robot.geometry.known or cell.frames.base is None:
         return None
     geometry = cell.robot.geometry.array()
