@@ -26,6 +26,8 @@ STEPS = 49
 """Places that are tried on an axis, so that a rail of 5 m has one every 100 mm."""
 _REACHED = -0.99
 """Quality above which a place is reached, if only to hit something: that is a finding of its own."""
+_NEARLY = 0.7
+"""Share of the best quality with which an axis that moves along is content."""
 _MOST_PLACES = 1000
 _MOST_ROWS, _FEWEST_ROWS = 300, 3
 _ROWS_A_PASS = 24
@@ -214,12 +216,13 @@ def _with_others_best(table: Floats, places: Floats, ranges: list[Range]) -> Int
 
 
 def _corridor(places: Floats, quality: Floats) -> tuple[float, float]:
-    """Return the first and the last place around the best one from which a row is reached."""
+    """Return the first and the last place around the best one that are good, or nearly as good as that."""
     best = int(np.argmax(np.minimum(quality, GOOD) - 1e-6 * np.abs(np.arange(len(places)) - len(places) / 2)))
+    enough = max(LEAST, min(GOOD, _NEARLY * float(quality[best])))
     first = last = best
-    while first > 0 and quality[first - 1] >= LEAST:
+    while first > 0 and quality[first - 1] >= enough:
         first -= 1
-    while last + 1 < len(places) and quality[last + 1] >= LEAST:
+    while last + 1 < len(places) and quality[last + 1] >= enough:
         last += 1
     return float(places[first]), float(places[last])
 

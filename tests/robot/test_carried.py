@@ -61,17 +61,20 @@ def tip_in_base(q, external):
     return np.linalg.inv(table @ frame(BASE)) @ root @ flange @ CELL.tool_matrix(1)
 
 
+def drawn(count, seed):
+    """Joints (n, 6), external axes (n, 6) and the tool in $BASE (n, 4, 4) by the other library."""
+    random = np.random.default_rng(seed)
+    low, high = [-180, -130, -100, -300, -120, -300], [180, -5, 140, 300, 120, 300]
+    q = np.radians(random.uniform(low, high, (count, 6)))
+    external = np.zeros((count, 6))
+    for name, axis in AXES.items():
+        external[:, int(name[1]) - 1] = random.uniform(*axis["limits"], count)
+    return q, external, np.array([tip_in_base(*row) for row in zip(q, external, strict=True)])
+
+
 @pytest.fixture(scope="module")
 def poses():
-    """Joints, external axes and the tool in $BASE by the other library."""
-    random = np.random.default_rng(7)
-    q = np.radians(
-        random.uniform([-180, -130, -100, -300, -120, -300], [180, -5, 140, 300, 120, 300], (COUNT, 6))
-    )
-    external = np.zeros((COUNT, 6))
-    for name, axis in AXES.items():
-        external[:, int(name[1]) - 1] = random.uniform(*axis["limits"], COUNT)
-    return q, external, np.array([tip_in_base(*row) for row in zip(q, external, strict=True)])
+    return drawn(COUNT, 7)
 
 
 def test_the_tool_is_where_another_library_has_it(poses):
