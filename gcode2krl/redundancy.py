@@ -45,7 +45,12 @@ def posed_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None) ->
         rotation=_rotations(planned, external, cell),
         external=external,
         cdis_mm=np.where(stops, 0.0, planned.cdis_mm),
-        issues=(*planned.issues, *_uncoupled(planned, external, cell), *_beyond(planned, external, cell)),
+        issues=(
+            *planned.issues,
+            *_uncoupled(planned, external, cell),
+            *_beyond(planned, external, cell),
+            *_without_speed(external, cell),
+        ),
     )
     return _with_home(planned, cell)
 
@@ -116,6 +121,15 @@ def _beyond(targets: Targets, external: Floats, cell: Cell) -> Iterator[Issue]:
             sentence = f"{name} at {external[row, column]:.1f} {axis.unit}, allowed {low:g}..{high:g}"
             remedy = f"leave out [external.{name}] follows, or state a position"
             yield Issue("error", "external-limit", int(targets.source_line[row]), sentence, remedy)
+
+
+def _without_speed(external: Floats, cell: Cell) -> Iterator[Issue]:
+    """Yield the axes that move in the program and have no stated speed."""
+    for column, name in enumerate(EXTERNAL_NAMES):
+        axis = cell.external.get(name)
+        if axis is not None and axis.speed is None and np.ptp(external[:, column]) > 0.0:
+            sentence = f"{name} moves, and its speed is not stated: what takes longer with it is not known"
+            yield Issue("warning", "external-speed", 0, sentence, f"give [external.{name}] speed")
 
 
 def _is_one(external: Floats) -> bool:

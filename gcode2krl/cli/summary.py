@@ -8,6 +8,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
+from gcode2krl.krl.external_words import axes_words
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
@@ -48,6 +49,7 @@ def summary_lines(
     yield f"  standstill {np.count_nonzero(lin & ~blended)} exact stops, {targets.wait_s.sum():.1f} s dwell"
     yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
+    yield from (f"  external   {words}" for words in axes_words(targets, cell))
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
     yield from load_lines(forecast.loads, cell)
     yield from _collisions(cell, np.unique(targets.tool).tolist(), is_cut=forecast.has_forces)

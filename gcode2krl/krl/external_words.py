@@ -12,13 +12,14 @@ from gcode2krl.tables import Targets
 
 def external_lines(targets: Targets, cell: Cell) -> list[str]:
     """Return a line for each external axis, and one on what is assumed; none without axes."""
-    lines = list(_axes(targets, cell))
+    lines = list(axes_words(targets, cell))
     if lines:
         lines.append("rails and tables are taken as rigid; a move takes them along evenly (ASSUMED)")
     return lines
 
 
-def _axes(targets: Targets, cell: Cell) -> Iterator[str]:
+def axes_words(targets: Targets, cell: Cell) -> Iterator[str]:
+    """Yield for each external axis of a cell where it stands."""
     for column, key in enumerate(w.EXTERNAL_KEYS):
         if key not in cell.external:
             continue
