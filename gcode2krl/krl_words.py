@@ -20,11 +20,14 @@ POSE_KEYS = ("X", "Y", "Z", "A", "B", "C")
 STATUS_TURN = ("S", "T")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
-MOTIONS_NOT_WRITTEN = _words("CIRC SPLINE ENDSPLINE SLIN SPTP SCIRC LIN_REL PTP_REL CIRC_REL SPL")
+SPLINE, SPL, ENDSPLINE = "SPLINE", "SPL", "ENDSPLINE"
+"""A block of spline motions, its points and its end."""
+MOTIONS_NOT_WRITTEN = _words("CIRC SLIN SPTP SCIRC LIN_REL PTP_REL CIRC_REL")
 """Motions that a program of this package never has."""
 MOTIONS = MOTIONS_NOT_WRITTEN | _words(
     """
-    LIN PTP SPTP_REL SLIN_REL SCIRC_REL ASYPTP ASYCONT ASYCANCEL ASYSTOP TIME_BLOCK CONST_VEL STOP
+    LIN PTP SPLINE ENDSPLINE SPL SPTP_REL SLIN_REL SCIRC_REL ASYPTP ASYCONT ASYCANCEL ASYSTOP TIME_BLOCK
+    CONST_VEL STOP
     """
 )
 """All words that move the robot or belong to a motion."""
@@ -131,7 +134,7 @@ such controllers show them. What an option package adds is not known here."""
 
 KIND_LIN, KIND_PTP, KIND_VEL_CP, KIND_APO_CDIS = range(4)
 KIND_WAIT_SEC, KIND_OTHER, KIND_PTP_AXES, KIND_TRIGGER = range(4, 8)
-KIND_CIRC = 8
+KIND_CIRC, KIND_SPL = 8, 9
 MALFORMED = -1
 """Stands for the blending of a statement that cannot be read."""
 ASSIGNS, CALLS = 1, 2

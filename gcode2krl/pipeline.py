@@ -312,6 +312,8 @@ def targets_and_joints(
     planned = posed_targets(toolpath, cell, tolerance_mm)
     if simplify_mm is not None:
         planned = _simplified(planned, toolpath, cell, simplify_mm, tolerance_mm)
+    if cell.controller.spline:
+        planned = program.with_stops(planned, cell.controller.circ)
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
     tilts = program.tilt_issues(planned, toolpath, cell)
     return checked(replace(planned, issues=(*planned.issues, *warnings, *tilts)), cell)

@@ -80,6 +80,9 @@
 #define W_C_DIS "C_DIS"
 #define W_CIRC "CIRC"
 #define W_CIRC_TYPE "$CIRC_TYPE=#BASE"
+#define W_SPLINE "SPLINE"
+#define W_SPL "SPL"
+#define W_ENDSPLINE "ENDSPLINE"
 #define W_BRAKE "BRAKE"
 #define W_WAIT "WAIT"
 #define W_SEC "SEC"
@@ -149,6 +152,7 @@
 #define W_KIND_PTP_AXES 6
 #define W_KIND_TRIGGER 7
 #define W_KIND_CIRC 8
+#define W_KIND_SPL 9
 #define W_MALFORMED (-1)
 #define W_ASSIGNS 1
 #define W_CALLS 2

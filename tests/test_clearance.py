@@ -302,6 +302,7 @@ def test_an_effect_keeps_the_clearance_with_its_motion(part):
     assert other.clearance is None or len(other.clearance) == len(other.motion)
 
 
+@pytest.mark.slow
 def test_random_boxes_are_hit_by_what_a_dense_sampling_says_at_its_lines(part):
     """30 boxes near any part of the arm, the spindle or the cutter, 10 of them near a PTP."""
     rng = np.random.default_rng(5)

@@ -71,6 +71,7 @@ def test_dir_shows_the_public_names_and_nothing_else():
     assert sorted(gcode2krl.__all__) == sorted(PUBLIC["gcode2krl"])
 
 
+@pytest.mark.slow
 def test_a_public_name_stays_a_function_when_every_module_has_been_imported():
     """Importing a module binds its name in its package; a function of that name would be hidden."""
     program = (

@@ -17,7 +17,6 @@ from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import statements as st
-from gcode2krl.krl.arcs import Arc
 from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.external_words import external_lines
 from gcode2krl.krl.names import part_name
@@ -26,6 +25,8 @@ from gcode2krl.krl.pilot_text import PilotText, checksum
 from gcode2krl.krl.provenance import provenance_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
+from gcode2krl.program.arcs import Arc
+from gcode2krl.program.splines import Chain
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
@@ -80,6 +81,8 @@ class Layout:
     """What was checked for collisions; None: nothing."""
     arcs: tuple[Arc, ...] = ()
     """Rows that are written as CIRC."""
+    splines: tuple[Chain, ...] = ()
+    """Rows that are written as SPLINE blocks."""
 
 
 def compose(
@@ -126,8 +129,8 @@ class _Composer:
         self.rsi = self._rsi(layout.online) if layout.online else None
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         self.event_rows = np.array(sorted(rows), dtype=np.int64)
-        self.arcs: list[Arc] = []
-        self.arc_firsts: Ints = np.zeros(0, dtype=np.int64)
+        self.curves: list[Arc | Chain] = []
+        self.curve_firsts: Ints = np.zeros(0, dtype=np.int64)
 
     def _rsi(self, name: str) -> RsiText:
         on, off = rsi_rows(self.targets)
@@ -141,11 +144,13 @@ class _Composer:
         is_one = count <= most and self.layout.split == "defs"
         chunks = [(0, count, False)] if is_one else self._chunks(most)
         starts, ends = np.array([(start, end) for start, end, _ in chunks]).T
-        of_chunk = np.searchsorted(starts, [arc.first for arc in self.layout.arcs], side="right") - 1
-        self.arcs = [  # an arc over the end of a part stays chords
-            arc for arc, k in zip(self.layout.arcs, of_chunk, strict=True) if arc.end < ends[k]
+        curves: list[Arc | Chain] = [*self.layout.arcs, *self.layout.splines]
+        curves.sort(key=lambda curve: curve.first)
+        of_chunk = np.searchsorted(starts, [curve.first for curve in curves], side="right") - 1
+        self.curves = [  # one over the end of a part stays chords
+            curve for curve, k in zip(curves, of_chunk, strict=True) if curve.end < ends[k]
         ]
-        self.arc_firsts = np.array([arc.first for arc in self.arcs], dtype=np.int64)
+        self.curve_firsts = np.array([curve.first for curve in self.curves], dtype=np.int64)
         whole = [(start, end) for start, end, is_part in chunks if is_part]
         parts = [_Part(part_name(self.name, k), *rows) for k, rows in enumerate(whole, start=1)]
         files: dict[str, Iterable[bytes]] = {f"{self.name}{w.SOURCE_SUFFIX}": self._main(chunks, parts)}
@@ -253,14 +258,14 @@ class _Composer:
             at = row + 1
 
     def _ways(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
-        """Yield the text of rows that follow each other without anything between them, arcs as CIRC."""
+        """Yield the text of rows that follow each other without anything between them, curves as such."""
         at = start
-        for arc in self.arcs[slice(*np.searchsorted(self.arc_firsts, (start, end)))]:
-            if arc.first < at or arc.end >= end:
+        for curve in self.curves[slice(*np.searchsorted(self.curve_firsts, (start, end)))]:
+            if curve.first < at or curve.end >= end:
                 continue
-            yield from self._straight(at, arc.first, state)
-            yield self._arc(arc, state)
-            at = arc.end + 1
+            yield from self._straight(at, curve.first, state)
+            yield self._arc(curve, state) if isinstance(curve, Arc) else self._spline(curve, state)
+            at = curve.end + 1
         yield from self._straight(at, end, state)
 
     def _straight(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
@@ -275,13 +280,22 @@ class _Composer:
         )
         return head + f"{w.CIRC} {{{via}}},{{".encode("ascii") + end
 
-    def _lines(self, start: int, end: int, state: Floats) -> list[bytes]:
+    def _spline(self, chain: Chain, state: Floats) -> bytes:
+        """Return a SPLINE block, with what is set before it as before a LIN."""
+        text = b"".join(self._lines(chain.first, chain.end + 1, state, passes=True))
+        head, _, points = text.partition(_LIN)
+        spl = f"{w.SPL} {{".encode("ascii")
+        block = spl + points.replace(b"\r\n" + _LIN, b"\r\n" + spl)
+        return head + w.SPLINE.encode("ascii") + NEWLINE + block + w.ENDSPLINE.encode("ascii") + NEWLINE
+
+    def _lines(self, start: int, end: int, state: Floats, *, passes: bool = False) -> list[bytes]:
         rows = slice(start, end)
+        cdis_mm = self.targets.cdis_mm[rows]
         return motion_lines(
             self.position[rows],
             self.abc_deg[rows],
             self.targets.speed_mm_s[rows] / MM_PER_M,
-            self.targets.cdis_mm[rows],
+            np.zeros_like(cdis_mm) if passes else cdis_mm,
             self.targets.source_line[rows],
             state,
             self.cell.program.comment_every,
@@ -362,15 +376,17 @@ class _Composer:
             declarations.append("DECL FRAME GK_BASE")
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
+        arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
         template = st.environment().get_template("head.src.j2")
         text = template.render(
             source=self.source,
             name=self.name,
             version=__version__,
             cell=self.cell,
-            motions=len(self.targets) - sum(arc.end - arc.first for arc in self.arcs),
-            arcs=len(self.arcs),
-            circ_type=w.CIRC_TYPE if self.arcs else "",
+            motions=len(self.targets) - sum(arc.end - arc.first for arc in arcs),
+            arcs=len(arcs),
+            splines=sum(isinstance(curve, Chain) for curve in self.curves),
+            circ_type=w.CIRC_TYPE if arcs else "",
             options=st.ascii_text(self.layout.options, 200),
             allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
             guard=self.layout.guard,

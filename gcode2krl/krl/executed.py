@@ -114,5 +114,5 @@ def _merged(files: Sequence[int], rows: Sequence[tuple[int, int]]) -> list[tuple
 def is_motion(kind: NDArray[np.int8]) -> Bools:
     """Tell which statements (k,) are motions."""
     result: Bools = (kind == w.KIND_LIN) | (kind == w.KIND_PTP) | (kind == w.KIND_PTP_AXES)
-    result |= kind == w.KIND_CIRC
+    result |= (kind == w.KIND_CIRC) | (kind == w.KIND_SPL)
     return result

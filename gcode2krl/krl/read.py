@@ -76,6 +76,8 @@ class KrlProgram:
     """(c, 3) a point that each passes."""
     external: Floats
     """(p, 6) E1 to E6, NaN where absent; one row in memory where no motion has any."""
+    spl_rows: Ints
+    """(s,) points of splines."""
     ptp: Bools
     speed_mm_s: Floats
     cdis_mm: Floats
@@ -219,6 +221,7 @@ class _Reader:
             circ_rows=circ_rows,
             circ_via_mm=self._via_mm(executed, len(circ_rows)),
             external=executed.external,
+            spl_rows=executed.motions_before(np.flatnonzero(kind == w.KIND_SPL)),
             ptp=ptp,
             speed_mm_s=speed,
             cdis_mm=cdis,

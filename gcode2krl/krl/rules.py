@@ -13,6 +13,7 @@ from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.names import name_problem
 from gcode2krl.krl.read import KrlProgram
 from gcode2krl.krl.rsi_rules import rsi_issues
+from gcode2krl.krl.splines import blocks_of
 from gcode2krl.krl.statements import frame_text, written_tool
 from gcode2krl.units import MM_PER_M
 
@@ -32,6 +33,8 @@ _KNOWN_WORDS = frozenset(
             w.GLOBAL,
             w.TRIGGER,
             w.CONTINUE,
+            w.SPLINE,
+            w.ENDSPLINE,
         ),
     ]
 )
@@ -58,6 +61,7 @@ def rule_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
     if not program.ptp[0]:
         issues.append(Issue("error", "krl-first-motion", int(program.line[0]), "the first motion is not PTP"))
     issues += _motion_issues(program, cell)
+    issues += blocks_of(program)[1]
     issues += _statement_rules(program, cell)
     issues += _setting_issues(program, cell)
     issues += rsi_issues(program, cell)

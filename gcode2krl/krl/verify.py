@@ -16,7 +16,7 @@ from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
 from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
-from gcode2krl.krl.arcs import arcs_of, unrolled
+from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
@@ -27,9 +27,12 @@ from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
+from gcode2krl.krl.splines import at_rest_behind, passing
 from gcode2krl.pilot import knot_rows, read_pilot
 from gcode2krl.pipeline import plan_motion, set_targets, solve_ptp_joints
 from gcode2krl.prediction import Prediction
+from gcode2krl.program.arcs import arcs_of
+from gcode2krl.program.splines import splines_of
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
 
@@ -152,7 +155,8 @@ def verify_krl(
     alone = declares_itself(program)
     online = rsi_name(program, Path(path).parent)
     arcs = tuple(arcs_of(targets)) if len(program.circ_rows) else ()
-    layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs)
+    splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
+    layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
     expected = {name: store(pieces) for name, pieces in composed.items()}
     if not alone:
@@ -214,8 +218,8 @@ def compare(
     With ``intended``, also what is between them; with ``pilot``, also what announces the pilot force; with
     ``original``, where corners are left out, also with every move of the G-code.
     """
-    program = unrolled(program, targets)
-    intended = unrolled(intended, targets) if intended is not None else None
+    program = passing(unrolled(at_rest_behind(program), targets), targets)
+    intended = passing(unrolled(intended, targets), targets) if intended is not None else None
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
     issues += _start_issues(program, targets)

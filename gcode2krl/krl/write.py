@@ -1,6 +1,6 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -16,7 +16,6 @@ from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.files.stored import Stored, Texts
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.arcs import Arc, arcs_of
 from gcode2krl.krl.composition import Layout
 from gcode2krl.krl.draft import Composer, Content
 from gcode2krl.krl.pilot_check import PilotFigures
@@ -29,6 +28,8 @@ from gcode2krl.krl.verify import VerifyReport
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
+from gcode2krl.program.arcs import Arc, arcs_of
+from gcode2krl.program.splines import Chain, splines_of
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
@@ -164,8 +165,8 @@ def write_krl(
         of_name += online_issues(targets, cell)
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
 
-    arcs, about_arcs = _arcs(targets, cell, pilot, is_online=online is not None)
-    of_name += about_arcs
+    arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
+    of_name += about_curves
 
     def layout(known: Targets | Prediction | Forecast) -> Layout:
         return Layout(
@@ -178,6 +179,7 @@ def write_krl(
             online=online or "",
             collisions=_scope(known, cell),
             arcs=tuple(arcs),
+            splines=tuple(splines),
         )
 
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
@@ -187,7 +189,7 @@ def write_krl(
         if complete is not None:
             source = composer.composed_while(complete, bare, layout(source))
         issues = list(released([*of_name, *source.issues], allow, strict))
-        plan = _pilot_plan(source, "none" if arcs else pilot, joints, file is not None)
+        plan = _pilot_plan(source, "none" if arcs or splines else pilot, joints, file is not None)
         give_back()
         content = bare if plan is None or isinstance(plan, Issue) else Content.of(plan)
         report = composer.composed(content, layout(source))
@@ -205,31 +207,48 @@ def write_krl(
     )
 
 
-def _arcs(
+def _curves(
     targets: Targets, cell: Cell, pilot: PilotForm | None, *, is_online: bool
-) -> tuple[list[Arc], list[Issue]]:
-    """Return the arcs that become CIRC, and what there is to say of them where the cell asks for them.
+) -> tuple[list[Arc], list[Chain], list[Issue]]:
+    """Return what becomes CIRC and SPLINE, and what there is to say of that where the cell asks for it.
 
     The triggers of a pilot force and RSI count on motions as they are predicted, so they need the chords: a
     pilot force that is asked for by name keeps them, the default one is left out instead.
     """
-    if not cell.controller.circ:
-        return [], []
+    if not (cell.controller.circ or cell.controller.spline):
+        return [], [], []
     why = "RSI" if is_online else "a pilot force" if pilot in ("index", "values") else ""
-    why = "--simplify" if targets.simplified is not None else why
     if why:
-        sentence = f"arcs stay LIN: {why} needs the motions as they are predicted"
-        return [], [Issue("note", "circ-left-out", 0, sentence, "leave out one of them")]
-    arcs = arcs_of(targets)
-    if not arcs:
-        return [], []
-    chords = sum(arc.end - arc.first + 1 for arc in arcs)
-    saved_kB = (chords - len(arcs)) * _CHORD_BYTES / 1e3
-    sentence = (
-        f"{len(arcs)} CIRC instead of {chords} LIN, about {saved_kB:.0f} kB less, without a pilot force; "
-        "their time is that of the chords (assumed)"
-    )
-    return arcs, [Issue("note", "circ", 0, sentence, "measure one with the controller's trace")]
+        kinds = "arcs" if cell.controller.circ else "short moves"
+        sentence = f"{kinds} stay LIN: {why} needs the motions as they are predicted"
+        return [], [], [Issue("note", "circ-left-out", 0, sentence, "leave out one of them")]
+    arcs = arcs_of(targets) if cell.controller.circ and targets.simplified is None else []
+    splines = splines_of(targets, bool(arcs)) if cell.controller.spline else []
+    return arcs, splines, [*_about_arcs(arcs, targets, cell), *_about_splines(splines)]
+
+
+def _about_arcs(arcs: list[Arc], targets: Targets, cell: Cell) -> Iterator[Issue]:
+    if cell.controller.circ and targets.simplified is not None:
+        sentence = "arcs stay LIN: --simplify needs the motions as they are predicted"
+        yield Issue("note", "circ-left-out", 0, sentence, "leave out one of them")
+    if arcs:
+        chords = sum(arc.end - arc.first + 1 for arc in arcs)
+        saved_kB = (chords - len(arcs)) * _CHORD_BYTES / 1e3
+        sentence = (
+            f"{len(arcs)} CIRC instead of {chords} LIN, about {saved_kB:.0f} kB less, without a pilot force; "
+            "their time is that of the chords (assumed)"
+        )
+        yield Issue("note", "circ", 0, sentence, "measure one with the controller's trace")
+
+
+def _about_splines(splines: list[Chain]) -> Iterator[Issue]:
+    if splines:
+        points = sum(chain.end - chain.first + 1 for chain in splines)
+        sentence = (
+            f"{len(splines)} SPLINE blocks of {points} points, entered and left at rest, without a pilot "
+            "force; their path between the points and their time are those of the chords (assumed)"
+        )
+        yield Issue("note", "spline", 0, sentence, "measure one with the controller's trace")
 
 
 def _scope(source: Targets | Prediction | Forecast, cell: Cell) -> CollisionScope | None:

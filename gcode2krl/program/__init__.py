@@ -14,6 +14,7 @@ from gcode2krl.program.restart import (
     state_words,
 )
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
+from gcode2krl.program.splines import with_stops
 from gcode2krl.program.stations import Range, plan_stations
 from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
@@ -41,4 +42,5 @@ __all__ = [
     "stiffest_spin",
     "tilt_issues",
     "tool_rotation",
+    "with_stops",
 ]

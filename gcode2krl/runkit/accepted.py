@@ -21,6 +21,7 @@ from gcode2krl.krl import statements as st
 from gcode2krl.krl.arcs import in_chords
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG
 from gcode2krl.krl.read import KrlProgram, read_krl
+from gcode2krl.krl.splines import in_points
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
@@ -67,7 +68,7 @@ def read_program(path: Path, cell: Cell) -> Accepted:
     Raises `NotUnderstoodError` where a file cannot be read, `RefusedError` where the program is broken, not
     written by gcode2krl, or made for another cell.
     """
-    program = in_chords(read_krl(path))
+    program = in_chords(in_points(read_krl(path), cell.controller.cdis_mm))
     text = program.texts[program.file[0]].decode("ascii", "replace").replace("\r\n", "\n")
     made = _MADE_BY.search(text)
     if made is None:

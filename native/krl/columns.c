@@ -3,7 +3,8 @@
 #include "constants.h"
 
 static inline bool is_motion_kind(uint8_t kind) {
-    return kind == W_KIND_LIN || kind == W_KIND_PTP || kind == W_KIND_PTP_AXES || kind == W_KIND_CIRC;
+    return kind == W_KIND_LIN || kind == W_KIND_PTP || kind == W_KIND_PTP_AXES || kind == W_KIND_CIRC ||
+           kind == W_KIND_SPL;
 }
 
 /* Take over a setting of the path speed in m/s or of the approximation in mm; one that has no number is none. */

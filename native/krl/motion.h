@@ -63,15 +63,24 @@ static inline Place components(Place at, Place end, double *value, double *exter
     }
 }
 
+/* Tell whether a blank or a brace stands at a place: what is before it is a whole word. */
+static inline bool ends_word(Place at, Place end) {
+    return at < end && (is_blank(HERE(at, end)) || is(at, end, CH_BRACE_OPEN));
+}
+
 /* Tell whether a statement is a CIRC, and not a name that begins with it. */
 static inline bool is_circ(Place begin, Place end) {
-    const Place behind = begin + sizeof(W_CIRC) - 1;
-    return STANDS(begin, end, W_CIRC) && behind < end && (is_blank(HERE(behind, end)) || is(behind, end, CH_BRACE_OPEN));
+    return STANDS(begin, end, W_CIRC) && ends_word(begin + sizeof(W_CIRC) - 1, end);
+}
+
+/* Tell whether a statement is a point of a spline. */
+static inline bool is_spl(Place begin, Place end) {
+    return STANDS(begin, end, W_SPL) && ends_word(begin + sizeof(W_SPL) - 1, end);
 }
 
 /* Tell whether a statement is a motion, whether or not it can be read. */
 static inline bool is_motion(Place begin, Place end) {
-    return STANDS(begin, end, W_LIN) || STANDS(begin, end, W_PTP) || is_circ(begin, end);
+    return STANDS(begin, end, W_LIN) || STANDS(begin, end, W_PTP) || is_circ(begin, end) || is_spl(begin, end);
 }
 
 /* Read the point that a CIRC passes, which is asked for again by whoever needs it; return where its end begins. */
@@ -87,8 +96,12 @@ static inline Place passed_point(Place at, Place end, double *value) {
 
 /* Read a motion into value and external; of a CIRC its end. Tell in has_external whether there are any. */
 static inline Statement motion(Place begin, Place end, double *value, double *external, bool *has_external) {
-    const bool arc = is_circ(begin, end);
-    Statement read = {arc ? W_KIND_CIRC : STANDS(begin, end, W_LIN) ? W_KIND_LIN : W_KIND_PTP, W_MALFORMED};
+    const bool arc = is_circ(begin, end), point = is_spl(begin, end);
+    Statement read = {arc                           ? W_KIND_CIRC
+                      : point                       ? W_KIND_SPL
+                      : STANDS(begin, end, W_LIN) ? W_KIND_LIN
+                                                    : W_KIND_PTP,
+                      W_MALFORMED};
     int found;
     *has_external = false;
     Place at = blank(begin + (arc ? sizeof(W_CIRC) : sizeof(W_LIN)) - 1, end);
@@ -107,10 +120,12 @@ static inline Statement motion(Place begin, Place end, double *value, double *ex
         return read;
     at = blank(at, end);
     const bool blends = STANDS(at, end, W_C_DIS);
+    if (blends && point)
+        return read;
     if (blends)
         at = blank(at + sizeof(W_C_DIS) - 1, end);
     if (ends_here(at, end))
-        read.blend = blends;
+        read.blend = blends || point; /* it passes without a stop */
     return read;
 }
 

@@ -185,6 +185,7 @@ def test_an_output_that_was_changed_or_lost_is_put_back(parts, run):
     assert len(cached("out")) == 3
 
 
+@pytest.mark.slow
 def test_a_damaged_entry_is_a_miss(parts, run, tmp_path):
     run("batch", parts, "-o", "out")
     entries = sorted((tmp_path / "cache").rglob("*.zip"))
@@ -260,6 +261,7 @@ def test_json_and_quiet(parts, run):
     assert "no.nc:1: error" in done.err
 
 
+@pytest.mark.slow
 def test_against_an_earlier_run(parts, run):
     run("batch", parts, "-o", "old")
     (parts / "a.nc").write_text(GOOD.format(x=150))
@@ -270,6 +272,7 @@ def test_against_an_earlier_run(parts, run):
     assert run("batch", parts, "-o", "new", "--against", "nothing").code == 2
 
 
+@pytest.mark.slow
 def test_the_cache_is_shown_and_cleared(parts, run, tmp_path):
     run("batch", parts, "-o", "out")
     shown = json.loads(run("cache", "show", "--json").out)
@@ -288,6 +291,7 @@ def test_several_parts_for_translate_name_the_batch(parts, run):
     assert "batch" not in run(parts / "a.nc", "--nonsense").err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal")
 def test_on_a_terminal_the_lines_stand_above_one_bar(parts, tmp_path):
     import pty
@@ -394,6 +398,7 @@ def test_ctrl_c_after_the_last_part_does_not_cost_the_results(parts, run, monkey
     assert len(records("out")) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
 def test_a_batch_that_is_killed_leaves_no_worker(parts, tmp_path):
     many(parts, 6)

@@ -112,6 +112,7 @@ def test_one_post_call_makes_the_program(post, run):
     assert verified.code == 0, verified.err
 
 
+@pytest.mark.slow
 def test_a_tool_that_the_cell_has_not_fails_the_post(post):
     done = post(drill_tool=30)
     assert "gcode2krl refused the program, nothing was written" in done["error"]
@@ -121,6 +122,7 @@ def test_a_tool_that_the_cell_has_not_fails_the_post(post):
     assert b"T30 is not in the cell" in done["view"]
 
 
+@pytest.mark.slow
 def test_a_round_stock_is_handed_over_as_a_mesh(post):
     done = post(stock="cylinder")
     assert "text" in done, done["error"]
@@ -130,6 +132,7 @@ def test_a_round_stock_is_handed_over_as_a_mesh(post):
     assert mesh.bounds[:, 2] == pytest.approx([-2.0, 21.0])
 
 
+@pytest.mark.slow
 def test_freecad_1_writes_the_text_itself(post):
     done = post(output="-", arguments="--pilot values --strict --cell demonstration.toml")
     assert "demonstration.toml" in done["error"]  # the user's --cell counts, and is not there

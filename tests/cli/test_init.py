@@ -86,7 +86,9 @@ def test_the_spindles_are_switched_as_the_cells_say(run, tmp_path):
 # --- the ways to answer ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(SIX))
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if k else []) for k, name in enumerate(sorted(SIX))]
+)
 def test_keys_at_a_terminal_give_the_same_cell(name):
     given = answers_of(name)
     answers = completed(typed(keys(given)), NOBODY)
@@ -100,6 +102,7 @@ def test_a_wrong_answer_is_asked_again():
     assert typed(again)["home"] == [0.0, -60.0, 75.0, 0.0, -105.0, 0.0]
 
 
+@pytest.mark.slow
 def test_a_frame_may_be_pasted_as_the_controller_writes_it():
     words = keys(answers_of("upside_down"))
     at = next(k for k, word in enumerate(words) if "2600" in word)
@@ -269,6 +272,7 @@ def test_an_archive_is_read_back_to_the_same_cell(run, tmp_path, name):
     assert ours.robot.limits.source == "archive archive.zip, $SOFTN_END and $SOFTP_END"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STRANGERS)
 def test_enter_accepts_what_the_archive_states(tmp_path, name):
     controller = read_controller(archive_of(tmp_path / "archive.zip", name))
@@ -287,6 +291,7 @@ def test_an_archive_of_another_arm_is_refused(run, tmp_path):
     assert "robot: found 'KR 60 HA', allowed: KR 300 R2500 ultra" in done.err
 
 
+@pytest.mark.slow
 def test_what_is_cleared_at_the_terminal_is_left_out(tmp_path):
     controller = read_controller(archive_of(tmp_path / "archive.zip", "tool_magazine"))
     words = keys(answers_of("tool_magazine"), controller)

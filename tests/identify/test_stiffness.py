@@ -468,6 +468,7 @@ def test_readings_named_in_the_head(rows, tmp_path):
 # --- the command ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_command_prints_json_draws_and_applies(capfd, tmp_path):
     cell_file = tmp_path / "cell.toml"
     cell_file.write_text(

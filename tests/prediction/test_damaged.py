@@ -80,6 +80,7 @@ def test_a_constant_table_of_absurd_length_is_refused(tmp_path):
         outline_of(file)
 
 
+@pytest.mark.slow
 def test_a_long_table_of_real_values_is_read(tmp_path):
     file = tmp_path / "a.parquet"
     long = pl.DataFrame(

@@ -128,6 +128,8 @@ class Controller(Provenance):
     law: Literal["averages", "trapezoid"] = "averages"
     circ: bool = False
     """Arcs of the G-code become CIRC."""
+    spline: bool = False
+    """Chains of short moves become SPLINE blocks, which KSS has from 8.3 on."""
 
 
 class Frames(Provenance):
