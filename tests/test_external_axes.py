@@ -280,3 +280,14 @@ def test_clearances_along_a_moving_rail_are_those_of_the_poses(tmp_path):
         alone = there.poses(prediction.joints.q_rad[row : row + 1], 1, 50.0)[0]
         assert gap[row] <= alone + 1e-6  # since the sample before, so no more
         assert gap[row] > alone - 25.0
+
+
+def test_the_map_of_turns_is_that_of_the_arm_where_it_stands(tmp_path):
+    from gcode2krl.clearance import spin_map
+
+    cell = rail_cell()
+    prediction = predict(long_cut(tmp_path), cell, forces=False)
+    seen = spin_map(prediction.motion, prediction.joints, cell)
+    chosen = int(np.argmin(np.abs(seen.spin_rad)))
+    assert np.abs(seen.chosen_rad).max() < 1e-9
+    assert (seen.comfort[chosen] > 0.0).all()

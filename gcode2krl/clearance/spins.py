@@ -4,6 +4,7 @@ The cutter and its holder are round: whether they hit something does not depend 
 out but for the arm itself.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from gcode2krl import frames as fr
 from gcode2krl import program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import at_rest, standing
 from gcode2krl.clearance.beside import watch_of
 from gcode2krl.tables import Joints, Motion, rows_at
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
@@ -58,10 +60,19 @@ class SpinMap(NamedTuple):
 
 
 def spin_map(motion: Motion, joints: Joints, cell: Cell) -> SpinMap:
-    """Return the map of a motion, at up to 400 of its samples and every 5 degrees."""
+    """Return the map of a motion, at up to 400 of its samples and every 5 degrees.
+
+    Where external axes move, the turn is that which the robot sees, and what may be hit does not count.
+    """
+    moves = bool(cell.external) and bool((motion.external != motion.external[0]).any())
+    if cell.external and not moves:
+        cell = standing(cell, motion.external[0])
     rows = np.unique(np.linspace(0, len(motion) - 1, min(_MAP_ROWS, len(motion))).astype(np.int64))
     rows = rows[np.isfinite(joints.q_rad[rows]).all(axis=1)]
     shown, q_rad = rows_at(motion, rows), joints.q_rad[rows]
+    if moves:
+        position, rotation = at_rest(shown.position_mm, shown.rotation, shown.external, cell)
+        shown = replace(shown, position_mm=position, rotation=rotation)
     turned = fr.rotation_from_quaternion(np.ascontiguousarray(shown.rotation))
     axis, x = turned[:, :, 2], turned[:, :, 0]
     start = fr.rotation_from_quaternion(program.tool_rotation(axis, 0.0))
@@ -75,7 +86,8 @@ def spin_map(motion: Motion, joints: Joints, cell: Cell) -> SpinMap:
         pose = (shown.position_mm, rotation, shown.tool, cell)
         quality = np.full((len(rows), 8), -1.0)
         quality[own] = robot.pose_quality(*pose)[own]
-        comfort[k], free[k] = quality[own], freedom(*pose, quality)[own]
+        comfort[k] = quality[own]
+        free[k] = 1.0 if moves else freedom(*pose, quality)[own]
     return SpinMap(shown.path_mm, spins, comfort, free, chosen)
 
 
