@@ -7,6 +7,7 @@ from gcode2krl.clearance.beside import (
     shown_otherwise,
     watch_of,
 )
+from gcode2krl.clearance.retracts import collisions_on_retracts
 from gcode2krl.clearance.spins import SpinMap, freedom, spin_map
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Inside",
     "SpinMap",
     "collisions_beside",
+    "collisions_on_retracts",
     "freedom",
     "moves_watched_at_targets",
     "shown_otherwise",

@@ -3,12 +3,15 @@
 from gcode2krl.cell.carried import at_rest, from_rest, to_rest
 from gcode2krl.robot.joints import (
     Follower,
+    Places,
+    angles_along,
     angles_near,
     follow,
     follow_motion,
     joints_from_angles,
     line_angles,
     motion_angles,
+    places_between,
     ptp_joints,
     rise_angles,
     target_angles,
@@ -20,6 +23,8 @@ from gcode2krl.robot.standing import limit_margin, raise_shares
 
 __all__ = [
     "Follower",
+    "Places",
+    "angles_along",
     "angles_near",
     "at_rest",
     "flange_frames",
@@ -33,6 +38,7 @@ __all__ = [
     "limit_margin",
     "line_angles",
     "motion_angles",
+    "places_between",
     "pose_quality",
     "ptp_joints",
     "raise_shares",

@@ -7,9 +7,11 @@ it.
 
 import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import at_rest
@@ -100,6 +102,43 @@ def rise_angles(
     external = np.broadcast_to(targets.external[row], (len(height), 6))
     poses = at_rest(position, rotation, external, cell)
     return same_branch(Path(*poses, tool, np.zeros(len(height), dtype=np.bool_)), q_rad, cell)
+
+
+class Places(NamedTuple):
+    """Places (m) along the lines to targets, with the joints there."""
+
+    line: Line
+    q_rad: Floats
+
+    @property
+    def target(self) -> Ints:
+        """The target (m,) that each place leads to."""
+        return self.line.target
+
+    @property
+    def external(self) -> Floats:
+        """E1 to E6 (m, 6)."""
+        return self.line.external
+
+
+def places_between(targets: Targets, first: int, last: int, cell: Cell) -> Places:
+    """Return the places along the lines from target ``first`` to ``last``, in the program's branch."""
+    counts = count_samples(targets, cell)
+    line = sample_lines(targets, cell, first, last + 1)
+    branch = _branch_of(targets, counts, cell)
+    guess = branch.guess(int(counts[first]) - 1)
+    return Places(line, branch.joints(path_of(line, cell), cell, guess))
+
+
+def angles_along(places: Places, row: int, way_mm: Floats, cell: Cell) -> Floats:
+    """Return the angles (n, 6) in rad at ways (n,) out of a place along the tool axis; NaN out of reach."""
+    line, count = places.line, len(way_mm)
+    axis = fr.rotation_from_quaternion(line.rotation[row])[:, 2]
+    position = line.position_mm[row] + way_mm[:, None] * axis
+    rotation = np.tile(line.rotation[row], (count, 1))
+    poses = at_rest(position, rotation, np.broadcast_to(line.external[row], (count, 6)), cell)
+    tool = np.full(count, line.tool[row], dtype=np.int32)
+    return same_branch(Path(*poses, tool, np.zeros(count, dtype=np.bool_)), places.q_rad[row], cell)
 
 
 def motion_angles(motion: Motion, cell: Cell) -> tuple[Floats, Floats]:
