@@ -5,7 +5,7 @@ import pytest
 
 from gcode2krl import compliance, predict, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.cell.carried import standing
-from gcode2krl.errors import RefusedError
+from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.frames import abc_from_rotation, rotation_from_quaternion
 from gcode2krl.robot import inverse
 from tests.cells import over_demonstration
@@ -214,6 +214,20 @@ def test_an_axis_that_is_not_coupled_does_not_move_in_a_program(tmp_path):
     prediction = predict(passes(tmp_path), cell, forces=False)
     with pytest.raises(RefusedError, match="external-uncoupled"):
         write_krl(prediction, tmp_path / "PART.src")
+
+
+@pytest.mark.parametrize(
+    ("axes", "key"),
+    [
+        ({"E1": RAIL, "E3": {**RAIL, "axis": "x", "coupled": False}}, "external.E3.coupled"),
+        ({"E2": {**TABLE, "kind": "tilt", "machine_def": None}, "E3": TABLE}, "external.E2.machine_def"),
+        ({"E1": {**RAIL, "coupled": False, "position": 0.0}, "E2": TABLE}, "external.E1.coupled"),
+    ],
+)
+def test_axes_that_no_base_can_express_are_refused(axes, key):
+    axes = {name: {k: v for k, v in axis.items() if v is not None} for name, axis in axes.items()}
+    with pytest.raises(NotUnderstoodError, match=key):
+        over_demonstration({"external": axes, "frames": {"base": BASE}})
 
 
 def test_a_table_that_follows_turns_with_the_tool_and_the_arm_does_not(tmp_path):

@@ -9,7 +9,7 @@ or about a direction of its own origin::
 Rails and tables are taken as rigid, and as going exactly along or about their axes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,21 @@ def tables_of(external: External, base_on: ExternalName | None = None) -> list[E
     before = tables[: tables.index(last)]
     tilted = before and external[before[-1]].kind == "tilt"
     return [before[-1], last] if tilted else [last]
+
+
+def contradictions(external: External, base_on: ExternalName | None = None) -> Iterator[tuple[str, str]]:
+    """Yield key and reason where axes are coupled in a way that no ``$BASE`` of the controller expresses."""
+    if base_on is not None and (base_on not in external or external[base_on].is_rail):
+        return  # a finding of its own
+    rails, tables = rails_of(external), tables_of(external, base_on)
+    if len({external[name].coupled for name in rails}) > 1:
+        yield f"external.{rails[-1]}.coupled", f"all rails alike: {rails[0]} is coupled otherwise"
+    if len({external[name].machine_def for name in tables}) > 1:
+        words = f"{tables[0]} and {tables[-1]} are one machine: state the same machine_def for both"
+        yield f"external.{tables[0]}.machine_def", words
+    if rails and tables and not external[rails[0]].coupled and external[tables[-1]].is_coupled:
+        words = "false, while a table is coupled: where it stands is stated in $WORLD, which this rail leaves"
+        yield f"external.{rails[0]}.coupled", words
 
 
 def most_of(external: External, what: Literal["speed", "acceleration"]) -> Floats:

@@ -464,6 +464,7 @@ def _contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     base_on = cell.frames.base_on
     if base_on is not None and (base_on not in cell.external or cell.external[base_on].is_rail):
         yield _key_issue("frames.base_on", f"found {base_on}, and there is no table [external.{base_on}]")
+    yield from (_key_issue(*wrong) for wrong in carriers.contradictions(cell.external, base_on))
     yield from _obstacle_issues(cell)
     templates = cell.templates()
     view = {"cell": plain_view(cell), "spindle": cell.spindle.model_dump()} if templates else {}
