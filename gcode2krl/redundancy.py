@@ -149,8 +149,13 @@ def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     def quality(at: Ints, place: Floats) -> Floats:
         return _quality_at(targets, rows[at], place + followed[at], cell)
 
+    def bending(at: Ints, place: Floats) -> Floats:
+        return _bending_at(targets, rows[at], place + followed[at], cell)
+
     is_free = _free_motions(targets, toolpath)[rows]
-    found = program.plan_stations(targets.position_mm[rows], is_free, quality, ranges, cell.external_rest())
+    stiff = None if compliance.missing_stiffness(cell) else bending
+    start = cell.external_rest()
+    found = program.plan_stations(targets.position_mm[rows], is_free, quality, ranges, start, stiff)
     if followed.any():
         found = np.round(found + followed, 3)
     homes = np.flatnonzero(targets.home)
@@ -202,20 +207,37 @@ def _quality_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> F
 
     Where they differ from row to row, what may be hit does not count.
     """
-    position, rotation, tool = targets.position_mm[rows], targets.rotation[rows], targets.tool[rows]
+    there, position, turned = _turned_at(targets, rows, external, cell)
+    judge = _comfort_and_freedom if _is_one(external) else _comfort
+    best: Floats = np.max([judge(position, each, targets.tool[rows], there) for each in turned], axis=0)
+    return best
+
+
+def _bending_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> Floats:
+    """Return how far each branch (r, 8) bends with the external axes at (r, 6), in the stiffest turn."""
+    there, position, turned = _turned_at(targets, rows, external, cell)
+    tool = targets.tool[rows]
+    axes = ((each, fr.rotation_from_quaternion(each)[:, :, 2]) for each in turned)
+    stiffest: Floats = np.fmin.reduce([_bending_mm(position, each, axis, tool, there) for each, axis in axes])
+    return stiffest
+
+
+def _turned_at(
+    targets: Targets, rows: Ints, external: Floats, cell: Cell
+) -> tuple[Cell, Floats, Iterator[Floats]]:
+    """Return the cell with external axes at (r, 6), positions (r, 3) in it, and the orientations to try."""
+    position, rotation = targets.position_mm[rows], targets.rotation[rows]
     if _is_one(external):
-        there, judge = standing(cell, external[0]), _comfort_and_freedom
+        there = standing(cell, external[0])
     else:
-        there, judge = cell, _comfort
+        there = cell
         position, rotation = at_rest(position, rotation, external, cell)
     spin = cell.frames.spin
     if not isinstance(spin, str) and not _is_following(external, cell):
-        return judge(position, rotation, tool, there)
+        return there, position, iter([rotation])
     axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
     tried = _TRIED_SPINS if isinstance(spin, str) else np.array([spin * RAD_PER_DEG])
-    turned = (program.tool_rotation(axis, float(each)) for each in tried)
-    best: Floats = np.max([judge(position, each, tool, there) for each in turned], axis=0)
-    return best
+    return there, position, (program.tool_rotation(axis, float(each)) for each in tried)
 
 
 def _comfort(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:

@@ -1,5 +1,7 @@
 """Rails and tables through the whole chain: beside a cell that simply stands there, and sample by sample."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,19 @@ def test_joints_and_deflection_along_a_moving_rail(tmp_path):
         assert np.allclose(bent[0], prediction.deflection.deflection_base_mm[row], atol=1e-9)
 
 
+def test_the_robot_bends_less_than_from_the_nearest_place(tmp_path):
+    part, base = square(tmp_path), {**BASE, "x_mm": 1300.0, "y_mm": 1400.0}
+    cell = rail_cell(frames={"base": base})
+    near = rail_cell(
+        frames={"base": base}, external={"E1": {**RAIL, "home": 0.0, "position": 0.0}}
+    )  # a good place too
+    chosen, nearest = predict(part, cell), predict(part, near)
+    assert not [i for one in (chosen, nearest) for i in one.issues if i.severity == "error"]
+    assert np.ptp(chosen.motion.external[1:-1, 0]) < 1200.0  # HOME apart, one place
+    bent, bent_near = (np.sqrt((p.deflection.deflection_base_mm**2).sum(axis=1)) for p in (chosen, nearest))
+    assert np.sqrt(np.mean(bent**2)) < 0.95 * np.sqrt(np.mean(bent_near**2))
+
+
 def test_no_axis_is_faster_than_it_may_be(tmp_path):
     cell = rail_cell()
     for part in (long_cut(tmp_path), passes(tmp_path)):
@@ -168,9 +183,9 @@ def test_every_target_states_the_axes_and_is_read_back(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "code"),
     [
-        (",E1 1375.000", ",E1 1376.000", "verify-external"),
-        (",E1 1375.000}", "}", "verify-external"),
-        (",E1 1375.000}", ",E1 1375.000,E2 0.0}", "krl-external"),
+        (",E1 {at:.3f}", ",E1 {off:.3f}", "verify-external"),
+        (",E1 {at:.3f}}}", "}}", "verify-external"),
+        (",E1 {at:.3f}}}", ",E1 {at:.3f},E2 0.0}}", "krl-external"),
     ],
 )
 def test_an_edited_axis_is_told(old, new, code, tmp_path):
@@ -179,6 +194,8 @@ def test_an_edited_axis_is_told(old, new, code, tmp_path):
     write_krl(prediction, tmp_path / "PART.src", pilot="none")
     file = tmp_path / "PART.src"
     text = file.read_text()
+    at = float(re.search(r"LIN .*,E1 ([\d.]+)\}", text)[1])
+    old, new = (each.format(at=at, off=at + 1.0) for each in (old, new))
     assert old in text
     file.write_text(text.replace(old, new, 1), newline="")
     report = verify_krl(file, prediction.toolpath, cell)

@@ -1,9 +1,10 @@
 """Where the external axes stand along a program: one place for all of it, one for each pass, or moving along.
 
 A station is a place of E1 to E6. It changes on the clearance plane only, where nothing is cut: one station
-for the whole program is the first choice, one for each pass the second. Where a pass is longer than the arm
-reaches, the axis moves along, as little and as evenly as the reach allows (the shortest line through the
-corridor of places from which the arm reaches).
+for the whole program is the first choice, one for each pass the second. Of good places those count where the
+robot bends least, then those that are near. Where a pass is longer than the arm reaches, the axis moves
+along, as little and as evenly as the reach allows (the shortest line through the corridor of places from
+which the arm reaches).
 """
 
 import itertools
@@ -17,6 +18,10 @@ from gcode2krl.arrays import Bools, Floats, Ints
 Quality = Callable[[Ints, Floats], Floats]
 """Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
 singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
+
+Bending = Callable[[Ints, Floats], Floats]
+"""Rows (r,) of the targets and E1 to E6 (6,) to how far each branch (r, 8) bends under a load, NaN where
+impossible."""
 
 GOOD = 0.3
 """Quality (1 = 30 degrees from limits and singularities) from which a place is as good as any better one."""
@@ -36,6 +41,11 @@ _MOST_POSES = 500_000
 axes but the widest stay."""
 _HITS_COST = 50.0
 """What a place costs at which something is hit, or nearly out of reach."""
+_AS_STIFF = 0.05
+"""Places that bend by so much more than the stiffest one count as equally stiff."""
+_BENDS = 0.5
+"""What a place costs at which the robot bends twice as far as at the best one for that pass; at most that."""
+_ROWS_THAT_BEND, _ROWS_A_PASS_THAT_BEND = 24, 3
 _MOVES = 0.5
 """What a way over the whole range between two passes costs, against a place of no quality at all."""
 _STARTS = 0.05
@@ -62,7 +72,12 @@ class Range:
 
 
 def plan_stations(
-    position_mm: Floats, is_free: Bools, quality: Quality, ranges: list[Range], start: Floats
+    position_mm: Floats,
+    is_free: Bools,
+    quality: Quality,
+    ranges: list[Range],
+    start: Floats,
+    bending: Bending | None = None,
 ) -> Floats:
     """Return E1 to E6 (p, 6) at targets, one row in memory where they stay.
 
@@ -73,6 +88,7 @@ def plan_stations(
     quality : of rows at a place.
     ranges : the axes that may be put somewhere else.
     start : (6,) where all axes are that may not, and that others are preferred to be near.
+    bending : of rows at a place; None where stiffness does not count.
     """
     if not ranges:
         return np.broadcast_to(start, (len(position_mm), 6))
@@ -81,11 +97,12 @@ def plan_stations(
     table = np.stack([quality(rows, place) for place in places])  # (places, rows, branches)
     worst = table.min(axis=1).max(axis=1)
     if worst.max() >= LEAST:
-        return np.broadcast_to(places[_best(worst, places, ranges, start)], (len(position_mm), 6))
+        bent = _bent(bending, _spread(rows, position_mm, _ROWS_THAT_BEND), places, worst)
+        return np.broadcast_to(places[_best(worst, bent, places, ranges, start)], (len(position_mm), 6))
     passes = np.cumsum(is_free, dtype=np.int64)
     if len(places) * (int(passes[-1]) + 1) * _FEWEST_ROWS > _MOST_POSES:
         places = places[_with_others_best(table, places, ranges)]
-    return _by_pass(position_mm, passes, quality, places, ranges)
+    return _by_pass(position_mm, passes, quality, bending, places, ranges)
 
 
 def _places(ranges: list[Range], start: Floats) -> Floats:
@@ -100,16 +117,38 @@ def _places(ranges: list[Range], start: Floats) -> Floats:
     return places
 
 
-def _best(worst: Floats, places: Floats, ranges: list[Range], start: Floats) -> int:
-    """Return the place of the best quality; of those that are good, the one nearest to where the axes are."""
+def _best(worst: Floats, bent: Floats, places: Floats, ranges: list[Range], start: Floats) -> int:
+    """Return the place of the best quality; of those that are good, the stiffest; of those, the nearest."""
     far = np.zeros(len(places))
     for axis in ranges:
         far += np.abs(places[:, axis.column] - start[axis.column]) / (axis.high - axis.low)
-    return int(np.lexsort((far, -np.minimum(np.round(worst, 2), GOOD)))[0])
+    quality = np.minimum(np.round(worst, 2), GOOD)
+    candidates = np.flatnonzero(quality == quality.max())
+    stiff = candidates[bent[candidates] <= (1.0 + _AS_STIFF) * bent[candidates].min()]
+    return int(stiff[np.lexsort((-worst[stiff], far[stiff]))[0]])
+
+
+def _bent(bending: Bending | None, rows: Ints, places: Floats, worst: Floats) -> Floats:
+    """Return how far the robot bends (k,) at good places, in root mean square over rows; else 1 for all.
+
+    ``worst`` (k,) is the quality of the places. Of the branches the stiffest counts that reaches all rows.
+    """
+    bent = np.ones(len(places))
+    if bending is None or len(places) == 1:
+        return bent
+    for place in np.flatnonzero(worst >= min(GOOD, float(worst.max()))).tolist():
+        square = np.mean(bending(rows, places[place]) ** 2, axis=0)
+        bent[place] = np.sqrt(np.nanmin(square)) if np.isfinite(square).any() else np.inf
+    return bent
 
 
 def _by_pass(
-    position_mm: Floats, passes: Ints, quality: Quality, places: Floats, ranges: list[Range]
+    position_mm: Floats,
+    passes: Ints,
+    quality: Quality,
+    bending: Bending | None,
+    places: Floats,
+    ranges: list[Range],
 ) -> Floats:
     """Return E1 to E6 (p, 6) with a station for each pass, or moving along in it."""
     borders = np.flatnonzero(np.diff(passes, prepend=-1, append=passes[-1] + 1))
@@ -130,7 +169,9 @@ def _by_pass(
         None if known else (external[run[0]], external[run[-1]])
         for known, run in zip(has_station, runs, strict=True)
     ]
-    for run, way, place in zip(runs, ways, _track(worst[:, :, branch], ways, places, ranges), strict=True):
+    own = worst[:, :, branch]
+    cost = _cost_of_places(own) + _cost_of_bending(bending, judged, branch, own, places)
+    for run, way, place in zip(runs, ways, _track(cost, ways, places, ranges), strict=True):
         if way is None:
             external[run] = places[place]
     return np.asarray(np.round(external, _DECIMALS) + 0.0)
@@ -145,14 +186,13 @@ def _branch(worst: Floats, table: Floats, ends: Ints) -> int:
 
 
 def _track(
-    worst: Floats, ways: list[tuple[Floats, Floats] | None], places: Floats, ranges: list[Range]
+    cost: Floats, ways: list[tuple[Floats, Floats] | None], places: Floats, ranges: list[Range]
 ) -> Ints:
     """Return the place of each pass (n,) that is cheapest over all: poor places and ways between cost.
 
-    ``ways`` has the first and the last place of a pass that the axes move along in.
+    ``cost`` (n, k) is that of the places, ``ways`` has the first and the last place of a pass that the axes
+    move along in.
     """
-    poor = np.where(worst > _REACHED, _HITS_COST - worst, 1e3)
-    cost = np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
     total, came_from = cost[0], np.zeros(cost.shape, dtype=np.int64)
     for number in range(1, len(cost)):
         before, here = ways[number - 1], ways[number]
@@ -166,6 +206,29 @@ def _track(
     for number in range(len(cost) - 1, 0, -1):
         track[number - 1] = came_from[number, track[number]]
     return track
+
+
+def _cost_of_places(worst: Floats) -> Floats:
+    """Return what places cost whose quality for each pass is (n, k)."""
+    poor = np.where(worst > _REACHED, _HITS_COST - worst, 1e3)
+    return np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
+
+
+def _cost_of_bending(
+    bending: Bending | None, judged: list[Ints], branch: int, worst: Floats, places: Floats
+) -> Floats:
+    """Return what it costs (n, k) that a pass bends farther at a place than at its stiffest good one."""
+    cost = np.zeros(worst.shape)
+    if bending is None:
+        return cost
+    rows = [run[np.linspace(0, len(run) - 1, _ROWS_A_PASS_THAT_BEND).astype(np.int64)] for run in judged]
+    for place in np.flatnonzero((worst >= LEAST).any(axis=0)).tolist():
+        bent = bending(np.concatenate(rows), places[place])[:, branch].reshape(len(rows), -1)
+        cost[:, place] = np.sqrt(np.mean(bent**2, axis=1))
+    cost[(worst < LEAST) | ~np.isfinite(cost)] = np.inf
+    least = np.min(cost, axis=1, keepdims=True, initial=np.inf)
+    excess = np.where(np.isfinite(cost), cost, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
+    return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))
 
 
 def _cost_of_moves(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:

@@ -19,14 +19,23 @@ def reached(position):
     return quality
 
 
-def planned(x, is_free, low=-5000.0, high=15000.0, start=0.0):
+def planned(x, is_free, low=-5000.0, high=15000.0, start=0.0, bending=None):
     position = np.zeros((len(x), 3))
     position[:, 0] = x
     at = np.zeros(6)
     at[0] = start
-    return plan_stations(position, np.array(is_free), reached(position), [Range(0, low, high)], at)[
-        :, 0
-    ], position
+    free, axis = np.array(is_free), Range(0, low, high)
+    return plan_stations(position, free, reached(position), [axis], at, bending)[:, 0], position
+
+
+def softer_away_from(x, side_mm):
+    """A robot that stands stiffest ``side_mm`` beside the tool; 500 mm off it bends twice as far."""
+
+    def bending(rows, place):
+        off = np.abs(np.asarray(x)[rows] + side_mm - place[0]) / 500.0
+        return np.tile((1.0 + off)[:, None], (1, 8))
+
+    return bending
 
 
 def test_one_station_where_one_is_enough():
@@ -38,6 +47,29 @@ def test_one_station_where_one_is_enough():
 def test_of_good_places_the_nearest_to_where_the_rail_is():
     external, _ = planned(np.full(20, 400.0), [True] + [False] * 19, start=900.0)
     assert abs(external[0] - 900.0) < 250.0
+
+
+def test_of_good_places_the_stiffest_before_the_nearest():
+    x, is_free = np.full(20, 400.0), [True] + [False] * 19
+    external, _ = planned(x, is_free, 0.0, 1500.0, start=900.0, bending=softer_away_from(x, -300.0))
+    assert abs(external[0] - 100.0) <= 35.0  # 31 mm apart, and 5 % more are as stiff
+
+
+def test_a_stiff_place_that_is_hardly_reached_is_not_taken():
+    x, is_free = np.full(20, 400.0), [True] + [False] * 19
+    external, _ = planned(x, is_free, 0.0, 1500.0, bending=softer_away_from(x, 950.0))
+    assert 1035.0 <= external[0] <= 1100.0  # the quality is good up to 700 mm off
+
+
+def test_each_pass_stands_where_it_is_stiff_unless_the_way_costs_more():
+    x = np.concatenate([np.full(30, start) for start in (0.0, 4000.0, 4020.0)])
+    is_free = np.zeros(len(x), dtype=bool)
+    is_free[[0, 30, 60]] = True
+    external, _ = planned(x, is_free, bending=softer_away_from(x, -500.0))
+    first, second, third = external[[0, 30, 60]]
+    assert abs(first + 500.0) < 450.0
+    assert abs(second - 3550.0) < 450.0
+    assert second == third
 
 
 def test_passes_have_stations_and_nothing_moves_within_one():
