@@ -7,6 +7,7 @@ from gcode2krl.clearance.beside import (
     shown_otherwise,
     watch_of,
 )
+from gcode2krl.clearance.meshes import obstacle_meshes
 from gcode2krl.clearance.retracts import collisions_on_retracts
 from gcode2krl.clearance.spins import SpinMap, freedom, spin_map
 
@@ -18,6 +19,7 @@ __all__ = [
     "collisions_on_retracts",
     "freedom",
     "moves_watched_at_targets",
+    "obstacle_meshes",
     "shown_otherwise",
     "spin_map",
     "watch_of",

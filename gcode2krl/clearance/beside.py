@@ -6,8 +6,6 @@ ones.
 """
 
 from collections.abc import Iterator
-from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +15,8 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import standing
 from gcode2krl.cell.checked_parts import checks_collisions
+from gcode2krl.clearance.meshes import triangles_of
 from gcode2krl.clearance.proposals import Ptp, proposal, ptp_way
-from gcode2krl.compiled.inputs import locked
-from gcode2krl.cutting.raw_part import load_mesh
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Targets
 
@@ -36,7 +33,7 @@ def watch_of(cell: Cell, *, tells: bool = False) -> collision.Watch | None:
     """Return the watch over a program, None where the cell describes nothing that may hit or be hit."""
     if not checks_collisions(cell) or not cell.robot.geometry.known:
         return None
-    return collision.Watch(cell, _triangles, tells=tells)
+    return collision.Watch(cell, triangles_of, tells=tells)
 
 
 def collisions_beside(targets: Targets, q_rad: Floats, cell: Cell) -> tuple[Issue, ...]:
@@ -136,17 +133,3 @@ def _owners(move: Ints32) -> Ints32:
     after = np.minimum(np.searchsorted(programmed, np.arange(len(move))), len(programmed) - 1)
     owner: Ints32 = move[programmed[after]]
     return owner
-
-
-def _triangles(file: str) -> Floats:
-    """Return the triangles (t, 3, 3) of a mesh file; as it is asked for several times, the last are kept."""
-    try:
-        state = Path(file).stat()
-    except OSError:
-        return _read(file, 0, 0)  # which says what is wrong
-    return _read(file, state.st_mtime_ns, state.st_size)
-
-
-@lru_cache(maxsize=8)
-def _read(file: str, changed_ns: int, size: int) -> Floats:
-    return locked(np.asarray(load_mesh(Path(file), "obstacle").triangles, dtype=np.float64))

@@ -48,6 +48,7 @@ def command(
         file = Path(output) if output is not None else place.with_name(f"{place.resolve().name}.html")
         files = [*place.glob("*")] if place.is_dir() else []
         require_report(str(file), existing(gcode, nominal, *files))
+        from gcode2krl.clearance import obstacle_meshes
         from gcode2krl.prediction import Prediction
         from gcode2krl.report.page import content_of, write_page
 
@@ -58,7 +59,10 @@ def command(
             stock_mm = stock_corners_mm(prediction.toolpath, prediction.cell)
             mesh = _nominal_file(prediction, place, nominal)
             beside = on_page(compared(prediction, mesh)) if mesh is not None else None
-            content = content_of(prediction, text=text, stock_mm=stock_mm, nominal=beside)
+            meshes_mm = obstacle_meshes(prediction.cell)
+            content = content_of(
+                prediction, text=text, stock_mm=stock_mm, meshes_mm=meshes_mm, nominal=beside
+            )
             write_page(content, file, files)
     except Gcode2KrlError as error:
         return console.refused(error)

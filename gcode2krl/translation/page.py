@@ -33,10 +33,18 @@ def write_page_of_written(
     page: Path, part: str, prediction: "Prediction", issues: tuple[Issue, ...], inputs: list[Path]
 ) -> None:
     """Write the page of a program that was written."""
+    from gcode2krl.clearance import obstacle_meshes
     from gcode2krl.report.page import content_of, write_page
 
     stock_mm = stock_corners_mm(prediction.toolpath, prediction.cell)
-    content = content_of(prediction, verdict="written", issues=issues, text=text_of(part), stock_mm=stock_mm)
+    content = content_of(
+        prediction,
+        verdict="written",
+        issues=issues,
+        text=text_of(part),
+        stock_mm=stock_mm,
+        meshes_mm=obstacle_meshes(prediction.cell),
+    )
     write_page(content, page, inputs)
 
 
@@ -53,6 +61,7 @@ def write_page_of_refused(
 
     Returns what the robot would do with it, None where that cannot be said.
     """
+    from gcode2krl.clearance import obstacle_meshes
     from gcode2krl.report.page import content_of, content_of_refused, write_page
 
     verdict = "refused" if error.exit_code == 1 else "not understood"
@@ -60,7 +69,14 @@ def write_page_of_refused(
     stock_mm = stock_corners_mm(toolpath, cell) if toolpath is not None and cell is not None else None
     prediction = _predicted(toolpath, cell, simplify_mm)
     if prediction is not None:
-        content = content_of(prediction, verdict=verdict, issues=error.issues, text=text, stock_mm=stock_mm)
+        content = content_of(
+            prediction,
+            verdict=verdict,
+            issues=error.issues,
+            text=text,
+            stock_mm=stock_mm,
+            meshes_mm=obstacle_meshes(prediction.cell),
+        )
     else:
         content = content_of_refused(
             error.issues,

@@ -1,6 +1,6 @@
 """What the page shows, from the tables of a prediction or from what is known of a refused program."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
@@ -16,6 +16,7 @@ from gcode2krl.errors import Issue, Told, told
 from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.columns import packed, packed_text
+from gcode2krl.report.page.drawn_mesh import drawn_mesh
 from gcode2krl.report.page.losses import (
     Place,
     Window,
@@ -90,6 +91,7 @@ class Content:
     text: str = ""
     compared: Compared | None = None
     solids: str = ""
+    meshes: str = ""
 
 
 def content_of(
@@ -99,6 +101,7 @@ def content_of(
     issues: Iterable[Issue] | None = None,
     text: str | None = None,
     stock_mm: Floats | None = None,
+    meshes_mm: Mapping[str, Floats] | None = None,
     nominal: dict[str, Any] | None = None,
 ) -> Content:
     """Return the page of a prediction.
@@ -109,6 +112,7 @@ def content_of(
     issues : its findings; default: those of the prediction.
     text : the G-code; None where it is not at hand.
     stock_mm : (2, 3) low and high corner of the raw part in ``$BASE``, None where it is not known.
+    meshes_mm : name of an obstacle → its triangles (t, 3, 3) in its frame; those left out are not drawn.
     nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
         ``triangles_mm`` (t, 3, 3). None where nobody compared.
@@ -122,6 +126,7 @@ def content_of(
     made = _content(
         _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
     )
+    made = _with_meshes(made, meshes_mm or {})
     return made if nominal is None else _with_nominal(made, nominal, whole)
 
 
@@ -202,6 +207,21 @@ def _content(
         head=head,
         data=data,
         text=packed_text(text or ""),
+    )
+
+
+def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:
+    """Return a page with the meshes of its obstacles, where it draws the robot."""
+    robot = content.head.get("robot")
+    named = [one["name"] for one in robot["obstacles"] if one["name"] in meshes_mm] if robot else []
+    if not named:
+        return content
+    corners = [drawn_mesh(meshes_mm[name]).reshape(-1, 3) for name in named]
+    points = np.concatenate(corners)
+    meshes, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
+    counts = {name: len(own) for name, own in zip(named, corners, strict=True)}
+    return replace(
+        content, head=content.head | {"meshes": {"columns": described, "counts": counts}}, meshes=meshes
     )
 
 

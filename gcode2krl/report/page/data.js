@@ -35,6 +35,19 @@ async function readSolids() {
   return readColumns("solids", head.solids.columns, head.solids.counts.reduce((sum, count) => sum + count, 0));
 }
 
+// The corners of the meshes that stand in the cell, by name.
+async function readMeshes() {
+  if (!head.meshes) return {};
+  const { counts, columns } = head.meshes;
+  const { x, y, z } = await readColumns("meshes", columns, Object.values(counts).reduce((sum, count) => sum + count, 0));
+  let first = 0;
+  return Object.fromEntries(Object.entries(counts).map(([name, count]) => {
+    const corners = new Float32Array(3 * count);
+    for (let i = 0; i < count; i++, first++) corners.set([x[first], y[first], z[first]], 3 * i);
+    return [name, corners];
+  }));
+}
+
 async function readLines() {
   if (!head.has_text) return [];
   const lines = new TextDecoder().decode(await inflated("gcode")).split(/\r\n|\n|\r/);

@@ -3,9 +3,10 @@
 const PASS = "pass";
 
 class Page {
-  constructor(columns, lines, solids) {
+  constructor(columns, lines, solids, meshes) {
     this.columns = columns;
     this.solidColumns = solids;
+    this.meshes = meshes;
     this.row = 0;
     this.rows = head.rows;
     this.stretch = null;
@@ -46,7 +47,7 @@ class Page {
       scene.scene.add(this.stock);
     }
     if (head.robot) {
-      this.robot = new Robot(head.robot, this.columns, head.near);
+      this.robot = new Robot(head.robot, this.columns, head.near, this.meshes);
       this.robot.wanted = true;
       scene.scene.add(this.robot.root, this.robot.obstacles);
       this.robot.show(this.firstFeed());
@@ -337,6 +338,6 @@ function say(words) {
 if (typeof DecompressionStream === "undefined") {
   say("This browser is too old for the 3D view, the plots and the G-code: Chrome or Edge 103, Firefox 113, Safari 16.4 or newer shows them.");
 } else {
-  const [columns, lines, solids] = await Promise.all([readColumns("columns", head.columns, head.rows), readLines(), readSolids()]);
-  window.report = new Page(columns, lines, solids);
+  const [columns, lines, solids, meshes] = await Promise.all([readColumns("columns", head.columns, head.rows), readLines(), readSolids(), readMeshes()]);
+  window.report = new Page(columns, lines, solids, meshes);
 }

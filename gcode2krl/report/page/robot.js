@@ -1,10 +1,10 @@
 // Stock, gouges, rest, what stands in the cell, and the robot: capsules that turn about the joint axes.
 
-const LINK_COLOUR = 0xe8a468, FOOT_COLOUR = 0x70777f, SPINDLE_COLOUR = 0x4a5560, CUTTER_COLOUR = 0xb8c0c8;
+const LINK_COLOUR = 0xe8a468, FOOT_COLOUR = 0x70777f, SPINDLE_COLOUR = 0x4a5560, CABLE_COLOUR = 0x2f2f2f, CUTTER_COLOUR = 0xb8c0c8;
 const OBSTACLE_COLOUR = 0x8f9aa5, HIT_COLOUR = 0xd00000, NEAR_COLOUR = 0xe69f00;
 
 class Robot {
-  constructor(sketch, columns, near) {
+  constructor(sketch, columns, near, meshes) {
     this.columns = columns;
     this.near = near;
     this.named = new Map();
@@ -32,7 +32,16 @@ class Robot {
     });
     this.obstacles = new THREE.Group();
     this.obstacles.add(this.world);
-    sketch.obstacles.forEach((one) => (one.stands ? this.world : this.obstacles).add(this.keep(one.name, obstacle(one))));
+    sketch.obstacles.forEach((one) => {
+      const mesh = one.low ? obstacle(one) : meshes[one.name] && solid(one, meshes[one.name]);
+      if (mesh) (one.stands ? this.world : this.obstacles).add(this.keep(one.name, mesh));
+    });
+    this.cables = sketch.cables.map((one) => {
+      const shape = new THREE.CylinderGeometry(one.radius, one.radius, 1, 12);
+      const mesh = new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ color: CABLE_COLOUR, transparent: true, opacity: 0.35, depthWrite: false }));
+      this.root.add(this.keep("the cables", mesh));
+      return { mesh, from: new THREE.Vector3(...one.from), to: new THREE.Vector3(...one.to) };
+    });
     this.tools = {};
     Object.entries(sketch.tools).forEach(([number, tool]) => tool && this.addTool(number, tool));
   }
@@ -85,6 +94,7 @@ class Robot {
       this.links[k + 1].matrix.copy(there).multiply(turn).multiply(back);
       this.links[k + 1].matrixWorldNeedsUpdate = true;
     });
+    this.stretchCables();
     this.carry("root", row);
     this.carry("world", row);
     const number = String(this.columns.tool[row]);
@@ -92,6 +102,18 @@ class Robot {
     this.root.visible = this.wanted && this.reached;
     this.shown = this.tools[number];
     this.colour(row);
+  }
+
+  // Lay the cables from where A3 has their first ends to where the flange has the second.
+  stretchCables() {
+    const turned = (point, links) => links.reduceRight((at, link) => at.applyMatrix4(link.matrix), point.clone());
+    this.cables.forEach(({ mesh, from, to }) => {
+      const start = turned(from, this.links.slice(1, 4)), end = turned(to, this.links.slice(1));
+      const along = end.clone().sub(start), length = Math.max(along.length(), 1e-6);
+      mesh.position.copy(start).lerp(end, 0.5);
+      mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
+      mesh.scale.set(1, length, 1);
+    });
   }
 
   // Put the robot root or $WORLD where the external axes have it at a row; they stay without such columns.
@@ -148,6 +170,18 @@ function obstacle({ frame, low, high }) {
   );
   mesh.matrixAutoUpdate = false;
   mesh.matrix.fromArray(frame).multiply(new THREE.Matrix4().makeTranslation(...low.map((value, k) => (value + high[k]) / 2)));
+  return mesh;
+}
+
+// A mesh in its frame; with few triangles, so its faces are flat.
+function solid({ frame }, corners) {
+  const shape = new THREE.BufferGeometry();
+  shape.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+  shape.computeVertexNormals();
+  const material = new THREE.MeshLambertMaterial({ color: OBSTACLE_COLOUR, transparent: true, opacity: 0.6, side: THREE.DoubleSide });
+  const mesh = new THREE.Mesh(shape, material);
+  mesh.matrixAutoUpdate = false;
+  mesh.matrix.fromArray(frame);
   return mesh;
 }
 

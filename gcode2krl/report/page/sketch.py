@@ -3,7 +3,7 @@
 The capsules are those by which collisions are checked; where the cell states none, they are a sketch between
 the joint centres of the kinematics. Everything is stated in the robot root with all joints at zero; from
 there the turns about axes 1 to k, the last first, move link k (a product of exponentials), which is all that
-the page needs. Cables, which lie on two links, and meshes are not drawn.
+the page needs. A stretch of cables has its ends on two links. A mesh is only named here.
 """
 
 from collections.abc import Iterator
@@ -39,7 +39,9 @@ def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
         "root": np.linalg.inv(cell.base_matrix()).T.reshape(-1).tolist(),
         "world": np.linalg.inv(cell.base_in_world()).T.reshape(-1).tolist(),
         "axes": [{"point": p.tolist(), "along": d.tolist()} for p, d in joint_axes(geometry)],
+        "is_sketch": not cell.robot.body.capsules,
         "links": list(_links(cell, geometry, flange)),
+        "cables": list(_cables(cell, geometry, flange)),
         "tools": {str(number): _tool(cell, number, flange, reach_mm) for number in tools},
         "obstacles": list(_obstacles(cell)),
     }
@@ -47,10 +49,7 @@ def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
 
 def _links(cell: Cell, geometry: Floats, flange: Floats) -> Iterator[dict[str, Any]]:
     """Yield the capsules of arm and spindle: number of the link, name, ends and radius."""
-    frames = [np.eye(4) for _ in LINKS]
-    for frame, point in zip(frames[2:6], _centres(geometry), strict=True):
-        frame[:3, 3] = point
-    frames[6] = flange
+    frames = _frames(geometry, flange)
     for capsule in cell.robot.body.capsules:
         yield _capsule(LINKS.index(capsule.link), capsule.link, capsule, frames)
     if not cell.robot.body.capsules:
@@ -62,13 +61,30 @@ def _links(cell: Cell, geometry: Floats, flange: Floats) -> Iterator[dict[str, A
         yield _capsule(6, "spindle", stretch, frames)
 
 
+def _cables(cell: Cell, geometry: Floats, flange: Floats) -> Iterator[dict[str, Any]]:
+    """Yield stretches of cables: the first end turns with A3, the second with the flange."""
+    frames = _frames(geometry, flange)
+    for stretch in cell.cables.capsules if cell.cables is not None else ():
+        start, end = frames[3] @ [*stretch.from_mm, 1.0], frames[6] @ [*stretch.to_mm, 1.0]
+        yield {"from": start[:3].tolist(), "to": end[:3].tolist(), "radius": stretch.radius_mm}
+
+
+def _frames(geometry: Floats, flange: Floats) -> list[Floats]:
+    """Return the frame (4, 4) of each of `LINKS` in the root, all joints at zero."""
+    frames = [np.eye(4) for _ in LINKS]
+    for frame, point in zip(frames[2:6], _centres(geometry), strict=True):
+        frame[:3, 3] = point
+    frames[6] = flange
+    return frames
+
+
 def _capsule(link: int, name: str, capsule: Capsule, frames: list[Floats]) -> dict[str, Any]:
     start, end = ((frames[link] @ [*point, 1.0])[:3].tolist() for point in (capsule.from_mm, capsule.to_mm))
     return {"link": link, "name": name, "from": start, "to": end, "radius": capsule.radius_mm}
 
 
 def _obstacles(cell: Cell) -> Iterator[dict[str, Any]]:
-    """Yield table, boxes and planes: a name, a frame (4, 4) and two corners in it.
+    """Yield table, boxes and planes: a name, a frame (4, 4) and two corners in it; of a mesh no corners.
 
     The frame stands in ``$BASE``, or in ``$WORLD`` where external axes do not carry what is drawn.
     """
@@ -86,6 +102,8 @@ def _obstacles(cell: Cell) -> Iterator[dict[str, Any]]:
             yield _box(each.name, frame, [*each.box_mm[0], *each.box_mm[1]], stands=stands)
         elif each.plane is not None:
             yield _box(each.name, frame @ _across(each.plane), flat, stands=stands)
+        else:
+            yield {"name": each.name, "frame": frame.T.reshape(-1).tolist(), "stands": stands}
 
 
 def _box(name: str, frame: Floats, corners: list[float], *, stands: bool = False) -> dict[str, Any]:

@@ -4,8 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import trimesh
 
 from gcode2krl import load_cell, predict, read_gcode
+from gcode2krl.clearance import obstacle_meshes
 from gcode2krl.errors import Issue
 from gcode2krl.report.page import content_of, content_of_refused, write_page
 from gcode2krl.report.page.one_file import HERE
@@ -350,6 +352,33 @@ def test_what_hits_something_is_red_at_that_moment(browser, tmp_path):
         assert 0xD00000 not in window.evaluate(colour, "A3")
         assert ("spindle hits beam" in window.inner_text("#readout")) == is_hit
     assert window.is_visible("#show-cell")
+    assert window.said == []
+    window.context.close()
+
+
+def test_a_mesh_and_the_cables_are_drawn(browser, tmp_path):
+    part = tmp_path / "part.nc"
+    part.write_text(PART)
+    fixture = trimesh.creation.box((20.0, 30.0, 40.0))
+    fixture.apply_translation((0.0, 150.0, -20.0))
+    fixture.export(tmp_path / "fixture.stl")
+    cables = {"capsules": [{"from_mm": [0.0, 250, 0], "to_mm": [-150.0, 0, 40], "radius_mm": 40}]}
+    obstacle = {"name": "vice", "mesh": str(tmp_path / "fixture.stl"), "frame": "robroot"}
+    predicted = predict(part, cell_with(obstacle, cables=cables), forces=False)
+    meshes = obstacle_meshes(predicted.cell)
+    write_page(content_of(predicted, text=PART, meshes_mm=meshes), tmp_path / "cell.html")
+    window = opened_page(browser, tmp_path / "cell.html")
+    corners = window.evaluate(
+        "Array.from(report.robot.named.get('vice')[0].geometry.attributes.position.array)"
+    )
+    assert corners == pytest.approx(meshes["vice"].ravel(), abs=6e-3)
+    stretch = "(({ mesh }) => [mesh.scale.y, ...mesh.position.toArray()])(report.robot.cables[0])"
+    drawn = []
+    for row in (0, len(predicted.motion) // 2):
+        window.evaluate("row => report.select(row)", row)
+        drawn.append(window.evaluate(stretch))
+    assert all(100.0 < length < 2500.0 for length, *_ in drawn)
+    assert drawn[0] != drawn[1]
     assert window.said == []
     window.context.close()
 

@@ -78,6 +78,34 @@ def test_the_capsules_go_where_they_are_checked():
                 assert moved(np.array(one[end]), q[: one["link"]], own) == pytest.approx(at, abs=1e-8)
 
 
+def test_cables_hang_between_the_forearm_and_the_flange():
+    """Their ends, against a capsule of A3 and one of the spindle at the same places."""
+    on_a3, on_flange = [180.0, 60.0, -240.0], [-30.0, 20.0, 90.0]
+
+    def point(at):
+        return {"from_mm": at, "to_mm": at, "radius_mm": 40.0}
+
+    demonstration = load_cell()
+    body = {**demonstration.robot.body.model_dump(), "capsules": [{"link": "A3", **point(on_a3)}]}
+    cell = over_demonstration(
+        {
+            "robot": {"body": body},
+            "spindle": {"body": {"capsules": [point(on_flange)]}},
+            "cables": {"capsules": [{"from_mm": on_a3, "to_mm": on_flange, "radius_mm": 40.0}]},
+        }
+    )
+    (drawn,), axes, carried = (
+        robot_sketch(cell, [1])["cables"],
+        joint_axes(cell.robot.geometry.array()),
+        Carried(cell),
+    )
+    assert drawn["radius"] == 40.0
+    q_rad = np.random.default_rng(5).uniform(-2.0, 2.0, (10, 6))
+    for q, (first, second) in zip(q_rad, carried.ends_mm(q_rad), strict=True):
+        assert moved(np.array(drawn["from"]), q[:3], axes[:3]) == pytest.approx(first[:3], abs=1e-8)
+        assert moved(np.array(drawn["to"]), q, axes) == pytest.approx(second[3:], abs=1e-8)
+
+
 def test_what_stands_in_the_cell_is_drawn_where_it_is():
     cell = over_demonstration(
         {
