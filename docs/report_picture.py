@@ -13,7 +13,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from gcode2krl import predict
-from gcode2krl.cell.definition import resolve_cell
+from gcode2krl.cell import resolve_cell
 from gcode2krl.report.page import content_of, write_page
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,13 +7,11 @@ if TYPE_CHECKING:
         CODES_WITHOUT_SIGNALS,
         Cell,
         as_toml,
-        cell_from_resolved,
         cell_schema,
         controller_axes,
-        load_cell,
         plain_view,
-        resolve_cell,
     )
+    from gcode2krl.cell.loading import cell_from_resolved, load_cell, resolve_cell
 
 __all__ = [
     "CODES_WITHOUT_SIGNALS",
@@ -26,12 +24,13 @@ __all__ = [
     "plain_view",
     "resolve_cell",
 ]
+_LOADING = ("cell_from_resolved", "load_cell", "resolve_cell")
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use: the model library is read without the definition of a cell."""
     if name not in __all__:
         raise AttributeError(f"module 'gcode2krl.cell' has no attribute {name!r}")
-    from gcode2krl.cell import definition
+    from gcode2krl.cell import definition, loading
 
-    return getattr(definition, name)
+    return getattr(loading if name in _LOADING else definition, name)

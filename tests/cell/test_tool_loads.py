@@ -79,7 +79,7 @@ def test_a_person_confirms_both(cell):
 def test_a_tool_whose_load_is_stated_needs_no_other():
     frame = {"x_mm": 200.0, "y_mm": 0.0, "z_mm": 300.0, "a_deg": 0.0, "b_deg": 90.0, "c_deg": 0.0}
     tool = {"model": "flat 16 z3", "frame": frame, "axis": "+z"}
-    from gcode2krl.cell.definition import resolve_cell
+    from gcode2krl.cell import resolve_cell
 
     assert "load.mass_kg" in missing_keys(resolve_cell({"tool": {"1": tool}}))
     assert "load.mass_kg" not in missing_keys(resolve_cell({"tool": {"1": {**tool, "load": HEAVY}}}))

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from gcode2krl import load_cell, plan_motion, read_gcode
-from gcode2krl.cell.definition import resolve_cell
+from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting import remove
 from gcode2krl.cutting.mesh_file import MeshError
 from gcode2krl.cutting.nominal import MOST_SOLIDS, TOLERANCE_MM, compare

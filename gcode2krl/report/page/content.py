@@ -15,8 +15,8 @@ from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
+from gcode2krl.report.page.coarse import drawn_mesh
 from gcode2krl.report.page.columns import packed, packed_text
-from gcode2krl.report.page.drawn_mesh import drawn_mesh
 from gcode2krl.report.page.losses import (
     Place,
     Window,

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import load_cell
-from gcode2krl.cell.definition import resolve_cell
+from gcode2krl.cell import resolve_cell
 from gcode2krl.collision import Carried
 from gcode2krl.report.page.sketch import joint_axes, robot_sketch
 from gcode2krl.robot.kinematics import flange_pose
