@@ -1,6 +1,6 @@
 """The stages on a Motion, block after block, so that no stage keeps all samples."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from gcode2krl import collision, compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.clearance import ArmInStock, Inside, moves_watched_at_targets, watch_of
+from gcode2krl.clearance import ArmInStock, Beside, Inside, moves_watched_at_targets, watch_of
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
@@ -241,10 +241,12 @@ class Loads:
         dt_s: float,
         *,
         has_peaks: bool = True,
+        ways: Callable[[], Sequence[Beside]] = tuple,
     ) -> None:
         """Set up the stock; raises `NotUnderstoodError` where it cannot be read.
 
         Without peaks, ``peak_N`` of the forces is their mean: no figure of a program depends on it.
+        ``ways`` are those that the motion does not show, to be held against the stock.
         """
         self._toolpath, self._cell = toolpath, cell
         self._milling: cutting.Milling | None = None
@@ -262,7 +264,7 @@ class Loads:
             return
         try:
             self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s, has_peaks=has_peaks)
-            self._arm = ArmInStock.of(toolpath, cell, self._milling)
+            self._arm = ArmInStock.of(toolpath, cell, self._milling, ways)
             give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
@@ -324,6 +326,7 @@ class Loads:
             return Outcome(None, None, self._skipped)
         found = self._milling.issues()
         if self._arm is not None:
+            self._arm.finish()
             found = (*found, *self._arm.issues())
         limits, bent = self._force_limits, self._deflection_limit
         if limits.absurd is not None:

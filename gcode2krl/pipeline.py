@@ -17,7 +17,7 @@ from gcode2krl import cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.clearance import collisions_beside
+from gcode2krl.clearance import Beside, collisions_beside, ways_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from gcode2krl.effects import Applied
 
 _PTP_KNOWN: WeakKeyDictionary[Targets, tuple[Any, ...]] = WeakKeyDictionary()
+_WAYS_KNOWN: WeakKeyDictionary[Targets, tuple[Cell, tuple[Beside, ...]]] = WeakKeyDictionary()
 _ANGLES_KNOWN: WeakKeyDictionary[Motion, tuple[Cell, Floats, Floats]] = WeakKeyDictionary()
 _CLEARANCE_KNOWN: WeakKeyDictionary[Motion, Clearance] = WeakKeyDictionary()
 
@@ -166,7 +167,7 @@ def predict_toolpath(
     loads: tuple[Forces | None, Deflection | None, tuple[Issue, ...]] = (None, None, ())
     if forces:
         cutting_begins = begin("material, forces, deflection")
-        loads = forces_and_deflection(toolpath, motion, joints, cell, cutting_begins)
+        loads = forces_and_deflection(toolpath, motion, joints, cell, cutting_begins, targets)
     inputs: dict[str, Any] = {
         "program": toolpath.source,
         "version": __version__,
@@ -200,7 +201,14 @@ def forecast_toolpath(
     outcome = Outcome(None, None, ())
     if forces:
         tell = begin("material, forces, deflection")
-        loads = Loads(toolpath, cell, planned.outlook, course.dt_s, has_peaks=False)
+        loads = Loads(
+            toolpath,
+            cell,
+            planned.outlook,
+            course.dt_s,
+            has_peaks=False,
+            ways=lambda: _ways_beside(targets, cell),
+        )
         with closing(loads.along(blocks_with_joints(course, cell))) as blocks:
             for block in blocks:
                 figures.take(block.forces, block.deflection)
@@ -248,15 +256,27 @@ def forecast_of(prediction: Prediction) -> Forecast:
 
 
 def forces_and_deflection(
-    toolpath: Toolpath, motion: Motion, joints: Joints, cell: Cell, tell: Progress = unheard
+    toolpath: Toolpath,
+    motion: Motion,
+    joints: Joints,
+    cell: Cell,
+    tell: Progress = unheard,
+    targets: Targets | None = None,
 ) -> tuple[Forces | None, Deflection | None, tuple[Issue, ...]]:
     """Return forces and deflection, None where a stage cannot run, and the findings that say why.
 
-    ``tell`` is told how many samples are done. Raises `NotUnderstoodError` where the stock that the cell
+    ``tell`` is told how many samples are done. With ``targets`` the ways that a Motion does not show are held
+    against the stock too. Raises `NotUnderstoodError` where the stock that the cell
     names cannot be read.
     """
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
-    loads = Loads(toolpath, cell, lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)), dt_s)
+    loads = Loads(
+        toolpath,
+        cell,
+        lambda: cutting.outlook_of(block for block, _ in blocks_of(motion)),
+        dt_s,
+        ways=lambda: () if targets is None else _ways_beside(targets, cell),
+    )
     all_forces, all_bent = Gathered[Forces](len(motion)), Gathered[Deflection](len(motion))
     with closing(loads.along(blocks_with(joints, motion))) as blocks:
         for done in blocks:
@@ -337,11 +357,21 @@ def checked(targets: Targets, cell: Cell) -> tuple[Targets, Joints]:
     Among them are the collisions on the motions that a Motion does not show (`clearance`).
     """
     joints, findings = robot.follow(targets, cell, conditioning=False)
-    findings = (*findings, *collisions_beside(targets, joints.q_rad, cell))
+    ways = tuple(ways_beside(targets, joints.q_rad, cell))
+    findings = (*findings, *collisions_beside(ways, targets, cell))
     judged = replace(targets, issues=(*targets.issues, *program.below_table(targets, cell), *findings))
     rows = np.flatnonzero(targets.ptp)
+    _WAYS_KNOWN[judged] = (cell, ways)
     _PTP_KNOWN[judged] = (cell, rows, joints.q_rad[rows], joints.status[rows], joints.turn[rows])
     return judged, replace(joints, issues=findings)
+
+
+def _ways_beside(targets: Targets, cell: Cell) -> tuple[Beside, ...]:
+    """Return the ways that a Motion does not show, cached as long as the targets live."""
+    known = _WAYS_KNOWN.get(targets)
+    if known is not None and known[0] is cell:
+        return known[1]
+    return tuple(ways_beside(targets, robot.target_angles(targets, cell)[0], cell))
 
 
 def controller_test_targets(

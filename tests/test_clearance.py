@@ -7,7 +7,13 @@ import pytest
 
 from gcode2krl import plan_motion, predict, robot, set_targets, solve_joints, write_krl
 from gcode2krl.cell.checked_parts import collision_scope
-from gcode2krl.clearance import collisions_beside, moves_watched_at_targets, shown_otherwise, watch_of
+from gcode2krl.clearance import (
+    collisions_beside,
+    moves_watched_at_targets,
+    shown_otherwise,
+    watch_of,
+    ways_beside,
+)
 from gcode2krl.clearance.proposals import ptp_way
 from gcode2krl.collision import scene
 from gcode2krl.collision.bodies import capsules_of, parts_of
@@ -178,7 +184,7 @@ def test_a_way_to_home_within_the_program_is_one_of_the_joints(tmp_path):
     assert not shown_otherwise(targets)[targets.move == 7].any()
     found = contacts(file, cell)
     assert next(issue.line for issue in found if "cutter" in issue.message) in (12, 13)
-    assert collisions_beside(targets, joints.q_rad, cell) == ()
+    assert collisions_beside(ways_beside(targets, joints.q_rad, cell), targets, cell) == ()
 
 
 def test_the_table_is_held_against_spindle_and_holder_not_against_the_cutter(part):

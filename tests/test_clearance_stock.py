@@ -9,6 +9,7 @@ from gcode2krl.cutting import Milling, outlook_of
 from gcode2krl.errors import RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.pipeline import plan_motion
+from tests.cells import over_demonstration
 from tests.test_clearance import box, cell_with
 
 HEAD = "G21 G90 G94 G17\nT1 M6\nS10000 M3\nG0 G43 H1 X-30 Y0 Z200\n"
@@ -32,9 +33,9 @@ def layers(top, bottom, step=10):
 
 @pytest.fixture
 def found(tmp_path):
-    def found(text, **cell):
+    def found(text, height=200, **cell):
         file = tmp_path / "part.nc"
-        file.write_text(HEAD + text + END)
+        file.write_text((HEAD + text + END).replace("Z200", f"Z{height}"))
         prediction = predict(file, cell_with(**cell))
         return prediction, [issue for issue in prediction.issues if issue.code == "collision"]
 
@@ -92,7 +93,7 @@ def test_the_program_is_refused_and_its_header_says_what_is_checked(found, tmp_p
     head = " ".join(text[:8000].replace("\r\n;", " ").split())
     assert "stock as it stands (by arm and spindle)" in head
     assert "NOT CHECKED for collisions: " in head
-    assert "stock on the ways from the last cut on, and on PTP between" in head
+    assert "stock on the ways" not in head
 
 
 def test_the_ptp_from_home_goes_through_the_raw_part(found):
@@ -103,6 +104,47 @@ def test_the_ptp_from_home_goes_through_the_raw_part(found):
     ways = {issue.message.split(",")[0] for issue in issues if "PTP from HOME" in issue.message}
     assert ways
     assert all("hits the stock on the PTP from HOME" in way for way in ways)
+
+
+def test_the_ptp_to_home_goes_through_what_still_stands(found):
+    tower = [[-400.0, -100, -60], [-60, 100, 900]]
+    _, issues = found(BESIDE, stock={"box_mm": tower, "resolution_mm": 2.0})
+    ways = {issue.message.split(",")[0] for issue in issues if issue.message.count("PTP to HOME")}
+    assert ways
+    assert all("hits the stock on the PTP to HOME" in way for way in ways)
+    assert all(issue.remedy.startswith("choose a higher") for issue in issues if "to HOME" in issue.message)
+
+
+def on_ptp(issues):
+    return {issue.message.split(",")[0] for issue in issues if " PTP " in issue.message}
+
+
+def test_a_ptp_beside_a_post_that_is_gone_or_stands(found):
+    more = {"stock": {"box_mm": POST, "resolution_mm": 0.5}, "clearance": {"z_mm": "none"}, "height": 125}
+    low = "G0 X-30 Y-25\nG28 X-30 Y-25\nG0 X-30 Y-25 Z0\n"
+    _, issues = found(low, **{**more, "height": 0})
+    assert any(name.startswith("spindle hits the stock on the PTP to HOME") for name in on_ptp(issues))
+    _, issues = found(layers(110, 0).replace("Z15", "Z0") + low, **more)
+    assert on_ptp(issues) == set()
+
+
+def test_holder_and_cutter_in_the_stock_on_a_ptp(found):
+    """From within a slot the tip leaves sideways."""
+    tool = over_demonstration().tool[1].model_dump(exclude_none=True)
+    tool |= {"stick_out_mm": 40.0, "holder_diameter_mm": 50.0, "length_mm": 100.0}
+    stock = {"box_mm": [[-60.0, -60, -60], [60, 60, 0]]}
+    more = {"stock": stock, "tool": {"1": tool}, "clearance": {"z_mm": "none"}, "height": -30}
+    _, issues = found("G0 X0 Y-80\nG1 Y80 F3000\n", **more)
+    assert not any("to HOME" in name for name in on_ptp(issues))
+    _, issues = found("G0 X0 Y-80\nG1 Y0 F3000\nG28 X0 Y0\n", **more)
+    assert any(
+        name.startswith("the cutter of T1 hits the stock on the PTP to HOME") for name in on_ptp(issues)
+    )
+
+
+def test_a_guessed_stock_gives_warnings_on_the_ways_too(found):
+    _, issues = found("G0 X-250\nG0 Z20\nG1 Z0 F3000\nG1 X100\nG0 Z5\nG28 X100 Y0\n")
+    assert {issue.severity for issue in issues} <= {"warning"}
 
 
 def test_depths_are_those_of_every_cell_tried_by_hand(found, tmp_path):

@@ -63,11 +63,8 @@ def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> Coll
     carried = [word for word, is_stated in (("arm", arm.capsules), ("spindle", spindle)) if is_stated]
     if carried and is_cut:
         obstacles.append(f"stock as it stands (by {' and '.join(carried)})")
-        is_stated = cell.stock is not None and (cell.stock.box_mm is not None or cell.stock.mesh is not None)
-        way_in = "" if is_stated else "from HOME, "
-        unchecked.append(f"stock on the ways {way_in}from the last cut on, and on PTP between")
     else:
-        unchecked.append("stock by arm and spindle")
+        unchecked.append("stock by arm and spindle, and by the tool on PTP")
     if cell.cables is not None:
         movers.append(f"cables ({len(cell.cables.capsules)} capsules, warnings only)")
     else:

@@ -3,10 +3,11 @@
 Cutter, shank and holder in the stock are judged by the removal itself. Where arm or spindle comes into the
 box around the raw part, the samples are cut in short stretches, and the capsules are held against what
 stands before each: material that a stretch takes away counts as standing until its end, and so does what
-the field lags behind the cutter.
+the field lags behind the cutter. The ways that a Motion does not show are held against what stands when the
+samples behind them begin, with holder and cutter, which no removal judges there.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import points_moved, to_rest
 from gcode2krl.cell.checked_parts import checks_collisions
+from gcode2krl.clearance.ways import Beside
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.frames import invert
 from gcode2krl.tables import Motion, Toolpath, rows_of
@@ -28,6 +30,7 @@ _MARGIN_MM = 1.0
 _STEP_MM = 0.5
 """Between two samples the joints go straight, in steps in which no end of a capsule moves farther."""
 _MOST_STEPS = 200
+_AROUND = "choose a higher [clearance] z_mm or another HOME, or cut in another order"
 _CONTACT_MM = 0.1
 """A capsule that is less deep in the material touches it by the rounding of cells."""
 
@@ -36,7 +39,7 @@ Samples = tuple[Motion, Floats, Floats, bool]
 
 
 class Inside(NamedTuple):
-    """Rows of joints (k) within the box around the raw part."""
+    """Rows of joints (k) within the box around the raw part, and ways that come before them."""
 
     before_rad: Floats
     """(k, 6) the rows before them."""
@@ -45,13 +48,27 @@ class Inside(NamedTuple):
     """(k, 6) E1 to E6."""
     external: Floats
     line: Ints32
+    ways: tuple[Beside, ...] = ()
+
+
+class _Place(NamedTuple):
+    """Line of the G-code, and which way beside it."""
+
+    line: int
+    words: str = ""
 
 
 class ArmInStock:
     """Holds arm and spindle against the stock along a motion that comes block after block."""
 
-    def __init__(self, toolpath: Toolpath, cell: Cell, milling: cutting.Milling) -> None:
-        """Take what cuts the stock; arm and spindle are those of the cell."""
+    def __init__(
+        self, toolpath: Toolpath, cell: Cell, milling: cutting.Milling, ways: Sequence[Beside] = ()
+    ) -> None:
+        """Take what cuts the stock, and the ways that a Motion does not show.
+
+        Those before the first cut are left out where a raw part is stated, against which they are held as
+        what stands in the cell.
+        """
         self._toolpath, self._milling, self._box = toolpath, milling, milling.raw_box()
         frame = cell.base_matrix()
         self._to_base = np.linalg.inv(frame)
@@ -59,20 +76,28 @@ class ArmInStock:
         to_root[:3, :3] = frame[:3, :3] @ self._box.to_field.T
         to_root[:3, 3] = frame[:3, 3]
         self._carried = collision.Carried(cell)
-        self._dips = self._dips_in(to_root)
+        self._dips = self._dips_in(to_root, self._carried)
         self._contacts = collision.Contacts(0.0)
         self._hit_lines: set[int] = set()
         self._last_rad, self._last_external = np.zeros((0, 6)), np.zeros((0, 6))
+        held = [way for way in ways if not way.is_uncut or self._box.guessed]
+        self._ways = sorted(held, key=lambda way: way.before)
         self._cell, self._dips_at = cell, cell.external_rest()
         self._frame, self._to_root = frame, to_root
 
     @classmethod
-    def of(cls, toolpath: Toolpath, cell: Cell, milling: cutting.Milling) -> "ArmInStock | None":
+    def of(
+        cls,
+        toolpath: Toolpath,
+        cell: Cell,
+        milling: cutting.Milling,
+        ways: Callable[[], Sequence[Beside]] = tuple,
+    ) -> "ArmInStock | None":
         """Return what watches them, None where the cell is not checked for collisions or states neither."""
         stated = bool(cell.robot.body.capsules) or cell.spindle.body is not None
         if not (stated and checks_collisions(cell) and cell.robot.geometry.known):
             return None
-        return cls(toolpath, cell, milling)
+        return cls(toolpath, cell, milling, ways())
 
     def divided(self, samples: Samples) -> Iterator[tuple[Samples, Inside | None]]:
         """Yield samples in stretches that are cut one after the other, each with its rows within the box.
@@ -84,19 +109,20 @@ class ArmInStock:
         external = motion.external[np.minimum(np.arange(len(q_rad)), len(motion) - 1)]
         stood = np.concatenate([self._last_external if len(self._last_external) else external[:1], external])
         self._last_rad, self._last_external = before[-1:].copy(), stood[-1:].copy()
-        rows = self._rows_inside(motion, q_rad)
-        if not len(rows):
+        rows, due = self._rows_inside(motion, q_rad), self._due(motion)
+        if not len(rows) and not due:
             yield samples, None
             return
         line = self._lines(motion, len(q_rad))
-        last = min(int(rows[-1]) + 1, len(motion))  # there may be a row of joints more than samples
-        borders = sorted({0, *rows[::_STRETCH_ROWS].tolist(), last, len(motion)})
+        last = min(int(rows[-1]) + 1, len(motion)) if len(rows) else 0  # a row of joints more than samples
+        borders = sorted({0, *rows[::_STRETCH_ROWS].tolist(), *due, last, len(motion)})
         for start, end in pairwise(borders):
             behind = None if end == len(motion) else end
             own = rows[rows >= start] if behind is None else rows[(rows >= start) & (rows < end)]
             part = rows_of(motion, start, end), q_rad[start:behind], qd_rad_s[start:behind]
             columns = before[own], q_rad[own], stood[own], external[own], line[own]
-            inside = Inside(*columns) if len(own) else None
+            ways = tuple(due.get(start, ()))
+            inside = Inside(*columns, ways) if len(own) or ways else None
             yield (*part, ends and behind is None), inside
 
     def judge(self, inside: Inside) -> None:
@@ -104,22 +130,59 @@ class ArmInStock:
 
         A line that has hit something in an earlier stretch is told already.
         """
+        for way in inside.ways:
+            self._judge_way(way)
         told = set(self._hit_lines)
-        for before, after, stood, stands, line in zip(*inside, strict=True):
-            if int(line) in told:
-                continue
-            before = before if np.isfinite(before).all() else after  # behind what is out of reach
-            ends = self._ends_mm(np.stack([before, after]), np.stack([stood, stands]))
-            chord_mm = np.sqrt(np.square(np.diff(ends.reshape(2, -1, 3), axis=0)).sum(axis=2).max())
-            steps = int(np.clip(np.ceil(chord_mm / _STEP_MM), 1, _MOST_STEPS))
-            share = np.linspace(0.0, 1.0, steps + 1)[1:, None]
-            at = np.array([stands]) if (stood == stands).all() else stood + share * (stands - stood)
-            self._hold(self._ends_mm(before + share * (after - before), at), int(line))
+        for before, after, stood, stands, line in zip(*inside[:5], strict=True):
+            if int(line) not in told:
+                before = before if np.isfinite(before).all() else after  # behind what is out of reach
+                place = _Place(int(line))
+                q_rad, external = np.stack([before, after]), np.stack([stood, stands])
+                self._hit_lines |= self._hold_along(self._carried, q_rad, external, place)
+
+    def finish(self) -> None:
+        """Hold the ways behind the last cut against what is left; to be called once all is cut."""
+        for way in self._ways:
+            self._judge_way(way)
+        self._ways = []
 
     def issues(self) -> tuple[Issue, ...]:
         """Return the collisions, as warnings where the stock is guessed."""
         severity: Severity = "warning" if self._box.guessed else "error"
         return tuple(replace(issue, severity=severity) for issue in self._contacts.issues())
+
+    def _due(self, motion: Motion) -> dict[int, list[Beside]]:
+        """Return the ways that come before rows of a motion, and take them off the list."""
+        move, due = self._moves(motion, len(motion)), dict[int, list[Beside]]()
+        while self._ways and len(move) and self._ways[0].before <= int(move[-1]):
+            way = self._ways.pop(0)
+            due.setdefault(int(np.argmax(move >= way.before)), []).append(way)
+        return due
+
+    def _judge_way(self, way: Beside) -> None:
+        """Hold a way against what stands now."""
+        if not np.isfinite(way.q_rad).all():
+            return  # out of reach, which is a finding of its own
+        carried = collision.Carried(self._cell, way.tool, cuts=not way.is_ptp)
+        at, place = way.external, _Place(way.line, way.words)
+        rows = np.arange(len(way.q_rad))
+        if (at == at[0]).all():
+            rows = np.flatnonzero(self._dips_in(self._frame_with(at[:1]), carried).take(way.q_rad))
+        for row in rows[rows > 0].tolist():
+            both = slice(row - 1, row + 1)
+            self._hold_along(carried, way.q_rad[both], at[both], place)
+
+    def _hold_along(
+        self, carried: collision.Carried, q_rad: Floats, external: Floats, place: "_Place"
+    ) -> set[int]:
+        """Hold capsules against the material between two rows (2, 6) of joints; return the line of a hit."""
+        (before, after), (stood, stands) = q_rad, external
+        ends = self._ends_mm(carried, q_rad, external)
+        chord_mm = np.sqrt(np.square(np.diff(ends.reshape(2, -1, 3), axis=0)).sum(axis=2).max())
+        steps = int(np.clip(np.ceil(chord_mm / _STEP_MM), 1, _MOST_STEPS))
+        share = np.linspace(0.0, 1.0, steps + 1)[1:, None]
+        at = np.array([stands]) if (stood == stands).all() else stood + share * (stands - stood)
+        return self._hold(carried, self._ends_mm(carried, before + share * (after - before), at), place)
 
     def _rows_inside(self, motion: Motion, q_rad: Floats) -> Ints:
         """Return the rows of joints within the box, but for ways that a Motion does not show as they are."""
@@ -130,15 +193,20 @@ class ArmInStock:
             self._dips_at = np.full(6, np.nan)  # another box with each row: all of them are looked at
             return np.flatnonzero(shown)
         if not np.array_equal(motion.external[0], self._dips_at):
-            by = to_rest(motion.external[:1], self._cell)
-            moved = np.eye(4) if by is None else by[0]
-            self._dips = self._dips_in(self._frame @ moved @ invert(self._frame) @ self._to_root)
+            self._dips = self._dips_in(self._frame_with(motion.external[:1]), self._carried)
             self._dips_at = motion.external[0].copy()
         return np.flatnonzero(self._dips.take(q_rad) & shown)
 
-    def _dips_in(self, to_root: Floats) -> collision.Dips:
-        """Return what tells when a capsule comes into the box, which stands in a frame (4, 4) of the root."""
-        return collision.Dips(self._carried, self._box.low_mm, self._box.high_mm, to_root, _MARGIN_MM)
+    def _frame_with(self, external: Floats) -> Floats:
+        """Return the frame (4, 4) of the box in the robot root at rest, E1 to E6 at (1, 6)."""
+        by = to_rest(external, self._cell)
+        moved = np.eye(4) if by is None else by[0]
+        frame: Floats = self._frame @ moved @ invert(self._frame) @ self._to_root
+        return frame
+
+    def _dips_in(self, to_root: Floats, carried: collision.Carried) -> collision.Dips:
+        """Return what tells when a capsule comes into the box, which stands in a frame of the root."""
+        return collision.Dips(carried, self._box.low_mm, self._box.high_mm, to_root, _MARGIN_MM)
 
     def _lines(self, motion: Motion, count: int) -> Ints32:
         lines: Ints32 = self._toolpath.source_line[self._moves(motion, count)]
@@ -149,9 +217,9 @@ class ArmInStock:
         sample = np.minimum(np.arange(count), len(motion) - 1)
         return np.clip(motion.move[sample], 0, len(self._toolpath) - 1)
 
-    def _ends_mm(self, q_rad: Floats, external: Floats) -> Floats:
+    def _ends_mm(self, carried: collision.Carried, q_rad: Floats, external: Floats) -> Floats:
         """Return both ends (n, b, 6) of all capsules in ``$BASE``, E1 to E6 at (n, 6) or (1, 6)."""
-        ends = self._carried.ends_mm(q_rad)
+        ends = carried.ends_mm(q_rad)
         base: Floats = ends.reshape(-1, 3) @ self._to_base[:3, :3].T + self._to_base[:3, 3]
         by = to_rest(external, self._cell)
         if by is not None:
@@ -159,15 +227,17 @@ class ArmInStock:
             base = points_moved(base, invert(np.repeat(by, points, axis=0) if len(by) > 1 else by))
         return base.reshape(ends.shape)
 
-    def _hold(self, ends_mm: Floats, line: int) -> None:
-        """Hold capsules (n, b, 6) against the material, and note what is in it deepest."""
+    def _hold(self, carried: collision.Carried, ends_mm: Floats, at: "_Place") -> set[int]:
+        """Hold capsules (n, b, 6) against the material, note the deepest; return the line of a hit."""
         count, bodies, _ = ends_mm.shape
-        depth, place = self._milling.bodies_in(
-            ends_mm.reshape(-1, 6), np.tile(self._carried.radius_mm, count)
-        )
+        depth, place = self._milling.bodies_in(ends_mm.reshape(-1, 6), np.tile(carried.radius_mm, count))
         deepest = depth.reshape(count, bodies).argmax(axis=0) * bodies + np.arange(bodies)
+        hit = set[int]()
         for body, row in enumerate(deepest.tolist()):
             if depth[row] > _CONTACT_MM:
-                touch = collision.Touch(-float(depth[row]), line, place[row])
-                self._contacts.note(self._carried.names[body], collision.STOCK, touch)
-                self._hit_lines.add(line)
+                touch = collision.Touch(-float(depth[row]), at.line, place[row], at.words)
+                if at.words:
+                    touch.remedy = _AROUND
+                self._contacts.note(carried.names[body], collision.STOCK, touch)
+                hit.add(at.line)
+        return hit

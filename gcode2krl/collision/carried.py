@@ -1,19 +1,24 @@
-"""Arm and spindle alone: where they are, and when they come into a box."""
+"""What the robot carries: where it is, and when it comes into a box."""
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell import Cell
 from gcode2krl.collision.along import Way
-from gcode2krl.collision.bodies import FOOT, arm_and_spindle, capsules_of
+from gcode2krl.collision.bodies import FOOT, arm_and_spindle, capsules_of, parts_of
 from gcode2krl.collision.gaps import placed
 from gcode2krl.collision.scene import box
 
 
 class Carried:
-    """The capsules of arm and spindle (b)."""
+    """The capsules of arm and spindle (b), and of a tool where one is asked for."""
 
-    def __init__(self, cell: Cell) -> None:
-        """Take those of the cell; the foot stands still, and is left out."""
-        parts = [part for part in arm_and_spindle(cell) if part.link != FOOT]
+    def __init__(self, cell: Cell, tool: int | None = None, *, cuts: bool = False) -> None:
+        """Take those of the cell; the foot stands still, and is left out, as are cables.
+
+        Where the ``tool`` ``cuts``, its cutter is left out, as that may be in the material.
+        """
+        parts = arm_and_spindle(cell) if tool is None else parts_of(cell, tool)
+        left_out = {"cables", "cutter"} if cuts else {"cables"}
+        parts = [part for part in parts if part.link != FOOT and part.kind not in left_out]
         self.geometry = cell.robot.geometry.array()
         self.bodies = capsules_of(parts, self.geometry)
         self.names = [part.name for part in parts]
