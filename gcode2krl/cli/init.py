@@ -159,8 +159,9 @@ def _say_read(console: Console, controller: "Controller") -> None:
         f"{len(controller.tools)} tools, {len(controller.bases)} bases, {len(controller.loads or {})} loads"
     )
     console.hint(f"  {counts}")
-    if controller.external_axes:
-        console.hint(f"  {controller.external_axes} external axes: they are not moved and must stand still")
+    if controller.externals:
+        names = ", ".join(f"E{axis.number}" for axis in controller.externals)
+        console.hint(f"  external axes {names}: in comments, as no archive says where they stand")
 
 
 def _say_written(console: Console, cell_path: Path, lacking: list[str]) -> None:

@@ -18,7 +18,7 @@ from gcode2krl.cell.definition import Cell
 from gcode2krl.cell.descriptions import Description, descriptions_of
 from gcode2krl.cell.sections import Clearance, Frame, Frames, Home, Load, Robot, Spindle
 from gcode2krl.cell.setup.answers import frame_table
-from gcode2krl.cell.setup.controller import Controller
+from gcode2krl.cell.setup.controller import Controller, ExternalData
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, Answers
 from gcode2krl.units import DEG_PER_RAD
 
@@ -56,6 +56,7 @@ class _Writer:
             self._robot(),
             self._frames(),
             self._home(),
+            *(self._external(axis) for axis in self.controller.externals),
             self._heights(),
             self._load(),
             *(self._tool(tool) for tool in self.answers.get("tools", ())),
@@ -137,6 +138,24 @@ class _Writer:
     def _home(self) -> Iterator[str]:
         yield "[home]"
         yield from self._key(Home, "q_deg", self.answers.get("home"), "home")
+
+    def _external(self, axis: ExternalData) -> Iterator[str]:
+        """Write what the archive states of an external axis, as a comment, as its place is not in it."""
+        numbers = f"[{axis.number + 6}]"
+        rail = axis.is_linear is not False
+        yield f"# NOT ANSWERED: E{axis.number}, of which the archive does not state direction and place."
+        yield "# Without this table it is not moved and must stand still (docs/external_axes.md)."
+        yield f"# [external.E{axis.number}]"
+        yield f'# kind = "{"rail" if rail else "turntable"}"  # or "tilt" ($AXIS_TYPE{numbers})'
+        yield f'# axis = "{"y" if rail else "z"}"  # direction of travel, or of the turn, as seen from origin'
+        yield "# origin = { x_mm = 0.0, y_mm = 0.0, z_mm = 0.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
+        limits = toml_value(list(axis.limits)) if axis.limits else ""
+        yield f"# limits = {limits}  # $SOFTN_END{numbers}, $SOFTP_END{numbers}"
+        speed = "" if axis.speed_deg_s is None else _number(axis.speed_deg_s)
+        yield f"# speed = {speed}  # mm/s or deg/s"
+        yield "# acceleration =   # mm/s2 or deg/s2"
+        if axis.home is not None:
+            yield f"# home = {_number(axis.home)}  # XHOME"
 
     def _heights(self) -> Iterator[str]:
         yield "[clearance]"

@@ -4,7 +4,7 @@ Lengths and speeds come from ``$machine.dat`` as the planner there uses them; bo
 library's KR 210 R2700-2, whose values were read elsewhere: the lengths are equal, the speeds to 0.1 deg/s.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +21,8 @@ _MOST_NUMBER = 32
 _SAME_MM = 0.5
 """Two arms whose lengths differ by no more are the same model."""
 _DEG_S_PER_RPM = 6.0
+_LINEAR = 1
+"""``$AXIS_TYPE`` of a linear axis; 3 to 5 turn."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,19 @@ class Payload:
 
 
 @dataclass(frozen=True)
+class ExternalData:
+    """What the data lists state of an external axis; not how it stands in the room, nor what it carries."""
+
+    number: int
+    is_linear: bool | None
+    limits: tuple[float, float] | None
+    """In mm or degrees."""
+    speed_deg_s: float | None
+    """None of a linear axis, whose ratio is not one of turns."""
+    home: float | None
+
+
+@dataclass(frozen=True)
 class Controller:
     """What an archive states; None or empty where it does not."""
 
@@ -65,7 +80,7 @@ class Controller:
     tools: tuple[NamedFrame, ...] = ()
     bases: tuple[NamedFrame, ...] = ()
     loads: Mapping[int, Payload] | None = None
-    external_axes: int = 0
+    externals: tuple[ExternalData, ...] = ()
 
 
 def read_controller(path: Path) -> Controller:
@@ -93,7 +108,7 @@ def controller_of(values: Mapping[str, Value], source: str) -> Controller:
         tools=_named(values, "TOOL"),
         bases=_named(values, "BASE"),
         loads=_loads(values),
-        external_axes=int(_number(values.get("$EX_AX_NUM")) or 0),
+        externals=tuple(_externals(values)),
     )
 
 
@@ -131,26 +146,46 @@ def _loads(values: Mapping[str, Value]) -> dict[int, Payload]:
 
 
 def _limits(values: Mapping[str, Value]) -> tuple[tuple[float, float], ...] | None:
-    pairs = []
-    for axis in range(1, 7):
-        low = _number(values.get(f"$SOFTN_END[{axis}]"))
-        high = _number(values.get(f"$SOFTP_END[{axis}]"))
-        if low is None or high is None or low >= high:
-            return None
-        pairs.append((low, high))
-    return tuple(pairs)
+    pairs = [_limits_of(values, axis) for axis in range(1, 7)]
+    known = [pair for pair in pairs if pair is not None]
+    return tuple(known) if len(known) == len(pairs) else None
+
+
+def _limits_of(values: Mapping[str, Value], axis: int) -> tuple[float, float] | None:
+    low = _number(values.get(f"$SOFTN_END[{axis}]"))
+    high = _number(values.get(f"$SOFTP_END[{axis}]"))
+    return None if low is None or high is None or low >= high else (low, high)
 
 
 def _speeds(values: Mapping[str, Value]) -> Numbers | None:
-    """Return the joints' largest speeds: those of the motors in rpm over the ratios of the gears."""
-    speeds = []
-    for axis in range(1, 7):
-        motor_rpm = _number(values.get(f"$VEL_AXIS_MA[{axis}]"))
-        ratio = _members(values.get(f"$RAT_MOT_AX[{axis}]"), ("N", "D"))
-        if not motor_rpm or ratio is None or not all(ratio):
-            return None
-        speeds.append(round(abs(motor_rpm * ratio[1] / ratio[0]) * _DEG_S_PER_RPM, 1))
-    return tuple(speeds)
+    speeds = [_speed_of(values, axis) for axis in range(1, 7)]
+    known = [speed for speed in speeds if speed is not None]
+    return tuple(known) if len(known) == len(speeds) else None
+
+
+def _speed_of(values: Mapping[str, Value], axis: int) -> float | None:
+    """Return the largest speed of a joint in deg/s: that of its motor in rpm over the ratio of its gear."""
+    motor_rpm = _number(values.get(f"$VEL_AXIS_MA[{axis}]"))
+    ratio = _members(values.get(f"$RAT_MOT_AX[{axis}]"), ("N", "D"))
+    if not motor_rpm or ratio is None or not all(ratio):
+        return None
+    return round(abs(motor_rpm * ratio[1] / ratio[0]) * _DEG_S_PER_RPM, 1)
+
+
+def _externals(values: Mapping[str, Value]) -> Iterator[ExternalData]:
+    """Yield E1 to E6 as far as there are any; they are axes 7 to 12 of the machine data."""
+    home = values.get("XHOME")
+    for number in range(1, min(int(_number(values.get("$EX_AX_NUM")) or 0), 6) + 1):
+        axis = number + 6
+        kind = _number(values.get(f"$AXIS_TYPE[{axis}]"))
+        is_linear = None if kind is None else kind == _LINEAR
+        yield ExternalData(
+            number=number,
+            is_linear=is_linear,
+            limits=_limits_of(values, axis),
+            speed_deg_s=None if is_linear is not False else _speed_of(values, axis),
+            home=_number(home.get(f"E{number}")) if isinstance(home, Mapping) else None,
+        )
 
 
 def _lengths(values: Mapping[str, Value]) -> Numbers | None:

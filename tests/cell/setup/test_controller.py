@@ -2,13 +2,15 @@
 
 import contextlib
 import io
+import tomllib
 import zipfile
 
 import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cell.setup import archive
-from gcode2krl.cell.setup.controller import controller_of, read_controller
+from gcode2krl.cell.setup.cell_text import text_of_cell
+from gcode2krl.cell.setup.controller import ExternalData, controller_of, read_controller
 from gcode2krl.cell.setup.krl_data import krl_values
 from gcode2krl.errors import NotUnderstoodError
 from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_folder, write_zip
@@ -60,7 +62,27 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
         (7, "Ständer", 10.5),
     ]
     assert (found.loads[2].mass_kg, found.loads[2].centre_mm) == (24.0, (0.0, 0.0, 140.0))
-    assert found.external_axes == 1
+    assert [(one.number, one.is_linear, one.limits, one.home) for one in found.externals] == [
+        (1, None, None, 0.0)
+    ]
+
+
+def test_external_axes_are_those_behind_the_sixth(hanging):
+    values = krl_values(machine_dat(hanging, external_axes=2)) | {
+        **{"$AXIS_TYPE[7]": 1.0, "$SOFTN_END[7]": -200.0, "$SOFTP_END[7]": 5200.0},
+        **{"$AXIS_TYPE[8]": 5.0, "$VEL_AXIS_MA[8]": 3000.0, "$RAT_MOT_AX[8]": {"N": 450.0, "D": 1.0}},
+        "XHOME": {"A1": 0.0, "E1": 150.0, "E2": -90.0},
+    }
+    rail, table = controller_of(values, "").externals
+    assert rail == ExternalData(1, True, (-200.0, 5200.0), None, 150.0)
+    assert table == ExternalData(2, False, None, 40.0, -90.0)
+    text = text_of_cell({"robot": "KR 60 HA"}, controller_of(values, ""), "s.json")
+    loaded = tomllib.loads(text)
+    assert "external" not in loaded
+    block = "\n".join(line[2:] for line in text.splitlines() if line.startswith("# "))
+    start = block.index("[external.E1]")
+    described = tomllib.loads(block[start : block.index("acceleration", start)].replace("speed =", "#"))
+    assert described["external"]["E1"]["limits"] == [-200.0, 5200.0]
 
 
 def test_a_robot_is_named_only_where_its_lengths_agree(hanging):
