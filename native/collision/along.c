@@ -5,6 +5,9 @@
 
 enum { DEEPEST_HALVING = 40 };
 
+/* Rows that a leap should pass by: for less a gap is not computed again. */
+enum { WORTH_ROWS = 16 };
+
 /* What is remembered of a pair since the pose at which its gap was computed last. */
 typedef struct {
     uint8_t *known;
@@ -251,6 +254,98 @@ static Gap judged(const Walk *walk, const int32_t *pair, const Pair *state, bool
     return gap;
 }
 
+/* What tells that no pair can come as near as it is asked for, without placing a body: eq. 1 with the longest levers. */
+typedef struct {
+    double lever[AXES];  /* no body has a longer one */
+    double step[STANCE]; /* from the row before */
+    double sagitta;      /* of no body is it more on that way */
+    double farthest;     /* no body goes farther on that way, with what it may be off the chord */
+    double room;         /* every pair may still move so far */
+    double used;         /* no body has gone farther since the rows were looked at one by one */
+    int64_t passed;      /* rows since then */
+} Leap;
+
+static Leap no_leap(const Bodies *bodies) {
+    Leap leap = {.room = -INFINITY};
+    for (int64_t body = 0; body < bodies->link.rows; body++)
+        for (int j = 0; j < AXES; j++)
+            leap.lever[j] = greater(leap.lever[j], CELL(bodies->lever_mm, body, j));
+    return leap;
+}
+
+/* Go on by a row. The samples of a controller may be off the chord by an eighth of the second difference, which is no
+   more than the levers times that of the joints and four sagittae of either way. */
+static void step_on(Leap *leap, const double *stood, const double *stands) {
+    double turned = 0.0, bent = 0.0, shifted = 0.0, shift_bent = 0.0, share[AXES];
+    const double sagitta = leap->sagitta;
+    sagitta_shares(stood, stands, share);
+    leap->sagitta = 0.0;
+    for (int j = 0; j < AXES; j++) {
+        const double step = stands[j] - stood[j];
+        turned += leap->lever[j] * fabs(step);
+        bent += leap->lever[j] * fabs(step - leap->step[j]);
+        leap->sagitta += leap->lever[j] * share[j];
+        leap->step[j] = step;
+    }
+    for (int j = AXES; j < STANCE; j++) {
+        const double step = stands[j] - stood[j];
+        shifted += fabs(step);
+        shift_bent += fabs(step - leap->step[j]);
+        leap->step[j] = step;
+    }
+    leap->farthest =
+        turned + shifted + leap->sagitta + 0.125 * (bent + shift_bent + 4.0 * (sagitta + leap->sagitta));
+}
+
+/* Write the stance of a row. */
+static void stance_of(Floats q_rad, Floats shift_mm, int64_t row, double *stance) {
+    for (int j = 0; j < AXES; j++)
+        stance[j] = CELL(q_rad, row, j);
+    for (int j = AXES; j < STANCE; j++)
+        stance[j] = CELL(shift_mm, row, j - AXES);
+}
+
+/* How far every pair may still move before it has to be looked at. Where that is less than half the gap, it is
+   counted from where the pair is now; where it is less than `worth`, the gap is computed again. */
+static double room_of_all(const Walk *walk, const Watched *watched, double horizon_mm, double worth) {
+    double least = INFINITY;
+    for (int64_t each = 0; each < watched->pairs.rows && least > 0.0; each++) {
+        const int32_t *pair = &CELL(watched->pairs, each, 0);
+        const Pair state = pair_state(watched->states, watched->known, each);
+        if (!*state.known || *state.gap <= 0.0)
+            return -INFINITY;
+        const double gone = of_both(walk->gone, pair);
+        double room = *state.limit - gone - horizon_mm;
+        if (room < 0.5 * *state.gap) {
+            const double moved = moved_since(pair, &state, walk->now);
+            *state.limit = *state.gap - moved + gone;
+            room = *state.limit - gone - horizon_mm;
+            if (room < worth) {
+                remember(walk, &state, pair, gap_of(walk, pair, &state, walk->now, false).mm);
+                room = *state.limit - gone - horizon_mm;
+            }
+        }
+        least = lesser(least, pair[1] < 0 ? 0.5 * room : room);
+    }
+    return least;
+}
+
+/* Place the bodies in the rows before one, which have been passed by. */
+static void place_past(Walk *walk, const Leap *leap, Floats q_rad, Floats shift_mm, int64_t row, Floats past) {
+    for (int back = leap->passed > 1 ? 2 : 1; back > 0; back--) {
+        Stance stance;
+        stance_of(q_rad, shift_mm, row - back, stance);
+        place_bodies(stance, &walk->arm, walk->bodies, walk->now);
+        for (int64_t body = 0; body < walk->bodies->link.rows; body++)
+            for (int k = 0; k < 6; k++) {
+                CELL(past, body, 6 + k) = CELL(past, body, k);
+                CELL(past, body, k) = walk->now[body][k];
+            }
+    }
+    for (int64_t body = 0; body < walk->bodies->link.rows; body++)
+        CELL(past, body, 12) += leap->used;
+}
+
 /* Walk along rows of angles (n, 6), and of shifts of the robot root (n, 3), from `first` on, until the notes are full; return the row that comes next.
 
    Writes the least gap (n) up to `horizon_mm` since the row before, and of which pair (n), -1: none is as near.
@@ -266,6 +361,7 @@ EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Flo
     const int64_t count = bodies->link.rows, pairs = watched->pairs.rows;
     int64_t steps = first > 0 ? AT(watched->steps, 0) : 0; /* rows without a break up to the last one */
     Floats past = watched->ends_mm;                         /* of the last row and the one before it; way gone */
+    Leap leap = no_leap(bodies);
     for (int64_t i = first; i < q_rad.rows; i++) {
         if (AT(noted, 0) + pairs > notes.rows) {
             AT(watched->steps, 0) = steps;
@@ -276,14 +372,30 @@ EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Flo
         if (isnan(CELL(q_rad, i, 0))) {
             steps = 0;
             AT(gap_mm, i) = NAN;
+            leap.room = -INFINITY;
+            leap.used = 0.0;
+            leap.passed = 0;
             continue;
         }
-        for (int j = 0; j < STANCE; j++) {
-            const Floats from = j < AXES ? q_rad : shift_mm;
-            const int column = j < AXES ? j : j - AXES;
-            walk.stands[j] = CELL(from, i, column);
-            walk.stood[j] = steps > 0 ? CELL(from, i - 1, column) : walk.stands[j];
+        stance_of(q_rad, shift_mm, i, walk.stands);
+        if (leap.passed == 0)
+            stance_of(q_rad, shift_mm, steps > 0 ? i - 1 : i, walk.stood);
+        if (steps > 0)
+            step_on(&leap, walk.stood, walk.stands);
+        if (steps > 1 && i + 1 < q_rad.rows) {
+            leap.used += leap.farthest;
+            if (leap.used < leap.room) {
+                leap.passed++;
+                steps++;
+                for (int j = 0; j < STANCE; j++)
+                    walk.stood[j] = walk.stands[j];
+                continue;
+            }
         }
+        if (leap.passed > 0)
+            place_past(&walk, &leap, q_rad, shift_mm, i, past);
+        leap.used = 0.0;
+        leap.passed = 0;
         place_bodies(walk.stands, &walk.arm, bodies, walk.now);
         sagitta_shares(walk.stood, walk.stands, walk.share);
         for (int64_t body = 0; body < count; body++) {
@@ -324,6 +436,7 @@ EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Flo
             }
         }
         steps++;
+        leap.room = steps > 1 ? room_of_all(&walk, watched, horizon_mm, WORTH_ROWS * leap.farthest) : -INFINITY;
     }
     AT(watched->steps, 0) = steps;
     return q_rad.rows;

@@ -153,6 +153,36 @@ def test_blocks_and_full_notes_change_nothing():
     np.testing.assert_array_equal(whole.note_gap_mm, np.concatenate([piece.note_gap_mm for piece in pieces]))
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_rows_that_are_passed_by_would_have_told_nothing(seed):
+    """Row by row, where each is looked at, against all at once, where some are passed by."""
+    rng = np.random.default_rng([7, seed])
+    rows = np.arange(400)[:, None]
+    q = rng.uniform(LOW, HIGH) + 0.2 * np.sin(rng.uniform(0.002, 0.03, 6) * rows + rng.uniform(0, 6, 6))
+    shift = rng.uniform(0.0, 300.0, 3) * np.sin(0.01 * rows) * (seed % 2)
+    ends = placed(q, GEOMETRY, BODIES)[rng.integers(400), 7, 3:] + rng.normal(size=3) * 150.0
+    obstacles = scene.joined(
+        [
+            scene.plane(np.array([0.0, 0.0, ends[2] - 1500.0]), [0.0, 0.0, 1.0]),
+            scene.box(ends - 40.0, ends - 10.0, np.eye(4)),
+            scene.mesh(0.2 * torus(20, 9) + ends),
+        ]
+    )
+    pairs = [
+        *((body, each, 0) for body in range(4, 8) for each in range(3)),
+        (7, -1, 2),
+        (6, -1, 0),
+        (5, -1, 1),
+    ]
+    at_once = watch(obstacles, pairs, horizon_mm=0.0, is_sampled=seed % 3 > 0)
+    one_by_one = watch(obstacles, pairs, horizon_mm=0.0, is_sampled=seed % 3 > 0)
+    whole = at_once.take(q, shift)
+    single = [one_by_one.take(q[k : k + 1], shift[k : k + 1]) for k in range(400)]
+    np.testing.assert_allclose(whole.gap_mm, np.concatenate([each.gap_mm for each in single]), atol=1e-6)
+    np.testing.assert_array_equal(whole.pair, np.concatenate([each.pair for each in single]))
+    assert len(whole.row) == sum(len(each.row) for each in single)
+
+
 def test_a_row_out_of_reach_begins_another_way():
     q = np.tile(np.radians([0, -90, 90, 0, 0, 0.0]), (4, 1))
     q[1] = np.nan
