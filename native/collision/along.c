@@ -6,7 +6,10 @@
 enum { DEEPEST_HALVING = 40 };
 
 /* Rows that a leap should pass by: for less a gap is not computed again. */
-enum { WORTH_ROWS = 16 };
+enum { WORTH_ROWS = 4 };
+
+/* Rows that have been passed by, from which on it is worth looking whether the leap may go on. */
+enum { WORTH_LOOKING = 4 };
 
 /* What is remembered of a pair since the pose at which its gap was computed last. */
 typedef struct {
@@ -342,8 +345,20 @@ static void place_past(Walk *walk, const Leap *leap, Floats q_rad, Floats shift_
                 CELL(past, body, k) = walk->now[body][k];
             }
     }
+}
+
+/* Count all that has been used as gone by every body. */
+static void count_gone(Walk *walk, Leap *leap, Floats past) {
     for (int64_t body = 0; body < walk->bodies->link.rows; body++)
-        CELL(past, body, 12) += leap->used;
+        walk->gone[body] = CELL(past, body, 12) += leap->used;
+    leap->used = 0.0;
+}
+
+/* Look where the bodies are now; tell whether they all still had room on the way to this row. */
+static bool may_leap_on(Walk *walk, Leap *leap, const Watched *watched, double horizon_mm) {
+    place_bodies(walk->stands, &walk->arm, walk->bodies, walk->now);
+    leap->room = room_of_all(walk, watched, horizon_mm, WORTH_ROWS * leap->farthest);
+    return leap->room > leap->farthest;
 }
 
 /* Walk along rows of angles (n, 6), and of shifts of the robot root (n, 3), from `first` on, until the notes are full; return the row that comes next.
@@ -384,7 +399,12 @@ EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Flo
             step_on(&leap, walk.stood, walk.stands);
         if (steps > 1 && i + 1 < q_rad.rows) {
             leap.used += leap.farthest;
-            if (leap.used < leap.room) {
+            bool may_leap = leap.used < leap.room;
+            if (!may_leap && leap.passed >= WORTH_LOOKING) {
+                count_gone(&walk, &leap, past);
+                may_leap = may_leap_on(&walk, &leap, watched, horizon_mm);
+            }
+            if (may_leap) {
                 leap.passed++;
                 steps++;
                 for (int j = 0; j < STANCE; j++)
@@ -392,8 +412,10 @@ EXPORT int64_t collision_along(Floats q_rad, Floats shift_mm, int64_t first, Flo
                 continue;
             }
         }
-        if (leap.passed > 0)
+        if (leap.passed > 0) {
             place_past(&walk, &leap, q_rad, shift_mm, i, past);
+            count_gone(&walk, &leap, past);
+        }
         leap.used = 0.0;
         leap.passed = 0;
         place_bodies(walk.stands, &walk.arm, bodies, walk.now);
