@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from gcode2krl.cell.carriers import rails_of, tables_of
+from gcode2krl.cell.carriers import rails_of
 from gcode2krl.cell.definition import Cell
 
 _ESTIMATES = ("assumption", "memory", "unknown")
@@ -75,11 +75,9 @@ def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> Coll
 
 
 def _carriers(cell: Cell) -> list[str]:
-    """Return what is not checked of rails and tables."""
+    """Return what is not checked of rails."""
     rails = [name for name in rails_of(cell.external) if cell.external[name].moves]
-    words = [f"carriage and foot of the robot on {name}" for name in rails]
-    tables = [name for name in tables_of(cell.external, cell.frames.base_on) if cell.external[name].moves]
-    return [*words, *(f"what {name} carries, while it turns" for name in tables)]
+    return [f"carriage and foot of the robot on {name}" for name in rails]
 
 
 def _estimated(sure: str) -> str:

@@ -111,7 +111,7 @@ def is_held(
 ) -> bool:
     """Tell whether a pair counts on a way: those with the stock only where it is still the raw part.
 
-    Where a table ``turns``, what it carries is not held against anything.
+    Where a table ``turns``, what it carries is left to `collision.turning`.
 
     Elsewhere it is judged as it stands, with the removal. So is the cutter on the lines of an approach,
     which may go into it.

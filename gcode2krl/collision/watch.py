@@ -1,6 +1,7 @@
 """The watch over everything that a program does: its samples, and the ways between."""
 
 import itertools
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from gcode2krl.collision.surroundings import (
     root_of,
     surroundings_of,
 )
+from gcode2krl.collision.turning import Turning
 from gcode2krl.errors import Issue
 
 HORIZON_MM = 50.0
@@ -75,6 +77,7 @@ class Watch:
         self._last: tuple[Floats, Floats] = (np.zeros((0, 6)), np.zeros((0, 6)))
         at_rest = cell.external_rest()
         self._from_rest = fr.invert(root_of(cell, at_rest))
+        self._rest_to_base = fr.invert(cell.base_matrix()) if cell.external else np.eye(4)
         tables = carriers.tables_of(cell.external, cell.frames.base_on)
         self._table_columns = [EXTERNAL_NAMES.index(name) for name in tables]
 
@@ -129,6 +132,12 @@ class Watch:
             found = self._way.take(q, self._shift_mm(at))
             self._contacts.take(found, setting.names, lines, stand.to_base)
             gap[rows], near[rows] = found.gap_mm[skip:], setting.places[found.pair[skip:]]
+            if is_turning:
+                carried = self._carried(number, against_raw=False, is_ptp=False)
+                seen = self._take_turning(carried, q_rad, external, lines[skip:], slice(start, end))
+                nearer = seen.gap_mm < gap[rows]
+                gap[rows] = np.where(nearer, seen.gap_mm, gap[rows])
+                near[rows] = np.where(nearer[:, None], carried.places[seen.pair], near[rows])
             self._last = q[-1:].copy(), at[-1:].copy()
         return gap, near
 
@@ -166,7 +175,51 @@ class Watch:
         found = self._new_way(setting, stand, is_sampled=not is_ptp).take(q_rad, self._shift_mm(external))
         lines = np.full(len(q_rad), line, dtype=np.int32)
         self._contacts.take(found, setting.names, lines, stand.to_base, words)
-        return found
+        if not turns:
+            return found
+        carried = self._carried(tool, against_raw=against_raw, is_ptp=is_ptp)
+        seen = self._turn(carried).take(q_rad, external)
+        self._contacts.take(seen, carried.names, lines, self._rest_to_base, words)
+        return seen if seen.hits else found
+
+    def _take_turning(
+        self, carried: "_Setting", q_rad: Floats, external: Floats, lines: Ints32, rows: slice
+    ) -> Clearances:
+        """Go along rows in which tables turn, from the row before them on, and note what is near."""
+        before = (
+            (each[-1:] for each in self._last)
+            if rows.start == 0
+            else (each[rows.start - 1 : rows.start] for each in (q_rad, external))
+        )
+        q, at = (np.concatenate([b, each[rows]]) for b, each in zip(before, (q_rad, external), strict=True))
+        skip = len(q) - len(lines)
+        found = self._turn(carried).take(q, at)
+        all_lines = np.concatenate([lines[:skip], lines])
+        self._contacts.take(found, carried.names, all_lines, self._rest_to_base)
+        return replace(found, gap_mm=found.gap_mm[skip:], pair=found.pair[skip:])
+
+    def _turn(self, carried: "_Setting") -> Turning:
+        shapes = self._stand(self._cell.external_rest()).around.shapes
+        return Turning(
+            self._cell,
+            carried.bodies,
+            shapes,
+            carried.pairs,
+            near_mm=self._cell.collision.clearance_mm,
+            horizon_mm=self._horizon_mm,
+        )
+
+    def _carried(self, tool: int, *, against_raw: bool, is_ptp: bool) -> "_Setting":
+        """Return the setting with what a table carries alone."""
+        whole, around = self._setting(tool), self._stand(self._cell.external_rest()).around
+        return whole.only(
+            [
+                pair[1] >= 0
+                and around.names[pair[1]] in around.carried
+                and is_held(pair, whole.parts, around, against_raw=against_raw, is_ptp=is_ptp)
+                for pair in whole.pairs
+            ]
+        )
 
     def poses(self, q_rad: Floats, tool: int, horizon_mm: float) -> Floats:
         """Return the least distance (n,) at single poses, angles (n, 6) in rad, at most the horizon.
