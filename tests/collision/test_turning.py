@@ -32,6 +32,7 @@ def cell_of(seed, tmp_path):
     return cell_with(*obstacles, external=external, frames={"base": ON_TABLE})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(9))
 def test_hits_and_gaps_are_those_of_a_dense_sampling(seed, tmp_path):
     rng = np.random.default_rng([3, seed])
