@@ -1,10 +1,11 @@
 """Which parts of a cell are checked for collisions, and which are not, in the words of header and report."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from gcode2krl.cell.carriers import rails_of
 from gcode2krl.cell.definition import Cell
+from gcode2krl.cell.sections import Capsule
 
 _ESTIMATES = ("assumption", "memory", "unknown")
 
@@ -36,11 +37,11 @@ def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> Coll
     movers, unchecked = [], []
     arm, spindle = cell.robot.body, cell.spindle.body
     if arm.capsules:
-        movers.append(f"arm ({len(arm.capsules)} capsules{_estimated(arm.sure)})")
+        movers.append(f"arm ({_count(arm.capsules)}{_estimated(arm.sure)})")
     else:
         unchecked.append("arm ([robot.body] is not stated)")
     if spindle is not None:
-        movers.append(f"spindle ({len(spindle.capsules)} capsules{_estimated(spindle.sure)})")
+        movers.append(f"spindle ({_count(spindle.capsules)}{_estimated(spindle.sure)})")
     else:
         unchecked.append("spindle and bracket ([spindle.body] is not stated)")
     known = [number for number in sorted(tools) if number in cell.tool]
@@ -66,7 +67,7 @@ def collision_scope(cell: Cell, tools: Collection[int], *, is_cut: bool) -> Coll
     else:
         unchecked.append("stock by arm and spindle, and by the tool on PTP")
     if cell.cables is not None:
-        movers.append(f"cables ({len(cell.cables.capsules)} capsules, warnings only)")
+        movers.append(f"cables ({_count(cell.cables.capsules)}, warnings only)")
     else:
         unchecked.append("cables ([cables] is not stated)")
     unchecked += _carriers(cell)
@@ -78,6 +79,10 @@ def _carriers(cell: Cell) -> list[str]:
     """Return what is not checked of rails."""
     rails = [name for name in rails_of(cell.external) if cell.external[name].moves]
     return [f"carriage and foot of the robot on {name}" for name in rails]
+
+
+def _count(capsules: Sequence[Capsule]) -> str:
+    return f"{len(capsules)} capsule{'s' if len(capsules) != 1 else ''}"
 
 
 def _estimated(sure: str) -> str:

@@ -82,6 +82,7 @@ class ArmInStock:
         self._last_rad, self._last_external = np.zeros((0, 6)), np.zeros((0, 6))
         held = [way for way in ways if not way.is_uncut or self._box.guessed]
         self._ways = sorted(held, key=lambda way: way.before)
+        self._with_tools: dict[tuple[int, bool], collision.Carried] = {}
         self._cell, self._dips_at = cell, cell.external_rest()
         self._frame, self._to_root = frame, to_root
 
@@ -163,7 +164,7 @@ class ArmInStock:
         """Hold a way against what stands now."""
         if not np.isfinite(way.q_rad).all():
             return  # out of reach, which is a finding of its own
-        carried = collision.Carried(self._cell, way.tool, cuts=not way.is_ptp)
+        carried = self._with_tool(way.tool, way.is_ptp)
         at, place = way.external, _Place(way.line, way.words)
         rows = np.arange(len(way.q_rad))
         if (at == at[0]).all():
@@ -171,6 +172,12 @@ class ArmInStock:
         for row in rows[rows > 0].tolist():
             both = slice(row - 1, row + 1)
             self._hold_along(carried, way.q_rad[both], at[both], place)
+
+    def _with_tool(self, tool: int, is_ptp: bool) -> collision.Carried:
+        key = tool, is_ptp
+        if key not in self._with_tools:
+            self._with_tools[key] = collision.Carried(self._cell, tool, cuts=not is_ptp)
+        return self._with_tools[key]
 
     def _hold_along(
         self, carried: collision.Carried, q_rad: Floats, external: Floats, place: "_Place"
