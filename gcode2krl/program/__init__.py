@@ -6,6 +6,7 @@ from gcode2krl.program.doubts import doubtful, feeds_per_tooth
 from gcode2krl.program.following import following_deg
 from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
+from gcode2krl.program.places import Range
 from gcode2krl.program.restart import (
     approached_row,
     begun_at,
@@ -15,7 +16,7 @@ from gcode2krl.program.restart import (
 )
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.splines import with_stops
-from gcode2krl.program.stations import Range, plan_stations
+from gcode2krl.program.stations import plan_stations
 from gcode2krl.program.table import below_table
 from gcode2krl.program.targets import plan_targets
 from gcode2krl.program.tilts import tilt_issues

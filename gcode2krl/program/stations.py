@@ -8,67 +8,36 @@ which the arm reaches).
 """
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.program.moving_along import moved_along
+from gcode2krl.program.places import (
+    GOOD,
+    LEAST,
+    REACHED,
+    Bending,
+    Quality,
+    Range,
+    cost_of_moves,
+    cost_of_places,
+    tried_places,
+    with_others_best,
+)
 
-Quality = Callable[[Ints, Floats], Floats]
-"""Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
-singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
-
-Bending = Callable[[Ints, Floats], Floats]
-"""Rows (r,) of the targets and E1 to E6 (6,) to how far each branch (r, 8) bends under a load, NaN where
-impossible."""
-
-GOOD = 0.3
-"""Quality (1 = 30 degrees from limits and singularities) from which a place is as good as any better one."""
-LEAST = 0.05
-"""Quality below which a place is not taken."""
-STEPS = 49
-"""Places that are tried on an axis, so that a rail of 5 m has one every 100 mm."""
-_REACHED = -0.99
-"""Quality above which a place is reached, if only to hit something: that is a finding of its own."""
-_NEARLY = 0.7
-"""Share of the best quality with which an axis that moves along is content."""
-_MOST_PLACES = 1000
 _MOST_ROWS, _FEWEST_ROWS = 300, 3
 _ROWS_A_PASS = 24
 _MOST_POSES = 500_000
 """Poses that are judged for passes, some 20 us each; with more passes fewer rows of each are judged, and all
 axes but the widest stay."""
-_HITS_COST = 50.0
-"""What a place costs at which something is hit, or nearly out of reach."""
 _AS_STIFF = 0.05
 """Places that bend by so much more than the stiffest one count as equally stiff."""
 _BENDS = 0.5
 """What a place costs at which the robot bends twice as far as at the best one for that pass; at most that."""
 _ROWS_THAT_BEND, _ROWS_A_PASS_THAT_BEND = 24, 3
-_MOVES = 0.5
-"""What a way over the whole range between two passes costs, against a place of no quality at all."""
-_STARTS = 0.05
-"""What any way between two passes costs, so that there are few."""
-_WHOLE = 5.0
-"""Places that are farther from each other are whole numbers, where the limits are."""
 _DECIMALS = 3
 """Those of the program's text."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """A free axis: its column in E1 to E6, and its limits."""
-
-    column: int
-    low: float
-    high: float
-
-    def places(self, steps: int) -> Floats:
-        """Return places evenly over the range."""
-        step = (self.high - self.low) / max(steps - 1, 1)
-        places = np.round(np.linspace(self.low, self.high, steps), 0 if step > _WHOLE else _DECIMALS)
-        return np.clip(places, self.low, self.high)
 
 
 def plan_stations(
@@ -92,7 +61,7 @@ def plan_stations(
     """
     if not ranges:
         return np.broadcast_to(start, (len(position_mm), 6))
-    places = _places(ranges, start)
+    places = tried_places(ranges, start)
     rows = _spread(np.arange(len(position_mm)), position_mm, _MOST_ROWS)
     table = np.stack([quality(rows, place) for place in places])  # (places, rows, branches)
     worst = table.min(axis=1).max(axis=1)
@@ -101,20 +70,8 @@ def plan_stations(
         return np.broadcast_to(places[_best(worst, bent, places, ranges, start)], (len(position_mm), 6))
     passes = np.cumsum(is_free, dtype=np.int64)
     if len(places) * (int(passes[-1]) + 1) * _FEWEST_ROWS > _MOST_POSES:
-        places = places[_with_others_best(table, places, ranges)]
+        places = places[with_others_best(table, places, ranges)]
     return _by_pass(position_mm, passes, quality, bending, places, ranges)
-
-
-def _places(ranges: list[Range], start: Floats) -> Floats:
-    """Return the places (k, 6) that are tried: a grid over all free axes."""
-    steps = STEPS
-    while steps ** len(ranges) > _MOST_PLACES:
-        steps -= 2
-    grids = [axis.places(steps) for axis in ranges]
-    places = np.tile(start, (int(np.prod([len(grid) for grid in grids])), 1))
-    for axis, column in zip(ranges, np.array(list(itertools.product(*grids))).T, strict=True):
-        places[:, axis.column] = column
-    return places
 
 
 def _best(worst: Floats, bent: Floats, places: Floats, ranges: list[Range], start: Floats) -> int:
@@ -161,16 +118,16 @@ def _by_pass(
     worst = np.stack([table[:, a:b].min(axis=1) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
     branch = _branch(worst, table, ends)
     external = np.empty((len(position_mm), 6))
-    has_station = worst[:, :, branch].max(axis=1) > _REACHED
+    has_station = worst[:, :, branch].max(axis=1) > REACHED
     for number in np.flatnonzero(~has_station).tolist():
         run, own = runs[number], table[:, ends[number] : ends[number + 1], branch]
-        external[run] = _along(position_mm, run, judged[number], own, places, ranges)
+        external[run] = moved_along(position_mm, run, judged[number], own, places, ranges)
     ways = [
         None if known else (external[run[0]], external[run[-1]])
         for known, run in zip(has_station, runs, strict=True)
     ]
     own = worst[:, :, branch]
-    cost = _cost_of_places(own) + _cost_of_bending(bending, judged, branch, own, places)
+    cost = cost_of_places(own) + _cost_of_bending(bending, judged, branch, own, places)
     for run, way, place in zip(runs, ways, _track(cost, ways, places, ranges), strict=True):
         if way is None:
             external[run] = places[place]
@@ -179,7 +136,7 @@ def _by_pass(
 
 def _branch(worst: Floats, table: Floats, ends: Ints) -> int:
     """Return the branch with the most passes that have a place, then the most rows that have one."""
-    with_station = (worst.max(axis=1) > _REACHED).sum(axis=0)
+    with_station = (worst.max(axis=1) > REACHED).sum(axis=0)
     reached = (table.max(axis=0) >= LEAST).sum(axis=0)
     best = worst.max(axis=1).clip(0.0, GOOD).sum(axis=0)
     return int(np.lexsort((-best, -reached, -with_station))[0])
@@ -198,7 +155,7 @@ def _track(
         before, here = ways[number - 1], ways[number]
         leaves = places if before is None else np.broadcast_to(before[1], places.shape)
         enters = places if here is None else np.broadcast_to(here[0], places.shape)
-        through = total[None, :] + _cost_of_moves(leaves, enters, ranges)
+        through = total[None, :] + cost_of_moves(leaves, enters, ranges)
         came_from[number] = np.argmin(through, axis=1)
         total = through[np.arange(len(places)), came_from[number]] + cost[number]
     track = np.empty(len(cost), dtype=np.int64)
@@ -206,12 +163,6 @@ def _track(
     for number in range(len(cost) - 1, 0, -1):
         track[number - 1] = came_from[number, track[number]]
     return track
-
-
-def _cost_of_places(worst: Floats) -> Floats:
-    """Return what places cost whose quality for each pass is (n, k)."""
-    poor = np.where(worst > _REACHED, _HITS_COST - worst, 1e3)
-    return np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
 
 
 def _cost_of_bending(
@@ -229,109 +180,6 @@ def _cost_of_bending(
     least = np.min(cost, axis=1, keepdims=True, initial=np.inf)
     excess = np.where(np.isfinite(cost), cost, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
     return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))
-
-
-def _cost_of_moves(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:
-    """Return what it costs (e, l) to go to places from places."""
-    far = np.zeros((len(enters), len(leaves)))
-    for axis in ranges:
-        way = np.abs(enters[:, axis.column, None] - leaves[None, :, axis.column])
-        far += way / (axis.high - axis.low)
-    return np.asarray(np.where(far > 0.0, _STARTS + _MOVES * far, 0.0))
-
-
-def _along(
-    position_mm: Floats, run: Ints, judged: Ints, table: Floats, places: Floats, ranges: list[Range]
-) -> Floats:
-    """Return E1 to E6 (r, 6) along a pass: the axis of the widest range moves, the others help.
-
-    ``table`` (places, judged) is the quality of the judged rows.
-    """
-    own, widest = _with_others_best(table[:, :, None], places, ranges), _widest(ranges)
-    column = places[own, widest.column]
-    low, high = np.array([_corridor(column, table[own, k]) for k in range(len(judged))]).T
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm[run], axis=0), axis=1))])
-    at = way[np.searchsorted(run, judged)]
-    external = np.tile(places[own[0]], (len(run), 1))
-    external[:, widest.column] = np.interp(way, at, taut(at, low, high))
-    return external
-
-
-def _widest(ranges: list[Range]) -> Range:
-    return max(ranges, key=lambda axis: axis.high - axis.low)
-
-
-def _with_others_best(table: Floats, places: Floats, ranges: list[Range]) -> Ints:
-    """Return the places at which all axes but the widest are where the most rows can be reached.
-
-    ``table`` (places, rows, branches) is the quality of rows.
-    """
-    others = [axis.column for axis in ranges if axis is not _widest(ranges)]
-    choices = np.unique(places[:, others], axis=0) if others else np.zeros((1, 0))
-
-    def of(choice: Floats) -> Ints:
-        return np.flatnonzero((places[:, others] == choice).all(axis=1))
-
-    def reached(rows: Ints) -> int:
-        return int((table[rows].max(axis=0) >= LEAST).sum(axis=0).max())
-
-    return max((of(choice) for choice in choices), key=reached)
-
-
-def _corridor(places: Floats, quality: Floats) -> tuple[float, float]:
-    """Return the first and the last place around the best one that are good, or nearly as good as that."""
-    best = int(np.argmax(np.minimum(quality, GOOD) - 1e-6 * np.abs(np.arange(len(places)) - len(places) / 2)))
-    enough = max(LEAST, min(GOOD, _NEARLY * float(quality[best])))
-    first = last = best
-    while first > 0 and quality[first - 1] >= enough:
-        first -= 1
-    while last + 1 < len(places) and quality[last + 1] >= enough:
-        last += 1
-    return float(places[first]), float(places[last])
-
-
-def taut(at: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the shortest line (n,) over rising ``at`` (n,) that keeps between ``low`` and ``high`` (n,).
-
-    From each knot it goes as far as it can be seen, which is where the bound that closes the view is touched.
-    """
-    value = np.empty(len(at))
-    start, here = 0, _level(low, high)
-    value[0] = here
-    while start < len(at) - 1:
-        steepest, flattest = np.inf, -np.inf
-        by_high = by_low = start
-        end = len(at)
-        for k in range(start + 1, len(at)):
-            span = max(at[k] - at[start], 1e-9)
-            up, down = (high[k] - here) / span, (low[k] - here) / span
-            if down > steepest or up < flattest:
-                end = by_high if down > steepest else by_low
-                slope = steepest if down > steepest else flattest
-                break
-            if up <= steepest:
-                steepest, by_high = up, k
-            if down >= flattest:
-                flattest, by_low = down, k
-        else:  # the end is in sight: level if that is within it, else to the bound that is in the way
-            slope = min(max(0.0, flattest), steepest)
-            end = by_low if slope > 0.0 else by_high if slope < 0.0 else end
-        last = min(end, len(at) - 1)
-        value[start + 1 : last + 1] = here + slope * (at[start + 1 : last + 1] - at[start])
-        here, start = float(value[last]), last
-    return value
-
-
-def _level(low: Floats, high: Floats) -> float:
-    """Return where a level line begins that stays between the bounds as long as it can."""
-    bottom, top = -np.inf, np.inf
-    for lowest, highest in zip(low, high, strict=True):
-        if lowest > top:
-            return float(top)
-        if highest < bottom:
-            return float(bottom)
-        bottom, top = max(bottom, lowest), min(top, highest)
-    return float((bottom + top) / 2.0)
 
 
 def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.program.following import following_deg
-from gcode2krl.program.stations import LEAST, Range, plan_stations, taut
+from gcode2krl.program.moving_along import taut
+from gcode2krl.program.places import LEAST, Range
+from gcode2krl.program.stations import plan_stations
 
 REACH_MM = 1000.0
 
