@@ -1,45 +1,90 @@
 """External axes that move along a pass that is longer than the arm reaches.
 
-The axis goes as little and as evenly as the reach allows: the shortest line through the corridor of places
-from which the arm reaches.
+Among the places from which the arm reaches, the track is chosen along which it bends least, as far as that is
+worth the way of the axis. Around the track a corridor is left in which the arm bends hardly more, and through
+that the axis goes the shortest way, evenly along the path.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
-from gcode2krl.program.places import GOOD, LEAST, Range, widest, with_others_best
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.program.places import (
+    GOOD,
+    LEAST,
+    Range,
+    cheapest_track,
+    cost_of_bending,
+    cost_of_places,
+    cost_of_ways,
+    widest,
+    with_others_best,
+)
+
+BendingHere = Callable[[Ints, Floats], Floats]
+"""Rows (r,) of the targets and E1 to E6 (6,) to how far the arm bends (r,), in the branch of the program."""
 
 _NEARLY = 0.7
-"""Share of the best quality with which an axis that moves along is content."""
+"""Share of the quality on the track with which the corridor is content."""
+_SOFTER = 0.1
+"""In the corridor the arm bends at most by so much more than at the stiffest place of a row."""
 
 
 def moved_along(
-    position_mm: Floats, run: Ints, judged: Ints, table: Floats, places: Floats, ranges: list[Range]
+    position_mm: Floats,
+    run: Ints,
+    judged: Ints,
+    table: Floats,
+    bending: BendingHere | None,
+    places: Floats,
+    ranges: list[Range],
 ) -> Floats:
     """Return E1 to E6 (r, 6) along a pass: the axis of the widest range moves, the others help.
 
-    ``table`` (places, judged) is the quality of the judged rows.
+    ``table`` (places, judged) is the quality of the judged rows. Without ``bending`` stiffness does not
+    count.
     """
     own, axis = with_others_best(table[:, :, None], places, ranges), widest(ranges)
-    column = places[own, axis.column]
-    low, high = np.array([_corridor(column, table[own, k]) for k in range(len(judged))]).T
+    places, quality = places[own], table[own].T
+    bent = np.ones(quality.shape)
+    if bending is not None:
+        bent = np.stack([bending(judged, place) for place in places], axis=1)
+    bent = np.where((quality >= LEAST) & np.isfinite(bent), bent, np.inf)
+    low, high = _corridor(places, quality, bent, axis)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position_mm[run], axis=0), axis=1))])
     at = way[np.searchsorted(run, judged)]
-    external = np.tile(places[own[0]], (len(run), 1))
+    external = np.tile(places[0], (len(run), 1))
     external[:, axis.column] = np.interp(way, at, taut(at, low, high))
     return external
 
 
-def _corridor(places: Floats, quality: Floats) -> tuple[float, float]:
-    """Return the first and the last place around the best one that are good, or nearly as good as that."""
-    best = int(np.argmax(np.minimum(quality, GOOD) - 1e-6 * np.abs(np.arange(len(places)) - len(places) / 2)))
-    enough = max(LEAST, min(GOOD, _NEARLY * float(quality[best])))
-    first = last = best
-    while first > 0 and quality[first - 1] >= enough:
-        first -= 1
-    while last + 1 < len(places) and quality[last + 1] >= enough:
-        last += 1
-    return float(places[first]), float(places[last])
+def _corridor(places: Floats, quality: Floats, bent: Floats, axis: Range) -> tuple[Floats, Floats]:
+    """Return between which places (n,) and (n,) of an axis the arm reaches the rows well and bends little.
+
+    ``quality`` (n, k) and ``bent`` (n, k) are those of the rows at the places (k, 6).
+    """
+    cost = (cost_of_places(quality) + cost_of_bending(bent)) / len(quality)
+    ways = cost_of_ways(places, places, [axis])
+    track = cheapest_track(cost, lambda _: ways)
+    rows = np.arange(len(track))
+    enough = np.maximum(LEAST, _NEARLY * np.minimum(quality[rows, track], GOOD))
+    stiff = bent <= (1.0 + _SOFTER) * np.min(bent, axis=1, keepdims=True)
+    beside = np.abs(np.arange(len(places)) - track[:, None]) <= 1  # so that coarse places make no stairs
+    within = (quality >= enough[:, None]) & (stiff | beside)
+    within[rows, track] = True
+    ends = np.array([_around(place, here) for place, here in zip(track.tolist(), within, strict=True)])
+    at = places[:, axis.column]
+    return at[ends[:, 0]], at[ends[:, 1]]
+
+
+def _around(place: int, within: Bools) -> tuple[int, int]:
+    """Return the first and the last of the places (k,) around one that are within."""
+    outside = np.flatnonzero(~within)
+    number = int(np.searchsorted(outside, place))
+    first = int(outside[number - 1]) + 1 if number > 0 else 0
+    last = int(outside[number]) - 1 if number < len(outside) else len(within) - 1
+    return first, last
 
 
 def taut(at: Floats, low: Floats, high: Floats) -> Floats:

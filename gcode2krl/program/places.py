@@ -25,8 +25,12 @@ STEPS = 49
 REACHED = -0.99
 """Quality above which a place is reached, if only to hit something: that is a finding of its own."""
 _MOST_PLACES = 1000
+AS_STIFF = 0.05
+"""Places that bend by so much more than the stiffest one count as equally stiff."""
 _HITS_COST = 50.0
 """What a place costs at which something is hit, or nearly out of reach."""
+_BENDS = 0.5
+"""What a place costs at which the robot bends twice as far as at the best one there; at most that."""
 _MOVES = 0.5
 """What a way over the whole range between two passes costs, against a place of no quality at all."""
 _STARTS = 0.05
@@ -92,10 +96,40 @@ def cost_of_places(worst: Floats) -> Floats:
     return np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
 
 
+def cost_of_bending(bent: Floats) -> Floats:
+    """Return what it costs (n, k) that rows bend so far at places: inf is no place, the least costs nothing."""
+    least = np.min(bent, axis=1, keepdims=True)
+    excess = np.where(np.isfinite(bent), bent, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
+    return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))
+
+
 def cost_of_moves(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:
-    """Return what it costs (e, l) to go to places from places."""
+    """Return what it costs (e, l) to stop, and to go to places from places."""
+    ways = cost_of_ways(leaves, enters, ranges)
+    return np.asarray(np.where(ways > 0.0, _STARTS + ways, 0.0))
+
+
+def cost_of_ways(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:
+    """Return what the ways cost (e, l) to places from places."""
     far = np.zeros((len(enters), len(leaves)))
     for axis in ranges:
         way = np.abs(enters[:, axis.column, None] - leaves[None, :, axis.column])
         far += way / (axis.high - axis.low)
-    return np.asarray(np.where(far > 0.0, _STARTS + _MOVES * far, 0.0))
+    return _MOVES * far
+
+
+def cheapest_track(cost: Floats, moves: Callable[[int], Floats]) -> Ints:
+    """Return the place of each row (n,) that is cheapest over all.
+
+    ``cost`` (n, k) is that of places, ``moves(row)`` (k, k) that of coming to places from those before.
+    """
+    total, came_from = cost[0], np.zeros(cost.shape, dtype=np.int64)
+    for row in range(1, len(cost)):
+        through = total[None, :] + moves(row)
+        came_from[row] = np.argmin(through, axis=1)
+        total = through[np.arange(len(total)), came_from[row]] + cost[row]
+    track = np.empty(len(cost), dtype=np.int64)
+    track[-1] = int(np.argmin(total))
+    for row in range(len(cost) - 1, 0, -1):
+        track[row - 1] = came_from[row, track[row]]
+    return track

@@ -14,12 +14,15 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.program.moving_along import moved_along
 from gcode2krl.program.places import (
+    AS_STIFF,
     GOOD,
     LEAST,
     REACHED,
     Bending,
     Quality,
     Range,
+    cheapest_track,
+    cost_of_bending,
     cost_of_moves,
     cost_of_places,
     tried_places,
@@ -31,10 +34,6 @@ _ROWS_A_PASS = 24
 _MOST_POSES = 500_000
 """Poses that are judged for passes, some 20 us each; with more passes fewer rows of each are judged, and all
 axes but the widest stay."""
-_AS_STIFF = 0.05
-"""Places that bend by so much more than the stiffest one count as equally stiff."""
-_BENDS = 0.5
-"""What a place costs at which the robot bends twice as far as at the best one for that pass; at most that."""
 _ROWS_THAT_BEND, _ROWS_A_PASS_THAT_BEND = 24, 3
 _DECIMALS = 3
 """Those of the program's text."""
@@ -81,7 +80,7 @@ def _best(worst: Floats, bent: Floats, places: Floats, ranges: list[Range], star
         far += np.abs(places[:, axis.column] - start[axis.column]) / (axis.high - axis.low)
     quality = np.minimum(np.round(worst, 2), GOOD)
     candidates = np.flatnonzero(quality == quality.max())
-    stiff = candidates[bent[candidates] <= (1.0 + _AS_STIFF) * bent[candidates].min()]
+    stiff = candidates[bent[candidates] <= (1.0 + AS_STIFF) * bent[candidates].min()]
     return int(stiff[np.lexsort((-worst[stiff], far[stiff]))[0]])
 
 
@@ -119,15 +118,18 @@ def _by_pass(
     branch = _branch(worst, table, ends)
     external = np.empty((len(position_mm), 6))
     has_station = worst[:, :, branch].max(axis=1) > REACHED
+    here = None if bending is None else lambda rows, place: bending(rows, place)[:, branch]
     for number in np.flatnonzero(~has_station).tolist():
         run, own = runs[number], table[:, ends[number] : ends[number + 1], branch]
-        external[run] = moved_along(position_mm, run, judged[number], own, places, ranges)
+        external[run] = moved_along(position_mm, run, judged[number], own, here, places, ranges)
     ways = [
         None if known else (external[run[0]], external[run[-1]])
         for known, run in zip(has_station, runs, strict=True)
     ]
     own = worst[:, :, branch]
-    cost = cost_of_places(own) + _cost_of_bending(bending, judged, branch, own, places)
+    cost = cost_of_places(own)
+    if bending is not None:
+        cost = cost + cost_of_bending(_bent_in_passes(bending, judged, branch, own, places))
     for run, way, place in zip(runs, ways, _track(cost, ways, places, ranges), strict=True):
         if way is None:
             external[run] = places[place]
@@ -150,36 +152,26 @@ def _track(
     ``cost`` (n, k) is that of the places, ``ways`` has the first and the last place of a pass that the axes
     move along in.
     """
-    total, came_from = cost[0], np.zeros(cost.shape, dtype=np.int64)
-    for number in range(1, len(cost)):
+
+    def moves(number: int) -> Floats:
         before, here = ways[number - 1], ways[number]
         leaves = places if before is None else np.broadcast_to(before[1], places.shape)
         enters = places if here is None else np.broadcast_to(here[0], places.shape)
-        through = total[None, :] + cost_of_moves(leaves, enters, ranges)
-        came_from[number] = np.argmin(through, axis=1)
-        total = through[np.arange(len(places)), came_from[number]] + cost[number]
-    track = np.empty(len(cost), dtype=np.int64)
-    track[-1] = int(np.argmin(total))
-    for number in range(len(cost) - 1, 0, -1):
-        track[number - 1] = came_from[number, track[number]]
-    return track
+        return cost_of_moves(leaves, enters, ranges)
+
+    return cheapest_track(cost, moves)
 
 
-def _cost_of_bending(
-    bending: Bending | None, judged: list[Ints], branch: int, worst: Floats, places: Floats
+def _bent_in_passes(
+    bending: Bending, judged: list[Ints], branch: int, worst: Floats, places: Floats
 ) -> Floats:
-    """Return what it costs (n, k) that a pass bends farther at a place than at its stiffest good one."""
-    cost = np.zeros(worst.shape)
-    if bending is None:
-        return cost
+    """Return how far passes bend (n, k) at places of the quality (n, k), inf where that is too poor."""
+    bent = np.full(worst.shape, np.inf)
     rows = [run[np.linspace(0, len(run) - 1, _ROWS_A_PASS_THAT_BEND).astype(np.int64)] for run in judged]
     for place in np.flatnonzero((worst >= LEAST).any(axis=0)).tolist():
-        bent = bending(np.concatenate(rows), places[place])[:, branch].reshape(len(rows), -1)
-        cost[:, place] = np.sqrt(np.mean(bent**2, axis=1))
-    cost[(worst < LEAST) | ~np.isfinite(cost)] = np.inf
-    least = np.min(cost, axis=1, keepdims=True, initial=np.inf)
-    excess = np.where(np.isfinite(cost), cost, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
-    return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))
+        each = bending(np.concatenate(rows), places[place])[:, branch].reshape(len(rows), -1)
+        bent[:, place] = np.sqrt(np.mean(each**2, axis=1))
+    return np.where((worst >= LEAST) & np.isfinite(bent), bent, np.inf)
 
 
 def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:

@@ -102,6 +102,20 @@ def test_a_pass_that_is_too_long_takes_the_rail_along():
     assert np.ptp(np.diff(external)[100:300]) < 2.0  # evenly
 
 
+@pytest.mark.parametrize("side_mm", [-500.0, 0.0, 400.0])
+def test_along_a_pass_the_rail_keeps_where_the_arm_is_stiff(side_mm):
+    x = np.linspace(0.0, 9000.0, 400)
+    limits, free = (-2000.0, 11000.0), [True] + [False] * 399
+    anywhere, _ = planned(x, free, *limits)
+    stiff, _ = planned(x, free, *limits, bending=softer_away_from(x, side_mm))
+    bent, bent_anywhere = (1.0 + np.abs(e - x - side_mm) / 500.0 for e in (stiff, anywhere))
+    assert (
+        np.median(bent) < 1.0 + 271.0 / 500.0
+    )  # places are 271 mm apart, and those beside the stiffest are in
+    assert np.sqrt(np.mean(bent**2)) < 0.9 * np.sqrt(np.mean(bent_anywhere**2))
+    assert (np.diff(stiff) >= 0.0).all()
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_a_taut_line_is_the_shortest_in_its_corridor(seed):
     """Beside it a linear program: no line between the bounds has a shorter way in e than the taut one."""
