@@ -74,7 +74,7 @@ def _rotations(targets: Targets, external: Floats, cell: Cell) -> Floats:
         seen, seen_axis = (
             (position, axis) if by is None else (points_moved(position, by), vectors_turned(axis, by))
         )
-        spin = _spin_of(cell)(seen, seen_axis, tool)
+        spin = _spin_of(cell, at)(seen, seen_axis, tool)
         turned = from_rest(seen, program.tool_rotation(seen_axis, spin), at, cell)[1]
     result = np.array(targets.rotation)
     result[rows] = turned
@@ -203,13 +203,10 @@ def _free_motions(targets: Targets, toolpath: Toolpath) -> Bools:
 
 
 def _quality_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> Floats:
-    """Return the quality (r, 8) of targets with the external axes at (r, 6), in the best turn.
-
-    Where they differ from row to row, what may be hit does not count.
-    """
+    """Return the quality (r, 8) of targets with the external axes at (r, 6), in the best turn."""
     there, position, turned = _turned_at(targets, rows, external, cell)
-    judge = _comfort_and_freedom if _is_one(external) else _comfort
-    best: Floats = np.max([judge(position, each, targets.tool[rows], there) for each in turned], axis=0)
+    at, tool = None if _is_one(external) else external, targets.tool[rows]
+    best: Floats = np.max([_quality(position, each, tool, there, at) for each in turned], axis=0)
     return best
 
 
@@ -240,13 +237,13 @@ def _turned_at(
     return there, position, (program.tool_rotation(axis, float(each)) for each in tried)
 
 
-def _comfort(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
-    return robot.pose_quality(position, rotation, tool, cell)
+def _quality(position: Floats, rotation: Floats, tool: Ints32, cell: Cell, external: Floats | None) -> Floats:
+    """Return how far from limits, singularities and obstacles each branch (n, 8) is, the worst of them.
 
-
-def _comfort_and_freedom(position: Floats, rotation: Floats, tool: Ints32, cell: Cell) -> Floats:
+    Poses as the robot sees them; ``external`` (n, 6) is where E1 to E6 are, at rest where None.
+    """
     plain = robot.pose_quality(position, rotation, tool, cell)
-    free = freedom(position, rotation, tool, cell, plain)
+    free = freedom(position, rotation, tool, cell, plain, external)
     return np.where((free < 0.0) & (plain >= 0.0), _HITS + 0.5 * plain, np.minimum(plain, free))
 
 
@@ -267,7 +264,11 @@ def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
     return home_pose
 
 
-def _spin_of(cell: Cell) -> SpinOf:
+def _spin_of(cell: Cell, external: Floats | None = None) -> SpinOf:
+    """Return what chooses the turn about the tool axis at poses as the robot sees them, and between them.
+
+    ``external`` (n, 6) is where E1 to E6 are at these poses, at rest by default.
+    """
     spin = cell.frames.spin
     if not isinstance(spin, str):
         return lambda position, axis, tool: float(spin) * RAD_PER_DEG
@@ -277,17 +278,24 @@ def _spin_of(cell: Cell) -> SpinOf:
             raise NotUnderstoodError(missing, source=cell.name)
 
     def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
+        points = program.between(position, np.diff(tool, prepend=tool[:1]) == 0)
+        position, axis, tool = points.of(position), points.directions(axis), tool[points.before]
+        at = None if external is None else points.of(external)
+
         def quality(rows: Ints, spin_rad: float) -> Floats:
-            rotation = program.tool_rotation(axis[rows], spin_rad)
-            return _comfort_and_freedom(position[rows], rotation, tool[rows], cell)
+            rotation, there = program.tool_rotation(axis[rows], spin_rad), None if at is None else at[rows]
+            return _quality(position[rows], rotation, tool[rows], cell, there)
 
         def bending(rows: Ints, spin_rad: float) -> Floats:
             rotation = program.tool_rotation(axis[rows], spin_rad)
             return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
 
+        is_target = points.share == 0.0
         if spin == "stiffest":
-            return program.stiffest_spin(position, quality, bending, axis)
-        return program.smooth_spin(position, quality, axis)
+            found = program.stiffest_spin(position, quality, bending, axis, is_target)
+        else:
+            found = program.smooth_spin(position, quality, axis, is_target)
+        return found if isinstance(found, float) else found[is_target]
 
     return searched
 

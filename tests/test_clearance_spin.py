@@ -65,6 +65,17 @@ def test_a_post_behind_the_tool_turns_it(part):
     assert hits_on_the_cut(part, searching(POST)) == []
 
 
+def test_a_post_beside_a_long_move_turns_it(tmp_path):
+    """At both ends of the move, which are its targets, the wrist is far from the post in any turn."""
+    lines = ["G0 X0 Y-400 Z20", "G43 H1 Z20", "G1 Z-1 F500", "G1 Y400 F2000", "G0 Z50", "M30"]
+    file = tmp_path / "long.nc"
+    file.write_text("\n".join(["G21 G90 G17", "T1 M6", "S8000 M3", *lines]) + "\n")
+    low = box("post", [-260.0, -60, 60], [-190, 60, 225])
+    assert hits_on_the_cut(file, cell_with(low))
+    assert spins_deg(set_targets(read_gcode(file, searching()), searching())).tolist() == [0.0]
+    assert hits_on_the_cut(file, searching(low)) == []
+
+
 def test_where_every_turn_hits_the_collision_is_told(part):
     room = box("room", [-2000.0, -2000, 200], [2000, 2000, 2000])
     assert hits_on_the_cut(part, searching(room))

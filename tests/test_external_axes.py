@@ -7,6 +7,7 @@ import pytest
 
 from gcode2krl import compliance, predict, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.cell.carried import standing
+from gcode2krl.clearance import watch_of
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.frames import abc_from_rotation, rotation_from_quaternion
 from gcode2krl.robot import inverse
@@ -292,8 +293,6 @@ def test_what_stands_beside_the_rail_is_hit_on_the_way_only(tmp_path):
 
 def test_clearances_along_a_moving_rail_are_those_of_the_poses(tmp_path):
     """Sample by sample: the least distance of the arm where it stands, in a cell that stands there."""
-    from gcode2krl.clearance import watch_of
-
     wall = [
         {
             "name": "wall",
@@ -322,3 +321,47 @@ def test_the_map_of_turns_is_that_of_the_arm_where_it_stands(tmp_path):
     chosen = int(np.argmin(np.abs(seen.spin_rad)))
     assert np.abs(seen.chosen_rad).max() < 1e-9
     assert (seen.comfort[chosen] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "external",
+    [{"E1": RAIL}, {"E2": TABLE}, {"E1": RAIL, "E2": TABLE}],
+    ids=["rail", "table", "rail and table"],
+)
+def test_distances_of_single_poses_are_those_where_the_axes_stand(external):
+    """Rows far from each other in E1 and E2, beside the cell that stands there."""
+    base = {"base": ON_TABLE} if "E2" in external else {"base": BASE}
+    cell = over_demonstration({"external": external, "frames": base, "obstacle": obstacles()})
+    draw = np.random.default_rng(7)
+    q_rad = np.radians([0.0, -75.0, 105.0, 0.0, 60.0, 0.0]) + draw.normal(size=(40, 6)) * 0.25
+    at = np.zeros((40, 6))
+    at[:, 0] = draw.uniform(-400.0, 600.0, 40) if "E1" in external else 0.0
+    at[:, 1] = draw.uniform(-170.0, 170.0, 40) if "E2" in external else 0.0
+    found = watch_of(cell).poses(q_rad, 1, 300.0, at)
+    alone = [watch_of(standing(cell, e)).poses(q[None], 1, 300.0)[0] for q, e in zip(q_rad, at, strict=True)]
+    np.testing.assert_allclose(np.minimum(found, 300.0), alone, atol=1e-6)
+    assert (np.array(alone) < 0.0).any()
+    assert (np.array(alone) > 100.0).any()
+
+
+def test_a_post_that_the_rail_passes_turns_the_tool(tmp_path):
+    post = {"name": "post", "frame": "base", "box_mm": [[-260.0, 3940.0, 60], [-190, 4060, 225]]}
+    part, searched = long_cut(tmp_path), {"frames": {"base": BASE, "spin": "auto"}}
+
+    def hits(cell):
+        issues = predict(part, cell, forces=False).issues
+        return [each for each in issues if each.code == "collision" and " on the " not in each.message]
+
+    assert hits(rail_cell(obstacle=[post]))
+    assert hits(rail_cell(obstacle=[post], **searched)) == []
+
+
+def test_what_the_arm_would_hit_with_the_rail_at_rest_does_not_turn_it(tmp_path):
+    """A low post that the tool passes when the rail has moved on; see `test_the_map_of_turns`."""
+    post = {"name": "post", "frame": "world", "box_mm": [[1240.0, -560.0, 860], [1310, -440, 1025]]}
+    searched, part = {"frames": {"base": BASE, "spin": "auto"}}, long_cut(tmp_path)
+    with_post, without = (
+        set_targets(read_gcode(part, cell), cell)
+        for cell in (rail_cell(obstacle=[post], **searched), rail_cell(**searched))
+    )
+    assert (with_post.rotation == without.rotation).all()

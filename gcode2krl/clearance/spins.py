@@ -24,10 +24,18 @@ _MAP_ROWS = 400
 _MAP_STEP_RAD = 5.0 * RAD_PER_DEG
 
 
-def freedom(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cell, comfort: Floats) -> Floats:
+def freedom(
+    position_mm: Floats,
+    rotation: Floats,
+    tool: Ints32,
+    cell: Cell,
+    comfort: Floats,
+    external: Floats | None = None,
+) -> Floats:
     """Return how free each branch (n, 8) of tool poses is: 0 = touching, -1 = in it, 1 = `ENOUGH` away.
 
-    Poses (n) in ``$BASE``, rotations as quaternions. Only branches with a ``comfort`` (n, 8) above 0 are
+    Poses (n) in ``$BASE`` as seen with the external axes at rest, rotations as quaternions; ``external``
+    (n, 6) is where E1 to E6 are, at rest by default. Only branches with a ``comfort`` (n, 8) above 0 are
     looked at, the others are 1; so are all where the cell describes nothing that may be hit.
     """
     free = np.ones((len(position_mm), 8))
@@ -39,7 +47,8 @@ def freedom(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cell, com
         rows = np.flatnonzero(tool == number)
         q_rad = robot.inverse(position_mm[rows], rotation[rows], cell, int(number))
         looked, branch = np.nonzero((comfort[rows] > 0.0) & np.isfinite(q_rad).all(axis=2))
-        gap_mm = watch.poses(q_rad[looked, branch], int(number), enough_mm)
+        at = None if external is None else external[rows[looked]]
+        gap_mm = watch.poses(q_rad[looked, branch], int(number), enough_mm, at)
         free[rows[looked], branch] = np.where(gap_mm <= 0.0, -1.0, np.minimum(gap_mm / enough_mm, 1.0))
     return free
 
@@ -62,7 +71,7 @@ class SpinMap(NamedTuple):
 def spin_map(motion: Motion, joints: Joints, cell: Cell) -> SpinMap:
     """Return the map of a motion, at up to 400 of its samples and every 5 degrees.
 
-    Where external axes move, the turn is that which the robot sees, and what may be hit does not count.
+    Where external axes move, the turn is that which the robot sees.
     """
     moves = bool(cell.external) and bool((motion.external != motion.external[0]).any())
     if cell.external and not moves:
@@ -87,7 +96,7 @@ def spin_map(motion: Motion, joints: Joints, cell: Cell) -> SpinMap:
         quality = np.full((len(rows), 8), -1.0)
         quality[own] = robot.pose_quality(*pose)[own]
         comfort[k] = quality[own]
-        free[k] = 1.0 if moves else freedom(*pose, quality)[own]
+        free[k] = freedom(*pose, quality, shown.external if moves else None)[own]
     return SpinMap(shown.path_mm, spins, comfort, free, chosen)
 
 

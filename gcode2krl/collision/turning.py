@@ -76,6 +76,15 @@ class Turning:
                 self._along(q_rad[start:end], external[start:end], start, found)
         return found.clearances()
 
+    def apart(self, q_rad: Floats, external: Floats) -> Floats:
+        """Return the least gap (n,) at single rows of angles in rad and E1 to E6 (n, 6)."""
+        ends, _ = self._seen(q_rad, external)
+        least = np.full(len(ends), np.inf)
+        for shape, rows, body in self._shapes:
+            gaps, _ = obstacle_gaps(ends[:, body].reshape(-1, 6), 0.0, shape)
+            least = np.minimum(least, (gaps.reshape(len(ends), -1) - self._radius_mm[rows]).min(axis=1))
+        return least
+
     def _along(self, q_rad: Floats, external: Floats, first: int, found: "_Found") -> None:
         """Go along rows without a break, of which the first has this number."""
         arm, table, farther = self._gone(q_rad, external)
@@ -105,9 +114,8 @@ class Turning:
         """
         step = np.abs(np.diff(q_rad, axis=0, prepend=q_rad[:1]))
         bent = np.zeros_like(step)
-        bent[2:] = np.abs(
-            q_rad[2:] - 2.0 * q_rad[1:-1] + q_rad[:-2]
-        )  # a sample may be off the way of the joints
+        # a sample may be off the way of the joints
+        bent[2:] = np.abs(q_rad[2:] - 2.0 * q_rad[1:-1] + q_rad[:-2])
         arm = np.cumsum((step + 0.125 * bent) @ self._bodies.lever_mm.T, axis=0)
         moved = np.abs(np.diff(external, axis=0, prepend=external[:1]))
         turned = moved[:, self._tables] * RAD_PER_DEG

@@ -49,6 +49,10 @@ class _Setting(NamedTuple):
         pairs, names = [self.pairs[row] for row in rows], [self.names[row] for row in rows]
         return self._replace(pairs=pairs, names=names, places=self.places[[*rows, -1]])
 
+    def not_round(self) -> "_Setting":
+        """Return the setting without what cutter and holder may hit, but for the arm itself."""
+        return self.only([p[1] < 0 or self.parts[p[0]].kind in ("arm", "spindle") for p in self.pairs])
+
 
 class _Stand(NamedTuple):
     """What stands around the robot root at rest, and what takes its places to ``$BASE``."""
@@ -221,29 +225,36 @@ class Watch:
             ]
         )
 
-    def poses(self, q_rad: Floats, tool: int, horizon_mm: float) -> Floats:
+    def poses(self, q_rad: Floats, tool: int, horizon_mm: float, external: Floats | None = None) -> Floats:
         """Return the least distance (n,) at single poses, angles (n, 6) in rad, at most the horizon.
 
-        Of what is round about the tool axis, cutter and holder, only the distance to the arm itself counts.
+        ``external`` (n, 6) is where E1 to E6 are, at rest by default. Of what is round about the tool axis,
+        cutter and holder, only the distance to the arm itself counts.
         """
-        whole = self._held(tool, against_raw=False, is_ptp=False)
-        kinds = [whole.parts[pair[0]].kind for pair in whole.pairs]
-        setting = whole.only(
-            [pair[1] < 0 or kind in ("arm", "spindle") for pair, kind in zip(whole.pairs, kinds, strict=True)]
-        )
+        if external is None:
+            external = np.broadcast_to(self._cell.external_rest(), (len(q_rad), 6))
+        if not len(q_rad):
+            return np.zeros(0)
+        columns = self._table_columns
+        turns = bool((external[:, columns] != external[-1, columns]).any())
+        setting = self._held(tool, against_raw=False, is_ptp=False, turns=turns).not_round()
         way = Way(
             setting.bodies,
-            self._stand(self._cell.external_rest()).around.shapes,
+            self._stand(external[-1]).around.shapes,
             setting.pairs,
             self._geometry,
             near_mm=self._cell.collision.clearance_mm,
             horizon_mm=horizon_mm,
             is_sampled=False,
         )
-        apart = np.full((2 * len(q_rad), 6), np.nan)  # behind a row of NaN another way begins
-        apart[::2] = q_rad
-        gap_mm: Floats = way.take(apart).gap_mm[::2]
-        return gap_mm
+        single = np.full((2 * len(q_rad), 6), np.nan)  # behind a row of NaN another way begins
+        single[::2] = q_rad
+        shift_mm = np.repeat(np.broadcast_to(self._shift_mm(external), (len(q_rad), 3)), 2, axis=0)
+        gap_mm: Floats = way.take(single, shift_mm).gap_mm[::2]
+        if not turns:
+            return gap_mm
+        carried = self._carried(tool, against_raw=False, is_ptp=False).not_round()
+        return np.minimum(gap_mm, self._turn(carried).apart(q_rad, external))
 
     def advise(self, line: int, words: str, remedy: str) -> None:
         """Say what helps against the collisions on a way."""

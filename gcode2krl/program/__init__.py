@@ -1,5 +1,6 @@
 """Toolpath to Targets: what the KRL program will say."""
 
+from gcode2krl.program.between import between
 from gcode2krl.program.blending import asked_tolerance
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
@@ -28,6 +29,7 @@ __all__ = [
     "begun_at",
     "begun_row",
     "below_table",
+    "between",
     "check_toolpath",
     "doubtful",
     "feeds_per_tooth",

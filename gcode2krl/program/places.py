@@ -97,7 +97,7 @@ def cost_of_places(worst: Floats) -> Floats:
 
 
 def cost_of_bending(bent: Floats) -> Floats:
-    """Return what it costs (n, k) that rows bend so far at places: inf is no place, the least costs nothing."""
+    """Return what it costs (n, k) to bend so far at places; the least costs nothing, inf is no place."""
     least = np.min(bent, axis=1, keepdims=True)
     excess = np.where(np.isfinite(bent), bent, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
     return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))

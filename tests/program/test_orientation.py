@@ -1,12 +1,14 @@
 """Tool frames from axis and spin: z is the axis, the spin turns about it, the tilt is the shortest."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.program import smooth_spin, tool_rotation
+from gcode2krl.program import between, smooth_spin, tool_rotation
 
 angles = st.floats(-2 * np.pi, 2 * np.pi)
 components = st.floats(-1, 1)
@@ -121,6 +123,35 @@ def test_changes_slowly_where_no_constant_will_do():
     worst = min(quality(rows[k : k + 1], spin[k])[0, 0] for k in rows)
     assert worst > 0
     assert np.abs(np.diff(spin)).max() <= np.radians(5.001) * 10 / 25 * 2.5  # 10 mm a row
+
+
+def test_between_targets_the_angle_is_on_the_way_from_one_to_the_other():
+    """No constant will do; of the turns at the ends only those count that pass the middle well."""
+    centre_deg = np.array([0.0, 10.0, 70.0, 75.0, 80.0])  # at 0, 500, 1000, 1500, 2000 mm
+    is_target = np.array([True, False, False, False, True])
+    width = np.radians(42)
+    spin = smooth_spin(PATH[::50], around(lambda rows: np.radians(centre_deg)[rows], width), None, is_target)
+    assert np.shape(spin) == (5,)
+    assert np.allclose(np.diff(spin), np.diff(spin)[0])
+    apart = np.abs(np.degrees(spin) - centre_deg)
+    assert apart.max() < 42.0
+    for first, last in itertools.product(np.radians(np.arange(-90, 91, 5)), repeat=2):
+        line = np.linspace(first, last, 5)
+        assert np.abs(np.degrees(line) - centre_deg).sum() >= apart.sum() - 3 * 5.0 - 1e-9
+
+
+def test_a_long_move_has_points_between_its_targets():
+    position = np.array([[0.0, 0, 0], [0, 0, 120], [0, 0, 130], [300, 0, 130], [300, 400, 130]])
+    points = between(position, np.array([True, True, True, False, True]))
+    found = points.of(position)
+    assert (found[points.share == 0.0] == position).all()
+    way = np.linalg.norm(np.diff(found, axis=0), axis=1)
+    assert np.sort(way)[-1] == pytest.approx(300.0)  # the move that is not joined
+    assert np.sort(way)[-2] <= 50.0 + 1e-9
+    assert way.sum() == pytest.approx(120 + 10 + 300 + 400)
+    axis = points.directions(np.array([[0.0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]]))
+    assert np.linalg.norm(axis, axis=1) == pytest.approx(1.0)
+    assert len(between(position[:1], np.ones(1, dtype=bool)).of(position[:1])) == 1
 
 
 def test_a_single_position():

@@ -1,0 +1,52 @@
+"""Points of long moves, so that what is judged at targets is judged on the way between them as well."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcode2krl.arrays import Bools, Floats, Ints
+
+STEP_MM = 50.0
+"""Way between points that are judged."""
+_MOST_POINTS = 2000
+"""With more the step grows."""
+
+
+@dataclass(frozen=True)
+class Between:
+    """Targets (p) and the points between them, (d) in all."""
+
+    before: Ints
+    """(d,) the target that a point is at, or behind."""
+    share: Floats
+    """(d,) of the way to the next one, 0 at targets."""
+
+    def of(self, values: Floats) -> Floats:
+        """Return values (d, k) of the points, those (p, k) of the targets in proportion to the way."""
+        if values.strides[0] == 0:
+            return np.broadcast_to(values[0], (len(self.before), *values.shape[1:]))
+        if len(self.before) == len(values):
+            return values
+        first, share = values[self.before], self.share[:, None]
+        after: Floats = values[np.minimum(self.before + 1, len(values) - 1)]
+        return np.asarray(np.where(share > 0.0, first + share * (after - first), first))
+
+    def directions(self, values: Floats) -> Floats:
+        """Return unit vectors or quaternions (d, k) of the points, those (p, k) of the targets as `of`."""
+        found = self.of(values)
+        if found.strides[0] == 0 or len(found) == len(values):
+            return found
+        return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12))
+
+
+def between(position_mm: Floats, joined: Bools) -> Between:
+    """Return the points of moves that are longer than `STEP_MM`.
+
+    ``position_mm`` (p, 3) of targets, ``joined`` (p,) where a straight move leads to one from that before it.
+    """
+    way = np.linalg.norm(np.diff(position_mm, axis=0), axis=1) * joined[1:]
+    step = max(STEP_MM, float(way.sum()) / _MOST_POINTS)
+    count = np.append(np.maximum(np.ceil(way / step - 1e-9), 1.0).astype(np.int64), 1)[: len(position_mm)]
+    before = np.repeat(np.arange(len(position_mm)), count)
+    number = np.arange(len(before)) - np.repeat(np.cumsum(count) - count, count)
+    return Between(before, number / count[before])
