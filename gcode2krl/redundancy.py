@@ -9,17 +9,13 @@ from gcode2krl import compliance, program, robot
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.cell.carried import at_rest, from_rest, points_moved, standing, to_rest, vectors_turned
+from gcode2krl.cell.carried import from_rest, points_moved, standing, to_rest, vectors_turned
 from gcode2krl.cell.sections.external import EXTERNAL_NAMES
-from gcode2krl.clearance import freedom
 from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.posture import Poses, bending_at, bending_mm, is_following, is_one, quality_at, quality_of
 from gcode2krl.tables import Targets, Toolpath
 from gcode2krl.units import RAD_PER_DEG
 
-_HITS = -0.9
-"""Quality of a pose that hits something, but for half its comfort: above that of one that is out of reach."""
-_ACROSS_N = 100.0
-_TRIED_SPINS = np.arange(-180.0, 180.0, 30.0) * RAD_PER_DEG
 _SAME_HEIGHT_MM = 1e-6
 _ROUNDING = 1e-3
 """The last decimal of an external axis in the program's text."""
@@ -64,10 +60,10 @@ def _rotations(targets: Targets, external: Floats, cell: Cell) -> Floats:
     rows = np.flatnonzero(~targets.home)
     position, rotation, tool = targets.position_mm[rows], targets.rotation[rows], targets.tool[rows]
     at, searched = external[rows], isinstance(cell.frames.spin, str)
-    if not searched and not _is_following(at, cell):
+    if not searched and not is_following(at, cell):
         return targets.rotation
     axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
-    if _is_one(at):
+    if is_one(at):
         turned = program.tool_rotation(axis, _spin_of(standing(cell, at[0]))(position, axis, tool))
     else:
         by = to_rest(at, cell)
@@ -79,11 +75,6 @@ def _rotations(targets: Targets, external: Floats, cell: Cell) -> Floats:
     result = np.array(targets.rotation)
     result[rows] = turned
     return result
-
-
-def _is_following(external: Floats, cell: Cell) -> bool:
-    """Tell whether a table follows the tool, with E1 to E6 at (r, 6)."""
-    return not _is_one(external) and any(axis.follows is not None for axis in cell.external.values())
 
 
 def _stops(external: Floats, is_free: Bools) -> Bools:
@@ -132,14 +123,18 @@ def _without_speed(external: Floats, cell: Cell) -> Iterator[Issue]:
             yield Issue("warning", "external-speed", 0, sentence, f"give [external.{name}] speed")
 
 
-def _is_one(external: Floats) -> bool:
-    return external.strides[0] == 0 or bool((external == external[0]).all())
-
-
 def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     """Return E1 to E6 (p, 6) at targets, at HOME as stated, else as at its neighbour."""
     rows = np.flatnonzero(~targets.home)
-    followed = _followed(targets, rows, cell)
+    is_free = _free_motions(targets, toolpath)[rows]
+    points = program.between(targets.position_mm[rows], ~is_free)
+    is_target = points.share == 0.0
+    poses = Poses(
+        points.of(targets.position_mm[rows]),
+        points.rotations(targets.rotation[rows]),
+        targets.tool[rows][points.before],
+    )
+    followed = points.of(_followed(targets, rows, cell))
     ranges = [
         program.Range(column, *_room(cell.external[name].limits, followed[:, column]))
         for column, name in enumerate(EXTERNAL_NAMES)
@@ -147,20 +142,21 @@ def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     ]
 
     def quality(at: Ints, place: Floats) -> Floats:
-        return _quality_at(targets, rows[at], place + followed[at], cell)
+        return quality_at(poses.at(at), place + followed[at], cell)
 
     def bending(at: Ints, place: Floats) -> Floats:
-        return _bending_at(targets, rows[at], place + followed[at], cell)
+        return bending_at(poses.at(at), place + followed[at], cell)
 
-    is_free = _free_motions(targets, toolpath)[rows]
     stiff = None if compliance.missing_stiffness(cell) else bending
     start = cell.external_rest()
-    found = program.plan_stations(targets.position_mm[rows], is_free, quality, ranges, start, stiff)
+    is_free = is_free[points.before] & is_target
+    found = program.plan_stations(poses.position_mm, is_free, quality, ranges, start, stiff)
     if followed.any():
         found = np.round(found + followed, 3)
+    found = found if is_one(found) else found[is_target]
     homes = np.flatnonzero(targets.home)
     stated = [(k, cell.external[n].home) for k, n in enumerate(EXTERNAL_NAMES) if n in cell.external]
-    if _is_one(found) and all(value is None or value == found[0, k] for k, value in stated):
+    if is_one(found) and all(value is None or value == found[0, k] for k, value in stated):
         return np.broadcast_to(found[0], (len(targets), 6))
     external = np.empty((len(targets), 6))
     external[rows] = found
@@ -192,59 +188,18 @@ def _room(limits: tuple[float, float], followed: Floats) -> tuple[float, float]:
 
 
 def _free_motions(targets: Targets, toolpath: Toolpath) -> Bools:
-    """Mark the motions (p,) during which external axes may move: PTP, and rapids above all that is cut."""
+    """Mark the motions (p,) during which external axes may move: PTP, and rapids above all that is cut.
+
+    A retract from the highest cut is none: the tool is still in the part.
+    """
     row = np.maximum(targets.move, 0)
     rapid = (targets.move < 0) | toolpath.rapid[row] | toolpath.machine[row]
     height = targets.position_mm[:, 2]
     cut = ~rapid & ~targets.ptp
     above = height >= (height[cut].max() if cut.any() else -np.inf) - _SAME_HEIGHT_MM
-    free: Bools = targets.ptp | (rapid & above & np.roll(above, 1))
+    retract = np.roll(cut, 1) & (height > np.roll(height, 1) + _SAME_HEIGHT_MM)
+    free: Bools = targets.ptp | (rapid & above & np.roll(above, 1) & ~retract)
     return free
-
-
-def _quality_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> Floats:
-    """Return the quality (r, 8) of targets with the external axes at (r, 6), in the best turn."""
-    there, position, turned = _turned_at(targets, rows, external, cell)
-    at, tool = None if _is_one(external) else external, targets.tool[rows]
-    best: Floats = np.max([_quality(position, each, tool, there, at) for each in turned], axis=0)
-    return best
-
-
-def _bending_at(targets: Targets, rows: Ints, external: Floats, cell: Cell) -> Floats:
-    """Return how far each branch (r, 8) bends with the external axes at (r, 6), in the stiffest turn."""
-    there, position, turned = _turned_at(targets, rows, external, cell)
-    tool = targets.tool[rows]
-    axes = ((each, fr.rotation_from_quaternion(each)[:, :, 2]) for each in turned)
-    stiffest: Floats = np.fmin.reduce([_bending_mm(position, each, axis, tool, there) for each, axis in axes])
-    return stiffest
-
-
-def _turned_at(
-    targets: Targets, rows: Ints, external: Floats, cell: Cell
-) -> tuple[Cell, Floats, Iterator[Floats]]:
-    """Return the cell with external axes at (r, 6), positions (r, 3) in it, and the orientations to try."""
-    position, rotation = targets.position_mm[rows], targets.rotation[rows]
-    if _is_one(external):
-        there = standing(cell, external[0])
-    else:
-        there = cell
-        position, rotation = at_rest(position, rotation, external, cell)
-    spin = cell.frames.spin
-    if not isinstance(spin, str) and not _is_following(external, cell):
-        return there, position, iter([rotation])
-    axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
-    tried = _TRIED_SPINS if isinstance(spin, str) else np.array([spin * RAD_PER_DEG])
-    return there, position, (program.tool_rotation(axis, float(each)) for each in tried)
-
-
-def _quality(position: Floats, rotation: Floats, tool: Ints32, cell: Cell, external: Floats | None) -> Floats:
-    """Return how far from limits, singularities and obstacles each branch (n, 8) is, the worst of them.
-
-    Poses as the robot sees them; ``external`` (n, 6) is where E1 to E6 are, at rest where None.
-    """
-    plain = robot.pose_quality(position, rotation, tool, cell)
-    free = freedom(position, rotation, tool, cell, plain, external)
-    return np.where((free < 0.0) & (plain >= 0.0), _HITS + 0.5 * plain, np.minimum(plain, free))
 
 
 def _with_home(targets: Targets, cell: Cell) -> Targets:
@@ -284,11 +239,11 @@ def _spin_of(cell: Cell, external: Floats | None = None) -> SpinOf:
 
         def quality(rows: Ints, spin_rad: float) -> Floats:
             rotation, there = program.tool_rotation(axis[rows], spin_rad), None if at is None else at[rows]
-            return _quality(position[rows], rotation, tool[rows], cell, there)
+            return quality_of(position[rows], rotation, tool[rows], cell, there)
 
         def bending(rows: Ints, spin_rad: float) -> Floats:
             rotation = program.tool_rotation(axis[rows], spin_rad)
-            return _bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
+            return bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
 
         is_target = points.share == 0.0
         if spin == "stiffest":
@@ -298,23 +253,3 @@ def _spin_of(cell: Cell, external: Floats | None = None) -> SpinOf:
         return found if isinstance(found, float) else found[is_target]
 
     return searched
-
-
-def _bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, cell: Cell) -> Floats:
-    """Return how far each branch (n, 8) bends under a load of 100 N across the tool, whichever way it points.
-
-    The root mean square over all directions across the axis; NaN where a branch has no solution.
-    """
-    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    result = np.full((len(position), 8), np.nan)
-    for number in np.unique(tool):
-        rows = np.flatnonzero(tool == number)
-        q = robot.inverse(position[rows], rotation[rows], cell, int(number)).reshape(-1, 6)
-        square = np.zeros(len(q))
-        for direction in (across[rows], np.cross(axis[rows], across[rows])):
-            load_N = np.repeat(_ACROSS_N * direction, 8, axis=0)
-            bent_mm, _ = compliance.deflection_of(q, load_N, np.zeros(3), np.zeros(3), cell, int(number))
-            square += np.einsum("ij,ij->i", bent_mm, bent_mm)
-        result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
-    return result

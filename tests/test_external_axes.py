@@ -5,13 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from gcode2krl import compliance, predict, read_gcode, set_targets, verify_krl, write_krl
+from gcode2krl import compliance, load_cell, predict, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.cell.carried import standing
 from gcode2krl.clearance import watch_of
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.frames import abc_from_rotation, rotation_from_quaternion
 from gcode2krl.robot import inverse
 from tests.cells import over_demonstration
+from tests.conftest import ROOT
 
 BASE = {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
 RAIL = {"kind": "rail", "axis": "y", "limits": [-500.0, 9500.0], "speed": 1200.0, "acceleration": 1500.0}
@@ -108,6 +109,18 @@ def test_a_part_longer_than_the_arm_needs_the_rail(tmp_path):
     assert (targets.cdis_mm[changed] == 0.0).all()
     assert (targets.cdis_mm[changed - 1] == 0.0).all()
     assert e1[0] == e1[-1] == 0.0  # HOME
+
+
+def test_axes_stay_while_the_tool_leaves_the_part(tmp_path):
+    """All is cut at one height, so that the retract begins at the height of the highest cut."""
+    example = ROOT / "examples" / "external" / "long_part.nc"
+    on_rail = load_cell(ROOT / "examples" / "external" / "robot_on_rail.toml")
+    for file, cell in ((passes(tmp_path), rail_cell()), (example, on_rail)):
+        targets = set_targets(read_gcode(file, cell), cell)
+        z, e1 = targets.position_mm[1:-2, 2], targets.external[1:-2, 0]
+        leaves = np.flatnonzero((z[:-1] < 0.0) & (z[1:] > 0.0))
+        assert len(leaves)
+        assert np.abs(e1[leaves + 1] - e1[leaves]).max() < 5.0
 
 
 def test_joints_and_deflection_along_a_moving_rail(tmp_path):

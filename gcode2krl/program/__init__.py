@@ -1,10 +1,10 @@
 """Toolpath to Targets: what the KRL program will say."""
 
-from gcode2krl.program.between import between
 from gcode2krl.program.blending import asked_tolerance
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
 from gcode2krl.program.following import following_deg
+from gcode2krl.program.long_moves import between
 from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.places import Range

@@ -25,7 +25,7 @@ from gcode2krl.program.places import (
 BendingHere = Callable[[Ints, Floats], Floats]
 """Rows (r,) of the targets and E1 to E6 (6,) to how far the arm bends (r,), in the branch of the program."""
 
-_NEARLY = 0.7
+_NEARLY = 0.5
 """Share of the quality on the track with which the corridor is content."""
 _SOFTER = 0.1
 """In the corridor the arm bends at most by so much more than at the stiffest place of a row."""

@@ -32,11 +32,18 @@ class Between:
         return np.asarray(np.where(share > 0.0, first + share * (after - first), first))
 
     def directions(self, values: Floats) -> Floats:
-        """Return unit vectors or quaternions (d, k) of the points, those (p, k) of the targets as `of`."""
+        """Return unit vectors (d, k) of the points, those (p, k) of the targets as `of`."""
         found = self.of(values)
         if found.strides[0] == 0 or len(found) == len(values):
             return found
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12))
+
+    def rotations(self, values: Floats) -> Floats:
+        """Return the quaternions (d, 4) of the points, those (p, 4) of the targets as `of`."""
+        if values.strides[0] != 0:
+            turns_over = np.einsum("ij,ij->i", values[1:], values[:-1]) < 0.0
+            values = values * np.where(np.cumsum(np.append(False, turns_over)) % 2, -1.0, 1.0)[:, None]
+        return self.directions(values)
 
 
 def between(position_mm: Floats, joined: Bools) -> Between:
