@@ -26,6 +26,7 @@ TABLE = {
     "machine_def": 2,
 }
 ON_TABLE = {**BASE, "x_mm": -50.0, "z_mm": 100.0}
+TABLE_MACHINE = {"kind": "table-table", "axes": ["A", "C"], "signs": [-1, -1], "tcpm": True}
 HEAD = ["G21 G90 G17", "T1 M6", "S8000 M3", "G0 X0 Y0 Z20", "G43 H1 Z20"]
 
 
@@ -51,6 +52,18 @@ def passes(folder):
         for line in (f"G0 X0 Y{y}", "G0 Z5", "G1 Z-1 F500", "G1 X100 F1500", f"G1 Y{y + 300}", "G0 Z20")
     ]
     return written(folder, lines)
+
+
+def cone(folder):
+    """A cone around Z on a table machine, three quarters of a turn."""
+    lines = ["G0 X60 Y0 Z40 A0 C0", "G43.4 H1"]
+    lines += [
+        f"G1 X{60 * np.cos(a):.4f} Y{60 * np.sin(a):.4f} Z5 A-20 C{-np.degrees(a) - 90:.4f} F2000"
+        for a in np.linspace(0.0, 1.5 * np.pi, 60)
+    ]
+    file = folder / "cone.nc"
+    file.write_text("\n".join([*HEAD[:3], *lines, "G49", "G0 Z60", "M30"]) + "\n")
+    return file
 
 
 def six(matrix):
@@ -263,15 +276,7 @@ def test_axes_that_no_base_can_express_are_refused(axes, key):
 
 def test_a_table_that_follows_turns_with_the_tool_and_the_arm_does_not(tmp_path):
     """A cone around Z on a table machine: with the table following, A1 and A6 hardly turn."""
-    lines = ["G21 G90 G17", "T1 M6", "S8000 M3", "G0 X60 Y0 Z40 A0 C0", "G43.4 H1"]
-    lines += [
-        f"G1 X{60 * np.cos(a):.4f} Y{60 * np.sin(a):.4f} Z5 A-20 C{-np.degrees(a) - 90:.4f} F2000"
-        for a in np.linspace(0.0, 1.5 * np.pi, 60)
-    ]
-    part = tmp_path / "cone.nc"
-    part.write_text("\n".join([*lines, "G49", "G0 Z60", "M30"]) + "\n")
-    machine = {"kind": "table-table", "axes": ["A", "C"], "signs": [-1, -1], "tcpm": True}
-    more = {"machine": machine, "frames": {"base": {**ON_TABLE, "x_mm": 0.0}}}
+    part, more = cone(tmp_path), {"machine": TABLE_MACHINE, "frames": {"base": {**ON_TABLE, "x_mm": 0.0}}}
     turned = {}
     for name, follows in (("follows", {"follows": "tool"}), ("stays", {"position": 0.0})):
         cell = over_demonstration({"external": {"E2": {**TABLE, **follows}}, **more})

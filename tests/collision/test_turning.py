@@ -11,7 +11,7 @@ from gcode2krl.collision.gaps import obstacle_gaps, placed
 from gcode2krl.collision.surroundings import pairs_of, surroundings_of
 from gcode2krl.collision.turning import Turning
 from tests.test_clearance import cell_with
-from tests.test_external_axes import BASE, ON_TABLE, RAIL, TABLE
+from tests.test_external_axes import BASE, ON_TABLE, RAIL, TABLE, TABLE_MACHINE, cone
 
 TILT = {**TABLE, "kind": "tilt", "axis": "y", "limits": [-120.0, 120.0]}
 ON_TILT = {**TABLE, "origin": {**BASE, "x_mm": 40.0, "z_mm": 60.0}}
@@ -90,24 +90,12 @@ def gap_standing(cell, parts, pairs, bodies, names, q_rad, external):
     return least
 
 
-def cone(folder):
-    lines = ["G21 G90 G17", "T1 M6", "S8000 M3", "G0 X60 Y0 Z40 A0 C0", "G43.4 H1"]
-    lines += [
-        f"G1 X{60 * np.cos(a):.4f} Y{60 * np.sin(a):.4f} Z5 A-20 C{-np.degrees(a) - 90:.4f} F2000"
-        for a in np.linspace(0.0, 1.5 * np.pi, 60)
-    ]
-    part = folder / "cone.nc"
-    part.write_text("\n".join([*lines, "G49", "G0 Z60", "M30"]) + "\n")
-    return part
-
-
 @pytest.mark.parametrize(("low", "lines"), [([-15.0, 64, 15], True), ([-15.0, -150, 15], False)])
 def test_a_clamp_on_a_table_that_follows_is_hit_at_its_line(low, lines, tmp_path):
     """Beside the circle at 90 degrees, which is its 20th chord; the other where the tool never comes."""
-    machine = {"kind": "table-table", "axes": ["A", "C"], "signs": [-1, -1], "tcpm": True}
     clamp = {"name": "clamp", "box_mm": [low, [low[0] + 30.0, low[1] + 20.0, 60.0]]}
     external, frames = {"E2": {**TABLE, "follows": "tool"}}, {"base": {**ON_TABLE, "x_mm": 0.0}}
-    cell = cell_with(clamp, external=external, machine=machine, frames=frames)
+    cell = cell_with(clamp, external=external, machine=TABLE_MACHINE, frames=frames)
     prediction = predict(cone(tmp_path), cell, forces=False)
     assert np.ptp(prediction.motion.external[:, 1]) > 200.0
     hits = {
