@@ -49,6 +49,11 @@ class Range:
     low: float
     high: float
 
+    @property
+    def share(self) -> float:
+        """Return the share of the range that a millimetre or degree is, 0 where there is no range."""
+        return 1.0 / (self.high - self.low) if self.high > self.low else 0.0
+
     def places(self, steps: int) -> Floats:
         """Return places evenly over the range."""
         step = (self.high - self.low) / max(steps - 1, 1)
@@ -113,8 +118,7 @@ def cost_of_ways(leaves: Floats, enters: Floats, ranges: list[Range]) -> Floats:
     """Return what the ways cost (e, l) to places from places."""
     far = np.zeros((len(enters), len(leaves)))
     for axis in ranges:
-        way = np.abs(enters[:, axis.column, None] - leaves[None, :, axis.column])
-        far += way / (axis.high - axis.low)
+        far += axis.share * np.abs(enters[:, axis.column, None] - leaves[None, :, axis.column])
     return _MOVES * far
 
 

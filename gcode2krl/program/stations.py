@@ -77,7 +77,7 @@ def _best(worst: Floats, bent: Floats, places: Floats, ranges: list[Range], star
     """Return the place of the best quality; of those that are good, the stiffest; of those, the nearest."""
     far = np.zeros(len(places))
     for axis in ranges:
-        far += np.abs(places[:, axis.column] - start[axis.column]) / (axis.high - axis.low)
+        far += axis.share * np.abs(places[:, axis.column] - start[axis.column])
     quality = np.minimum(np.round(worst, 2), GOOD)
     candidates = np.flatnonzero(quality == quality.max())
     stiff = candidates[bent[candidates] <= (1.0 + AS_STIFF) * bent[candidates].min()]

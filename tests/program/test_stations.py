@@ -46,6 +46,14 @@ def test_one_station_where_one_is_enough():
     assert abs(external[0] - 450.0) < 500.0
 
 
+def test_an_axis_without_room_stays():
+    with np.errstate(all="raise"):
+        external, _ = planned(np.linspace(0.0, 900.0, 20), [True] + [False] * 19, 300.0, 300.0, start=300.0)
+        along, _ = planned(np.linspace(0.0, 5000.0, 20), [True] + [False] * 19, 300.0, 300.0, start=300.0)
+    assert (external == 300.0).all()
+    assert (along == 300.0).all()
+
+
 def test_of_good_places_the_nearest_to_where_the_rail_is():
     external, _ = planned(np.full(20, 400.0), [True] + [False] * 19, start=900.0)
     assert abs(external[0] - 900.0) < 250.0
