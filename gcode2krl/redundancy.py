@@ -153,7 +153,7 @@ def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     found = program.plan_stations(poses.position_mm, is_free, quality, ranges, start, stiff)
     if followed.any():
         found = np.round(found + followed, 3)
-    found = found if is_one(found) else found[is_target]
+    found = np.broadcast_to(found[0], (len(rows), 6)) if is_one(found) else found[is_target]
     homes = np.flatnonzero(targets.home)
     stated = [(k, cell.external[n].home) for k, n in enumerate(EXTERNAL_NAMES) if n in cell.external]
     if is_one(found) and all(value is None or value == found[0, k] for k, value in stated):

@@ -124,6 +124,15 @@ def test_a_part_longer_than_the_arm_needs_the_rail(tmp_path):
     assert e1[0] == e1[-1] == 0.0  # HOME
 
 
+def test_one_place_for_long_moves_and_another_at_home(tmp_path):
+    cell = rail_cell(frames={"base": {**BASE, "y_mm": 2500.0}})
+    part = written(tmp_path, ["G0 Z5", "G1 Z-1 F500", "G1 Y900 F3000", "G1 Y0", "G0 Z20"])
+    e1 = set_targets(read_gcode(part, cell), cell).external[:, 0]
+    assert e1[0] == e1[-1] == 0.0
+    assert np.ptp(e1[1:-1]) == 0.0
+    assert e1[1] > 1000.0
+
+
 def test_axes_stay_while_the_tool_leaves_the_part(tmp_path):
     """All is cut at one height, so that the retract begins at the height of the highest cut."""
     example = ROOT / "examples" / "external" / "long_part.nc"
