@@ -148,6 +148,8 @@ def _seen_along(
     q_rad, qd_rad_s = angles if follower is not None else (None, None)
     kept = Kept(gathered.table(), q_rad, qd_rad_s, clearance) if keeps else None
     contacts = guard.watch.issues() if guard is not None else ()
+    if share is not None:
+        share[moves_watched_at_targets(targets)] = 0.0  # a PTP keeps to the joint speeds by itself
     return _Seen(share[chain.move] if share is not None else None, acceleration, watch, contacts, kept)
 
 

@@ -143,6 +143,15 @@ def test_a_joint_too_slow_for_the_feed_slows_the_robot_down(tmp_path):
     assert "s more" in found.message
 
 
+def test_a_way_to_home_within_the_program_slows_nothing_down(cell):
+    """At HOME the wrist is stretched: on a straight line through it A4 would turn at once."""
+    part = "G0 X0 Y{0} Z50\nG1 Z20 F1000\nG1 X50\nG0 Z50\n"
+    text = f"G21 T1 M6\nS9000 M3\nG43 H1\n{part.format(-400)}G28 Z0\nG28 X0 Y0\n{part.format(400)}M30\n"
+    motion = plan_motion(set_targets(_toolpath(text, cell), cell), cell)
+    assert "joint-speed" not in [issue.code for issue in motion.issues]
+    assert motion.time_s[-1] < 30.0
+
+
 def test_what_costs_time_is_said_with_line_and_seconds(cell):
     short = "".join(f"X{k * 0.4:.2f} Y{(k % 2) * 0.05:.2f}\n" for k in range(1, 300))
     text = f"G21 T1 M6\nS9000 M3\nG0 G43 H1 Z50\nX0 Y0\nG1 Z0 F600\nF4500\n{short}G4 P3\nG0 Z50\nM30\n"
