@@ -37,24 +37,26 @@ class Poses(NamedTuple):
         return Poses(self.position_mm[rows], self.rotation[rows], self.tool[rows])
 
 
-def quality_at(poses: Poses, external: Floats, cell: Cell) -> Floats:
+def quality_at(poses: Poses, external: Floats, cell: Cell, *, table_follows: bool) -> Floats:
     """Return the quality (r, 8) of poses with the external axes at (r, 6), in the best turn."""
-    there, position, turned = _turned_at(poses, external, cell)
+    there, position, turned = _turned_at(poses, external, cell, table_follows)
     at, tool = None if is_one(external) else external, poses.tool
     best: Floats = np.max([quality_of(position, each, tool, there, at) for each in turned], axis=0)
     return best
 
 
-def bending_at(poses: Poses, external: Floats, cell: Cell) -> Floats:
+def bending_at(poses: Poses, external: Floats, cell: Cell, *, table_follows: bool) -> Floats:
     """Return how far each branch (r, 8) bends with the external axes at (r, 6), in the stiffest turn."""
-    there, position, turned = _turned_at(poses, external, cell)
+    there, position, turned = _turned_at(poses, external, cell, table_follows)
     tool = poses.tool
     axes = ((each, fr.rotation_from_quaternion(each)[:, :, 2]) for each in turned)
     stiffest: Floats = np.fmin.reduce([bending_mm(position, each, axis, tool, there) for each, axis in axes])
     return stiffest
 
 
-def _turned_at(poses: Poses, external: Floats, cell: Cell) -> tuple[Cell, Floats, Iterator[Floats]]:
+def _turned_at(
+    poses: Poses, external: Floats, cell: Cell, table_follows: bool
+) -> tuple[Cell, Floats, Iterator[Floats]]:
     """Return the cell with external axes at (r, 6), positions (r, 3) in it, and the orientations to try."""
     position, rotation = poses.position_mm, poses.rotation
     if is_one(external):
@@ -63,7 +65,7 @@ def _turned_at(poses: Poses, external: Floats, cell: Cell) -> tuple[Cell, Floats
         there = cell
         position, rotation = at_rest(position, rotation, external, cell)
     spin = cell.frames.spin
-    if not isinstance(spin, str) and not is_following(external, cell):
+    if not isinstance(spin, str) and not table_follows:
         return there, position, iter([rotation])
     axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
     tried = _TRIED_SPINS if isinstance(spin, str) else np.array([spin * RAD_PER_DEG])
@@ -100,11 +102,6 @@ def bending_mm(position: Floats, rotation: Floats, axis: Floats, tool: Ints32, c
             square += np.einsum("ij,ij->i", bent_mm, bent_mm)
         result[rows] = np.sqrt(square / 2.0).reshape(-1, 8)
     return result
-
-
-def is_following(external: Floats, cell: Cell) -> bool:
-    """Tell whether a table follows the tool, with E1 to E6 at (r, 6)."""
-    return not is_one(external) and any(axis.follows is not None for axis in cell.external.values())
 
 
 def is_one(external: Floats) -> bool:

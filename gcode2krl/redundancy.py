@@ -7,20 +7,18 @@ import numpy as np
 
 from gcode2krl import compliance, program, robot
 from gcode2krl import frames as fr
-from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
-from gcode2krl.cell.carried import from_rest, points_moved, standing, to_rest, vectors_turned
+from gcode2krl.cell.carried import from_rest, points_moved, standing, to_rest
 from gcode2krl.cell.sections.external import EXTERNAL_NAMES
-from gcode2krl.errors import Issue, NotUnderstoodError
-from gcode2krl.posture import Poses, bending_at, bending_mm, is_following, is_one, quality_at, quality_of
+from gcode2krl.errors import Issue
+from gcode2krl.posture import Poses, bending_at, is_one, quality_at
 from gcode2krl.tables import Targets, Toolpath
-from gcode2krl.units import RAD_PER_DEG
+from gcode2krl.turns import seen_at_rest, spin_of
 
 _SAME_HEIGHT_MM = 1e-6
 _ROUNDING = 1e-3
 """The last decimal of an external axis in the program's text."""
-
-SpinOf = Callable[[Floats, Floats, Ints32], Floats | float]
 
 
 def posed_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None) -> Targets:
@@ -30,15 +28,16 @@ def posed_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None) ->
     """
     home = _home_pose(cell)
     if not cell.external:
-        return program.plan_targets(toolpath, cell, home, _spin_of(cell), tolerance_mm)
+        return program.plan_targets(toolpath, cell, home, spin_of(cell), tolerance_mm)
     searched = isinstance(cell.frames.spin, str)
-    untouched: SpinOf = (lambda *_: 0.0) if searched else _spin_of(cell)
+    untouched: program.SpinOf = (lambda *_: 0.0) if searched else spin_of(cell)
     planned = program.plan_targets(toolpath, cell, home, untouched, tolerance_mm)
-    external = _stations(planned, toolpath, cell)
+    followed = _followed(planned, cell)
+    external = _stations(planned, toolpath, followed, cell)
     stops = _stops(external, _free_motions(planned, toolpath))
     planned = replace(
         planned,
-        rotation=_rotations(planned, external, cell),
+        rotation=_rotations(planned, external, cell, table_follows=bool(followed.any())),
         external=external,
         cdis_mm=np.where(stops, 0.0, planned.cdis_mm),
         issues=(
@@ -51,26 +50,23 @@ def posed_targets(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None) ->
     return _with_home(planned, cell)
 
 
-def _rotations(targets: Targets, external: Floats, cell: Cell) -> Floats:
+def _rotations(targets: Targets, external: Floats, cell: Cell, *, table_follows: bool) -> Floats:
     """Return the quaternions (p, 4) of targets whose external axes are at (p, 6).
 
     Where they move and the turn about the tool axis is searched, or a table follows the tool, the turn is
     that which the robot sees, with the external axes at rest; else it is that in ``$BASE``.
     """
-    rows = np.flatnonzero(~targets.home)
-    position, rotation, tool = targets.position_mm[rows], targets.rotation[rows], targets.tool[rows]
-    at, searched = external[rows], isinstance(cell.frames.spin, str)
-    if not searched and not is_following(at, cell):
+    if not isinstance(cell.frames.spin, str) and not table_follows:
         return targets.rotation
-    axis = fr.rotation_from_quaternion(rotation)[:, :, 2]
+    rows = np.flatnonzero(~targets.home)
+    position, at, tool = targets.position_mm[rows], external[rows], targets.tool[rows]
+    axis = fr.rotation_from_quaternion(targets.rotation[rows])[:, :, 2]
+    lines = program.straight(targets.ptp, targets.home, targets.tool)[rows]
     if is_one(at):
-        turned = program.tool_rotation(axis, _spin_of(standing(cell, at[0]))(position, axis, tool))
+        turned = program.tool_rotation(axis, spin_of(standing(cell, at[0]))(position, axis, tool, lines))
     else:
-        by = to_rest(at, cell)
-        seen, seen_axis = (
-            (position, axis) if by is None else (points_moved(position, by), vectors_turned(axis, by))
-        )
-        spin = _spin_of(cell, at)(seen, seen_axis, tool)
+        seen, seen_axis = seen_at_rest(position, axis, at, cell)
+        spin = spin_of(cell, at)(position, axis, tool, lines)
         turned = from_rest(seen, program.tool_rotation(seen_axis, spin), at, cell)[1]
     result = np.array(targets.rotation)
     result[rows] = turned
@@ -123,18 +119,23 @@ def _without_speed(external: Floats, cell: Cell) -> Iterator[Issue]:
             yield Issue("warning", "external-speed", 0, sentence, f"give [external.{name}] speed")
 
 
-def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
-    """Return E1 to E6 (p, 6) at targets, at HOME as stated, else as at its neighbour."""
-    rows = np.flatnonzero(~targets.home)
-    is_free = _free_motions(targets, toolpath)[rows]
-    points = program.between(targets.position_mm[rows], ~is_free)
+def _stations(targets: Targets, toolpath: Toolpath, followed: Floats, cell: Cell) -> Floats:
+    """Return E1 to E6 (p, 6) at targets, at HOME as stated, else as at its neighbour.
+
+    ``followed`` (p, 6) is how far they turn with the program.
+    """
+    rows, table_follows = np.flatnonzero(~targets.home), bool(followed.any())
+    is_free, followed = _free_motions(targets, toolpath)[rows], followed[rows]
+    lines = program.straight(targets.ptp, targets.home, targets.tool)[rows]
+    turned = _turned_with(targets.position_mm[rows], followed, cell) if table_follows else None
+    points = program.between(targets.position_mm[rows], lines & ~is_free, turned)
     is_target = points.share == 0.0
     poses = Poses(
         points.of(targets.position_mm[rows]),
         points.rotations(targets.rotation[rows]),
         targets.tool[rows][points.before],
     )
-    followed = points.of(_followed(targets, rows, cell))
+    followed = points.of(followed)
     ranges = [
         program.Range(column, *_room(cell.external[name].limits, followed[:, column]))
         for column, name in enumerate(EXTERNAL_NAMES)
@@ -142,16 +143,16 @@ def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     ]
 
     def quality(at: Ints, place: Floats) -> Floats:
-        return quality_at(poses.at(at), place + followed[at], cell)
+        return quality_at(poses.at(at), place + followed[at], cell, table_follows=table_follows)
 
     def bending(at: Ints, place: Floats) -> Floats:
-        return bending_at(poses.at(at), place + followed[at], cell)
+        return bending_at(poses.at(at), place + followed[at], cell, table_follows=table_follows)
 
     stiff = None if compliance.missing_stiffness(cell) else bending
     start = cell.external_rest()
     is_free = is_free[points.before] & is_target
-    found = program.plan_stations(poses.position_mm, is_free, quality, ranges, start, stiff)
-    if followed.any():
+    found = program.plan_stations(poses.position_mm, is_free, quality, ranges, start, stiff, is_target)
+    if table_follows:
         found = np.round(found + followed, 3)
     found = np.broadcast_to(found[0], (len(rows), 6)) if is_one(found) else found[is_target]
     homes = np.flatnonzero(targets.home)
@@ -167,9 +168,10 @@ def _stations(targets: Targets, toolpath: Toolpath, cell: Cell) -> Floats:
     return external
 
 
-def _followed(targets: Targets, rows: Ints, cell: Cell) -> Floats:
-    """Return how far E1 to E6 turn with the program (r, 6), from their places at its first row on."""
-    followed = np.broadcast_to(0.0, (len(rows), 6))
+def _followed(targets: Targets, cell: Cell) -> Floats:
+    """Return how far E1 to E6 turn with the program (p, 6), from their places at its first row on."""
+    followed = np.broadcast_to(0.0, (len(targets), 6))
+    rows = np.flatnonzero(~targets.home)
     for column, name in enumerate(EXTERNAL_NAMES):
         axis = cell.external.get(name)
         if axis is None or axis.follows is None:
@@ -177,8 +179,14 @@ def _followed(targets: Targets, rows: Ints, cell: Cell) -> Floats:
         tool_axis = fr.rotation_from_quaternion(targets.rotation[rows])[:, :, 2]
         in_base = cell.stated_base()[:3, :3].T @ axis.direction()
         followed = np.array(followed)
-        followed[:, column] = program.following_deg(tool_axis, in_base)
+        followed[rows, column] = program.following_deg(tool_axis, in_base)
     return followed
+
+
+def _turned_with(position_mm: Floats, followed: Floats, cell: Cell) -> Floats:
+    """Return positions (r, 3) as the robot sees them where the external axes turn by (r, 6)."""
+    by = to_rest(cell.external_rest() + followed, cell)
+    return position_mm if by is None else points_moved(position_mm, by)
 
 
 def _room(limits: tuple[float, float], followed: Floats) -> tuple[float, float]:
@@ -190,15 +198,17 @@ def _room(limits: tuple[float, float], followed: Floats) -> tuple[float, float]:
 def _free_motions(targets: Targets, toolpath: Toolpath) -> Bools:
     """Mark the motions (p,) during which external axes may move: PTP, and rapids above all that is cut.
 
-    A retract from the highest cut is none: the tool is still in the part.
+    No rapid is one that leaves a cut, level or upwards: the tool is still in the part. Where a feed motion
+    has led it up, it is not.
     """
     row = np.maximum(targets.move, 0)
     rapid = (targets.move < 0) | toolpath.rapid[row] | toolpath.machine[row]
     height = targets.position_mm[:, 2]
     cut = ~rapid & ~targets.ptp
     above = height >= (height[cut].max() if cut.any() else -np.inf) - _SAME_HEIGHT_MM
-    retract = np.roll(cut, 1) & (height > np.roll(height, 1) + _SAME_HEIGHT_MM)
-    free: Bools = targets.ptp | (rapid & above & np.roll(above, 1) & ~retract)
+    rises = height > np.roll(height, 1) + _SAME_HEIGHT_MM
+    leaves = np.roll(cut, 1) & (rises | ~np.roll(rises, 1))
+    free: Bools = targets.ptp | (rapid & above & np.roll(above, 1) & ~leaves)
     return free
 
 
@@ -217,39 +227,3 @@ def _home_pose(cell: Cell) -> Callable[[int], tuple[Floats, Floats]]:
         return position[0], rotation[0]
 
     return home_pose
-
-
-def _spin_of(cell: Cell, external: Floats | None = None) -> SpinOf:
-    """Return what chooses the turn about the tool axis at poses as the robot sees them, and between them.
-
-    ``external`` (n, 6) is where E1 to E6 are at these poses, at rest by default.
-    """
-    spin = cell.frames.spin
-    if not isinstance(spin, str):
-        return lambda position, axis, tool: float(spin) * RAD_PER_DEG
-    if spin == "stiffest":
-        missing = compliance.missing_stiffness(cell)
-        if missing is not None:
-            raise NotUnderstoodError(missing, source=cell.name)
-
-    def searched(position: Floats, axis: Floats, tool: Ints32) -> Floats | float:
-        points = program.between(position, np.diff(tool, prepend=tool[:1]) == 0)
-        position, axis, tool = points.of(position), points.directions(axis), tool[points.before]
-        at = None if external is None else points.of(external)
-
-        def quality(rows: Ints, spin_rad: float) -> Floats:
-            rotation, there = program.tool_rotation(axis[rows], spin_rad), None if at is None else at[rows]
-            return quality_of(position[rows], rotation, tool[rows], cell, there)
-
-        def bending(rows: Ints, spin_rad: float) -> Floats:
-            rotation = program.tool_rotation(axis[rows], spin_rad)
-            return bending_mm(position[rows], rotation, axis[rows], tool[rows], cell)
-
-        is_target = points.share == 0.0
-        if spin == "stiffest":
-            found = program.stiffest_spin(position, quality, bending, axis, is_target)
-        else:
-            found = program.smooth_spin(position, quality, axis, is_target)
-        return found if isinstance(found, float) else found[is_target]
-
-    return searched

@@ -145,6 +145,20 @@ def test_axes_stay_while_the_tool_leaves_the_part(tmp_path):
         assert np.abs(e1[leaves + 1] - e1[leaves]).max() < 5.0
 
 
+def test_axes_stay_while_the_tool_leaves_a_cut_at_its_height(tmp_path):
+    """The rapid at the height of the highest cut would be the first at which they may move."""
+    lines = [
+        line
+        for y in range(0, 8000, 1500)
+        for line in (f"G1 X0 Y{y} Z5 F5000", f"G1 Y{y + 300} F1500", f"G0 Y{y + 1500}", "G0 Z20")
+    ]
+    cell = rail_cell()
+    targets = set_targets(read_gcode(written(tmp_path, lines), cell), cell)
+    changed = np.flatnonzero(np.diff(targets.external[:, 0])[1:-1]) + 2
+    assert len(changed)
+    assert (targets.position_mm[changed, 2] >= 20.0 - 1e-6).all()
+
+
 def test_joints_and_deflection_along_a_moving_rail(tmp_path):
     cell = rail_cell()
     prediction = predict(long_cut(tmp_path), cell)
@@ -381,6 +395,19 @@ def test_a_post_that_the_rail_passes_turns_the_tool(tmp_path):
 
     assert hits(rail_cell(obstacle=[post]))
     assert hits(rail_cell(obstacle=[post], **searched)) == []
+
+
+def test_a_thin_post_beside_a_moving_rail_turns_the_tool(tmp_path):
+    """The rail moves with the tool, so that the arm sees the tool stand while the post passes by."""
+    part, searched = long_cut(tmp_path), {"frames": {"base": BASE, "spin": "auto"}}
+    for y in (3987.0, 4100.0):
+        post = {"name": "post", "frame": "base", "box_mm": [[-200.0, y - 3.0, 60], [-194, y + 3.0, 225]]}
+        for cell, hit in (
+            (rail_cell(obstacle=[post]), True),
+            (rail_cell(obstacle=[post], **searched), False),
+        ):
+            issues = predict(part, cell, forces=False).issues
+            assert hit is any(i.code == "collision" and " on the " not in i.message for i in issues)
 
 
 def test_what_the_arm_would_hit_with_the_rail_at_rest_does_not_turn_it(tmp_path):

@@ -4,7 +4,7 @@ from gcode2krl.program.blending import asked_tolerance
 from gcode2krl.program.checks import check_toolpath, require_geometry
 from gcode2krl.program.doubts import doubtful, feeds_per_tooth
 from gcode2krl.program.following import following_deg
-from gcode2krl.program.long_moves import between
+from gcode2krl.program.long_moves import between, straight
 from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.places import Range
@@ -19,11 +19,12 @@ from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.splines import with_stops
 from gcode2krl.program.stations import plan_stations
 from gcode2krl.program.table import below_table
-from gcode2krl.program.targets import plan_targets
+from gcode2krl.program.targets import SpinOf, plan_targets
 from gcode2krl.program.tilts import tilt_issues
 
 __all__ = [
     "Range",
+    "SpinOf",
     "approached_row",
     "asked_tolerance",
     "begun_at",
@@ -43,6 +44,7 @@ __all__ = [
     "smooth_spin",
     "state_words",
     "stiffest_spin",
+    "straight",
     "tilt_issues",
     "tool_rotation",
     "with_stops",

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints
 
 Quality = Callable[[Ints, Floats], Floats]
 """Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
 singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
 
 Bending = Callable[[Ints, Floats], Floats]
-"""Rows (r,) of the targets and E1 to E6 (6,) to how far each branch (r, 8) bends under a load, NaN where
+"""Rows (r,) of the targets and E1 to E6 (r, 6) to how far each branch (r, 8) bends under a load, NaN where
 impossible."""
 
 GOOD = 0.3
@@ -25,6 +25,8 @@ STEPS = 49
 REACHED = -0.99
 """Quality above which a place is reached, if only to hit something: that is a finding of its own."""
 _MOST_PLACES = 1000
+MOST_THAT_BEND = 100_000
+"""Rows at places whose bending is found, 5 to 50 us each."""
 AS_STIFF = 0.05
 """Places that bend by so much more than the stiffest one count as equally stiff."""
 _HITS_COST = 50.0
@@ -101,8 +103,21 @@ def cost_of_places(worst: Floats) -> Floats:
     return np.where(worst >= LEAST, 1.0 - np.minimum(worst, GOOD) / GOOD, poor)
 
 
+def bent_at(bending: Bending, branch: int, rows: Ints, places: Floats, wanted: Bools) -> Floats:
+    """Return how far rows (n,) bend at places (k, 6), where wanted (n, k) and possible; inf elsewhere."""
+    bent = np.full(wanted.shape, np.inf)
+    row, place = np.nonzero(wanted)
+    if len(row):
+        found = bending(rows[row], places[place])[:, branch]
+        bent[row, place] = np.where(np.isnan(found), np.inf, found)
+    return bent
+
+
 def cost_of_bending(bent: Floats) -> Floats:
-    """Return what it costs (n, k) to bend so far at places; the least costs nothing, inf is no place."""
+    """Return what it costs (n, k) to bend so far at places; the least of a row costs nothing.
+
+    Where it is not known (inf) this costs nothing either: what is out of reach costs as a place.
+    """
     least = np.min(bent, axis=1, keepdims=True)
     excess = np.where(np.isfinite(bent), bent, 0.0) / np.where(np.isfinite(least), least, 1.0) - 1.0
     return np.asarray(_BENDS * np.clip(excess, 0.0, 1.0))

@@ -37,7 +37,8 @@ def smooth_spin(
     ``quality(rows, spin)`` gives (len(rows), branches): the distance to the nearest limit or
     singularity, 1 = 30° and more, 0 = at it, negative = impossible. One branch serves the whole program.
     Where the tool axis (p, 3) is given, its outermost directions are judged too. Positions that are not
-    ``is_target`` (p,) are points between targets, which the first and the last position are.
+    ``is_target`` (p,) are points on straight moves between targets; the first and the last position are
+    targets. Where nothing is possible throughout, the angle is taken that is impossible at the fewest.
     """
     rows = _judged_rows(position_mm, axis, is_target)
     spins = _grid()
@@ -47,9 +48,13 @@ def smooth_spin(
     spins = np.round(spins, 12) + 0.0
     if worst[best] >= GOOD_ENOUGH or len(rows) < 3:
         return float(spins[best])
-    order = np.argsort(spins)
-    changing = _changing(_Judged(position_mm, rows, is_target), spins[order], table[order])
-    return float(spins[best]) if changing is None else changing
+    order, costs = np.argsort(spins), _costs(table)
+    changing = _changing(_Judged(position_mm, rows, is_target), spins[order], costs[order])
+    if changing is not None:
+        return changing
+    if worst[best] < 0.0:
+        best = int(np.argmin(np.round(costs.sum(axis=1).min(axis=1), 6)))
+    return float(spins[best])
 
 
 def stiffest_spin(
@@ -140,7 +145,7 @@ class _Judged:
             )
             if k in self._passed:
                 for point, share in zip(*self._passed[k], strict=True):
-                    spins = before + share * (here - before)
+                    spins = np.round(before + share * (here - before), 9)
                     beside = (np.floor(spins), np.ceil(spins))
                     through += np.maximum(*(cost[each.astype(np.int64), point] for each in beside))
             came_from[k] = np.argmin(through, axis=1)
@@ -152,14 +157,18 @@ class _Judged:
         return float(total.min()), track
 
 
-def _changing(judged: _Judged, spins: Floats, table: Floats) -> Floats | None:
+def _costs(table: Floats) -> Floats:
+    """Return what a quality (spins, n, branches) costs."""
+    return np.where(table > 0, 1.0 - np.minimum(table, 1.0), 1e3)
+
+
+def _changing(judged: _Judged, spins: Floats, costs: Floats) -> Floats | None:
     """Dynamic programming along the path, per branch; None where it is no better than a constant.
 
-    ``table`` (spins, n, branches) is the quality at rising angles ``spins``.
+    ``costs`` (spins, n, branches) are those at rising angles ``spins``.
     """
-    costs = np.where(table > 0, 1.0 - np.minimum(table, 1.0), 1e3)
     best_cost, best_track = np.inf, None
-    for branch in range(table.shape[2]):
+    for branch in range(costs.shape[2]):
         cost, track = judged.cheapest_track(costs[:, :, branch])
         if cost < best_cost:
             best_cost, best_track = cost, track

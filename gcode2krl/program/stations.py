@@ -12,15 +12,17 @@ import itertools
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.program.moving_along import moved_along
+from gcode2krl.program.moving_along import Along, ways_along
 from gcode2krl.program.places import (
     AS_STIFF,
     GOOD,
     LEAST,
+    MOST_THAT_BEND,
     REACHED,
     Bending,
     Quality,
     Range,
+    bent_at,
     cheapest_track,
     cost_of_bending,
     cost_of_moves,
@@ -46,8 +48,9 @@ def plan_stations(
     ranges: list[Range],
     start: Floats,
     bending: Bending | None = None,
+    is_target: Bools | None = None,
 ) -> Floats:
-    """Return E1 to E6 (p, 6) at targets, one row in memory where they stay.
+    """Return E1 to E6 (p, 6), one row in memory where they stay.
 
     Parameters
     ----------
@@ -56,8 +59,12 @@ def plan_stations(
     quality : of rows at a place.
     ranges : the axes that may be put somewhere else.
     start : (6,) where all axes are that may not, and that others are preferred to be near.
-    bending : of rows at a place; None where stiffness does not count.
+    bending : of rows at places; None where stiffness does not count.
+    is_target : (p,) False at points between two targets, at which an axis cannot change its way; the first
+        and the last row of a pass are targets.
     """
+    if is_target is None:
+        is_target = np.ones(len(position_mm), dtype=np.bool_)
     if not ranges:
         return np.broadcast_to(start, (len(position_mm), 6))
     places = tried_places(ranges, start)
@@ -65,41 +72,51 @@ def plan_stations(
     table = np.stack([quality(rows, place) for place in places])  # (places, rows, branches)
     worst = table.min(axis=1).max(axis=1)
     if worst.max() >= LEAST:
-        bent = _bent(bending, _spread(rows, position_mm, _ROWS_THAT_BEND), places, worst)
-        return np.broadcast_to(places[_best(worst, bent, places, ranges, start)], (len(position_mm), 6))
+        station = _station(worst, bending, rows, position_mm, places, ranges, start)
+        return np.broadcast_to(places[station], (len(position_mm), 6))
     passes = np.cumsum(is_free, dtype=np.int64)
     if len(places) * (int(passes[-1]) + 1) * _FEWEST_ROWS > _MOST_POSES:
         places = places[with_others_best(table, places, ranges)]
-    return _by_pass(position_mm, passes, quality, bending, places, ranges)
+    return _by_pass(position_mm, is_target, passes, quality, bending, places, ranges)
 
 
-def _best(worst: Floats, bent: Floats, places: Floats, ranges: list[Range], start: Floats) -> int:
+def _station(
+    worst: Floats,
+    bending: Bending | None,
+    rows: Ints,
+    position_mm: Floats,
+    places: Floats,
+    ranges: list[Range],
+    start: Floats,
+) -> int:
     """Return the place of the best quality; of those that are good, the stiffest; of those, the nearest."""
-    far = np.zeros(len(places))
-    for axis in ranges:
-        far += axis.share * np.abs(places[:, axis.column] - start[axis.column])
     quality = np.minimum(np.round(worst, 2), GOOD)
     candidates = np.flatnonzero(quality == quality.max())
-    stiff = candidates[bent[candidates] <= (1.0 + AS_STIFF) * bent[candidates].min()]
-    return int(stiff[np.lexsort((-worst[stiff], far[stiff]))[0]])
+    bent = np.ones(len(candidates))
+    if bending is not None and len(candidates) > 1:
+        most = int(np.clip(MOST_THAT_BEND // len(candidates), _FEWEST_ROWS, _ROWS_THAT_BEND))
+        bent = _bent(bending, _spread(rows, position_mm, most), places[candidates])
+    far = np.zeros(len(candidates))
+    for axis in ranges:
+        far += axis.share * np.abs(places[candidates, axis.column] - start[axis.column])
+    as_stiff = bent <= (1.0 + AS_STIFF) * bent.min()
+    order = np.lexsort((-worst[candidates], far, ~as_stiff))
+    return int(candidates[order[0]])
 
 
-def _bent(bending: Bending | None, rows: Ints, places: Floats, worst: Floats) -> Floats:
-    """Return how far the robot bends (k,) at good places, in root mean square over rows; else 1 for all.
+def _bent(bending: Bending, rows: Ints, places: Floats) -> Floats:
+    """Return how far the robot bends at places (k,), in root mean square over rows.
 
-    ``worst`` (k,) is the quality of the places. Of the branches the stiffest counts that reaches all rows.
+    Of the branches the stiffest counts that reaches all rows; inf where none does.
     """
-    bent = np.ones(len(places))
-    if bending is None or len(places) == 1:
-        return bent
-    for place in np.flatnonzero(worst >= min(GOOD, float(worst.max()))).tolist():
-        square = np.mean(bending(rows, places[place]) ** 2, axis=0)
-        bent[place] = np.sqrt(np.nanmin(square)) if np.isfinite(square).any() else np.inf
-    return bent
+    each = bending(np.tile(rows, len(places)), np.repeat(places, len(rows), axis=0))
+    square = np.mean(each.reshape(len(places), len(rows), -1) ** 2, axis=1)  # (places, branches)
+    return np.asarray(np.sqrt(np.min(np.where(np.isnan(square), np.inf, square), axis=1)))
 
 
 def _by_pass(
     position_mm: Floats,
+    is_target: Bools,
     passes: Ints,
     quality: Quality,
     bending: Bending | None,
@@ -110,23 +127,24 @@ def _by_pass(
     borders = np.flatnonzero(np.diff(passes, prepend=-1, append=passes[-1] + 1))
     runs = [np.arange(a, b) for a, b in itertools.pairwise(borders)]
     most = int(np.clip(_MOST_POSES // (len(places) * len(runs)), _FEWEST_ROWS, _ROWS_A_PASS))
-    judged = [_spread(run, position_mm, most) for run in runs]
+    judged = [_judged(run, position_mm, is_target, most) for run in runs]
     rows = np.concatenate(judged)
     table = np.stack([quality(rows, place) for place in places])
     ends = np.cumsum([0, *map(len, judged)])
     worst = np.stack([table[:, a:b].min(axis=1) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
     branch = _branch(worst, table, ends)
+    own = worst[:, :, branch]
+    has_station = own.max(axis=1) > REACHED
+    moving = np.flatnonzero(~has_station).tolist()
+    along = [Along(runs[k], judged[k], table[:, ends[k] : ends[k + 1], branch]) for k in moving]
     external = np.empty((len(position_mm), 6))
-    has_station = worst[:, :, branch].max(axis=1) > REACHED
-    here = None if bending is None else lambda rows, place: bending(rows, place)[:, branch]
-    for number in np.flatnonzero(~has_station).tolist():
-        run, own = runs[number], table[:, ends[number] : ends[number + 1], branch]
-        external[run] = moved_along(position_mm, run, judged[number], own, here, places, ranges)
+    moved = ways_along(position_mm, is_target, along, bending, branch, places, ranges)
+    for each, moves in zip(along, moved, strict=True):
+        external[each.run] = moves
     ways = [
         None if known else (external[run[0]], external[run[-1]])
         for known, run in zip(has_station, runs, strict=True)
     ]
-    own = worst[:, :, branch]
     cost = cost_of_places(own)
     if bending is not None:
         cost = cost + cost_of_bending(_bent_in_passes(bending, judged, branch, own, places))
@@ -165,13 +183,27 @@ def _track(
 def _bent_in_passes(
     bending: Bending, judged: list[Ints], branch: int, worst: Floats, places: Floats
 ) -> Floats:
-    """Return how far passes bend (n, k) at places of the quality (n, k), inf where that is too poor."""
-    bent = np.full(worst.shape, np.inf)
-    rows = [run[np.linspace(0, len(run) - 1, _ROWS_A_PASS_THAT_BEND).astype(np.int64)] for run in judged]
-    for place in np.flatnonzero((worst >= LEAST).any(axis=0)).tolist():
-        each = bending(np.concatenate(rows), places[place])[:, branch].reshape(len(rows), -1)
-        bent[:, place] = np.sqrt(np.mean(each**2, axis=1))
-    return np.where((worst >= LEAST) & np.isfinite(bent), bent, np.inf)
+    """Return how far passes bend (n, k) at places of the quality (n, k), inf where that is too poor.
+
+    With very many passes and places it is inf throughout: stiffness does not count then.
+    """
+    wanted = worst >= LEAST
+    rows = min(MOST_THAT_BEND // max(int(wanted.sum()), 1), _ROWS_A_PASS_THAT_BEND)
+    square = np.full(worst.shape, np.inf if rows == 0 else 0.0)
+    for share in np.linspace(0.0, 1.0, rows) if rows > 1 else np.full(rows, 0.5):
+        row = np.array([run[int(share * (len(run) - 1))] for run in judged])
+        square += bent_at(bending, branch, row, places, wanted) ** 2 / rows
+    return np.asarray(np.sqrt(square))
+
+
+def _judged(run: Ints, position_mm: Floats, is_target: Bools, most: int) -> Ints:
+    """Return at most so many rows of a pass: half of them targets, at which an axis may change its way."""
+    targets = run[is_target[run]]
+    if len(run) <= most or len(targets) == len(run):
+        return _spread(run, position_mm, most)
+    chosen = _spread(targets, position_mm, max(most // 2, 2))
+    others = _spread(run[~is_target[run]], position_mm, max(most - len(chosen), 1))
+    return np.union1d(chosen, others)
 
 
 def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:

@@ -21,12 +21,13 @@ from gcode2krl.compiled.threads import in_threads
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
+from gcode2krl.program.long_moves import straight
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M
 
 HomePose = Callable[[int], tuple[Floats, Floats]]
-SpinOf = Callable[[Floats, Floats, Ints32], Floats | float]
+SpinOf = Callable[[Floats, Floats, Ints32, Bools], Floats | float]
 GRID_MM = 1e-3
 """Decimals of the KRL text: rows that print as the same point are one target."""
 
@@ -44,7 +45,8 @@ def plan_targets(
     Parameters
     ----------
     home_pose : tool number → tip position (3,) in mm and quaternion (4,) of HOME in ``$BASE``.
-    spin_of : positions (p, 3), axes (p, 3), tools (p,) → spin about the axis in rad, a number or (p,).
+    spin_of : positions (p, 3), axes (p, 3), tools (p,), and to which of them straight lines lead (p,) → spin
+        about the axis in rad, a number or (p,).
     tolerance_mm : blend tolerance; below ``G64 P``, above the cell's own.
 
     Raises
@@ -291,7 +293,8 @@ class _Plan:
     ) -> Floats:
         planned = _as_slice(kind != _HOME)
         axis = _rows(axis, planned)
-        spin = spin_of(position[planned], axis, tool[planned])
+        lines = straight(kind != _LIN, kind == _HOME, tool)
+        spin = spin_of(position[planned], axis, tool[planned], lines[planned])
         rotation = np.empty((len(position), 4))
         turned = tool_rotation(axis, spin)
         if isinstance(planned, slice):

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.program import between, smooth_spin, tool_rotation
+from gcode2krl.program import between, smooth_spin, straight, tool_rotation
 
 angles = st.floats(-2 * np.pi, 2 * np.pi)
 components = st.floats(-1, 1)
@@ -152,6 +152,41 @@ def test_a_long_move_has_points_between_its_targets():
     axis = points.directions(np.array([[0.0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]]))
     assert np.linalg.norm(axis, axis=1) == pytest.approx(1.0)
     assert len(between(position[:1], np.ones(1, dtype=bool)).of(position[:1])) == 1
+
+
+def test_short_moves_leave_no_fewer_points_to_long_ones():
+    short = np.column_stack([np.linspace(0, 400_000, 40_001), np.zeros(40_001), np.zeros(40_001)])
+    position = np.vstack([short, short[-1] + [0.0, 400.0, 0.0]])
+    assert len(between(position, np.ones(len(position), dtype=bool)).before) == len(position) + 7
+
+
+def test_what_the_robot_does_not_see_move_has_points_all_the_same():
+    """A rail goes along with the tool; then a table turns below it."""
+    position = np.array([[0.0, 0, 0], [0, 400, 0], [0, 400, 0]])
+    seen = np.array([[0.0, 0, 0], [0, 0, 0], [200, 0, 0]])
+    before = between(position, np.ones(3, dtype=bool), seen).before
+    assert np.bincount(before).tolist() == [8, 4, 1]
+
+
+def test_opposite_axes_have_no_direction_between():
+    points = between(np.array([[0.0, 0, 0], [0, 0, 200]]), np.ones(2, dtype=bool))
+    with np.errstate(all="raise"):
+        axis = points.directions(np.array([UP, -UP]))
+    assert np.linalg.norm(axis, axis=1) == pytest.approx(1.0)
+
+
+def test_no_line_leads_through_home_or_to_another_tool():
+    ptp = np.array([True, False, False, True, True, False, False])
+    home = np.array([True, False, False, True, False, False, False])
+    tool = np.array([1, 1, 1, 1, 1, 1, 2])
+    assert straight(ptp, home, tool).tolist() == [False, False, True, False, False, True, False]
+
+
+def test_a_point_out_of_reach_does_not_make_the_others_worse():
+    """No angle is possible in the last row: that which is good in all the others is taken."""
+    good = around(lambda rows: np.full(len(rows), np.radians(100.0)), np.radians(30))
+    spin = smooth_spin(PATH, lambda rows, spin: np.where(rows[:, None] == 200, -1.0, good(rows, spin)))
+    assert np.abs(np.degrees(spin) - 100.0).max() <= 15.0
 
 
 def test_a_single_position():
