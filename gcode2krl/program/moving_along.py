@@ -44,7 +44,7 @@ class Along(NamedTuple):
     judged: Ints
     """Those of them (n,) that are judged."""
     quality: Floats
-    """(k, n) of the judged rows at the places, in the branch of the program."""
+    """(n, k) of the judged rows at the places, in the branch of the program."""
 
 
 def ways_along(
@@ -66,7 +66,7 @@ def ways_along(
     rows = MOST_THAT_BEND // max(sum(map(len, helped)), 1)
     ways = []
     for each, own in zip(passes, helped, strict=True):
-        quality = each.quality[own].T
+        quality = each.quality[:, own]
         bent = np.full(quality.shape, np.inf)
         if bending is not None and rows >= _FEWEST_THAT_BEND:
             few = np.unique(np.linspace(0, len(quality) - 1, min(rows, len(quality))).astype(np.int64))

@@ -9,8 +9,8 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 
 Quality = Callable[[Ints, Floats], Floats]
-"""Rows (r,) of the targets and E1 to E6 (6,) to the quality (r, 8) of each branch there: 1 = far from limits,
-singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
+"""Rows (r,) of the targets and E1 to E6 (r, 6) to the quality (r, 8) of each branch there: 1 = far from
+limits, singularities and obstacles, 0 = at one, below 0 = hits something, -1 = impossible."""
 
 Bending = Callable[[Ints, Floats], Floats]
 """Rows (r,) of the targets and E1 to E6 (r, 6) to how far each branch (r, 8) bends under a load, NaN where
@@ -25,6 +25,8 @@ STEPS = 49
 REACHED = -0.99
 """Quality above which a place is reached, if only to hit something: that is a finding of its own."""
 _MOST_PLACES = 1000
+_AT_ONCE = 20_000
+"""Rows at places that are judged in one call."""
 MOST_THAT_BEND = 100_000
 """Rows at places whose bending is found, 5 to 50 us each."""
 AS_STIFF = 0.05
@@ -83,7 +85,7 @@ def widest(ranges: list[Range]) -> Range:
 def with_others_best(table: Floats, places: Floats, ranges: list[Range]) -> Ints:
     """Return the places at which all axes but the widest are where the most rows can be reached.
 
-    ``table`` (places, rows, branches) is the quality of rows.
+    ``table`` (rows, places, branches) is the quality of rows.
     """
     others = [axis.column for axis in ranges if axis is not widest(ranges)]
     choices = np.unique(places[:, others], axis=0) if others else np.zeros((1, 0))
@@ -92,9 +94,20 @@ def with_others_best(table: Floats, places: Floats, ranges: list[Range]) -> Ints
         return np.flatnonzero((places[:, others] == choice).all(axis=1))
 
     def reached(rows: Ints) -> int:
-        return int((table[rows].max(axis=0) >= LEAST).sum(axis=0).max())
+        return int((table[:, rows].max(axis=1) >= LEAST).sum(axis=0).max())
 
     return max((of(choice) for choice in choices), key=reached)
+
+
+def quality_table(quality: Quality, rows: Ints, places: Floats) -> Floats:
+    """Return the quality (n, k, branches) of rows (n,) at places (k, 6)."""
+    step = max(1, _AT_ONCE // max(len(rows), 1))
+    parts = [
+        quality(np.tile(rows, len(some)), np.repeat(some, len(rows), axis=0))
+        for some in (places[first : first + step] for first in range(0, len(places), step))
+    ]
+    table = np.concatenate(parts)
+    return np.asarray(np.moveaxis(table.reshape(len(places), len(rows), -1), 1, 0))
 
 
 def cost_of_places(worst: Floats) -> Floats:

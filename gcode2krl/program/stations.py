@@ -12,9 +12,10 @@ import itertools
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.program.judged import of_pass, spread
 from gcode2krl.program.moving_along import Along, ways_along
+from gcode2krl.program.one_place import best_place
 from gcode2krl.program.places import (
-    AS_STIFF,
     GOOD,
     LEAST,
     MOST_THAT_BEND,
@@ -27,16 +28,16 @@ from gcode2krl.program.places import (
     cost_of_bending,
     cost_of_moves,
     cost_of_places,
+    quality_table,
     tried_places,
     with_others_best,
 )
 
-_MOST_ROWS, _FEWEST_ROWS = 300, 3
-_ROWS_A_PASS = 24
+_FEWEST_ROWS, _ROWS_A_PASS, _ROWS_OF_ALL = 3, 24, 60
 _MOST_POSES = 500_000
 """Poses that are judged for passes, some 20 us each; with more passes fewer rows of each are judged, and all
 axes but the widest stay."""
-_ROWS_THAT_BEND, _ROWS_A_PASS_THAT_BEND = 24, 3
+_ROWS_A_PASS_THAT_BEND = 3
 _DECIMALS = 3
 """Those of the program's text."""
 
@@ -56,7 +57,7 @@ def plan_stations(
     ----------
     position_mm : (p, 3)
     is_free : (p,) True where the motion to the target is on the clearance plane, or a PTP.
-    quality : of rows at a place.
+    quality : of rows at places.
     ranges : the axes that may be put somewhere else.
     start : (6,) where all axes are that may not, and that others are preferred to be near.
     bending : of rows at places; None where stiffness does not count.
@@ -68,50 +69,14 @@ def plan_stations(
     if not ranges:
         return np.broadcast_to(start, (len(position_mm), 6))
     places = tried_places(ranges, start)
-    rows = _spread(np.arange(len(position_mm)), position_mm, _MOST_ROWS)
-    table = np.stack([quality(rows, place) for place in places])  # (places, rows, branches)
-    worst = table.min(axis=1).max(axis=1)
-    if worst.max() >= LEAST:
-        station = _station(worst, bending, rows, position_mm, places, ranges, start)
-        return np.broadcast_to(places[station], (len(position_mm), 6))
+    found = best_place(position_mm, quality, bending, places, ranges, start)
+    if found is not None:
+        return np.broadcast_to(places[found], (len(position_mm), 6))
     passes = np.cumsum(is_free, dtype=np.int64)
     if len(places) * (int(passes[-1]) + 1) * _FEWEST_ROWS > _MOST_POSES:
-        places = places[with_others_best(table, places, ranges)]
+        rows = spread(np.arange(len(position_mm)), position_mm, _ROWS_OF_ALL)
+        places = places[with_others_best(quality_table(quality, rows, places), places, ranges)]
     return _by_pass(position_mm, is_target, passes, quality, bending, places, ranges)
-
-
-def _station(
-    worst: Floats,
-    bending: Bending | None,
-    rows: Ints,
-    position_mm: Floats,
-    places: Floats,
-    ranges: list[Range],
-    start: Floats,
-) -> int:
-    """Return the place of the best quality; of those that are good, the stiffest; of those, the nearest."""
-    quality = np.minimum(np.round(worst, 2), GOOD)
-    candidates = np.flatnonzero(quality == quality.max())
-    bent = np.ones(len(candidates))
-    if bending is not None and len(candidates) > 1:
-        most = int(np.clip(MOST_THAT_BEND // len(candidates), _FEWEST_ROWS, _ROWS_THAT_BEND))
-        bent = _bent(bending, _spread(rows, position_mm, most), places[candidates])
-    far = np.zeros(len(candidates))
-    for axis in ranges:
-        far += axis.share * np.abs(places[candidates, axis.column] - start[axis.column])
-    as_stiff = bent <= (1.0 + AS_STIFF) * bent.min()
-    order = np.lexsort((-worst[candidates], far, ~as_stiff))
-    return int(candidates[order[0]])
-
-
-def _bent(bending: Bending, rows: Ints, places: Floats) -> Floats:
-    """Return how far the robot bends at places (k,), in root mean square over rows.
-
-    Of the branches the stiffest counts that reaches all rows; inf where none does.
-    """
-    each = bending(np.tile(rows, len(places)), np.repeat(places, len(rows), axis=0))
-    square = np.mean(each.reshape(len(places), len(rows), -1) ** 2, axis=1)  # (places, branches)
-    return np.asarray(np.sqrt(np.min(np.where(np.isnan(square), np.inf, square), axis=1)))
 
 
 def _by_pass(
@@ -127,16 +92,15 @@ def _by_pass(
     borders = np.flatnonzero(np.diff(passes, prepend=-1, append=passes[-1] + 1))
     runs = [np.arange(a, b) for a, b in itertools.pairwise(borders)]
     most = int(np.clip(_MOST_POSES // (len(places) * len(runs)), _FEWEST_ROWS, _ROWS_A_PASS))
-    judged = [_judged(run, position_mm, is_target, most) for run in runs]
-    rows = np.concatenate(judged)
-    table = np.stack([quality(rows, place) for place in places])
+    judged = [of_pass(run, position_mm, is_target, most) for run in runs]
+    table = quality_table(quality, np.concatenate(judged), places)  # (rows, places, branches)
     ends = np.cumsum([0, *map(len, judged)])
-    worst = np.stack([table[:, a:b].min(axis=1) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
-    branch = _branch(worst, table, ends)
+    worst = np.stack([table[a:b].min(axis=0) for a, b in itertools.pairwise(ends)])  # (passes, places, 8)
+    branch = _branch(worst, table)
     own = worst[:, :, branch]
     has_station = own.max(axis=1) > REACHED
     moving = np.flatnonzero(~has_station).tolist()
-    along = [Along(runs[k], judged[k], table[:, ends[k] : ends[k + 1], branch]) for k in moving]
+    along = [Along(runs[k], judged[k], table[ends[k] : ends[k + 1], :, branch]) for k in moving]
     external = np.empty((len(position_mm), 6))
     moved = ways_along(position_mm, is_target, along, bending, branch, places, ranges)
     for each, moves in zip(along, moved, strict=True):
@@ -154,10 +118,10 @@ def _by_pass(
     return np.asarray(np.round(external, _DECIMALS) + 0.0)
 
 
-def _branch(worst: Floats, table: Floats, ends: Ints) -> int:
+def _branch(worst: Floats, table: Floats) -> int:
     """Return the branch with the most passes that have a place, then the most rows that have one."""
     with_station = (worst.max(axis=1) > REACHED).sum(axis=0)
-    reached = (table.max(axis=0) >= LEAST).sum(axis=0)
+    reached = (table.max(axis=1) >= LEAST).sum(axis=0)
     best = worst.max(axis=1).clip(0.0, GOOD).sum(axis=0)
     return int(np.lexsort((-best, -reached, -with_station))[0])
 
@@ -194,24 +158,3 @@ def _bent_in_passes(
         row = np.array([run[int(share * (len(run) - 1))] for run in judged])
         square += bent_at(bending, branch, row, places, wanted) ** 2 / rows
     return np.asarray(np.sqrt(square))
-
-
-def _judged(run: Ints, position_mm: Floats, is_target: Bools, most: int) -> Ints:
-    """Return at most so many rows of a pass: half of them targets, at which an axis may change its way."""
-    targets = run[is_target[run]]
-    if len(run) <= most or len(targets) == len(run):
-        return _spread(run, position_mm, most)
-    chosen = _spread(targets, position_mm, max(most // 2, 2))
-    others = _spread(run[~is_target[run]], position_mm, max(most - len(chosen), 1))
-    return np.union1d(chosen, others)
-
-
-def _spread(rows: Ints, position_mm: Floats, most: int) -> Ints:
-    """Return at most so many rows spread over a run, its outermost points among them where there is room."""
-    if len(rows) <= most:
-        return rows
-    extremes = [op(position_mm[rows, k]) for k in range(3) for op in (np.argmin, np.argmax)]
-    evenly = np.linspace(0, len(rows) - 1, max(most - len(extremes), 2)).astype(np.int64)
-    chosen = np.unique(np.concatenate([evenly, extremes]))
-    picked = np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(np.int64)
-    return np.asarray(rows[chosen[picked]])

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from gcode2krl.program.following import following_deg
+from gcode2krl.program.judged import spread
 from gcode2krl.program.moving_along import _knots, taut
-from gcode2krl.program.places import GOOD, LEAST, MOST_THAT_BEND, Range
+from gcode2krl.program.one_place import best_place
+from gcode2krl.program.places import GOOD, LEAST, MOST_THAT_BEND, Range, quality_table, tried_places
 from gcode2krl.program.stations import plan_stations
 
 REACH_MM = 1000.0
@@ -15,7 +17,7 @@ def reached(position):
     """A robot on a rail along x: 1 where it stands beside the tool, 0 where the tool is out of reach."""
 
     def quality(rows, place):
-        off = np.abs(position[rows, 0] - place[0]) / REACH_MM
+        off = np.abs(position[rows, 0] - place[:, 0]) / REACH_MM
         return np.tile(np.where(off < 1.0, 1.0 - off, -1.0)[:, None], (1, 8))
 
     return quality
@@ -69,6 +71,39 @@ def test_a_stiff_place_that_is_hardly_reached_is_not_taken():
     x, is_free = np.full(20, 400.0), [True] + [False] * 19
     external, _ = planned(x, is_free, 0.0, 1500.0, bending=softer_away_from(x, 950.0))
     assert 1035.0 <= external[0] <= 1100.0  # the quality is good up to 700 mm off
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("count", [1, 2])
+def test_no_place_is_better_than_the_one_that_is_taken(count, seed):
+    """Beside it all places judged by all rows that count; a thin obstacle is seen by few of them."""
+    random = np.random.default_rng(seed)
+    x, middle = random.uniform(-500.0, 500.0, 400), random.uniform(0.0, 4000.0, count)
+    spoilt, width = random.integers(0, 400, 5), random.uniform(300.0, 1500.0)
+    spoilt_at = random.uniform(0.0, 4000.0, 5)
+    judged = []
+
+    def quality(rows, place):
+        judged.append(len(rows))
+        off = np.abs(place[:, :count] - middle - x[rows, None] * 0.2).max(axis=1) / width
+        for row, at in zip(spoilt, spoilt_at, strict=True):
+            off = np.where((rows == row) & (np.abs(place[:, 0] - at) < 300.0), 2.0, off)
+        return np.tile(np.maximum(0.6 - off, -1.0)[:, None], (1, 8))
+
+    position, start = np.column_stack([x, np.zeros((400, 2))]), np.full(6, 1500.0)
+    ranges = [Range(axis, 0.0, 4000.0) for axis in range(count)]
+    places = tried_places(ranges, start)
+    found = best_place(position, quality, None, places, ranges, start)
+    assert sum(judged) <= len(places) * 12 + 5 * 49 * 360
+    rows = np.unique(np.concatenate([spread(np.arange(400), position, most) for most in (12, 60, 300)]))
+    worst = quality_table(quality, rows, places).min(axis=0).max(axis=1)
+    if worst.max() < LEAST:
+        assert found is None
+        return
+    assert round(min(worst[found], GOOD), 2) == round(min(worst.max(), GOOD), 2)
+    near = np.abs(places - start).sum(axis=1)
+    if count == 1:
+        assert near[found] == near[np.minimum(worst.round(2), GOOD) == min(worst.max().round(2), GOOD)].min()
 
 
 def test_each_pass_stands_where_it_is_stiff_unless_the_way_costs_more():
@@ -128,7 +163,8 @@ def test_places_of_one_quality_are_told_apart_by_stiffness_alone():
     """Two places that round to one quality, whatever the unit of the bending."""
 
     def quality(rows, place):
-        return np.full((len(rows), 8), {0.0: 0.196, 600.0: 0.2}.get(place[0], 0.1))
+        each = np.select([place[:, 0] == 0.0, place[:, 0] == 600.0], [0.196, 0.2], 0.1)
+        return np.tile(each[:, None], (1, 8))
 
     def station(scale):
         def bending(rows, place):
