@@ -43,7 +43,7 @@ def test_lengths_are_those_of_numpy_to_the_bit():
     assert (lengths(vectors) == np.linalg.norm(vectors, axis=1)).all()
 
 
-@pytest.mark.parametrize("rows", [1, 23, 1000])
+@pytest.mark.parametrize("rows", [pytest.param(1, marks=pytest.mark.slow), 23, 1000])
 def test_motion_joints_forces_and_deflection_in_blocks_are_those_as_a_whole(part, rows):
     toolpath, targets, cell = part
     whole = predict_toolpath(toolpath, cell, targets=targets)

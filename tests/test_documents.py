@@ -23,7 +23,6 @@ box_mm = [[0, -100, -30], [300, 100, 0]]
 """
 ELSEWHERE = {"docs/diagnose_check.md": "hours of cases; .ci/run makes one with the same program"}
 """Documents with commands that are not run here, and why."""
-SLOW = ("diagnose", "predict .* --plot", "report .* -o", "--report", "batch .* -o")
 
 
 def blocks(language):
@@ -37,9 +36,8 @@ def blocks(language):
 
 
 def case(name, number, text):
-    """Return a block or a command as a parameter; whole diagnoses are slow."""
-    marks = [pytest.mark.slow] if any(re.search(rf"(?<!\w){word}\b", text) for word in SLOW) else []
-    return pytest.param(text, id=f"{name}:{number}", marks=marks)
+    """Return a block or a command as a parameter."""
+    return pytest.param(text, id=f"{name}:{number}")
 
 
 PYTHON = [case(*each) for each in blocks("python")]
@@ -113,6 +111,7 @@ def names_of(prediction):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", PYTHON)
 def test_python(code, folder, predicted):
     if "load_run" in code:
@@ -120,6 +119,7 @@ def test_python(code, folder, predicted):
     exec(compile(code, "example", "exec"), names_of(Prediction.load(predicted)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands(command, folder, run, predicted):
     words = shlex.split(command, comments=True)

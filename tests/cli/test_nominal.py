@@ -41,6 +41,7 @@ def test_findings_figures_and_files(run, folder):
         assert solid.volume == pytest.approx(one["volume_mm3"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_summary_names_both(run, folder):
     done = run(*WORDS)
     assert "  gouges     14" in done.out
@@ -62,6 +63,7 @@ def test_the_report_shows_them_if_the_part_is_unchanged(run, folder):
     assert "Against the nominal part" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_solids_of_an_earlier_prediction_go(run, folder):
     run(*WORDS)
     assert (folder / "prediction" / "rest.stl").is_file()

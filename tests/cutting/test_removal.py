@@ -316,7 +316,11 @@ def solid(tool, length_mm=60.0, count=256):
     return manifold3d.CrossSection([profile[::-1]], manifold3d.FillRule.NonZero).revolve(count)
 
 
-@pytest.mark.parametrize("tool", [FLAT, BULL, BALL, TAPERED, DRILL], ids=lambda tool: tool.kind)
+@pytest.mark.parametrize(
+    "tool",
+    [FLAT, BALL, *(pytest.param(tool, marks=pytest.mark.slow) for tool in (BULL, TAPERED, DRILL))],
+    ids=lambda tool: tool.kind,
+)
 def test_volume_against_exact_booleans(tool):
     """Plunge, slot, ramps down and up, a corner, a diagonal: each sweep is a hull of two convex bodies."""
     import manifold3d

@@ -99,7 +99,9 @@ def test_steps_of_the_last_decimal_are_no_gap():
     assert judged("", nothing, 1, quantum=1.5).verdict == "no_gap"
 
 
-@pytest.mark.parametrize("kind", ["ou 0.3 s", "ou 1 s", "1/f", "bursts"])
+@pytest.mark.parametrize(
+    "kind", ["ou 0.3 s", *(pytest.param(k, marks=pytest.mark.slow) for k in ("ou 1 s", "1/f", "bursts"))]
+)
 @pytest.mark.parametrize(("effect", "size"), [(PLAY, 2.0), (DRIFT, 3.5), (EFFECTS[3], 2.8)])
 def test_an_effect_of_twice_the_short_noise_keeps_its_name(kind, effect, size):
     found = judged(kind, lambda run: size * effect.form(TIME_S), 11)

@@ -65,6 +65,7 @@ def test_a_sound_run_has_no_slip_and_stays_as_it_is():
     assert set_up.context.pairs[0].inputs is context.pairs[0].inputs
 
 
+@pytest.mark.slow
 def test_a_wrong_clock_is_named_and_taken_off_besides_another_slip():
     context = _context("base_number:x_mm=30,a_deg=2", tracker=False)
     table = context.pairs[0].run.controller
@@ -77,6 +78,7 @@ def test_a_wrong_clock_is_named_and_taken_off_besides_another_slip():
     assert [one.effect.name for one in set_up.context.slips] == ["base_number"]
 
 
+@pytest.mark.slow
 def test_stops_come_first_and_are_in_the_plan():
     context = _context("advance_stop:count=2,hold_s=0.08", tracker=False)
     set_up = order.examine_set_up(context)

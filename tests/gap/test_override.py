@@ -18,6 +18,7 @@ def _pair(percent, **signals):
     return Pair(run=run, number=0, inputs=inputs_of(nominal))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signals", [{"tracker": False}, {"controller": False}])
 def test_the_override_is_found_by_joints_or_by_the_tip(signals):
     (slip,) = OverrideTest().find([_pair(72, **signals)], LIBRARY)

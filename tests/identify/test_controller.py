@@ -190,6 +190,7 @@ def test_recovers_k_cdis_and_law(targets, text, cell, k_cycles, cdis_mm, law):
         assert corner.error_mm.value == pytest.approx(programmed * corner.d_mm.value / CDIS_MM, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_fast_samples_missing_rows_and_rounding_alone(targets, text, cell):
     truth = Controller(0.144, 4.0, "averages")
     trace = trace_of(text, truth, noise_mm=0.0, cycle_s=0.004)
@@ -226,6 +227,7 @@ def test_corners_limited_by_half_a_line_do_not_determine_cdis(cell):
     assert [c.d_mm.value for c in found.corners] == pytest.approx([3.0, 4.0], abs=0.03)
 
 
+@pytest.mark.slow
 def test_another_acceleration_shows_as_misfit(targets, text, cell):
     other = cell.model_copy(update={"controller": cell.controller.model_copy(update={"acc_cp_m_s2": 1.0})})
     found = identify_controller(trace_of(text, Controller()), targets, other)
@@ -296,6 +298,7 @@ def test_command(run, tmp_path, text):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.toml", "figure.png", "trace.csv"]
 
 
+@pytest.mark.slow
 def test_command_with_a_program_of_the_cells_cdis(run, tmp_path, text):
     lines = [line for line in text.splitlines() if not line.startswith("(")]
     own = "\n".join("G64" if line.startswith("G64") else line for line in lines)

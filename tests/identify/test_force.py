@@ -42,6 +42,7 @@ def test_slots_at_three_feeds_give_all_six():
     assert fit.relative_band < 0.05
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(2)
     inside = []

@@ -118,7 +118,7 @@ class Case:
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(24), *(pytest.param(k, marks=pytest.mark.slow) for k in range(24, 120))]
+    "seed", [*range(12), *(pytest.param(k, marks=pytest.mark.slow) for k in range(12, 120))]
 )
 def test_leads_of_generated_programs(tmp_path, seed):
     """Several cells, both forms, with steps of the force and without."""

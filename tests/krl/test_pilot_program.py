@@ -92,12 +92,12 @@ def check(made, in_view=IN_VIEW):
 # --- the examples ---------------------------------------------------------------------------------------
 
 
-LONG = "raster_finish"
-"""An example of thousands of lines: some ten seconds a test."""
+LONG = ("cam_style", "contour_arcs", "raster_finish")
+"""Examples of hundreds and thousands of lines: a second, or ten, a test."""
 
 
 def _marks(part: Path):
-    return [pytest.mark.slow] if part.stem == LONG else []
+    return [pytest.mark.slow] if part.stem in LONG else []
 
 
 @pytest.fixture(

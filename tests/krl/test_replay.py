@@ -17,7 +17,13 @@ POSITION_MM, ROTATION_DEG, FEED_MM_MIN, JOINT_DEG = 0.002, 0.001, 0.1, 0.01
 RAPID_MM_S = 200.0
 
 
-@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda part: part.stem)
+def _marks(part: Path):
+    return [pytest.mark.slow] if part.stem in THINNED else []
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(part, marks=_marks(part), id=part.stem) for part in EXAMPLES]
+)
 def run(request, tmp_path_factory):
     """Translate an example with the default cell and replay it."""
     part, folder = request.param, tmp_path_factory.mktemp("replayed")

@@ -81,6 +81,7 @@ def apart(first, second):
     return float(last[-1])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(paths, st.floats(0.001, 0.05))
 def test_both_paths_are_within_the_tolerance_everywhere(path, limit_mm):
@@ -113,6 +114,7 @@ def test_both_paths_are_within_the_tolerance_everywhere(path, limit_mm):
         assert (steps @ unit >= size * math.cos(MOST_TURN_RAD) - 1e-12).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(st.one_of(steps_of(60, 10), wavy_lines()).map(lambda steps: np.cumsum(np.array(steps[:12]), axis=0)))
 def test_both_paths_are_passed_in_the_same_order(path):

@@ -216,6 +216,7 @@ class TestKinematics:
         assert "approximated corner" in labels(figure)
         assert np.isnan(speed.lines[0].get_ydata()[-1])  # no feed on a rapid
 
+    @pytest.mark.slow
     def test_long_names_the_outlier_that_is_beyond_the_frame(self, long):
         toolpath, _, motion = long
         speed = motion.speed_mm_s.copy()
@@ -243,6 +244,7 @@ class TestKinematics:
         )
         assert "largest 177 mm/s at 1481.48 s, line 11" in texts(figure)
 
+    @pytest.mark.slow
     def test_what_would_be_a_hatch_is_a_band_that_reaches_every_extreme(self, long):
         toolpath, _, motion = long
         rng = np.random.default_rng(3)

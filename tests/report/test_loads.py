@@ -46,6 +46,7 @@ def test_short_forces_are_lines():
     assert any(words.startswith("largest 50 N at 0.00 s, line 1") for words in texts(figure))
 
 
+@pytest.mark.slow
 def test_long_forces_are_bands_and_the_worst_is_enlarged(circles):
     toolpath, motion, force = circles
     figure = force_figure(toolpath, motion, forces_of(motion, force))
@@ -77,6 +78,7 @@ def test_engagement_is_the_share_of_samples():
     assert (share[120:, 5:] == 1.0).all()
 
 
+@pytest.mark.slow
 def test_long_deflection_is_a_band_and_the_worst_is_enlarged(circles):
     toolpath, motion, force = circles
     figure = deflection_figure(toolpath, motion, deflection_of(force / 300.0))
