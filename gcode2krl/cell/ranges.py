@@ -50,8 +50,8 @@ def range_issues(cell: BaseModel, tools: Collection[int] | None = None) -> Itera
 
     With ``tools``, keys of other tools are left out.
     """
-    table = all_ranges()
-    for key, value in numbers(cell):
+    table, stated = all_ranges(), list(numbers(cell))
+    for key, value in stated:
         known = table.get(general(key))
         if known is None or (tools is not None and key.startswith("tool.") and _number(key) not in tools):
             continue
@@ -62,7 +62,7 @@ def range_issues(cell: BaseModel, tools: Collection[int] | None = None) -> Itera
         low, high = known.plausible
         if not low <= value <= high:
             yield _issue("warning", "cell-doubtful", key, value, known.plausible, known.source)
-    yield from _radians(cell)
+    yield from _radians(stated)
 
 
 def _number(key: str) -> int:
@@ -83,7 +83,10 @@ def numbers(cell: BaseModel) -> Iterator[tuple[str, float]]:
 
 
 def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
-    if isinstance(value, BaseModel):
+    if isinstance(value, int | float):
+        if not isinstance(value, bool):
+            yield key, float(value)
+    elif isinstance(value, BaseModel):
         for name in type(value).model_fields:
             yield from _numbers(getattr(value, name), f"{key}.{name}" if key else name)
     elif isinstance(value, dict):
@@ -92,8 +95,6 @@ def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
     elif isinstance(value, tuple | list):
         for item in value:
             yield from _numbers(item, key)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield key, float(value)
 
 
 def _issue(
@@ -112,10 +113,10 @@ def _issue(
     )
 
 
-def _radians(cell: BaseModel) -> Iterator[Issue]:
+def _radians(stated: list[tuple[str, float]]) -> Iterator[Issue]:
     """Yield the frames, and HOME, whose angles are multiples of 45 degrees when read as radians."""
     angles: dict[str, list[float]] = {}
-    for key, value in numbers(cell):
+    for key, value in stated:
         match = _ANGLES.fullmatch(key)
         if match:
             angles.setdefault(match[1] or key, []).append(value)
