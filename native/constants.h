@@ -420,9 +420,6 @@
 #define DR_DEFAULT "linuxcnc"
 
 /* gcode2krl.gcode.findings */
-#define F_FIRST_FOREIGN 128
-#define F_VALUE_REMEDY "check the parameters that the expression takes"
-#define F_MM_PER_INCH 25.4
 #define F_OK 0
 #define F_BAD_CHARACTER 1
 #define F_NO_NUMBER 2
@@ -513,8 +510,6 @@
 #define F_CUTTER_ROTATED 87
 #define F_CUTTER_TURNED 88
 #define F_CUTTER_PARAMETER 89
-#define F_SPIRAL_SENTENCE "{count} with radii that differ at start and end, most by {difference:.4f} mm ({a:.4f} and {b:.4f} mm); read as a spiral"
-#define F_SPIRAL_REMEDY "let the post write X, Y, Z, I, J, K with {decimals} decimals"
 
 /* gcode2krl.gcode.cycle_findings */
 #define FC_NO_AXES 200

@@ -7,6 +7,7 @@ from gcode2krl.gcode import cycle_findings as c
 from gcode2krl.gcode import findings as f
 from gcode2krl.gcode import offset_findings as of_offsets
 from gcode2krl.gcode import polar_findings as p
+from gcode2krl.gcode.sentences import letters_of
 from gcode2krl.gcode.vocabulary import TENFOLD
 
 _BEFORE, _AFTER = 24, 32
@@ -142,9 +143,9 @@ def _pattern(number: int, a: float, b: float) -> str:
     if number in _OF_LETTER_A:
         return letter
     if number == of_offsets.FROM_UNKNOWN:
-        return f"[{re.escape(f.letters_of(b))}]"
+        return f"[{re.escape(letters_of(b))}]"
     if number in (f.UNUSED_WORD, f.VECTOR_AND_ANGLE, of_offsets.ROTARY):
-        return f"[{re.escape(f.letters_of(a))}]"
+        return f"[{re.escape(letters_of(a))}]"
     if number == f.CUTTER_ON:
         return _word("M" if a < 0 else "G", abs(a))
     if number in (f.CUTTER_PLANE, f.CUTTER_NO_D, f.CUTTER_NO_TOOL):

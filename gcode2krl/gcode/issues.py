@@ -12,6 +12,7 @@ from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings as f
+from gcode2krl.gcode import sentences
 from gcode2krl.gcode.excerpt import column, quote
 from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.slips import slip
@@ -104,7 +105,7 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     number, line = int(row["number"]), int(row["line"])
     a, b, c = (float(row[name]) for name in "abc")
     excerpt = quote(texts[line], number, a, b, c) if line in texts else ""
-    issue = f.make_issue(number, line, a, b, c, excerpt)
+    issue = sentences.make_issue(number, line, a, b, c, excerpt)
     if excerpt:
         issue = replace(issue, column=column(texts[line], number, a, b, c))
     letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
@@ -181,10 +182,12 @@ def _spirals(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
     if not count:
         return
     start, end = float(state["spiral_start"]), float(state["spiral_end"])
-    sentence = f.SPIRAL_SENTENCE.format(
+    sentence = sentences.SPIRAL_SENTENCE.format(
         count="an arc" if count == 1 else f"{count} arcs", difference=abs(start - end), a=start, b=end
     )
-    remedy = f.SPIRAL_REMEDY.format(decimals=f.decimals_needed(float(state["spiral_unit_mm"])))
+    remedy = sentences.SPIRAL_REMEDY.format(
+        decimals=sentences.decimals_needed(float(state["spiral_unit_mm"]))
+    )
     excerpt = quote(texts[line], f.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
     yield Issue("warning", "arc-radius-differs", line, sentence, remedy, excerpt)
 
