@@ -31,11 +31,11 @@ _OF_CHARACTER = {
 }
 """What to do about a character, where simply removing it would leave another mistake."""
 _LATER = "not read yet"
-UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
+_UNSUPPORTED_G_REASONS: dict[int, tuple[str, str]] = {
     v.G43_4: (f"tool offsets with rotary axes: {_LATER}", "use G43 H"),
     **NEVER_READ,
 }
-UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
+_UNSUPPORTED_M_REASONS: dict[int, tuple[str, str]] = {
     v.TENFOLD * v.M19: (
         "spindle orientation is not mapped",
         "map it in [m_code] of the cell once it is read",
@@ -80,7 +80,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     finding = f.FINDINGS[number]
     reason, remedy = "", ""
     if number in (f.UNSUPPORTED_G, f.UNSUPPORTED_M):
-        reasons = UNSUPPORTED_G_REASONS if number == f.UNSUPPORTED_G else UNSUPPORTED_M_REASONS
+        reasons = _UNSUPPORTED_G_REASONS if number == f.UNSUPPORTED_G else _UNSUPPORTED_M_REASONS
         reason, remedy = _nearest_below(reasons, int(a))
     if number in (f.DIALECT_CODE, f.DIALECT_STATEMENT):
         reason, remedy = REASONS[int(a)]
