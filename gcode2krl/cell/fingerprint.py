@@ -1,0 +1,58 @@
+"""The resolved values of a cell by section, and a hash of each section.
+
+What a person confirms, what a program's header remembers, and what `verify` compares are these values: of the
+cell file, its base, the library and the documented defaults together, so that a change in any of them shows.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from gcode2krl.cell.definition import Cell, as_toml
+
+Values = dict[str, dict[str, Any]]
+"""Section (``frames``, ``tool.1``, ``m_code``) → dotted key → plain value."""
+
+_NOT_OF_THE_CELL = frozenset({"name", "based_on", "verified", "taken_over", "defaults"})
+"""Who confirmed what, and where values came from, is not itself a value."""
+_PROVENANCE = frozenset({"source", "sure", "note"})
+_HASH_DIGITS = 12
+
+
+def values_by_section(cell: Cell) -> Values:
+    """Return section → dotted key → value of everything that a cell states or takes over.
+
+    Each tool is a section of its own. A key on the top level (``tool_change``) is a section with itself as
+    its only key. Sources and notes are left out: they change no motion.
+    """
+    record = as_toml(cell)
+    tools = record.pop("tool")
+    sections = {**record, **{f"tool.{number}": tool for number, tool in tools.items()}}
+    values = {
+        section: dict(_leaves(section, content))
+        for section, content in sorted(sections.items())
+        if section not in _NOT_OF_THE_CELL
+    }
+    return {section: leaves for section, leaves in values.items() if leaves}
+
+
+def section_hashes(values: Values) -> dict[str, str]:
+    """Return section → the first 12 hexadecimal digits of the SHA-256 of its values as canonical JSON."""
+    return {
+        section: hashlib.sha256(json.dumps(leaves, sort_keys=True).encode()).hexdigest()[:_HASH_DIGITS]
+        for section, leaves in values.items()
+    }
+
+
+def _leaves(key: str, content: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the dotted key of each plain value; the items of a list of tables are numbered from 1."""
+    if isinstance(content, Mapping):
+        for name, inner in content.items():
+            if name not in _PROVENANCE:
+                yield from _leaves(f"{key}.{name}", inner)
+    elif isinstance(content, list) and content and all(isinstance(item, Mapping) for item in content):
+        for number, item in enumerate(content, start=1):
+            yield from _leaves(f"{key}.{number}", item)
+    else:
+        yield key, content
