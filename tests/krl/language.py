@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from lark import Lark, Token, Transformer, Tree
-from lark.exceptions import LarkError, UnexpectedInput
+from lark.exceptions import LarkError, UnexpectedInput, UnexpectedToken
 
 LONGEST_NAME = 24
 
@@ -276,8 +276,9 @@ def _parsed(code: str) -> tuple:
     try:
         return _PARSER.parse(code)
     except UnexpectedInput as error:
-        at = code[(error.column or 1) - 1 :][:40] if isinstance(error.column, int) else ""
-        raise ValueError(f"not KRL from {at!r} on" if at else "the line is not complete") from None
+        if isinstance(error, UnexpectedToken) and error.token.type == "$END":
+            raise ValueError("the line is not complete") from None
+        raise ValueError(f"not KRL from {code[error.column - 1 :][:40]!r} on") from None
     except LarkError as error:
         raise ValueError(str(error)) from None
 

@@ -9,13 +9,15 @@ amid such ones, and asks the judge of `execution.py` which motions went wrong wi
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from gcode2krl import set_targets, write_krl
+from gcode2krl import Cell, set_targets, write_krl
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.restart import restarted
+from gcode2krl.tables import Targets
 from tests.cells import over_demonstration
 from tests.krl.conftest import read
 from tests.krl.execution import Cancelled, Controller, Halt, Run, execute, judge
@@ -23,7 +25,7 @@ from tests.krl.language import EXTERNAL_KEYS, Program, parse_program
 from tests.krl.surroundings import environment_of, expected_flange
 
 BASE = {"x_mm": 1500.0, "y_mm": 0.0, "z_mm": 800.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
-TOOL = {"x_mm": 250.0, "y_mm": 0.0, "a_deg": 0.0, "b_deg": -90.0, "c_deg": 0.0}
+TOOL = {"x_mm": 250.0, "y_mm": 0.0, "a_deg": 180.0, "b_deg": 0.0, "c_deg": 180.0}
 RAIL = {
     "kind": "rail",
     "axis": "y",
@@ -33,10 +35,10 @@ RAIL = {
     "home": 0.0,
 }
 M_CODES = {
-    "M61": "CLAMP(TRUE)",
-    "M62": "HALT ; look at the part",
-    "M63": "PROBE(3)\nWAIT SEC 0.5",
-    "M64": "IF $IN[4]==FALSE THEN\nCLAMP(FALSE)\nENDIF",
+    "M101": "CLAMP(TRUE)",
+    "M102": "HALT ; look at the part",
+    "M103": "PROBE(3)\nWAIT SEC 0.5",
+    "M104": "IF $IN[4]==FALSE THEN\nCLAMP(FALSE)\nENDIF",
 }
 EXTERNALS = ["MAGAZINE(INT :IN)", "CLAMP(BOOL :IN)", "PROBE(INT :IN)"]
 
@@ -44,27 +46,38 @@ EXTERNALS = ["MAGAZINE(INT :IN)", "CLAMP(BOOL :IN)", "PROBE(INT :IN)"]
 # --- what is drawn ---------------------------------------------------------------------------------------
 
 
-def drawn_cell(draw: np.random.Generator):
+@lru_cache
+def cell_of(base_number: int | None, by_number: bool, change: str, rail: str) -> Cell:
     """Return a cell: frames by number or by value, a change by subprogram or by hand, a rail or none."""
     data: dict = {
         "verified": {"by": "T. Ester", "date": "2026-01-31"},
-        "program": {"externals": EXTERNALS, "max_lines": int(draw.choice([10, 25, 5000]))},
+        "program": {"externals": EXTERNALS},
         "m_code": dict(M_CODES),
-        "tool_change": str(draw.choice(["MAGAZINE({{ tool }})", "HALT ; change the tool by hand"])),
-        "frames": {"base": BASE},
+        "tool_change": change,
+        "frames": {"base": BASE} | ({"base_data": base_number} if base_number is not None else {}),
     }
-    if draw.random() < 0.5:
-        data["frames"]["base_data"] = 3
-    if draw.random() < 0.5:
+    if by_number:
         data["tool"] = {
-            str(n): {"tool_data": n + 4, "frame": {**TOOL, "z_mm": 250.0 + 10.0 * n}} for n in (1, 2, 3)
+            str(n): {"tool_data": n + 4, "axis": "+x", "frame": {**TOOL, "z_mm": 250.0 + 10.0 * n}}
+            for n in (1, 2, 3)
         }
-    rail = draw.choice(["none", "none", "coupled", "uncoupled"])
     if rail == "coupled":
         data["external"] = {"E1": RAIL}
     elif rail == "uncoupled":
         data["external"] = {"E1": {**RAIL, "coupled": False, "position": 300.0}}
     return over_demonstration(data)
+
+
+def drawn_cell(draw: np.random.Generator) -> Cell:
+    """Return a cell whose programs are split after few motions, or not."""
+    cell = cell_of(
+        3 if draw.random() < 0.5 else None,
+        bool(draw.random() < 0.5),
+        str(draw.choice(["MAGAZINE({{ tool }})", "HALT ; change the tool by hand"])),
+        str(draw.choice(["none", "none", "coupled", "uncoupled"])),
+    )
+    most = int(draw.choice([10, 25, 5000]))  # fewer than a cell file may say: short parts, quick draws
+    return cell.model_copy(update={"program": cell.program.model_copy(update={"max_lines": most})})
 
 
 def drawn_part(draw: np.random.Generator) -> str:
@@ -86,18 +99,19 @@ def drawn_part(draw: np.random.Generator) -> str:
 
 
 def _interruption(draw: np.random.Generator, share: float) -> list[str]:
-    return [str(draw.choice(["M0", "M61", "M62", "M63", "M64", "M8", "G4 P0.3"]))] * (draw.random() < share)
+    return [str(draw.choice(["M0", "M101", "M102", "M103", "M104", "M8", "G4 P0.3"]))] * (draw.random() < share)
 
 
-def program_of(draw: np.random.Generator, folder) -> tuple[Program, object, object]:
+def program_of(draw: np.random.Generator, folder) -> tuple[Program, Targets, Cell]:
     """Return a program as parsed, its Targets and its cell; raises where the draw is refused."""
     cell = drawn_cell(draw)
     toolpath = read(drawn_part(draw), cell)
-    if draw.random() < 0.25:
+    if draw.random() < 0.1:
         cuts = np.flatnonzero(~toolpath.rapid)[1:]
         toolpath = restarted(toolpath, int(toolpath.source_line[draw.choice(cuts)]), cell)
     split = str(draw.choice(["defs", "files"]))
-    written = write_krl(set_targets(toolpath, cell), folder / "PART.src", cell, split=split)
+    place = folder / "PART.src" if split == "files" else None
+    written = write_krl(set_targets(toolpath, cell), place, cell, name=None if place else "PART", split=split)
     return parse_program(written.texts, "PART.src"), written.targets, cell
 
 
@@ -178,7 +192,7 @@ class Hostile:
         controller.jog(controller.q_deg + way * chosen, external)
 
 
-def refused_or_run(seed: int, folder) -> tuple[Run, Run, object, object] | None:
+def refused_or_run(seed: int, folder) -> tuple[Run, Run, Targets, Cell] | None:
     """Return the run as intended, the run amid hostile ones, Targets and cell; None where it is refused."""
     draw = np.random.default_rng(seed)
     try:
