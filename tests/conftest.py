@@ -85,7 +85,7 @@ def written_programs_are_krl(monkeypatch):
             _PARSED.add(digest)
             from tests.krl.language import parse_program  # lark is imported where there is something to parse
 
-            parse_program(program)
+            parse_program(program, has_globals=True)
 
 
 @pytest.fixture(scope="session")

@@ -47,11 +47,11 @@ SAME_MM, SAME_SHARE = 0.01, 1e-5
 """What two flanges may differ by: distance, and entries of the rotation."""
 
 
-class Cancelled(Exception):
+class Cancelled(Exception):  # noqa: N818
     """A person ends the program."""
 
 
-class Fault(Exception):
+class Fault(Exception):  # noqa: N818
     """The controller stops with an error."""
 
 
@@ -329,11 +329,11 @@ class Controller:
 # --- execution -----------------------------------------------------------------------------------------
 
 
-class _Exit(Exception):
+class _Exit(Exception):  # noqa: N818
     pass
 
 
-class _Return(Exception):
+class _Return(Exception):  # noqa: N818
     def __init__(self, value: Any) -> None:
         super().__init__()
         self.value = value
@@ -392,7 +392,9 @@ class _Executor:
         values = [self.value(a) for a in arguments]
         caller, place, loops = self.locals, self.place, self.loops
         inner = {name: self.first_value(v) for name, v in routine.variables.items()}
-        inner.update({name: copy.deepcopy(v) for (name, _), v in zip(routine.parameters, values, strict=True)})
+        inner.update(
+            {name: copy.deepcopy(v) for (name, _), v in zip(routine.parameters, values, strict=True)}
+        )
         self.locals, self.loops, outer_data = inner, 0, getattr(self, "shared", {})
         self.shared = self.data.get(routine.file.upper().rsplit(".", 1)[0], {})
         result = None

@@ -103,6 +103,7 @@ class Program:
     """The first routine of each .src, and those that are GLOBAL."""
     externals: dict[str, int]
     """What EXT names and no file of the program defines."""
+    has_globals: bool = False
 
     def data_of(self, file: str) -> Module | None:
         """Return the .dat of a .src."""
@@ -157,7 +158,9 @@ CONFIGURED = _words("BASE_DATA TOOL_DATA LOAD_DATA MACHINE_DEF BASE_NAME TOOL_NA
 """Variables of $CONFIG.DAT and the machine data."""
 CONSTANTS = _words("RSIOK PI")
 FUNCTIONS: dict[str, tuple[int, int]] = {
-    **dict.fromkeys(_words("ABS SQRT SIN COS TAN ACOS INV_POS INVERSE_FRAME STRLEN STRDECLEN STRCLEAR"), (1, 1)),
+    **dict.fromkeys(
+        _words("ABS SQRT SIN COS TAN ACOS INV_POS INVERSE_FRAME STRLEN STRDECLEN STRCLEAR"), (1, 1)
+    ),
     **dict.fromkeys(_words("ATAN2 STRADD STRCOPY VARTYPE SYNCCMD"), (2, 2)),
     **dict.fromkeys(_words("STRFIND"), (4, 4)),
     **dict.fromkeys(_words("STRCOMP PULSE EK EB FORWARD"), (3, 3)),
@@ -510,10 +513,13 @@ class _Reader:
 # --- a program -----------------------------------------------------------------------------------------
 
 
-def parse_program(texts: Mapping[str, str | bytes], main: str | None = None) -> Program:
+def parse_program(
+    texts: Mapping[str, str | bytes], main: str | None = None, *, has_globals: bool = False
+) -> Program:
     """Return the program of some .src and .dat by file name; ``main`` is the .src that is started.
 
-    Without ``main`` it is the first .src. Other files (sidecars, XML) are passed over. Raises `KrlError`.
+    ``has_globals``: the integrator's $CONFIG.DAT declares variables; then unknown names are taken for such,
+    but not those that begin with $ or GK_. Without ``main`` it is the first .src. Other files (sidecars, XML) are passed over. Raises `KrlError`.
     """
     modules = {
         file.upper(): parse_module(text, file)
@@ -532,9 +538,12 @@ def parse_program(texts: Mapping[str, str | bytes], main: str | None = None) -> 
                     raise KrlError(routine.file, routine.line, f"{routine.name} is defined in two files")
                 routines[routine.name] = routine
     externals = {
-        name: count for module in modules.values() for name, count in module.externals.items() if name not in routines
+        name: count
+        for module in modules.values()
+        for name, count in module.externals.items()
+        if name not in routines
     }
-    program = Program(modules, next(iter(started.routines.values())), routines, externals)
+    program = Program(modules, next(iter(started.routines.values())), routines, externals, has_globals)
     for module in sources:
         for routine in module.routines.values():
             _Checker(program, module, routine).check()
@@ -552,8 +561,12 @@ def statements_in(body: list[Statement]) -> Iterator[Statement]:
 _NUMBERS, _FRAMES = ("INT", "REAL"), ("FRAME", "POS", "E6POS", "E3POS")
 _SYSTEM_KINDS = {
     **dict.fromkeys(_words("$OUT $IN $STOPMESS $FLAG $CYCFLAG $T1 $T2 $PERI_RDY $ROB_STOPPED"), "truth"),
-    **dict.fromkeys(_words("$ADVANCE $ACT_BASE $ACT_TOOL $OV_PRO $ANOUT $ANIN $SEN_PINT $SEN_PREA $EX_AX_NUM"), "number"),
-    **dict.fromkeys(_words("$BASE $TOOL $ROBROOT $ROBROOT_C $WORLD $NULLFRAME $POS_ACT BASE_DATA TOOL_DATA"), "frame"),
+    **dict.fromkeys(
+        _words("$ADVANCE $ACT_BASE $ACT_TOOL $OV_PRO $ANOUT $ANIN $SEN_PINT $SEN_PREA $EX_AX_NUM"), "number"
+    ),
+    **dict.fromkeys(
+        _words("$BASE $TOOL $ROBROOT $ROBROOT_C $WORLD $NULLFRAME $POS_ACT BASE_DATA TOOL_DATA"), "frame"
+    ),
     **dict.fromkeys(_words("$ORI_TYPE $CIRC_TYPE $IPO_MODE"), "enum"),
     "$TRAFONAME": "text",
 }
@@ -585,15 +598,16 @@ class _Checker:
             getattr(self, f"check_{statement.kind}", self.check_parts)(statement)
 
     def check_parts(self, statement: Statement) -> None:
-        for value in (*statement.values, *(c for b in statement.blocks if isinstance(b, tuple) for c in b[0] or ())):
+        for value in (
+            *statement.values,
+            *(c for b in statement.blocks if isinstance(b, tuple) for c in b[0] or ()),
+        ):
             self.part(value)
 
     def part(self, value: Any) -> None:
         if not isinstance(value, tuple) or not value:
             return
-        if value[0] == "assign":
-            self.check_assign(Statement("assign", self.routine.file, self.line, value[1:]))
-        elif value[0] == "assigned":
+        if value[0] == "assign" or value[0] == "assigned":
             self.check_assign(Statement("assign", self.routine.file, self.line, value[1:]))
         elif value[0] == "call_statement":
             self.kind(value[1])
@@ -657,7 +671,7 @@ class _Checker:
     def check_move(self, statement: Statement) -> None:
         word, *values = statement.values
         blends = [value[1] for value in values if value and value[0] == "approximation"]
-        if word == "LIN" and set(blends) & {"C_PTP", "C_SPL"} or (word == "PTP" and "C_SPL" in blends):
+        if (word == "LIN" and set(blends) & {"C_PTP", "C_SPL"}) or (word == "PTP" and "C_SPL" in blends):
             self.refuse(f"{blends[0]} at {word}")
         for value in values:
             if value and value[0] == "aggregate":
@@ -736,7 +750,8 @@ class _Checker:
             self.refuse(f"{name} is a word of KRL")
         variable = self.variable(name)
         if variable is None and name not in SYSTEM_VARIABLES | CONFIGURED | CONSTANTS:
-            self.refuse(f"{name} is not declared")
+            if not self.program.has_globals or name.startswith(("$", "GK_")):
+                self.refuse(f"{name} is not declared")
         if len(components) > 1:
             if variable is not None and variable.type in ("INT", "REAL", "BOOL", "CHAR"):
                 self.refuse(f"{name} has no components")

@@ -99,7 +99,9 @@ def drawn_part(draw: np.random.Generator) -> str:
 
 
 def _interruption(draw: np.random.Generator, share: float) -> list[str]:
-    return [str(draw.choice(["M0", "M101", "M102", "M103", "M104", "M8", "G4 P0.3"]))] * (draw.random() < share)
+    return [str(draw.choice(["M0", "M101", "M102", "M103", "M104", "M8", "G4 P0.3"]))] * (
+        draw.random() < share
+    )
 
 
 def program_of(draw: np.random.Generator, folder) -> tuple[Program, Targets, Cell]:
@@ -153,7 +155,8 @@ class Hostile:
         draw = self.draw
 
         def frame():
-            return dict(zip("XYZABC", map(float, draw.uniform(-300.0, 300.0, 3).tolist() + [0, 10, 20])))
+            values = [*map(float, draw.uniform(-300.0, 300.0, 3)), 0.0, 10.0, 20.0]
+            return dict(zip("XYZABC", values, strict=True))
 
         new = {
             "$BASE": frame(),

@@ -3,8 +3,8 @@
 import pytest
 
 from tests.conftest import ROOT
-from tests.krl.language import KrlError, parse_line, parse_program
 from tests.krl.execution import Environment, execute
+from tests.krl.language import KrlError, parse_line, parse_program
 
 DATA = """&ACCESS RVP
 DEFDAT PART
@@ -110,7 +110,7 @@ BROKEN = [
 
 def test_a_program_of_every_kind_is_taken_and_runs():
     program = parse_program({"PART.src": GOOD, "PART.dat": DATA})
-    assert [r for r in program.local_routines("PART.src")] == ["PART", "LOST", "TOLD", "IS_FAR"]
+    assert list(program.local_routines("PART.src")) == ["PART", "LOST", "TOLD", "IS_FAR"]
     run = execute(program, Environment())
     assert run.ended == "end", run.ended
     assert [motion.kind for motion in run.motions] == ["LIN", "SPL", "CIRC"]
@@ -162,7 +162,9 @@ def test_short_cut_for_plain_motions_says_what_the_grammar_says(line):
     assert parse_line(line) == parse_line(line.replace("{", " {"))  # two spaces: not the short cut
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "tests" / "golden" / "krl").glob("*.src")), ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "source", sorted((ROOT / "tests" / "golden" / "krl").glob("*.src")), ids=lambda p: p.stem
+)
 def test_golden_programs_are_krl(source):
     files = [source, source.with_suffix(".dat")]
     assert parse_program({file.name: file.read_bytes() for file in files}).main.name == source.stem
