@@ -1,5 +1,6 @@
 """What all tests share: the checkout's folders and a way to run the command line in-process."""
 
+import hashlib
 import os
 import signal
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cli.main import _run
+from gcode2krl.files.output import Staging
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.nc"))
@@ -57,6 +59,33 @@ def run(capfd, tmp_path, monkeypatch):
         return Outcome(code, out, err)
 
     return run_command
+
+
+_MOST_BYTES_PARSED = 200_000
+_PARSED: set[bytes] = set()
+
+
+@pytest.fixture(autouse=True)
+def written_programs_are_krl(monkeypatch):
+    """Whatever program a test has gcode2krl write, the grammar of `tests/krl` takes it; each text once."""
+    programs: list[dict[str, bytes]] = []
+    take_places = Staging.take_places
+
+    def taking(staging):
+        take_places(staging)
+        sources = [place for place in staging._temporary if place.suffix in (".src", ".dat")]
+        if sources and sum(place.stat().st_size for place in sources) <= _MOST_BYTES_PARSED:
+            programs.append({place.name: place.read_bytes() for place in sources})
+
+    monkeypatch.setattr(Staging, "take_places", taking)
+    yield
+    for program in programs:
+        digest = hashlib.sha1(b"".join(program.values()), usedforsecurity=False).digest()
+        if digest not in _PARSED:
+            _PARSED.add(digest)
+            from tests.krl.language import parse_program  # lark is imported where there is something to parse
+
+            parse_program(program, has_globals=True)
 
 
 @pytest.fixture(scope="session")
