@@ -388,6 +388,7 @@ class _Composer:
                 q_deg = self.joints.q_rad[row] * DEG_PER_RAD
                 external = zip(w.EXTERNAL_KEYS, targets.external[row], strict=True)
                 template = st.environment().get_template("pose_guard.j2")
+                lines.append(cs.arm_before())
                 lines.append(
                     template.render(
                         q_deg=q_deg,
@@ -395,6 +396,8 @@ class _Composer:
                         root=st.root_check(self.cell, targets.external[row]),
                     )
                 )
+                # Jogged to the predicted axes the arm would pass, but not stand where the motion begins.
+                lines.append(cs.arm_guard("First position", self.cell))
                 lines.append(cs.settings_again(self._settings(int(targets.tool[row]))))
         if self.rsi is not None and row == self.rsi.off:
             lines.append(self.rsi.end)
@@ -428,7 +431,7 @@ class _Composer:
             declarations.append(FRAME_DECLARATIONS)
         if st.coupled_table(self.cell) is not None and self.cell.frames.base_data is None:
             declarations.append("DECL FRAME GK_BASE")
-        if self.layout.guard and self.disturbed_rows:
+        if self.layout.guard:
             declarations.append(cs.STOOD_DECLARATION)
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)

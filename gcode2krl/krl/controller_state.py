@@ -46,7 +46,7 @@ _SETS = {
 """Modal settings that motions depend on, and what sets each. ``$VEL.CP`` and ``$APO.CDIS`` are not among
 them: they stand at the motions, and the reader forgets them by itself (`krl.read`)."""
 _SETTERS = {name: re.compile(pattern) for name, pattern in _SETS.items()}
-_COMPARES_ARM = re.compile(r"WHILE.*" + ".*".join(rf"\$AXIS_ACT\.A{k}-" for k in range(1, 7)))
+_COMPARES_ARM = re.compile("WHILE.*" + ".*".join(rf"\$AXIS_ACT\.{k}-{STOOD}\.{k}\)" for k in w.AXIS_KEYS))
 
 
 def disturbs(statement: str) -> bool:
@@ -156,7 +156,7 @@ class ControllerState:
         elif statement == w.BLOCKS["WHILE"] and self._loops:
             # A loop is left only when its condition is false, however often somebody jogged at a HALT in it.
             condition = self._loops.pop()
-            if _COMPARES_ARM.match(condition) and (STOOD not in condition or self._stood_is_valid):
+            if _COMPARES_ARM.match(condition) and self._stood_is_valid:
                 self.arm_moved_by = ""
         elif disturbs(statement):
             if not self._never_left(statement):

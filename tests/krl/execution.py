@@ -23,7 +23,8 @@ program led, `None` before), ``jog(q_deg, external)`` and ``set(name, value)``; 
 the axes, file and line. `judge` compares the motions of two runs of one program: one with subprograms and
 people that change nothing, one with others. Wrong is a motion that ends elsewhere, a LIN, CIRC or SPL that
 starts elsewhere, a motion with other settings; unless a guard (a HALT with a message, in a loop) came between
-the last touch and it. Approximate: blending is recorded, not computed; a TRIGGER acts at the start of its motion; interrupts
+the last touch and it. Approximate: blending is recorded, not computed; a TRIGGER acts at the start of its
+motion; interrupts
 are recorded, never run; the advance run does not exist.
 """
 
@@ -141,7 +142,7 @@ class Environment:
 
     kinematics: Kinematics | None = None
     root: Callable[[Mapping[str, float]], np.ndarray] = lambda external: np.eye(4)
-    """The robot root in ``$WORLD`` (4, 4) of E1 to E6: not the identity where the controller couples a rail."""
+    """The robot root in ``$WORLD`` (4, 4) of E1 to E6; a coupled rail moves it."""
     table: Callable[[int, Mapping[str, float]], np.ndarray] = lambda machine, external: np.eye(4)
     """The table of ``MACHINE_DEF[n]`` in ``$WORLD`` (4, 4), for EK."""
     system: Mapping[str, Any] = field(default_factory=dict)

@@ -125,14 +125,16 @@ KEYWORDS = _words(
     """
     AND ANIN ANOUT BOOL BRAKE B_AND B_EXOR B_NOT B_OR CASE CHAR CIRC CIRC_REL CONST CONTINUE C_DIS C_ORI C_PTP
     C_SPL C_VEL DECL DEF DEFAULT DEFDAT DEFFCT DELAY DO ELSE END ENDDAT ENDFCT ENDFOR ENDIF ENDLOOP ENDSPLINE
-    ENDSWITCH ENDWHILE ENUM EXIT EXOR EXT EXTFCT FALSE FOR GLOBAL GOTO HALT IF IMPORT INT INTERRUPT LIN LIN_REL
+    ENDSWITCH ENDWHILE ENUM EXIT EXOR EXT EXTFCT FALSE FOR GLOBAL GOTO HALT IF IMPORT INT INTERRUPT LIN
+    LIN_REL
     LOOP NOT OR PRIO PTP PTP_REL PUBLIC REAL REPEAT RESUME RETURN SCIRC SEC SIGNAL SLIN SPL SPLINE SPTP STRUC
     SWITCH THEN TO TRIGGER TRUE UNTIL WAIT WHEN WHILE
     """
 )
 TYPES = _words(
     """
-    INT REAL BOOL CHAR FRAME POS E6POS E3POS AXIS E6AXIS E3AXIS LOAD INERTIA CP PTP_PARAMS ADAP_ACC BAS_COMMAND
+    INT REAL BOOL CHAR FRAME POS E6POS E3POS AXIS E6AXIS E3AXIS LOAD INERTIA CP PTP_PARAMS ADAP_ACC
+    BAS_COMMAND
     KRLMSG_T KRLMSGPAR_T KRLMSGOPT_T KRLMSGDLGSK_T FDAT LDAT PDAT MODULEPARAM_T CIRC_TYPE ORI_TYPE IPO_M_T
     STATE_T EX_KIN MODE_OP
     """
@@ -519,7 +521,8 @@ def parse_program(
     """Return the program of some .src and .dat by file name; ``main`` is the .src that is started.
 
     ``has_globals``: the integrator's $CONFIG.DAT declares variables; then unknown names are taken for such,
-    but not those that begin with $ or GK_. Without ``main`` it is the first .src. Other files (sidecars, XML) are passed over. Raises `KrlError`.
+    but not those that begin with $ or GK_. Without ``main`` it is the first .src. Other files (sidecars, XML)
+    are passed over. Raises `KrlError`.
     """
     modules = {
         file.upper(): parse_module(text, file)
@@ -749,9 +752,9 @@ class _Checker:
         if name in KEYWORDS:
             self.refuse(f"{name} is a word of KRL")
         variable = self.variable(name)
-        if variable is None and name not in SYSTEM_VARIABLES | CONFIGURED | CONSTANTS:
-            if not self.program.has_globals or name.startswith(("$", "GK_")):
-                self.refuse(f"{name} is not declared")
+        is_known = variable is not None or name in SYSTEM_VARIABLES | CONFIGURED | CONSTANTS
+        if not is_known and (not self.program.has_globals or name.startswith(("$", "GK_"))):
+            self.refuse(f"{name} is not declared")
         if len(components) > 1:
             if variable is not None and variable.type in ("INT", "REAL", "BOOL", "CHAR"):
                 self.refuse(f"{name} has no components")

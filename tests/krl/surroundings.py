@@ -41,7 +41,7 @@ class Arm(Kinematics):
 
 
 def environment_of(cell: Cell, tools=(1,), standing=None, **more) -> Environment:
-    """Return the environment in which a cell is as its file says; ``standing`` E1 to E6, ``more`` its fields."""
+    """Return the environment of a cell as its file says; ``standing`` E1 to E6, ``more`` its fields."""
     at = np.zeros(6) if standing is None else np.asarray(standing, dtype=float)
     frames = cell.frames
     robroot = np.eye(4) if frames.robroot is None else frames.robroot.matrix()

@@ -1,4 +1,4 @@
-"""Programs amid subprograms and people that leave their own settings and positions: no wrong target unguarded.
+"""Programs amid subprograms and people that leave their own settings: no wrong target unguarded.
 
 A subprogram that was taught with inline forms leaves its own ``$BASE``, ``$TOOL``, speeds and approximation,
 and the arm and the external axes where it ended; a person at a HALT jogs and touches the same. Each draw
@@ -186,12 +186,12 @@ class Hostile:
 
     def move(self, controller: Controller) -> None:
         """Move one axis or all, by more than the tolerance of a guard; external axes too."""
-        way = self.draw.uniform(3.0, 25.0, 6) * self.draw.choice([-1.0, 1.0], 6)
+        way = self.draw.uniform(0.3, 25.0, 6) * self.draw.choice([-1.0, 1.0], 6)
         chosen = np.ones(6) if self.draw.random() < 0.5 else np.eye(6)[self.draw.integers(6)]
         external = dict(controller.external)
         for key in EXTERNAL_KEYS:
             if key in self.cell.external and self.draw.random() < 0.5:
-                external[key] += float(self.draw.uniform(20.0, 400.0))
+                external[key] += float(self.draw.uniform(0.5, 400.0))
         controller.jog(controller.q_deg + way * chosen, external)
 
 
