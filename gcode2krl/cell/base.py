@@ -15,7 +15,7 @@ from gcode2krl.errors import NotUnderstoodError, input_error
 DEMONSTRATION = "kr300_demonstration"
 _OF_THE_FILE_ALONE = ("model", "name", "based_on", "verified")
 """Keys that describe one file; they are never taken over."""
-_NO_VALUES = frozenset(["source", "sure", "note", "robot_source", "robot_sure"])
+_NO_VALUES = frozenset(["source", "sure", "note", "robot_source", "robot_sure", "trafo_source", "trafo_sure"])
 _CUTTER_KEYS = frozenset(["model", "kind", "diameter_mm", "teeth"])
 """A tool that states one of these keys is another tool: nothing of the base's tool is kept."""
 _FORCE_LAW_KEYS = frozenset(["model", "linear_edge", "kienzle"])

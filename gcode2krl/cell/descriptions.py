@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-NOT_OF_A_FILE = ("taken_over", "defaults")
+NOT_OF_A_FILE = ("taken_over", "defaults", "unconfirmed")
 """Keys that only a resolved cell has."""
 
 

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from gcode2krl.cell import library
 from gcode2krl.cell.base import DEMONSTRATION, Taken, lay_over_base, stated_keys
+from gcode2krl.cell.confirmation import unconfirmed_of
 from gcode2krl.cell.definition import CODES_WITHOUT_SIGNALS, Cell
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE
 from gcode2krl.cell.key_lines import with_lines
@@ -70,7 +71,9 @@ def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str =
     wrong = (*split_pair_issues(stated), *contradictions(cell, known))
     if wrong:
         raise NotUnderstoodError(wrong, source)
-    return cell.model_copy(update={"defaults": tuple(_defaults(cell, known))})
+    return cell.model_copy(
+        update={"defaults": tuple(_defaults(cell, known)), "unconfirmed": unconfirmed_of(cell)}
+    )
 
 
 def cell_from_resolved(record: dict[str, Any], source: str) -> Cell:
@@ -93,6 +96,8 @@ def _fill_in(section: Any, kind: str) -> Any:
     model = library.read_model(kind, section["model"])
     if kind == "materials" and section.keys() & {"linear_edge", "kienzle"}:
         model = {key: value for key, value in model.items() if key not in ("linear_edge", "kienzle")}
+    if "trafo_name" in section:  # its source is the cell file, not the library
+        model = {key: value for key, value in model.items() if key not in ("trafo_source", "trafo_sure")}
     return {**library.merge(model, section), "model": model.get("model", section["model"])}
 
 
