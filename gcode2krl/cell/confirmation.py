@@ -14,16 +14,14 @@ from os.path import commonprefix
 from typing import Any
 
 from gcode2krl.cell.definition import Cell
-from gcode2krl.cell.fingerprint import Values, values_by_section
+from gcode2krl.cell.fingerprint import Values, section_of, values_by_section
 from gcode2krl.cell.sections import SignedSection, Unconfirmed, Verified
 from gcode2krl.errors import Issue
 
 _NOT_SHOWN = re.compile(
-    r"(?:robot\.(?:body|drives|payload)|spindle\.body|compliance|material|effects|limits|pilot|cables"
-    r"|online(?!\.link))(?:\..*)?"
+    r"(?:robot\.(?:body|drives)|spindle\.body|compliance|material|effects|online(?!\.link))(?:\..*)?"
 )
-"""Keys that reach predictions and checks only, or tables of numbers: a person is told of them, and their
-hashes are kept."""
+"""Long tables that no one compares number by number: a person is told of them, and their hashes are kept."""
 _TIME_ZONES = datetime.timedelta(days=1)
 """In other time zones it may already be tomorrow."""
 _ORDER = ("forged", "changed", "new", "removed", "unsigned")
@@ -77,7 +75,7 @@ def confirmed_digests(section: str, verified: Verified) -> Digests:
     """Return what a signature says of a section: the digest of each key."""
     listed = verified.digests.get(section, "")
     hidden = (pair.partition(" ") for pair in listed.split(", ") if listed)
-    shown = {key: _digest(value) for key, value in verified.values.items() if _section_of(key) == section}
+    shown = {key: _digest(value) for key, value in verified.values.items() if section_of(key) == section}
     return {**{f"{section}.{key}": digest for key, _, digest in hidden}, **shown}
 
 
@@ -90,7 +88,7 @@ def signed(cell: Cell, by: str, date: str, sections: Collection[str]) -> Verifie
     keeps_first = old is not None and any(sign.by is None for sign in kept.values())
     first = (old.by, old.date) if old is not None and keeps_first else (by, date)
     whose = {} if first == (by, date) else {"by": by, "date": date}
-    listed = {} if old is None else {key: v for key, v in old.values.items() if _section_of(key) in kept}
+    listed = {} if old is None else {key: v for key, v in old.values.items() if section_of(key) in kept}
     hidden = {} if old is None else {name: text for name, text in old.digests.items() if name in kept}
     signatures = dict(kept)
     for section in sections:
@@ -182,11 +180,6 @@ def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple
 
 def _code(one: Unconfirmed) -> str:
     return "cell-unsigned" if one.kind == "forged" else "cell-changed"
-
-
-def _section_of(key: str) -> str:
-    first, _, inner = key.partition(".")
-    return f"{first}.{inner.partition('.')[0]}" if first == "tool" else first
 
 
 def _digest(value: Any) -> str:

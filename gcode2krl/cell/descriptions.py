@@ -44,6 +44,18 @@ def descriptions_of(section: type[BaseModel]) -> dict[str, Description]:
     }
 
 
+def unit_of(cell: type[BaseModel], key: str) -> str:
+    """Return the unit of a dotted key of a cell, ``tool.1.length_mm``; empty where it has none."""
+    kinds: list[type[BaseModel]] = [cell]
+    unit = ""
+    for step in key.split("."):
+        having = [kind for kind in kinds if step in kind.model_fields]
+        if having:  # else the number of a tool, an entry of a list or the name of a work offset
+            unit = descriptions_of(having[0])[step].unit
+            kinds = [model for kind in having for model in sections_in(kind.model_fields[step].annotation)]
+    return unit
+
+
 def sections_in(annotation: Any) -> Iterator[type[BaseModel]]:
     """Yield the sections that a value of this type may be or hold."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

@@ -49,6 +49,12 @@ def section_hashes(values: Values) -> dict[str, str]:
     }
 
 
+def section_of(key: str) -> str:
+    """Return the section of a dotted key, or of a section itself."""
+    first, _, inner = key.partition(".")
+    return f"{first}.{inner.partition('.')[0]}" if first == "tool" else first
+
+
 def _leaves(key: str, content: Any) -> Iterator[tuple[str, Any]]:
     """Yield the dotted key of each plain value; the items of a list of tables are numbered from 1."""
     if isinstance(content, Mapping):

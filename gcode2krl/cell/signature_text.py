@@ -47,7 +47,8 @@ def _tables(signature: dict[str, Any]) -> list[str]:
             continue
         lines += ["", f"[{TABLE}.{name}]"]
         for key, value in table.items():
-            lines.append(f"{_toml(key)} = {_toml(value)}")
+            name = key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _toml(key)
+            lines.append(f"{name} = {_toml(value)}")
     return lines
 
 
