@@ -60,8 +60,8 @@ def lay_over_base(
 ) -> StatedCell:
     """Return ``data`` over the cell it is ``based_on``; without ``based_on`` it stands alone.
 
-    ``is_confirmed`` tells whether a base is as a person confirmed it, ``seen`` holds the files that led here. Raises `NotUnderstoodError` where the base is not found, is not
-    a cell file or is based on itself.
+    ``is_confirmed`` tells whether a base is as a person confirmed it, ``seen`` holds the files that led here.
+    Raises `NotUnderstoodError` where the base is not found, is not a cell file or is based on itself.
     """
     table = _with_whole_paths(data, beside)
     name = table.get("based_on", "")

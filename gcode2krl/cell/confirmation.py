@@ -1,8 +1,8 @@
 """What a person confirmed of a cell, against what the cell says now.
 
-The signature stands in the cell file, ``[verified]``: who confirmed which section when, the values that the
-person was shown, hashes of the others, and a hash of each section over all of that. It guards against mistakes
-and careless edits; it keeps no secret, so it is no proof against somebody who computes it anew.
+The signature stands in the cell file, ``[verified]``: who confirmed which section when, the values that
+the person was shown, hashes of the others, and a hash of each section over all of that. It guards against
+careless edits; it keeps no secret, so it is no proof against somebody who computes it anew.
 """
 
 import datetime
@@ -10,7 +10,6 @@ import hashlib
 import json
 import re
 from collections.abc import Collection, Iterator
-from os.path import commonprefix
 from typing import Any
 
 from gcode2krl.cell.definition import Cell
@@ -112,20 +111,25 @@ def confirmation_issues(cell: Cell) -> list[Issue]:
     if cell.is_confirmed:
         return []
     if cell.unconfirmed is None and cell.verified is not None and not cell.verified.sections:
-        text = f"`verified` of {cell.verified.by} names no values: it would hold after any edit, and counts as none"
+        text = (
+            f"`verified` of {cell.verified.by} names no values: it would outlive any edit, and counts as none"
+        )
         return [Issue("warning", "cell-unsigned", 0, text, _REMEDY, key="verified")]
     different = cell.unconfirmed or ()
     issues = [
-        Issue("warning", _code(one), 0, sentence_of(one), _REMEDY, key=one.key) for one in different[:_MOST_NAMED]
+        Issue("warning", _code(one), 0, sentence_of(one), _REMEDY, key=one.key)
+        for one in different[:_MOST_NAMED]
     ]
     if len(different) > _MOST_NAMED:
         text = f"{len(different) - _MOST_NAMED} more values are not as they were confirmed"
         issues.append(Issue("warning", "cell-changed", 0, text, _REMEDY))
     if issues:
         return issues
-    text, remedy = "the cell has not been confirmed by a person", "`gcode2krl models check` lists what to confirm"
+    text = "the cell has not been confirmed by a person"
+    remedy = "`gcode2krl models check` lists what to confirm"
     if cell.unconfirmed == ():
-        text = f"no confirmation covers the {len(cell.taken_over)} values that the cell takes over from another"
+        count = len(cell.taken_over)
+        text = f"no confirmation covers the {count} values that the cell takes over from another"
         remedy = "state in the cell file what `gcode2krl models check` lists as taken over, and confirm it"
     return [Issue("note", "cell-not-verified", 0, f"{text}; the program begins with a HALT", remedy)]
 
@@ -149,7 +153,9 @@ def sentence_of(one: Unconfirmed) -> str:
         return f"{one.key} is {_around(one.now, '')}; it was not there when the section was {who}"
     if one.kind == "removed":
         return f"{one.key} is gone; {_around(one.was, '') or 'a value'} was {who}"
-    return f"{one.key} is {_around(one.now, one.was)}; {_around(one.was, one.now) or 'another value'} was {who}"
+    return (
+        f"{one.key} is {_around(one.now, one.was)}; {_around(one.was, one.now) or 'another value'} was {who}"
+    )
 
 
 def signers(verified: Verified) -> list[str]:
@@ -198,7 +204,8 @@ def _text(value: Any) -> str:
 
 def _around(text: str, other: str) -> str:
     """Return a value on a short line: of a long one the place where it differs from another."""
-    same = len(commonprefix([text, other])) if other else 0
+    pairs = zip(text, other, strict=False)
+    same = next((place for place, (one, another) in enumerate(pairs) if one != another), 0)
     start = max(0, same - _BEFORE_DIFFERENCE) if len(text) > _MOST_OF_A_VALUE else 0
     part = text[start : start + _MOST_OF_A_VALUE]
     return f"{'…' if start else ''}{part}{'…' if start + _MOST_OF_A_VALUE < len(text) else ''}"

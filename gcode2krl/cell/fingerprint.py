@@ -19,7 +19,9 @@ Values = dict[str, dict[str, Any]]
 
 _NOT_OF_THE_CELL = frozenset({"name", "based_on", "verified", *NOT_OF_A_FILE})
 """Who confirmed what, and where values came from, is not itself a value."""
-_PROVENANCE = frozenset({"source", "sure", "note", "robot_source", "robot_sure", "trafo_source", "trafo_sure"})
+_PROVENANCE = frozenset(
+    {"source", "sure", "note", "robot_source", "robot_sure", "trafo_source", "trafo_sure"}
+)
 _HASH_DIGITS = 12
 _NAMES_FILE = re.compile(r"\.(?:model|mesh|calibration)$")
 

@@ -6,7 +6,9 @@ from typing import Any
 from gcode2krl.cell.key_lines import lines_of_table
 
 TABLE = "verified"
-_HEAD = "# What a person confirmed, by `gcode2krl models confirm`. An edit here or of a value above undoes it."
+_HEAD = (
+    "# What a person confirmed, by `gcode2krl models confirm`. An edit here or of a value above undoes it."
+)
 
 
 def with_signature(text: str, signature: dict[str, Any]) -> str:
@@ -23,7 +25,7 @@ def with_signature(text: str, signature: dict[str, Any]) -> str:
 
 
 def without_signature(text: str) -> str:
-    """Return the text without the lines of ``[verified]`` or ``verified = …``, and what was written around."""
+    """Return the text without the lines of ``[verified]`` or ``verified = …``, and its comment."""
     lines = re.findall(r"[^\n]*\n|[^\n]+", text)
     removed = lines_of_table(text, TABLE)
     first = min(removed, default=0)

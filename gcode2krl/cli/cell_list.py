@@ -101,7 +101,9 @@ def origin_of(cell: Cell, key: str, lines: Mapping[str, int]) -> str:
 
 def switched(cell: Cell) -> dict[str, str]:
     """Return key → what its template switches or says, as far as it can be rendered."""
-    return {name if name in cell.templates() else f"m_code.{name}": value for name, value, _ in _signals(cell)}
+    return {
+        name if name in cell.templates() else f"m_code.{name}": value for name, value, _ in _signals(cell)
+    }
 
 
 def _tools(cell: Cell) -> Iterator[Row]:

@@ -59,7 +59,7 @@ def command(
     sections = _sections_to_ask(cell, values, named)
     _require_answers(cell_path, by, yes, as_json)
     person = by or click.prompt("Who confirms? Your name")
-    day = day or str(datetime.date.today())  # noqa: DTZ011  (the day where the person is)
+    day = day or str(datetime.date.today())  # where the person is
     confirmed = list(sections) if yes else _asked(console, cell, cell_path, sections, values)
     declined = [section for section in sections if section not in confirmed]
     if confirmed:
@@ -138,7 +138,9 @@ def _is_this_robot(console: Console, cell: "Cell") -> bool:
     if cell.robot.is_named(shown):
         return True
     if shown:
-        console.say(f"  this is not {cell.robot.trafo_name!r}, and the guard of each program would stop there")
+        console.say(
+            f"  this is not {cell.robot.trafo_name!r}, and the guard of each program would stop there"
+        )
         name = shown.strip().removeprefix("#")
         console.say(f'  if it is the right robot, write into the cell file: [robot] trafo_name = "{name}"')
     console.say("  [robot] is not confirmed")
@@ -190,9 +192,7 @@ def _source(cell: "Cell", section: str) -> str:
     return f"{source or 'not stated'} ({sure})" if sure else ""
 
 
-def _sign(
-    cell: "Cell", cell_path: Path, before: bytes, by: str, day: str, sections: Sequence[str]
-) -> "Cell":
+def _sign(cell: "Cell", cell_path: Path, before: bytes, by: str, day: str, sections: Sequence[str]) -> "Cell":
     """Write the signature into the cell file, and return the cell as it is read then."""
     from pydantic import ValidationError
 
@@ -207,7 +207,9 @@ def _sign(
     except ValidationError as error:
         detail = error.errors(include_url=False)[0]
         which = "--date" if "date" in detail["loc"] else "--by"
-        raise input_error("option-value", f"{which}: {detail['msg']}", "--by NAME --date 2026-11-28") from None
+        raise input_error(
+            "option-value", f"{which}: {detail['msg']}", "--by NAME --date 2026-11-28"
+        ) from None
     text = with_signature(before.decode("utf-8"), signature.model_dump(mode="json", exclude_none=True))
     data = library.parse_toml(text.removeprefix("\ufeff"), str(cell_path))
     as_signed = resolve_cell(data, beside=cell_path.parent, source=str(cell_path))
@@ -231,6 +233,5 @@ def _say_done(
     if declined:
         console.say(f"NOT CONFIRMED: {', '.join(declined)}; programs begin with a HALT")
     if cell.taken_over:
-        console.say(
-            f"NOT COVERED: {len(cell.taken_over)} values taken over from another cell; programs begin with a HALT"
-        )
+        count = len(cell.taken_over)
+        console.say(f"NOT COVERED: {count} values taken over from another cell; programs begin with a HALT")

@@ -197,7 +197,7 @@ def not_compared_loads(cell: Cell, tools: list[int]) -> list[str]:
 
 
 def robot_names(cell: Cell) -> dict[str, str]:
-    """Return what the guard compares ``$TRAFONAME[]`` with: the ``whole`` of it, or what it ``begins`` with."""
+    """Return what ``$TRAFONAME[]`` must be: the ``whole`` of it, or what it ``begins`` with."""
     name = cell.robot.trafo_name.removeprefix("#").strip()
     return {"whole": name, "begins": f"{name} "} if name else {}
 

@@ -23,7 +23,6 @@ from tests.krl.conftest import PART, read
 from tests.krl.replay import components, frame
 
 
-
 def text_of(made) -> str:
     return made.src.read_bytes().decode("ascii")
 

@@ -98,7 +98,7 @@ class Robot(Section):
     """One robot model; without geometry its joint angles are unknown."""
 
     model: OneLine = ""
-    trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$")] = ""
+    trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$", max_length=32)] = ""
     """The robot's name in ``$TRAFONAME[]`` of the controller; empty: the guard does not check it."""
     trafo_source: str = ""
     trafo_sure: Sure = "memory"
@@ -111,7 +111,7 @@ class Robot(Section):
     note: str = ""
 
     def is_named(self, shown: str) -> bool:
-        """Tell whether ``$TRAFONAME[]`` that reads ``shown`` is of this robot, as the guard of a program does.
+        """Tell whether ``$TRAFONAME[]`` that reads ``shown`` is of this robot, as a program's guard does.
 
         The name begins it, after ``#`` or not, and a blank or nothing follows: KR60 is not of a KR600.
         """
