@@ -112,7 +112,7 @@ def confirmation_issues(cell: Cell) -> list[Issue]:
         return []
     if cell.unconfirmed is None and cell.verified is not None and not cell.verified.sections:
         text = (
-            f"`verified` of {cell.verified.by} names no values: it would outlive any edit, and counts as none"
+            f"`verified` of {cell.verified.by} names no values; it would outlive any edit"
         )
         return [Issue("warning", "cell-unsigned", 0, text, _REMEDY, key="verified")]
     different = cell.unconfirmed or ()
