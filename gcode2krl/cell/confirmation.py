@@ -86,17 +86,18 @@ def signed(cell: Cell, by: str, date: str, sections: Collection[str]) -> Verifie
     kept = {name: sign for name, sign in kept.items() if name in values}
     keeps_first = old is not None and any(sign.by is None for sign in kept.values())
     first = (old.by, old.date) if old is not None and keeps_first else (by, date)
-    whose = {} if first == (by, date) else {"by": by, "date": date}
     listed = {} if old is None else {key: v for key, v in old.values.items() if section_of(key) in kept}
     hidden = {} if old is None else {name: text for name, text in old.digests.items() if name in kept}
-    signatures = dict(kept)
+    signatures: dict[str, SignedSection] = {}
+    for name, sign in kept.items():
+        signatures[name] = _by(sign.hash, (sign.by or first[0], sign.date or first[1]), first)
     for section in sections:
         digests = {key: _digest(value) for key, value in values[section].items()}
         listed |= {key: value for key, value in values[section].items() if is_shown(key)}
         not_shown = [f"{key[len(section) + 1 :]} {digests[key]}" for key in digests if not is_shown(key)]
         if not_shown:
             hidden[section] = ", ".join(not_shown)
-        signatures[section] = SignedSection(hash=_section_hash(section, by, date, digests), **whose)
+        signatures[section] = _by(_section_hash(section, by, date, digests), (by, date), first)
     return Verified(
         by=first[0],
         date=first[1],
@@ -104,6 +105,11 @@ def signed(cell: Cell, by: str, date: str, sections: Collection[str]) -> Verifie
         values=dict(sorted(listed.items())),
         digests=dict(sorted(hidden.items())),
     )
+
+
+def _by(digest: str, who: tuple[str, str], first: tuple[str, str]) -> SignedSection:
+    """Return the signature of a section; who confirmed the cell is not repeated."""
+    return SignedSection(hash=digest) if who == first else SignedSection(hash=digest, by=who[0], date=who[1])
 
 
 def confirmation_issues(cell: Cell) -> list[Issue]:

@@ -88,6 +88,7 @@ class _Writer:
             yield from self._key(Robot, "model", robot, "robot")
         if controller.trafo_name:
             yield from _line(Robot, "trafo_name", controller.trafo_name)
+            yield from _line(Robot, "trafo_source", f"archive {controller.source}, $TRAFONAME[]")
             yield from _line(Robot, "trafo_sure", "verified")
         if robot == OTHER:
             yield from _line(Robot, "note", "not in the library")
