@@ -24,7 +24,7 @@ _NOT_SHOWN = re.compile(
 _TIME_ZONES = datetime.timedelta(days=1)
 """In other time zones it may already be tomorrow."""
 _ORDER = ("forged", "changed", "new", "removed", "unsigned")
-_MOST_NAMED = 8
+_MOST_NAMED, _MOST_SIGNED = 8, 4
 _MOST_OF_A_VALUE = 60
 _BEFORE_DIFFERENCE = 20
 _REMEDY = "if it is so at the cell: `gcode2krl models confirm CELL.toml`"
@@ -117,13 +117,11 @@ def confirmation_issues(cell: Cell) -> list[Issue]:
     if cell.is_confirmed:
         return []
     if cell.unconfirmed is None and cell.verified is not None and not cell.verified.sections:
-        text = (
-            f"`verified` of {cell.verified.by} names no values; it would outlive any edit"
-        )
+        text = f"`verified` of {cell.verified.by} names no values; it would outlive any edit"
         return [Issue("warning", "cell-unsigned", 0, text, _REMEDY, key="verified")]
     different = cell.unconfirmed or ()
     issues = [
-        Issue("warning", _code(one), 0, sentence_of(one), _REMEDY, key=one.key)
+        Issue("warning", _code(one), 0, sentence_of(one), _REMEDY, key=_place(one.key))
         for one in different[:_MOST_NAMED]
     ]
     if len(different) > _MOST_NAMED:
@@ -170,7 +168,11 @@ def signers(verified: Verified) -> list[str]:
     for section, sign in verified.sections.items():
         if sign.by is not None:
             others.setdefault(f"{sign.by} on {sign.date or verified.date}", []).append(section)
-    return [f"{verified.by} on {verified.date}", *(f"{who} ({', '.join(s)})" for who, s in others.items())]
+    named = {
+        who: ", ".join(sections[:_MOST_SIGNED]) + (", …" if len(sections) > _MOST_SIGNED else "")
+        for who, sections in others.items()
+    }
+    return [f"{verified.by} on {verified.date}", *(f"{who} ({words})" for who, words in named.items())]
 
 
 def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple[Issue, ...]:
@@ -188,6 +190,13 @@ def future_confirmation(cell: Cell, today: datetime.date | None = None) -> tuple
     text = f"verified.date = {last} is in the future (today is {today})"
     remedy = "write the day on which verified.by confirmed the cell, or set this computer's clock"
     return (Issue("warning", "verified-future", 0, text, remedy, key="verified.date"),)
+
+
+def _place(key: str) -> str:
+    """Return a key as `key_lines` has it, which counts the tables of a list from 0."""
+    if key.startswith("tool."):
+        return key
+    return re.sub(r"(?<=\.)\d+(?=\.|$)", lambda number: str(int(number[0]) - 1), key)
 
 
 def _code(one: Unconfirmed) -> str:

@@ -11,7 +11,7 @@ import pytest
 import tomli_w
 
 from gcode2krl import load_cell
-from gcode2krl.cell import as_toml, cell_from_resolved, library
+from gcode2krl.cell import as_toml, cell_from_resolved, confirmation, library
 from gcode2krl.cell.confirmation import confirmation_issues, signers
 from gcode2krl.cell.confirmation import signed as signature_of
 from gcode2krl.cell.fingerprint import section_of, values_by_section
@@ -215,6 +215,24 @@ def test_an_edit_is_told_with_what_was_confirmed(example, line, edited_line, mes
     assert {issue.code for issue in issues} == {"cell-changed"}
     assert any(issue.message.startswith(message) for issue in issues), issues
     assert all("models confirm" in issue.remedy for issue in issues)
+
+
+def test_a_default_of_another_release_was_not_confirmed(tmp_path, monkeypatch):
+    now = values_by_section(load_cell())
+    older = {
+        **now,
+        "controller": {key: value for key, value in now["controller"].items() if "circ" not in key},
+    }
+    older["spindle"] = now["spindle"] | {"spindle.start_s": 4.0}
+    with monkeypatch.context() as patch:
+        patch.setattr(confirmation, "values_by_section", lambda _: older)
+        data = signed(OWN_CELL)
+    (tmp_path / "cell.toml").write_text(tomli_w.dumps(data))
+    cell = load_cell(tmp_path / "cell.toml")
+    assert [(one.key, one.kind, one.was) for one in cell.unconfirmed] == [
+        ("spindle.start_s", "changed", "4.0"),
+        ("controller.circ", "new", ""),
+    ]
 
 
 def test_what_is_in_a_mesh_was_confirmed_and_where_it_lies_was_not(tmp_path):
