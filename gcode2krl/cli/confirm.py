@@ -32,7 +32,7 @@ _FRAME_KEYS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 @click.option(
     "--section", "named", multiple=True, help="Confirm this section only, again too; may be repeated."
 )
-@click.option("--yes", is_flag=True, help="Ask nothing: the person has compared everything that is listed.")
+@click.option("--yes", is_flag=True, help="Ask nothing: the person has compared what `models check` lists.")
 @click.option("--date", "day", help="Day of the confirmation, year-month-day.  [default: today]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
@@ -40,8 +40,8 @@ def command(
 ) -> int:
     """Confirm at the real cell that a cell file is true, and sign the file with what was confirmed.
 
-    Asked is what nobody has confirmed as it is now. The signature is [verified], at the end of the file; an
-    edit of a value, of the base or of the library undoes it for its section.
+    It asks for the sections that nobody has confirmed as they are now. The signature is [verified], at the end
+    of the file; an edit of a value, of the base or of the library undoes it for its section.
     """
     from gcode2krl.cell import load_cell
     from gcode2krl.cell.fingerprint import values_by_section

@@ -27,8 +27,8 @@ _LONGEST_LINE = 110
 _HEAD = """#:schema {schema}
 # Cell file of gcode2krl: what the G-code cannot say. Written by `gcode2krl init`.
 #
-# NOT CONFIRMED. Each program begins with a HALT until a person has compared every value below with the
-# real cell (`gcode2krl models check` lists them) and has signed this file:
+# Each program begins with a HALT until a person has compared every value below with the real cell, and again
+# after each edit. This signs the file at its end, section by section:
 #   gcode2krl models confirm CELL.toml
 """
 _LOAD_KEYS = {
