@@ -7,7 +7,7 @@ from typing import Any
 from gcode2krl.cell import Cell, plain_view, switching
 from gcode2krl.cell.confirmation import confirmation_issues, future_confirmation
 from gcode2krl.cell.ranges import range_issues
-from gcode2krl.cell.sections import Frame, Obstacle
+from gcode2krl.cell.sections import Frame, Obstacle, Robot
 from gcode2krl.errors import Issue
 
 MISSING = "MISSING"
@@ -18,7 +18,7 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     """Yield (what, value, how sure) of everything a person must confirm."""
     robot = cell.robot
     yield "robot", robot.model or ("geometry given" if robot.geometry.known else MISSING), robot.geometry.sure
-    yield "$TRAFONAME[] begins with", robot.trafo_name or "not compared", robot.trafo_sure
+    yield "$TRAFONAME[] begins with", _robot_name(robot), robot.trafo_sure
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
     yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s", "unknown"), robot.speeds.sure
     if cell.frames.robroot is not None:
@@ -43,6 +43,16 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
         "RSI",
         f"$OUT[{link.t1_output}] on in T1, $OUT[{link.ready_output}] free, PC {link.address}:{link.port}",
         "memory",
+    )
+
+
+def _robot_name(robot: Robot) -> str:
+    """Return what the guard compares, and what to do where nobody has read it at a controller."""
+    if not robot.trafo_name:
+        return "not compared: state [robot] trafo_name"
+    is_read = robot.trafo_sure in ("verified", "checked")
+    return robot.trafo_name + (
+        "" if is_read else ": if the controller shows another name, state [robot] trafo_name"
     )
 
 

@@ -32,7 +32,7 @@ _FRAME_KEYS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 @click.option(
     "--section", "named", multiple=True, help="Confirm this section only, again too; may be repeated."
 )
-@click.option("--yes", is_flag=True, help="Ask nothing: the person has compared what `models check` lists.")
+@click.option("--yes", is_flag=True, help="Ask nothing: the person has compared what `check` lists.")
 @click.option("--date", "day", help="Day of the confirmation, year-month-day.  [default: today]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
@@ -124,7 +124,7 @@ def _asked(
         console.say(f"\n[{section}]  {count} of {len(sections)}")
         for row in _rows(cell, section, values[section], lines):
             console.say(f"  {row}")
-        if section == "robot" and cell.robot.trafo_name and not _is_this_robot(console, cell):
+        if section == "robot" and not _is_this_robot(console, cell):
             continue
         if click.confirm("Is it so at the cell?", default=False):
             confirmed.append(section)
@@ -133,6 +133,9 @@ def _asked(
 
 def _is_this_robot(console: Console, cell: "Cell") -> bool:
     """Ask what the controller shows, and tell whether the guard of a program would accept it."""
+    if not cell.robot.trafo_name:
+        console.say("  no program can tell whether it runs on this robot: state [robot] trafo_name")
+        return True
     where = "What does $TRAFONAME[] show (Display > Variable > Single)? Enter: not read"
     shown = click.prompt(where, default="", show_default=False)
     if cell.robot.is_named(shown):
