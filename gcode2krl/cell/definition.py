@@ -131,7 +131,12 @@ class Cell(Section):
         return self.verified is not None and self.unconfirmed == () and not self.taken_over
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy; other values than those of the file are confirmed by nobody."""
+        """Return a copy; one with other values is confirmed by nobody.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().model_copy(update={"name": "mine"}).is_confirmed
+        False
+        """
         changed: dict[str, Any] = {} if update is None or "unconfirmed" in update else {"unconfirmed": None}
         return super().model_copy(update={**(update or {}), **changed}, deep=deep)
 

@@ -40,8 +40,8 @@ def command(
 ) -> int:
     """Confirm at the real cell that a cell file is true, and sign the file with what was confirmed.
 
-    It asks for the sections that nobody has confirmed as they are now. The signature is [verified], at the end
-    of the file; an edit of a value, of the base or of the library undoes it for its section.
+    It asks for the sections that nobody has confirmed as they are. The signature is [verified], at the end of
+    the file; an edit of a value, of the base or of the library undoes it for its section.
     """
     from gcode2krl.cell import load_cell
     from gcode2krl.cell.fingerprint import values_by_section
