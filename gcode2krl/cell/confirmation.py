@@ -79,11 +79,13 @@ def confirmed_digests(section: str, verified: Verified) -> Digests:
 
 
 def signed(cell: Cell, by: str, date: str, sections: Collection[str]) -> Verified:
-    """Return the signature of a cell of which a person confirmed ``sections``; other signatures stay."""
+    """Return the signature of a cell of which a person confirmed ``sections``; other signatures stay.
+
+    A section that the cell no longer has loses its signature: that it is gone was confirmed.
+    """
     old = cell.verified if cell.verified is not None and cell.verified.sections else None
     values = values_by_section(cell)
     kept = {} if old is None else {name: sign for name, sign in old.sections.items() if name not in sections}
-    kept = {name: sign for name, sign in kept.items() if name in values}
     keeps_first = old is not None and any(sign.by is None for sign in kept.values())
     first = (old.by, old.date) if old is not None and keeps_first else (by, date)
     listed = {} if old is None else {key: v for key, v in old.values.items() if section_of(key) in kept}
@@ -91,7 +93,7 @@ def signed(cell: Cell, by: str, date: str, sections: Collection[str]) -> Verifie
     signatures: dict[str, SignedSection] = {}
     for name, sign in kept.items():
         signatures[name] = _by(sign.hash, (sign.by or first[0], sign.date or first[1]), first)
-    for section in sections:
+    for section in (name for name in sections if name in values):
         digests = {key: _digest(value) for key, value in values[section].items()}
         listed |= {key: value for key, value in values[section].items() if is_shown(key)}
         not_shown = [f"{key[len(section) + 1 :]} {digests[key]}" for key in digests if not is_shown(key)]

@@ -78,11 +78,13 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _sections_to_ask(cell: "Cell", values: "Values", named: Sequence[str]) -> list[str]:
-    """Return the sections that are named, or else those that are not confirmed as they are."""
-    unknown = [section for section in named if section not in values]
+    """Return the sections that are named, or else those that are not confirmed as they are, or are gone."""
+    signed = cell.verified.sections if cell.verified is not None else {}
+    known = [*values, *(section for section in signed if section not in values)]
+    unknown = [section for section in named if section not in known]
     if unknown:
         sentence = f"--section: the cell has no {unknown[0]!r}"
-        raise input_error("option-value", sentence, f"name one of {', '.join(values)}")
+        raise input_error("option-value", sentence, f"name one of {', '.join(known)}")
     if named:
         return list(dict.fromkeys(named))
     if cell.unconfirmed is None:
@@ -90,7 +92,7 @@ def _sections_to_ask(cell: "Cell", values: "Values", named: Sequence[str]) -> li
     from gcode2krl.cell.fingerprint import section_of
 
     different = {section_of(one.key) for one in cell.unconfirmed}
-    return [section for section in values if section in different]
+    return [section for section in known if section in different]
 
 
 def _require_answers(cell_path: Path, by: str | None, yes: bool, as_json: bool) -> None:
@@ -113,6 +115,8 @@ def _asked(
 ) -> list[str]:
     """Ask section by section; return those that the person confirms."""
     from gcode2krl.cell.base import stated_keys
+    from gcode2krl.cell.confirmation import sentence_of
+    from gcode2krl.cell.fingerprint import section_of
     from gcode2krl.cell.key_lines import lines_of_keys
 
     text = library.read_text(cell_path)
@@ -122,7 +126,10 @@ def _asked(
     confirmed = []
     for count, section in enumerate(sections, start=1):
         console.say(f"\n[{section}]  {count} of {len(sections)}")
-        for row in _rows(cell, section, values[section], lines):
+        for one in cell.unconfirmed or ():
+            if section_of(one.key) == section and one.kind != "unsigned":
+                console.say(f"  ! {sentence_of(one)}")
+        for row in _rows(cell, section, values.get(section, {}), lines):
             console.say(f"  {row}")
         if section == "robot" and not _is_this_robot(console, cell):
             continue
@@ -190,7 +197,7 @@ def _source(cell: "Cell", section: str) -> str:
     """Return where a section's values come from, and how sure they are, as it says itself."""
     name, _, number = section.partition(".")
     table = getattr(cell, name)
-    table = table[int(number)] if number else table
+    table = table.get(int(number)) if number else table
     source, sure = getattr(table, "source", ""), getattr(table, "sure", "")
     return f"{source or 'not stated'} ({sure})" if sure else ""
 

@@ -303,9 +303,15 @@ def test_a_section_is_confirmed_again_by_another_and_the_others_stay(example):
     cell = load_cell(file)
     assert cell.is_confirmed
     assert signers(cell.verified) == ["M. M. on 2026-12-01"]
-    file.write_text(file.read_text().replace("x_mm = 261.0", "x_mm = 260.0", 1))
+    text = file.read_text().replace("x_mm = 261.0", "x_mm = 260.0", 1)
+    begin = text.index("[tool.2]")
+    file.write_text(text[:begin] + text[text.index("\n[", begin) + 1 :])
     confirm(file, by="A", day="2026-12-02", sections=["home"])
-    assert [one.key for one in load_cell(file).unconfirmed] == ["frames.tool.x_mm"]
+    different = load_cell(file).unconfirmed
+    assert {section_of(one.key) for one in different} == {"frames", "tool.2"}
+    assert {one.kind for one in different} == {"changed", "removed"}
+    confirm(file, by="A", day="2026-12-02", sections=["frames", "tool.2"])
+    assert load_cell(file).is_confirmed
 
 
 OLD = "[verified]  # old\nby = 'x'\ndate = '2026-01-01'\n"

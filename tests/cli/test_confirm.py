@@ -12,6 +12,7 @@ from gcode2krl.cell.fingerprint import values_by_section
 from tests.conftest import ROOT
 
 SOURCE = ROOT / "examples" / "cells" / "spindle_on_analog_output.toml"
+AT_TERMINAL = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 CONFIRM = ("models", "confirm", "cell.toml")
 
 
@@ -63,6 +64,17 @@ def test_a_script_confirms_what_a_person_has_compared(run, cell_file):
     assert "by B on 2026-11-29 (clearance)" in run("models", "check", "cell.toml").out
 
 
+@AT_TERMINAL
+def test_a_section_that_is_gone_is_asked_for(run, cell_file):
+    run(*CONFIRM, "--by", "A", "--yes", "--date", "2026-11-28")
+    cell_file.write_text(cell_file.read_text().replace("[table]\nz_mm = -60.0\n", "", 1))
+    output, _ = at_terminal(cell_file, ["B", "n"])
+    assert "! table.z_mm is gone; -60.0 was confirmed by A on 2026-11-28" in output
+    assert not load_cell(cell_file).is_confirmed
+    assert "confirmed and signed: table" in at_terminal(cell_file, ["B", "y"])[0]
+    assert load_cell(cell_file).is_confirmed
+
+
 def test_a_cell_with_an_error_is_not_confirmed(run, cell_file):
     cell_file.write_text(cell_file.read_text().replace("mass_kg = 42.0", "mass_kg = 4e6"))
     done = run(*CONFIRM, "--by", "A", "--yes")
@@ -78,7 +90,7 @@ def test_what_is_taken_over_is_not_covered(run, tmp_path):
     assert (cell.unconfirmed, cell.is_confirmed) == ((), False)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+@AT_TERMINAL
 @pytest.mark.parametrize(
     ("shown", "is_this"), [("#KR120R2700_2 C4 FLR", True), ("#KR120R2500 PRO C4", False), ("", False)]
 )
