@@ -135,6 +135,8 @@ such controllers show them. What an option package adds is not known here."""
 KIND_LIN, KIND_PTP, KIND_VEL_CP, KIND_APO_CDIS = range(4)
 KIND_WAIT_SEC, KIND_OTHER, KIND_PTP_AXES, KIND_TRIGGER = range(4, 8)
 KIND_CIRC, KIND_SPL = 8, 9
+KIND_FORGETS = 10
+"""A statement behind which the speed and the approximation in force are not known."""
 MALFORMED = -1
 """Stands for the blending of a statement that cannot be read."""
 ASSIGNS, CALLS = 1, 2

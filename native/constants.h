@@ -153,6 +153,7 @@
 #define W_KIND_TRIGGER 7
 #define W_KIND_CIRC 8
 #define W_KIND_SPL 9
+#define W_KIND_FORGETS 10
 #define W_MALFORMED (-1)
 #define W_ASSIGNS 1
 #define W_CALLS 2

@@ -69,7 +69,7 @@ def problem(text: str, externals: Iterable[str] = ()) -> str:
         wrong = _wrong(statement, callable_names)
         if wrong:
             return f"{statement[:50]!r} {wrong}"
-    return _unbalanced(text)
+    return _interrupts_left_on(text) or _unbalanced(text)
 
 
 def external_problem(external: str) -> str:
@@ -239,6 +239,22 @@ def _wrong_interrupt(statement: str, callable_names: set[str]) -> str:
     if match[1] and match[2] not in callable_names:
         return f"calls {match[2]}, which program.externals does not declare"
     return ""
+
+
+def _interrupts_left_on(text: str) -> str:
+    """Return why an interrupt may not stay on: nothing is set again behind a subprogram that it calls."""
+    is_on: dict[str, bool] = {}
+    for statement in statements(text):
+        match = re.match(r"INTERRUPT (ON|ENABLE|OFF|DISABLE) (\d+)$", statement)
+        if match:
+            is_on[match[2]] = match[1] in ("ON", "ENABLE")
+    number = next((number for number, on in is_on.items() if on), "")
+    if not number:
+        return ""
+    return (
+        f"leaves interrupt {number} on: its subprogram could change what the motions depend on "
+        f"between any two of them; switch it off in the same template"
+    )
 
 
 def _unbalanced(text: str) -> str:

@@ -30,8 +30,8 @@ def motion_columns(
     """Return PTP, speed in mm/s, approximation in mm and line (p,) of the motions among statements (k,).
 
     ``number`` (k - p,) is the first number of each statement that is no motion. Speed and approximation are
-    those of the last setting that has one, NaN before the first; the speed of a PTP is NaN, the approximation
-    of a motion without ``C_DIS`` is 0.
+    those of the last setting that has one, NaN before the first and behind `KIND_FORGETS`; the speed of a PTP
+    is NaN, the approximation of a motion without ``C_DIS`` is 0.
     """
     kinds, blends = kind.view(np.uint8), blend.view(np.uint8)
     borders = chunk_borders(len(kind))

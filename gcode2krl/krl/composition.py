@@ -11,12 +11,13 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.cell import Cell, controller_axes
+from gcode2krl.cell import Cell, controller_axes, template_rules
 from gcode2krl.cell.checked_parts import CollisionScope
 from gcode2krl.cell.confirmation import signers
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
+from gcode2krl.krl import controller_state as cs
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.external_words import external_lines
@@ -117,10 +118,6 @@ class _Composer:
         self.source = st.ascii_text(_file_name(targets.source), 40)
         self.position, self.abc_deg = written_poses(targets, cell)
         self.state = np.array(_NOTHING_IN_FORCE)
-        self.events: dict[int, list[tuple[float, str]]] = {}
-        for event in targets.events:
-            text = st.event_statements(event, cell)
-            self.events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
         self.guarded_pose = False
         self.on_the_way = False
         self.pilot = pilot
@@ -128,10 +125,56 @@ class _Composer:
         if pilot is not None:
             self.checksum = self._checksum(pilot)
         self.rsi = self._rsi(layout.online) if layout.online else None
+        most, count = cell.program.max_lines, len(targets)
+        is_one = count <= most and layout.split == "defs"
+        self.chunks = [(0, count, False)] if is_one else self._chunks(most)
+        self.curves = self._curves()
+        self.curve_firsts = np.array([curve.first for curve in self.curves], dtype=np.int64)
+        self.standing = targets.external[np.argmin(targets.home)]
+        self.disturbed_rows: set[int] = set()
+        self.events = self._event_texts()
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         self.event_rows = np.array(sorted(rows), dtype=np.int64)
-        self.curves: list[Arc | Chain] = []
-        self.curve_firsts: Ints = np.zeros(0, dtype=np.int64)
+
+    def _curves(self) -> list[Arc | Chain]:
+        """Return the arcs and splines that are written as such: one over the end of a part stays chords."""
+        starts, ends = np.array([(start, end) for start, end, _ in self.chunks]).T
+        curves: list[Arc | Chain] = [*self.layout.arcs, *self.layout.splines]
+        curves.sort(key=lambda curve: curve.first)
+        of_chunk = np.searchsorted(starts, [curve.first for curve in curves], side="right") - 1
+        return [curve for curve, k in zip(curves, of_chunk, strict=True) if curve.end < ends[k]]
+
+    def _event_texts(self) -> dict[int, list[tuple[float, str]]]:
+        """Return row → (dwell before it, KRL) of the events at its end, and fill ``disturbed_rows``.
+
+        Behind a statement that may have moved the arm or changed a setting, both are made sure of.
+        """
+        events: dict[int, list[tuple[float, str]]] = {}
+        tool = int(self.targets.tool[0])
+        for event in self.targets.events:
+            text = st.event_statements(event, self.cell)
+            changes_tool = event.kind == "tool" and event.values["tool"] in self.cell.tool
+            if changes_tool:
+                tool = event.values["tool"]
+            is_last = event.row == len(self.targets) - 1  # nothing moves behind it
+            if cs.may_disturb(text) and not is_last:
+                self.disturbed_rows.add(event.row)
+                line = event.values["line"]
+                text = self._made_sure(text, f"Line {line}" if line else "Program end", tool)
+            elif changes_tool:
+                text = f"{text}\n{st.tool_statements(self.cell, tool)}"
+            events.setdefault(event.row, []).append((event.values.get("dwell_s", 0.0), text))
+        return events
+
+    def _made_sure(self, text: str, place: str, tool: int) -> str:
+        """Return KRL that may disturb, with what finds the arm moved and sets everything again."""
+        if self.layout.guard:
+            text = f"{cs.arm_before()}\n{text}\n{cs.arm_guard(place, self.cell)}"
+        return f"{text}\n{cs.settings_again(self._settings(tool))}"
+
+    def _settings(self, tool: int) -> str:
+        base = st.base_statement(self.cell, self.standing)
+        return cs.settings(self.cell, base, tool, has_arcs=any(isinstance(c, Arc) for c in self.curves))
 
     def _rsi(self, name: str) -> RsiText:
         on, off = rsi_rows(self.targets)
@@ -140,30 +183,18 @@ class _Composer:
 
     def files(self) -> dict[str, Iterable[bytes]]:
         """Return the main program, its subprograms and what stands beside them."""
-        most = self.cell.program.max_lines
-        count = len(self.targets)
-        is_one = count <= most and self.layout.split == "defs"
-        chunks = [(0, count, False)] if is_one else self._chunks(most)
-        starts, ends = np.array([(start, end) for start, end, _ in chunks]).T
-        curves: list[Arc | Chain] = [*self.layout.arcs, *self.layout.splines]
-        curves.sort(key=lambda curve: curve.first)
-        of_chunk = np.searchsorted(starts, [curve.first for curve in curves], side="right") - 1
-        self.curves = [  # one over the end of a part stays chords
-            curve for curve, k in zip(curves, of_chunk, strict=True) if curve.end < ends[k]
-        ]
-        self.curve_firsts = np.array([curve.first for curve in self.curves], dtype=np.int64)
-        whole = [(start, end) for start, end, is_part in chunks if is_part]
+        whole = [(start, end) for start, end, is_part in self.chunks if is_part]
         parts = [_Part(part_name(self.name, k), *rows) for k, rows in enumerate(whole, start=1)]
-        files: dict[str, Iterable[bytes]] = {f"{self.name}{w.SOURCE_SUFFIX}": self._main(chunks, parts)}
+        files: dict[str, Iterable[bytes]] = {f"{self.name}{w.SOURCE_SUFFIX}": self._main(parts)}
         if self.layout.split == "files":
             files |= {f"{part.name}{w.SOURCE_SUFFIX}": self._part_file(part) for part in parts}
         return files | self._side_files()
 
-    def _main(self, chunks: list[tuple[int, int, bool]], parts: list[_Part]) -> Iterator[bytes]:
+    def _main(self, parts: list[_Part]) -> Iterator[bytes]:
         """Yield the main program; where the parts are not files, they stand behind it."""
         yield self._head(parts)
         names = iter(parts)
-        for start, end, is_part in chunks:
+        for start, end, is_part in self.chunks:
             if is_part:
                 yield _text(f"{next(names).name}( )")
                 self.state[:] = _NOTHING_IN_FORCE
@@ -187,15 +218,36 @@ class _Composer:
     def _subprogram(self, part: _Part) -> Iterator[bytes]:
         """Yield a part, which states its speed and CDIS."""
         first = self._first_message(part)
-        yield from (NEWLINE, _text(f"{w.DEF} {part.name}( )\n{'' if first is None else DECLARATIONS}"))
+        yield from (
+            NEWLINE,
+            _text("\n".join([f"{w.DEF} {part.name}( )", *self._declarations_of(part, first)])),
+        )
         state, begin = np.array(_NOTHING_IN_FORCE), part.start
         if first is not None:  # set up where the robot stands anyway: the part may begin in a blended corner
             yield from self._motions(begin, first, state)
             yield from self._lines(first, first + 1, state)
             yield from (_text(MESSAGE_SETUP), self._around(first))
             begin = first + 1
+            if first in self.disturbed_rows:
+                state[:] = _NOTHING_IN_FORCE
         yield from self._motions(begin, part.end, state)
         yield _text(w.END)
+
+    def _declarations_of(self, part: _Part, first_message: int | None) -> Iterator[str]:
+        """Yield what a part declares: what it calls where it is a file, and its own variables."""
+        rows = [row for row in self.events if part.start <= row < part.end]
+        if self.layout.split == "files":
+            text = "\n".join(event_text for row in rows for _, event_text in self.events[row])
+            called = set(template_rules.calls(text))
+            if w.BAS in called:
+                yield w.EXT_BAS
+            for external in self.cell.program.externals:
+                if external.split("(")[0].strip().upper() in called:
+                    yield f"{w.EXT} {external}"
+        if first_message is not None:
+            yield DECLARATIONS
+        if self.layout.guard and not self.disturbed_rows.isdisjoint(rows):
+            yield cs.STOOD_DECLARATION
 
     def _part_file(self, part: _Part) -> Iterator[bytes]:
         """Yield a part as a file of its own."""
@@ -256,6 +308,8 @@ class _Composer:
             yield from self._ways(at, stop, state)
             if row < end:
                 yield self._around(row)
+                if row in self.disturbed_rows:
+                    state[:] = _NOTHING_IN_FORCE
             at = row + 1
 
     def _ways(self, start: int, end: int, state: Floats) -> Iterator[bytes]:
@@ -342,6 +396,7 @@ class _Composer:
                         root=st.root_check(self.cell, targets.external[row]),
                     )
                 )
+                lines.append(cs.settings_again(self._settings(int(targets.tool[row]))))
         if self.rsi is not None and row == self.rsi.off:
             lines.append(self.rsi.end)
         waited_s = 0.0
@@ -365,8 +420,7 @@ class _Composer:
 
     def _head(self, parts: list[_Part]) -> bytes:
         tools = [int(number) for number in distinct(self.targets.tool)]
-        standing = self.targets.external[np.argmin(self.targets.home)]
-        checks = st.frame_checks(self.cell, tools, standing) if self.layout.guard else []
+        checks = st.frame_checks(self.cell, tools, self.standing) if self.layout.guard else []
         declarations = [w.EXT_BAS] if self.layout.single_file else []
         if self.layout.split == "files":
             declarations += [f"{w.EXT} {part.name}( )" for part in parts]
@@ -375,6 +429,8 @@ class _Composer:
             declarations.append(FRAME_DECLARATIONS)
         if st.coupled_table(self.cell) is not None and self.cell.frames.base_data is None:
             declarations.append("DECL FRAME GK_BASE")
+        if self.layout.guard and self.disturbed_rows:
+            declarations.append(cs.STOOD_DECLARATION)
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
         arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
@@ -387,7 +443,6 @@ class _Composer:
             motions=len(self.targets) - sum(arc.end - arc.first for arc in arcs),
             arcs=len(arcs),
             splines=sum(isinstance(curve, Chain) for curve in self.curves),
-            circ_type=w.CIRC_TYPE if arcs else "",
             options=st.ascii_text(self.layout.options, 200),
             allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
             guard=self.layout.guard,
@@ -409,12 +464,14 @@ class _Composer:
             no_guard=w.NO_GUARD,
             declarations="\n".join(declarations),
             message_setup=MESSAGE_SETUP,
-            base=st.base_statement(self.cell, standing),
+            settings=self._settings(int(self.targets.tool[0])),
             external_lines=external_lines(self.targets, self.cell),
             external_axes=max((int(name[1]) for name in self.cell.external), default=0),
-            tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
-        return _text(text) + _text(st.render(self.cell, "program.prologue"))
+        prologue = st.render(self.cell, "program.prologue")
+        if cs.may_disturb(prologue):
+            prologue = f"{prologue}\n{cs.settings_again(self._settings(int(self.targets.tool[0])))}"
+        return _text(text) + _text(prologue)
 
     def _collision_lines(self) -> list[str]:
         scope = self.layout.collisions

@@ -19,6 +19,7 @@ from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.files.stored import Stored, Texts, store, whole_lines
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
+from gcode2krl.krl.controller_state import may_disturb
 from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
@@ -206,7 +207,8 @@ class _Reader:
         other_kind = kind[others]
         self._malformed(executed)
         first_number = np.ascontiguousarray(value[:, 0])
-        ptp, speed, cdis, line = motion_columns(kind, executed.blend, executed.line, first_number)
+        forgetting = self._forgetting(executed)
+        ptp, speed, cdis, line = motion_columns(forgetting, executed.blend, executed.line, first_number)
         dwells = np.flatnonzero((other_kind == w.KIND_WAIT_SEC) & (executed.blend[others] == 1))
         joint_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_PTP_AXES))
         circ_rows = executed.motions_before(np.flatnonzero(kind == w.KIND_CIRC))
@@ -263,6 +265,17 @@ class _Reader:
             Statement(motion, self._statement(*place), self.names[place[0]], number)
             for motion, place, number in zip(motions, places, line, strict=True)
         )
+
+    def _forgetting(self, executed: Executed) -> NDArray[np.int8]:
+        """Return the kinds (k,); what may change speed and approximation is a kind of its own."""
+        kind = executed.kind
+        rows = executed.others[kind[executed.others] == w.KIND_OTHER]
+        places = zip(*(column.tolist() for column in executed.places(rows)), strict=True)
+        disturbing = [may_disturb(self._statement(*place)) for place in places]
+        if any(disturbing):
+            kind = kind.copy()
+            kind[rows[disturbing]] = w.KIND_FORGETS
+        return kind
 
     def _triggers(self, executed: Executed) -> ReadTriggers:
         own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)

@@ -1,17 +1,20 @@
 """Rules that a controller would enforce on any program, whatever it was made from."""
 
+import itertools
 import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from gcode2krl import krl_words as w
-from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.krl.controller_state import ControllerState
 from gcode2krl.krl.names import name_problem
-from gcode2krl.krl.read import KrlProgram
+from gcode2krl.krl.read import KrlProgram, Statement
 from gcode2krl.krl.rsi_rules import rsi_issues
 from gcode2krl.krl.splines import blocks_of
 from gcode2krl.krl.statements import frame_text, written_tool
@@ -47,6 +50,7 @@ _SETTING = re.compile(
 _SET_WITH_THE_TOOL = frozenset([w.LOAD, w.ACT_TOOL, w.ACT_BASE])
 _REMEDY = "take it out of the template in the cell (m_code, tool_change, program.epilogue)"
 _REMEDY_OF_TOOL = f"translate again, with the cell it was made with; or {_REMEDY}"
+_REMEDY_OF_STATE = "translate again: behind a call or a HALT everything is set again and the arm compared"
 _JUMP = re.compile(r"(GOTO|RESUME|ASYPTP)")
 
 
@@ -118,8 +122,9 @@ def _lacks(*columns: Floats) -> Bools:
 
 
 def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
-    """Behind the first motion only speeds and the tool of a tool change are set, and nothing jumps."""
+    """Behind the first motion only speeds, the tool of a tool change, and what was set before are set."""
     tools = {_squeezed(f"{w.TOOL}={frame_text(written_tool(cell, number))}") for number in _tools(cell)}
+    tools |= {_squeezed(statement.text) for statement in program.statements if statement.motion == 0}
     issues = []
     for statement in program.statements:
         text = _squeezed(statement.text)
@@ -136,6 +141,64 @@ def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
                 )
             )
     return issues[:MOST_PLACES]
+
+
+def state_issues(program: KrlProgram, tool: Ints32, cell: Cell) -> list[Issue]:
+    """Return the motions at which the controller's state is not known, or another tool is set.
+
+    ``tool`` (p,) are the tools of the motions; fewer than the program has where these cannot be paired.
+    """
+    state = ControllerState.at_start(has_arcs=len(program.circ_rows) > 0)
+    issues: list[Issue] = []
+    in_force: frozenset[int] | None = None
+    numbers = _numbers_of_tools(cell)
+    count = len(program.ptp)
+    begin = Statement(0, "", program.file[0], program.def_line)
+    statements = [begin, *program.statements, begin._replace(motion=count)]
+    for statement, until in itertools.pairwise(statements):
+        state.take(statement.text)
+        in_force = numbers.get(_squeezed(statement.text), in_force)
+        rows = slice(statement.motion, until.motion)
+        if rows.start == rows.stop:
+            continue
+        issues += _unknown_at(program, state, rows.start)
+        wrong = [number for number in distinct(tool[rows]).tolist() if in_force and number not in in_force]
+        if wrong:
+            row = rows.start + int(np.argmax(tool[rows] == wrong[0]))
+            text = f"this motion is of T{wrong[0]}, and $TOOL is another one"
+            issues.append(_at_motion(program, row, text))
+        state.move()
+    return issues[:MOST_PLACES]
+
+
+def _unknown_at(program: KrlProgram, state: ControllerState, row: int) -> Iterator[Issue]:
+    """Yield what is not known at a motion, once."""
+    if state.unknown:
+        name, changed_by = next(iter(state.unknown.items()))
+        more = f" and {len(state.unknown) - 1} more settings" if len(state.unknown) > 1 else ""
+        why = f"{changed_by[:40]!r} may have changed" if changed_by else "nothing sets"
+        yield _at_motion(program, row, f"{why} {name}{more}, on which this motion depends")
+        state.unknown = {}
+    if state.arm_moved_by and program.guard:
+        moved_by = state.arm_moved_by[:40]
+        yield _at_motion(program, row, f"{moved_by!r} may have moved the arm, which nothing compares before")
+        state.arm_moved_by = ""
+
+
+def _at_motion(program: KrlProgram, row: int, text: str) -> Issue:
+    file = in_file(program, program.file[program.file_of[row]])
+    return Issue("error", "krl-state-unknown", int(program.line[row]), file + text, _REMEDY_OF_STATE)
+
+
+def _numbers_of_tools(cell: Cell) -> dict[str, frozenset[int]]:
+    """Return statement without blanks → the tools that it sets."""
+    numbers: dict[str, frozenset[int]] = {}
+    for number in _tools(cell):
+        data = cell.tool[number].tool_data
+        frame = f"{w.TOOL}={frame_text(written_tool(cell, number))}"
+        text = _squeezed(frame if data is None else f"{w.BAS}(#TOOL,{data})")
+        numbers[text] = numbers.get(text, frozenset()) | {number}
+    return numbers
 
 
 def _tools(cell: Cell) -> list[int]:

@@ -224,14 +224,16 @@ def root_check(cell: Cell, external: Floats) -> dict[str, str] | None:
 
 
 def event_statements(event: Event, cell: Cell) -> str:
-    """Return the KRL of an event, from the cell's templates; a note where it was released without one."""
+    """Return the KRL of an event, from the cell's templates; a note where it was released without one.
+
+    That of a tool change does not set the tool: what is in force behind it, `controller_state` says.
+    """
     line = event.values["line"]
     place = f"line {line}" if line else "end of the program"
     if event.kind == "tool":
         number = event.values["tool"]
         text = render(cell, "tool_change", tool=number, line=line)
-        frame = tool_statements(cell, number) if number in cell.tool else ""
-        return f"; line {line}: M6 T{number}\n{text}\n{frame}"
+        return f"; line {line}: M6 T{number}\n{text}"
     code = event.values["m"]
     if code < 0:
         message = ascii_text(event.values["text"])

@@ -25,7 +25,7 @@ from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, chec
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
-from gcode2krl.krl.rules import in_file, rule_issues
+from gcode2krl.krl.rules import in_file, rule_issues, state_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.krl.splines import at_rest_behind, passing
 from gcode2krl.pilot import knot_rows, read_pilot
@@ -222,6 +222,7 @@ def compare(
     intended = passing(unrolled(intended, targets), targets) if intended is not None else None
     issues = [*program.issues, *more_issues]
     issues += rule_issues(program, cell)
+    issues += state_issues(program, targets.tool, cell)
     issues += _start_issues(program, targets)
     issues += _arc_issues(program)
     paired = len(program.ptp) == len(targets)

@@ -7,8 +7,11 @@ static inline bool is_motion_kind(uint8_t kind) {
            kind == W_KIND_SPL;
 }
 
-/* Take over a setting of the path speed in m/s or of the approximation in mm; one that has no number is none. */
+/* Take over a setting of the path speed in m/s or of the approximation in mm; one that has no number is none.
+   Behind a statement that may have changed them both are unknown. */
 static inline void set(uint8_t kind, double number, double *speed_mm_s, double *cdis_mm) {
+    if (kind == W_KIND_FORGETS)
+        *speed_mm_s = *cdis_mm = NAN;
     if (isnan(number))
         return;
     if (kind == W_KIND_VEL_CP)
