@@ -78,7 +78,7 @@ M30
 """
 PROGRAMS = {"base": BASE, "inch": INCH, "no tool": NO_TOOL}
 HOME_END = "G28 G91 Z0.\nG28 X0. Y0.\nG90"
-CELL_HEAD = 'based_on = "demonstration"\nverified = { by = "benchmark", date = "2026-01-15" }\n'
+CELL_HEAD = 'based_on = "demonstration"\n'
 CELL_TOOLS = "[tool.7]\nlength_mm = 120.0\n[tool.14]\nlength_mm = 90.0\n"
 """The clean cell: the demonstration cell with two tools of different length. A case's text goes between."""
 NO_TURN = "a_deg = 0.0\nb_deg = 0.0\nc_deg = 0.0\n"

@@ -5,10 +5,8 @@ with earlier states of this program, `FURTHER` are others thought of for this be
 least that is right: ``warning`` where a person may mean it.
 """
 
-from mistake_cases import CELL_HEAD, CELL_TOOLS, STOCK, Mistake
+from mistake_cases import CELL_TOOLS, STOCK, Mistake
 
-OWN_CELL = CELL_HEAD.replace('based_on = "demonstration"\n', "")
-"""A cell that is based on nothing."""
 FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
 AFTER_T7 = 6
 TWO_RAPIDS = {14: "@N110 G0 X60. Y40.", 15: "N120 G1 X110. Y80."}
@@ -18,7 +16,8 @@ BIG_STOCK = "[stock]\nbox_mm = [[-30.0, -30.0, -20.0], [150.0, 110.0, 0.0]]\n"
 
 
 def _own(text: str) -> dict[str, str]:
-    return {"cell": text, "head": OWN_CELL, "tools": ""}
+    """Return a cell that is based on nothing."""
+    return {"cell": text, "head": "", "tools": ""}
 
 
 REPORTED = (
@@ -355,7 +354,7 @@ FURTHER = (
     ),
     Mistake(
         "verified in the future",
-        r"verified|date",
+        r"in the future",
         **{
             "cell": "",
             "head": 'based_on = "demonstration"\nverified = { by = "benchmark", date = "2126-01-15" }\n',

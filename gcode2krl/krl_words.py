@@ -70,7 +70,7 @@ RSI_SLOW_CYCLE_S = 0.012
 
 VEL_CP, APO_CDIS = "$VEL.CP", "$APO.CDIS"
 BASE, TOOL, LOAD, ACT_BASE, ACT_TOOL = "$BASE", "$TOOL", "$LOAD", "$ACT_BASE", "$ACT_TOOL"
-BASE_DATA, TOOL_DATA, ROBROOT = "BASE_DATA", "TOOL_DATA", "$ROBROOT"
+BASE_DATA, TOOL_DATA, LOAD_DATA, ROBROOT = "BASE_DATA", "TOOL_DATA", "LOAD_DATA", "$ROBROOT"
 ROBROOT_NOW, MACHINE_DEF = "$ROBROOT_C", "MACHINE_DEF"
 """The robot root as a rail has moved it, and the machines of a cell, tables among them."""
 OUT = "$OUT"

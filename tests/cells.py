@@ -1,6 +1,9 @@
 """Cells for tests: one that states everything itself, and partial cells over the demonstration."""
 
-from gcode2krl.cell import Cell, library, resolve_cell
+from pathlib import Path
+
+from gcode2krl.cell import Cell, confirmation, library, resolve_cell
+from gcode2krl.cell.fingerprint import values_by_section
 
 _DEMONSTRATION = library.read_model("cells", "kr300_demonstration")
 OWN_CELL = {key: value for key, value in _DEMONSTRATION.items() if key != "model"} | {"based_on": ""}
@@ -10,3 +13,10 @@ OWN_CELL = {key: value for key, value in _DEMONSTRATION.items() if key != "model
 def over_demonstration(data: dict | None = None) -> Cell:
     """Return the demonstration cell with some keys of its own."""
     return resolve_cell({"based_on": "demonstration", **(data or {})})
+
+
+def signed(data: dict, by: str = "A. Person", date: str = "2026-01-31", beside: Path | None = None) -> dict:
+    """Return a cell file whose every section a person confirmed."""
+    cell = resolve_cell(data, beside)
+    signature = confirmation.signed(cell, by, date, values_by_section(cell))
+    return {**data, "verified": signature.model_dump(mode="json", exclude_none=True)}

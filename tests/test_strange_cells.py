@@ -158,9 +158,11 @@ def test_the_dump_of_the_demonstration_is_a_cell_of_its_own(tmp_path):
 
     shown = CliRunner().invoke(commands, ["models", "show", "kr300_demonstration"]).output
     path = tmp_path / "cell.toml"
-    path.write_text('verified = { by = "A", date = "2026-11-20" }\n' + shown)
+    path.write_text(shown)
+    confirm = ["models", "confirm", str(path), "--by", "A", "--yes"]
+    assert CliRunner().invoke(commands, confirm).exit_code == 0
     cell = load_cell(path)
     assert cell.is_confirmed
     assert not cell.taken_over
-    without = {"verified": None, "defaults": ()}
+    without = {"verified": None, "defaults": (), "unconfirmed": None}
     assert cell.model_copy(update=without) == load_cell().model_copy(update=without)

@@ -4,7 +4,7 @@ Nothing is taken over that the file does not ask for by name, and each value tak
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from gcode2krl.errors import NotUnderstoodError, input_error
 DEMONSTRATION = "kr300_demonstration"
 _OF_THE_FILE_ALONE = ("model", "name", "based_on", "verified")
 """Keys that describe one file; they are never taken over."""
-_NO_VALUES = frozenset(["source", "sure", "note", "robot_source", "robot_sure"])
+_NO_VALUES = frozenset(["source", "sure", "note", "robot_source", "robot_sure", "trafo_source", "trafo_sure"])
 _CUTTER_KEYS = frozenset(["model", "kind", "diameter_mm", "teeth"])
 """A tool that states one of these keys is another tool: nothing of the base's tool is kept."""
 _FORCE_LAW_KEYS = frozenset(["model", "linear_edge", "kienzle"])
@@ -51,18 +51,24 @@ class StatedCell:
     taken: tuple[Taken, ...]
 
 
-def lay_over_base(data: Table, beside: Path | None, source: str, seen: tuple[Path, ...] = ()) -> StatedCell:
+def lay_over_base(
+    data: Table,
+    beside: Path | None,
+    source: str,
+    is_confirmed: Callable[[StatedCell], bool],
+    seen: tuple[Path, ...] = (),
+) -> StatedCell:
     """Return ``data`` over the cell it is ``based_on``; without ``based_on`` it stands alone.
 
-    ``seen`` holds the files that led here. Raises `NotUnderstoodError` where the base is not found, is not
-    a cell file or is based on itself.
+    ``is_confirmed`` tells whether a base is as a person confirmed it, ``seen`` holds the files that led here.
+    Raises `NotUnderstoodError` where the base is not found, is not a cell file or is based on itself.
     """
     table = _with_whole_paths(data, beside)
     name = table.get("based_on", "")
     if not isinstance(name, str) or not name:
         return StatedCell(table, ())
-    base, whose = _base(name, beside, source, seen), name
-    verified = isinstance(base.data.get("verified"), dict)
+    base, whose = _base(name, beside, source, is_confirmed, seen), name
+    verified = isinstance(base.data.get("verified"), dict) and is_confirmed(base)
     below = {key: value for key, value in base.data.items() if key not in _OF_THE_FILE_ALONE}
     merged = _merge(_without_replaced(below, table), table, ())
     from_further = {taken.key: taken for taken in base.taken}
@@ -93,7 +99,13 @@ def is_demonstration(name: str) -> bool:
     return name in ("demonstration", DEMONSTRATION)
 
 
-def _base(name: str, beside: Path | None, source: str, seen: tuple[Path, ...]) -> StatedCell:
+def _base(
+    name: str,
+    beside: Path | None,
+    source: str,
+    is_confirmed: Callable[[StatedCell], bool],
+    seen: tuple[Path, ...],
+) -> StatedCell:
     if is_demonstration(name):
         return StatedCell(library.read_model("cells", DEMONSTRATION), ())
     if not name.endswith(".toml"):
@@ -115,7 +127,7 @@ def _base(name: str, beside: Path | None, source: str, seen: tuple[Path, ...]) -
         raise input_error(
             "cell-base", f"based_on: {name[:60]!r}: {reason}", "correct the path", source=source
         ) from None
-    return lay_over_base(data, file.parent, str(file), (*seen, file))
+    return lay_over_base(data, file.parent, str(file), is_confirmed, (*seen, file))
 
 
 def _with_whole_paths(data: Table, beside: Path | None) -> Table:

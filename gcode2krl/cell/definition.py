@@ -6,7 +6,8 @@ over is listed in ``taken_over``. Without a file, the demonstration cell serves:
 Hähn & Weigold 2020. Every key carries its unit; `sections` has the tables.
 """
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +15,7 @@ from pydantic import Field
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import carriers
-from gcode2krl.cell.descriptions import described_schema
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE, described_schema
 from gcode2krl.cell.looks import cell_html, cell_words
 from gcode2krl.cell.sections import (
     Axis,
@@ -44,6 +45,7 @@ from gcode2krl.cell.sections import (
     TakenOver,
     Tool,
     ToolNumber,
+    Unconfirmed,
     Verified,
     missing,
 )
@@ -114,16 +116,38 @@ class Cell(Section):
     """What came from ``based_on``; only the reader of cell files writes it."""
     defaults: tuple[str, ...] = ()
     """Dotted keys of documented defaults that nobody stated; only the reader of cell files writes it."""
+    unconfirmed: tuple[Unconfirmed, ...] | None = None
+    """What differs from what was confirmed, as the reader of cell files compared it; None: nobody confirmed
+    it, or the values were replaced since."""
 
     @property
     def is_confirmed(self) -> bool:
-        """True if a person confirmed every value; ``verified`` never covers values that were taken over.
+        """True if a person confirmed every value as it is; values that were taken over are never covered.
 
         >>> from gcode2krl import load_cell
         >>> load_cell().is_confirmed
         False
         """
-        return self.verified is not None and not self.taken_over
+        return self.verified is not None and self.unconfirmed == () and not self.taken_over
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy; one with other values is confirmed by nobody.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().model_copy(update={"name": "mine"}).is_confirmed
+        False
+        """
+        changed: dict[str, Any] = {} if update is None or "unconfirmed" in update else {"unconfirmed": None}
+        return super().model_copy(update={**(update or {}), **changed}, deep=deep)
+
+    def under(self, **sections: Any) -> Self:
+        """Return the cell under a job or options, which its confirmation does not speak of.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().under(stock=None).stock is None
+        True
+        """
+        return self.model_copy(update={**sections, "unconfirmed": self.unconfirmed})
 
     @property
     def clearance_z_mm(self) -> float | None:
@@ -318,7 +342,9 @@ def controller_axes(axis: Axis) -> Floats:
 
 def plain_view(cell: Cell) -> dict[str, Any]:
     """Return the cell as plain values: numbers, text, and tables of them, as its templates see it."""
-    view = cell.model_dump(mode="python", exclude={"taken_over", "defaults"})
+    signature = {"sections", "values", "digests"}
+    view = cell.model_dump(mode="python", exclude={*NOT_OF_A_FILE, "verified"})
+    view["verified"] = None if cell.verified is None else cell.verified.model_dump(exclude=signature)
     view["clearance_z_mm"] = cell.clearance_z_mm
     return view
 

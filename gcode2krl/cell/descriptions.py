@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-NOT_OF_A_FILE = ("taken_over", "defaults")
+NOT_OF_A_FILE = ("taken_over", "defaults", "unconfirmed")
 """Keys that only a resolved cell has."""
 
 
@@ -42,6 +42,18 @@ def descriptions_of(section: type[BaseModel]) -> dict[str, Description]:
         for key in section.model_fields
         if key not in NOT_OF_A_FILE
     }
+
+
+def unit_of(cell: type[BaseModel], key: str) -> str:
+    """Return the unit of a dotted key of a cell, ``tool.1.length_mm``; empty where it has none."""
+    kinds: list[type[BaseModel]] = [cell]
+    unit = ""
+    for step in key.split("."):
+        having = [kind for kind in kinds if step in kind.model_fields]
+        if having:  # else the number of a tool, an entry of a list or the name of a work offset
+            unit = descriptions_of(having[0])[step].unit
+            kinds = [model for kind in having for model in sections_in(kind.model_fields[step].annotation)]
+    return unit
 
 
 def sections_in(annotation: Any) -> Iterator[type[BaseModel]]:

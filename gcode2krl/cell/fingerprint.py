@@ -6,18 +6,24 @@ cell file, its base, the library and the documented defaults together, so that a
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from gcode2krl.cell.definition import Cell, as_toml
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE
 
 Values = dict[str, dict[str, Any]]
 """Section (``frames``, ``tool.1``, ``m_code``) → dotted key → plain value."""
 
-_NOT_OF_THE_CELL = frozenset({"name", "based_on", "verified", "taken_over", "defaults"})
+_NOT_OF_THE_CELL = frozenset({"name", "based_on", "verified", *NOT_OF_A_FILE})
 """Who confirmed what, and where values came from, is not itself a value."""
-_PROVENANCE = frozenset({"source", "sure", "note"})
+_PROVENANCE = frozenset(
+    {"source", "sure", "note", "robot_source", "robot_sure", "trafo_source", "trafo_sure"}
+)
 _HASH_DIGITS = 12
+_NAMES_FILE = re.compile(r"\.(?:model|mesh|calibration)$")
 
 
 def values_by_section(cell: Cell) -> Values:
@@ -45,6 +51,12 @@ def section_hashes(values: Values) -> dict[str, str]:
     }
 
 
+def section_of(key: str) -> str:
+    """Return the section of a dotted key, or of a section itself."""
+    first, _, inner = key.partition(".")
+    return f"{first}.{inner.partition('.')[0]}" if first == "tool" else first
+
+
 def _leaves(key: str, content: Any) -> Iterator[tuple[str, Any]]:
     """Yield the dotted key of each plain value; the items of a list of tables are numbered from 1."""
     if isinstance(content, Mapping):
@@ -54,5 +66,16 @@ def _leaves(key: str, content: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(content, list) and content and all(isinstance(item, Mapping) for item in content):
         for number, item in enumerate(content, start=1):
             yield from _leaves(f"{key}.{number}", item)
-    else:
-        yield key, content
+    elif content != []:
+        yield key, _wherever_it_lies(key, content)
+
+
+def _wherever_it_lies(key: str, value: Any) -> Any:
+    """Return a value as it is on every machine: of a file its name, and what is in it."""
+    if not isinstance(value, str) or not _NAMES_FILE.search(key) or not Path(value).is_absolute():
+        return value
+    file = Path(value)
+    if key.endswith(".model") or not file.is_file():  # the values of a model stand in its section
+        return file.name
+    with file.open("rb") as stream:
+        return f"{file.name} {hashlib.file_digest(stream, 'sha256').hexdigest()[:_HASH_DIGITS]}"

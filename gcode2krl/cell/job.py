@@ -94,7 +94,7 @@ def lay_job_over(cell: Cell, path: Path) -> UnderJob:
             issues += _differences(number, tools[number], cutter)
             tools[number] = _tool_with(tools[number], cutter, number, source)
     stock, doubts = _stock_of(job, cell, path.parent, source)
-    under = cell.model_copy(update={"tool": tools, "stock": stock})
+    under = cell.under(tool=tools, stock=stock)
     wrong = [issue for issue in range_issues(under, set(job.tool)) if issue.severity == "error"]
     if wrong:
         raise NotUnderstoodError(wrong, source)

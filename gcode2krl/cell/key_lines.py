@@ -34,6 +34,14 @@ def lines_of_keys(text: str) -> dict[str, int]:
     return scanner.lines
 
 
+def lines_of_table(text: str, name: str) -> set[int]:
+    """Return the lines (1-based) on which a table of the top level stands: headers, keys and values."""
+    scanner = _Scanner(text.removeprefix("\ufeff"))
+    with contextlib.suppress(_NotTomlError, RecursionError):
+        scanner.document()
+    return {line for table, first, last in scanner.spans if table == name for line in range(first, last + 1)}
+
+
 def with_lines(issues: Iterable[Issue], text: str) -> tuple[Issue, ...]:
     """Return findings on a cell file with their lines in its text.
 
@@ -63,6 +71,8 @@ class _Scanner:
     line: int = 1
     lines: dict[str, int] = field(default_factory=dict)
     counts: dict[_Path, int] = field(default_factory=dict)
+    spans: list[tuple[str, int, int]] = field(default_factory=list)
+    """Table of the top level, first and last line of each header and each pair."""
 
     def document(self) -> None:
         table: _Path = ()
@@ -86,6 +96,7 @@ class _Scanner:
                 path = (*path, str(self.counts[path] - 1))
         path = (*path, last)
         self._expect("]]" if is_list else "]")
+        self.spans.append((path[0], line, self.line))
         self._note(path, line)
         if is_list:
             self.counts[path] = self.counts.get(path, 0) + 1
@@ -101,6 +112,7 @@ class _Scanner:
             self._note(path, line)
         self._expect("=")
         self._value(path)
+        self.spans.append((path[0], line, self.line))
 
     def _key(self) -> _Path:
         parts: list[str] = []

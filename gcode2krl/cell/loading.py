@@ -9,7 +9,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from gcode2krl.cell import library
-from gcode2krl.cell.base import DEMONSTRATION, Taken, lay_over_base, stated_keys
+from gcode2krl.cell.base import DEMONSTRATION, StatedCell, Taken, lay_over_base, stated_keys
+from gcode2krl.cell.confirmation import unconfirmed_of
 from gcode2krl.cell.definition import CODES_WITHOUT_SIGNALS, Cell
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE
 from gcode2krl.cell.key_lines import with_lines
@@ -47,30 +48,46 @@ def load_cell(path: str | Path | None = None) -> Cell:
 
 def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str = "cell") -> Cell:
     """Lay ``data`` (a cell file as read) over its base, fill in the models, and check it."""
+    seen = (Path(source).resolve(),) if beside is not None else ()
     try:
         _refuse_keys_of_tools(data)
-        stated = lay_over_base(data, beside, source, (Path(source).resolve(),) if beside is not None else ())
-        merged = dict(stated.data)
-        known = stated_keys(merged)
-        for section, kind in _MODELS:
-            if section in merged:
-                merged[section] = _fill_in(merged[section], kind)
-        _take_compliance_of_robot(merged)
-        if isinstance(merged.get("tool"), dict):
-            merged["tool"] = {number: _fill_in_tool(tool) for number, tool in merged["tool"].items()}
-        own_codes = merged.get("m_code", {})
-        if isinstance(own_codes, dict):
-            merged["m_code"] = {**CODES_WITHOUT_SIGNALS, **own_codes}
-        merged["taken_over"] = [_record(taken) for taken in stated.taken]
-        cell = Cell.model_validate(merged)
+        stated = lay_over_base(data, beside, source, _is_confirmed, seen)
+        cell = _filled_in(stated)
     except NotUnderstoodError as error:
         raise NotUnderstoodError(error.issues, error.source or source) from None
     except ValidationError as error:
         raise NotUnderstoodError(validation_issues(error), source) from None
-    wrong = (*split_pair_issues(stated), *contradictions(cell, known))
+    wrong = (*split_pair_issues(stated), *contradictions(cell, stated_keys(stated.data)))
     if wrong:
         raise NotUnderstoodError(wrong, source)
-    return cell.model_copy(update={"defaults": tuple(_defaults(cell, known))})
+    return cell
+
+
+def _filled_in(stated: StatedCell) -> Cell:
+    """Return a cell with the models that it names, its defaults, and what of it is not as confirmed."""
+    merged = dict(stated.data)
+    known = stated_keys(merged)
+    for section, kind in _MODELS:
+        if section in merged:
+            merged[section] = _fill_in(merged[section], kind)
+    _take_compliance_of_robot(merged)
+    if isinstance(merged.get("tool"), dict):
+        merged["tool"] = {number: _fill_in_tool(tool) for number, tool in merged["tool"].items()}
+    own_codes = merged.get("m_code", {})
+    if isinstance(own_codes, dict):
+        merged["m_code"] = {**CODES_WITHOUT_SIGNALS, **own_codes}
+    merged["taken_over"] = [_record(taken) for taken in stated.taken]
+    cell = Cell.model_validate(merged)
+    whole = {"defaults": tuple(_defaults(cell, known)), "unconfirmed": unconfirmed_of(cell)}
+    return cell.model_copy(update=whole)
+
+
+def _is_confirmed(stated: StatedCell) -> bool:
+    """Tell whether a base is as a person confirmed it; one that is no cell by itself is not."""
+    try:
+        return _filled_in(stated).is_confirmed
+    except (NotUnderstoodError, ValidationError):
+        return False
 
 
 def cell_from_resolved(record: dict[str, Any], source: str) -> Cell:
@@ -93,6 +110,8 @@ def _fill_in(section: Any, kind: str) -> Any:
     model = library.read_model(kind, section["model"])
     if kind == "materials" and section.keys() & {"linear_edge", "kienzle"}:
         model = {key: value for key, value in model.items() if key not in ("linear_edge", "kienzle")}
+    if "trafo_name" in section:  # its source is the cell file, not the library
+        model = {key: value for key, value in model.items() if key not in ("trafo_source", "trafo_sure")}
     return {**library.merge(model, section), "model": model.get("model", section["model"])}
 
 

@@ -1,13 +1,13 @@
 """What a person must confirm of a cell, where its values come from, and what it does not state."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import PurePath
 from typing import Any
 
 from gcode2krl.cell import Cell, plain_view, switching
-from gcode2krl.cell.confirmation import future_confirmation
+from gcode2krl.cell.confirmation import confirmation_issues, future_confirmation
 from gcode2krl.cell.ranges import range_issues
-from gcode2krl.cell.sections import Frame, Obstacle
+from gcode2krl.cell.sections import Frame, Obstacle, Robot
 from gcode2krl.errors import Issue
 
 MISSING = "MISSING"
@@ -18,7 +18,7 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
     """Yield (what, value, how sure) of everything a person must confirm."""
     robot = cell.robot
     yield "robot", robot.model or ("geometry given" if robot.geometry.known else MISSING), robot.geometry.sure
-    yield "$TRAFONAME[] contains", robot.trafo_name or "not compared", "memory"
+    yield "$TRAFONAME[] begins with", _robot_name(robot), robot.trafo_sure
     yield "joint limits", _pairs(robot.limits.q_deg), robot.limits.sure
     yield "joint speeds", _list(robot.speeds.qd_deg_s, "deg/s", "unknown"), robot.speeds.sure
     if cell.frames.robroot is not None:
@@ -43,6 +43,16 @@ def to_confirm(cell: Cell) -> Iterator[Row]:
         "RSI",
         f"$OUT[{link.t1_output}] on in T1, $OUT[{link.ready_output}] free, PC {link.address}:{link.port}",
         "memory",
+    )
+
+
+def _robot_name(robot: Robot) -> str:
+    """Return what the guard compares, and what to do where nobody has read it at a controller."""
+    if not robot.trafo_name:
+        return "not compared: state [robot] trafo_name"
+    is_read = robot.trafo_sure in ("verified", "checked")
+    return robot.trafo_name + (
+        "" if is_read else ": if the controller shows another name, state [robot] trafo_name"
     )
 
 
@@ -83,7 +93,27 @@ def findings(cell: Cell) -> list[Issue]:
     templates = cell.templates()
     wrong = switching.template_issues(templates, _template_values(cell), cell.program.externals)
     pairs = switching.pair_issues(templates, _template_values(cell))
-    return [*wrong, *pairs, *range_issues(cell), *future_confirmation(cell)]
+    unconfirmed = [issue for issue in confirmation_issues(cell) if issue.severity == "warning"]
+    return [*wrong, *pairs, *range_issues(cell), *unconfirmed, *future_confirmation(cell)]
+
+
+def origin_of(cell: Cell, key: str, lines: Mapping[str, int]) -> str:
+    """Return where the value of a dotted key comes from; ``lines`` are those of the values of its file."""
+    steps = key.split(".")
+    places = {".".join(steps[:count]) for count in range(1, len(steps) + 1)}  # a frame is stated whole
+    for taken in cell.taken_over:
+        if taken.key in places:
+            return f"taken over from {taken.source}"
+    for place in places & lines.keys():
+        return f"line {lines[place]}"
+    return "default" if places & set(cell.defaults) else "library or default"
+
+
+def switched(cell: Cell) -> dict[str, str]:
+    """Return key → what its template switches or says, as far as it can be rendered."""
+    return {
+        name if name in cell.templates() else f"m_code.{name}": value for name, value, _ in _signals(cell)
+    }
 
 
 def _tools(cell: Cell) -> Iterator[Row]:

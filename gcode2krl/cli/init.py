@@ -168,4 +168,4 @@ def _say_written(console: Console, cell_path: Path, lacking: list[str]) -> None:
     console.say(f"wrote {cell_path} and {SCHEMA}")
     for key in lacking:
         console.say(f"  MISSING: {key}")
-    console.say(f"next: gcode2krl models check {cell_path}, and confirm each line at the cell")
+    console.say(f"next, at the cell: gcode2krl models confirm {cell_path}")

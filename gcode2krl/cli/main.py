@@ -36,7 +36,7 @@ _COMMANDS = {
     "a check list.",
     "make-test": "Write a test program of air moves.",
     "cache": "What a batch has computed before: show, clear.",
-    "models": "Robots, controllers, tools and cells: list, show, check, schema.",
+    "models": "Robots, controllers, tools and cells: list, show, check, confirm, schema.",
     "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "completion": "Print the script that completes commands, options and files in a shell.",
     "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",

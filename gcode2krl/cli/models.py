@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.cell import library
+from gcode2krl.cli import confirm
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, input_error
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 
 @click.group("models", epilog=examples("gcode2krl models list robots", "gcode2krl models check cell.toml"))
 def command() -> None:
-    """Robots, controllers, tools and cells: list, show, check, schema."""
+    """Robots, controllers, tools and cells: list, show, check, confirm, schema."""
+
+
+command.add_command(confirm.command)
 
 
 @command.command("list", epilog=examples("gcode2krl models list", "gcode2krl models list robots --json"))
@@ -108,7 +112,7 @@ def check(cell_path: str | None, as_json: bool) -> int:
     name = cell_path or "the demonstration cell"
     console.say(f"{name}: {'refused' if wrong else 'valid'}")
     console.findings(tuple(issues), name)
-    _say_verified(console, cell)
+    _say_verified(console, cell, cell_path)
     width = max(len(what) for what, _, _ in rows)
     for what, value, sure in rows:
         console.say(f"  {what:<{width}}  {value}  ({sure})")
@@ -116,16 +120,16 @@ def check(cell_path: str | None, as_json: bool) -> int:
     return 1 if wrong else 0
 
 
-def _say_verified(console: Console, cell: "Cell") -> None:
+def _say_verified(console: Console, cell: "Cell", cell_path: str | None) -> None:
+    from gcode2krl.cell.confirmation import signers
+
     if cell.is_confirmed and cell.verified is not None:
-        console.say(f"verified by {cell.verified.by} on {cell.verified.date}")
-    elif cell.verified is not None:
-        console.say("NOT VERIFIED: `verified` does not cover what is taken over, see below")
+        console.say(f"verified by {', by '.join(signers(cell.verified))}")
+    elif cell.unconfirmed == ():
+        console.say("NOT VERIFIED: the confirmation does not cover what is taken over, see below")
     else:
-        console.say(
-            "NOT VERIFIED: programs begin with a HALT. Confirm each line at the cell, then add to its file:"
-        )
-        console.say('  verified = { by = "your name", date = "YYYY-MM-DD" }')
+        console.say("NOT VERIFIED: programs begin with a HALT. Compare each line with the cell, then run")
+        console.say(f"  gcode2krl models confirm {cell_path or 'CELL.toml'}")
 
 
 def _say_provenance(console: Console, cell: "Cell", lacking: list[str]) -> None:

@@ -13,6 +13,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell, controller_axes, template_rules
 from gcode2krl.cell.checked_parts import CollisionScope
+from gcode2krl.cell.confirmation import signers
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
@@ -23,7 +24,7 @@ from gcode2krl.krl.external_words import external_lines
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
 from gcode2krl.krl.pilot_text import PilotText, checksum
-from gcode2krl.krl.provenance import provenance_lines
+from gcode2krl.krl.provenance import provenance_lines, unconfirmed_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
 from gcode2krl.program.arcs import Arc
@@ -457,6 +458,11 @@ class _Composer:
             rsi=self.rsi,
             pilot_start=self.pilot.start_statements(self.checksum) if self.pilot is not None else "",
             frame_checks=checks,
+            robot_names=st.robot_names(self.cell),
+            load_checks=st.load_checks(self.cell, tools),
+            not_compared=st.not_compared_loads(self.cell, tools) if self.layout.guard else [],
+            signers=signers(self.cell.verified) if self.cell.verified is not None else [],
+            changed=unconfirmed_lines(self.cell),
             unnumbered=st.unnumbered(self.cell, tools),
             no_guard=w.NO_GUARD,
             declarations="\n".join(declarations),

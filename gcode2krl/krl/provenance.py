@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from gcode2krl.cell import Cell
+from gcode2krl.cell.confirmation import changed_lines
 from gcode2krl.krl.statements import ascii_text
 
 _WIDTH = 100
@@ -35,6 +36,12 @@ def provenance_lines(cell: Cell, tools: list[int], pilot: bool, online: bool) ->
         lines.append("defaults that the cell does not state:")
         lines += _wrapped(named)
     return lines
+
+
+def unconfirmed_lines(cell: Cell) -> list[str]:
+    """Return the lines: what is not as a person confirmed it."""
+    lines = changed_lines(cell)
+    return [ascii_text(line.replace("…", "...").translate(_BRACKETS), 200) for line in lines]
 
 
 def _defaults(cell: Cell, tools: list[int], pilot: bool, online: bool) -> Iterator[str]:

@@ -20,6 +20,8 @@ from gcode2krl.tables import Event
 from gcode2krl.units import DEG_PER_RAD
 
 _MESSAGE_CHARACTERS = 70
+_LOAD_SHARE, _LOAD_KG, _LOAD_MM = 0.01, 0.5, 5.0
+_INERTIA_SHARE, _INERTIA_KGM2 = 0.2, 0.05
 
 
 def frame_text(matrix: Floats) -> str:
@@ -153,6 +155,57 @@ def frame_checks(cell: Cell, tools: list[int], external: Floats) -> list[dict[st
                 }
             )
     return checks
+
+
+def load_checks(cell: Cell, tools: list[int]) -> list[dict[str, str]]:
+    """Return what the guard compares of the loads that a tool's number sets: where one ``differs``.
+
+    Assumed tolerances: what moves the arm less than a careful load determination is sure of. The inertia is
+    compared by its sum about three axes, which is the same in the flange and in the axes A, B, C of ``CM``.
+    """
+    checks = {}
+    for number in tools:
+        data, load = cell.tool[number].tool_data, cell.load_of(number)
+        if data is None or load.mass_kg is None:
+            continue
+        variable = f"{w.LOAD_DATA}[{data}]"
+        inertia_kgm2 = load.jx_kgm2 + load.jy_kgm2 + load.jz_kgm2
+        rows = [
+            (".M", load.mass_kg, max(_LOAD_SHARE * load.mass_kg, _LOAD_KG)),
+            *((f".CM.{axis}", getattr(load, f"{axis.lower()}_mm"), _LOAD_MM) for axis in "XYZ"),
+        ]
+        if inertia_kgm2 > 0:
+            about_all = f".J.X+{variable}.J.Y+{variable}.J.Z"
+            rows.append((about_all, inertia_kgm2, max(_INERTIA_SHARE * inertia_kgm2, _INERTIA_KGM2)))
+        terms = [
+            f"(ABS({variable}{name}-{_operand(value)})>{fixed(slack, 3)})" for name, value, slack in rows
+        ]
+        checks[variable] = {"variable": variable, "differs": " OR ".join(terms)}
+    return list(checks.values())
+
+
+def not_compared_loads(cell: Cell, tools: list[int]) -> list[str]:
+    """Return what the header says of loads that a tool's number sets and the guard does not compare."""
+    lines = {}
+    for number in tools:
+        data, load = cell.tool[number].tool_data, cell.load_of(number)
+        if data is not None and load.mass_kg is None:
+            lines[data] = f"{w.LOAD_DATA}[{data}] IS NOT COMPARED: the cell states no load"
+        elif data is not None and not load.jx_kgm2 + load.jy_kgm2 + load.jz_kgm2:
+            lines[data] = f"the inertia in {w.LOAD_DATA}[{data}] is not compared: the cell states none"
+    return list(lines.values())
+
+
+def robot_names(cell: Cell) -> dict[str, str]:
+    """Return what ``$TRAFONAME[]`` must be: the ``whole`` of it, or what it ``begins`` with."""
+    name = cell.robot.trafo_name.removeprefix("#").strip()
+    return {"whole": name, "begins": f"{name} "} if name else {}
+
+
+def _operand(value: float) -> str:
+    """Return a number that may stand behind a minus."""
+    text = fixed(value, 3)
+    return f"({text})" if value < 0 else text
 
 
 def has_coupled_rail(cell: Cell) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.cell.confirmation import confirmation_issues
 from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
 from gcode2krl.compiled.threads import in_threads
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
@@ -374,19 +375,7 @@ class _Plan:
         return exact
 
     def _notes(self) -> list[Issue]:
-        notes = self._stopped_by_end()
-        if self.cell.is_confirmed:
-            return notes
-        return [
-            *notes,
-            Issue(
-                "note",
-                "cell-not-verified",
-                0,
-                "the cell has not been confirmed by a person; the program begins with a HALT",
-                "`gcode2krl models check` lists what to confirm",
-            ),
-        ]
+        return [*self._stopped_by_end(), *confirmation_issues(self.cell)]
 
     def _stopped_by_end(self) -> list[Issue]:
         """Return a note on what is still on at the program's end and is switched off there."""

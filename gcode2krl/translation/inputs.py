@@ -167,8 +167,15 @@ def cell_files(path: str | Path | None) -> list[Path]:
             continue
         files.append(file)
         if file.suffix.lower() == ".toml" or len(files) == 1:
-            waiting += (file.parent / name for name in _names_in(file) if (file.parent / name).is_file())
+            waiting += (file.parent / name for name in _names_in(file) if _is_file(file.parent / name))
     return files
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a text that is too long for the name of a file
+        return False
 
 
 def _names_in(file: Path) -> list[str]:

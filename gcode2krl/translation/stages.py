@@ -250,7 +250,7 @@ def _with_options(cell: "Cell", order: Order) -> "Cell":
     program = cell.program.model_copy(
         update={key: value for key, value in given.items() if value is not None}
     )
-    return cell.model_copy(update={"program": program})
+    return cell.under(program=program)
 
 
 def _header_words(order: Order, cell: "Cell") -> str:

@@ -9,6 +9,7 @@ import tomli_w
 
 from gcode2krl import Gcode2KrlError, frames, load_cell
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved, cell_schema, controller_axes, library
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE
 
 
 def _write(tmp_path, text):
@@ -135,7 +136,7 @@ def test_a_robot_of_ones_own_beside_the_cell(tmp_path):
 
 def test_the_schema_knows_every_key_and_requires_none():
     schema = cell_schema()
-    assert set(schema["properties"]) == set(Cell.model_fields) - {"taken_over", "defaults"}
+    assert set(schema["properties"]) == set(Cell.model_fields) - set(NOT_OF_A_FILE)
     assert '"required"' not in json.dumps(schema)
 
 

@@ -8,11 +8,10 @@ from gcode2krl import load_cell
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved, resolve_cell
 from gcode2krl.cell.sections import Controller
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from tests.cells import OWN_CELL, over_demonstration
+from tests.cells import OWN_CELL, over_demonstration, signed
 from tests.krl.conftest import Made
 
 PART = "G21 G90 G54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0\nG0 Z20\nG1 Z-1 F600\nG1 X20\nG0 Z50\nM5\nM30\n"
-VERIFIED = {"by": "A. Person", "date": "2026-01-31"}
 
 
 def own(**changes) -> dict:
@@ -86,7 +85,7 @@ def test_no_tool_of_another_cell(tmp_path):
 
 
 def test_a_complete_cell_is_enough_and_verified_covers_it(tmp_path):
-    made = Made(tmp_path, PART, data=own(verified=VERIFIED))
+    made = Made(tmp_path, PART, data=signed(own()))
     text = text_of(made)
     assert "cell verified by A. Person" in text
     assert "HAS NOT BEEN VERIFIED" not in text
@@ -108,7 +107,7 @@ def test_every_value_taken_over_is_in_the_header(tmp_path):
 
 
 def test_verified_does_not_cover_what_is_taken_over(tmp_path):
-    text = text_of(Made(tmp_path, PART, data={"verified": VERIFIED}))
+    text = text_of(Made(tmp_path, PART, data=signed({"based_on": "demonstration"})))
     assert "HAS NOT BEEN VERIFIED" in text
     assert "\nHALT" in text.replace("\r", "")
 
@@ -116,13 +115,18 @@ def test_verified_does_not_cover_what_is_taken_over(tmp_path):
 def test_a_base_that_is_verified_does_not_confirm_another_cell(tmp_path):
     import tomli_w
 
-    base = {key: value for key, value in own(verified=VERIFIED).items() if key != "based_on"}
+    base = {key: value for key, value in signed(own()).items() if key != "based_on"}
     write(tmp_path / "base.toml", tomli_w.dumps(base))
     assert load_cell(tmp_path / "base.toml").is_confirmed
-    child = 'based_on = "base.toml"\nverified = { by = "B", date = "2026-02-02" }\n[clearance]\nz_mm = 120\n'
-    cell = load_cell(write(tmp_path / "cell.toml", child))
+    child = signed({"based_on": "base.toml", "clearance": {"z_mm": 120}}, beside=tmp_path)
+    cell = load_cell(write(tmp_path / "cell.toml", tomli_w.dumps(child)))
     assert all(taken.verified and taken.source == "base.toml" for taken in cell.taken_over)
+    assert cell.unconfirmed == ()
     assert not cell.is_confirmed
+    write(tmp_path / "base.toml", tomli_w.dumps(base | {"home": {"q_deg": [0, -90, 90, 0, 1, 0]}}))
+    cell = load_cell(tmp_path / "cell.toml")
+    assert [one.key for one in cell.unconfirmed] == ["home.q_deg"]
+    assert not any(taken.verified for taken in cell.taken_over)
 
 
 def test_a_base_of_a_base_keeps_its_name(tmp_path):
@@ -277,12 +281,13 @@ def test_one_valve_for_flood_and_mist_is_a_plain_machine():
     resolve_cell({"spindle": {"flood_output": 3, "mist_output": 3}})
 
 
-@pytest.mark.parametrize("verified", [None, VERIFIED])
-def test_a_load_without_a_centre_and_a_length_of_the_library_are_said(tmp_path, verified):
-    data = own(load={"mass_kg": 60}, **({"verified": verified} if verified else {}))
+@pytest.mark.parametrize("is_signed", [False, True])
+def test_a_load_without_a_centre_and_a_length_of_the_library_are_said(tmp_path, is_signed):
+    data = own(load={"mass_kg": 60})
+    data = signed(data) if is_signed else data
     found = {issue.code for issue in Made(tmp_path, PART, data=data).targets.issues}
     assert "load-centre" in found
-    assert ("tool-length-library" in found) == (verified is not None)
+    assert ("tool-length-library" in found) == is_signed
 
 
 @pytest.mark.parametrize(

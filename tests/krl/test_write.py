@@ -18,11 +18,9 @@ from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl import verify_krl
 from gcode2krl.krl.number_text import fixed, motion_lines
-from tests.cells import OWN_CELL
+from tests.cells import OWN_CELL, signed
 from tests.krl.conftest import PART, read
 from tests.krl.replay import components, frame
-
-VERIFIED = {"by": "A. Person", "date": "2026-01-31"}
 
 
 def text_of(made) -> str:
@@ -224,7 +222,7 @@ def test_cell_that_nobody_verified_halts_first(make):
 def test_verified_cell_does_not_halt(make):
     made = make(
         PART.split("T2 M6")[0] + "M30\n",
-        data=OWN_CELL | {"verified": VERIFIED, "tool_change": "; changed by hand"},
+        data=signed(OWN_CELL | {"tool_change": "; changed by hand"}),
     )
     text = text_of(made)
     assert "cell verified by A. Person on 2026-01-31" in text

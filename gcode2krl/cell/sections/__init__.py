@@ -30,7 +30,16 @@ from gcode2krl.cell.sections.machining import (
     Table,
     Tool,
 )
-from gcode2krl.cell.sections.program import EffectEntry, Pilot, Program, TakenOver, ToolNumber, Verified
+from gcode2krl.cell.sections.program import (
+    EffectEntry,
+    Pilot,
+    Program,
+    SignedSection,
+    TakenOver,
+    ToolNumber,
+    Unconfirmed,
+    Verified,
+)
 from gcode2krl.cell.sections.robot import (
     VIRTUAL_JOINTS,
     Clearance,
@@ -101,6 +110,7 @@ __all__ = [
     "RobotBody",
     "Section",
     "SignalNumber",
+    "SignedSection",
     "SixFloats",
     "Speeds",
     "Spindle",
@@ -111,6 +121,7 @@ __all__ = [
     "TakenOver",
     "Tool",
     "ToolNumber",
+    "Unconfirmed",
     "Verified",
     "VirtualJoint",
     "VirtualJointName",

@@ -1,7 +1,7 @@
 """Sections of the program: its layout, the pilot, who verified the cell, and what it took over."""
 
 import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -61,11 +61,30 @@ class Program(Section):
         return externals
 
 
-class Verified(Section):
-    """Who confirmed that the cell file matches the real cell."""
+_Day = Annotated[str, Field(pattern=r"^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
+_Person = Annotated[OneLine, Field(min_length=1, max_length=100)]
+_KEY_DIGESTS = r"^[^ ,]+ [0-9a-f]{8}(, [^ ,]+ [0-9a-f]{8})*$"
 
-    by: Annotated[OneLine, Field(min_length=1, max_length=100)]
-    date: Annotated[str, Field(pattern=r"^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
+
+class SignedSection(Section):
+    """The signature of a section: a hash of who confirmed what of it."""
+
+    hash: Annotated[str, Field(pattern=r"^[0-9a-f]{12}$")]
+    by: _Person | None = None
+    """Who confirmed this section; None: who confirmed the cell."""
+    date: _Day | None = None
+
+
+class Verified(Section):
+    """Who confirmed which values; `gcode2krl models confirm` writes it, and without sections it is none."""
+
+    by: _Person
+    date: _Day
+    sections: dict[str, SignedSection] = Field(default_factory=dict)
+    values: dict[str, Any] = Field(default_factory=dict)
+    """Dotted key -> the value that was confirmed."""
+    digests: dict[str, Annotated[str, Field(pattern=_KEY_DIGESTS)]] = Field(default_factory=dict)
+    """Section -> ``key hash, key hash, …`` of the confirmed values that are not written out."""
 
     @field_validator("date")
     @classmethod
@@ -75,6 +94,19 @@ class Verified(Section):
         except ValueError:
             raise ValueError(f"{given} is not a date (year-month-day)") from None
         return given
+
+
+class Unconfirmed(Section):
+    """A value, or a section, that differs from what was confirmed."""
+
+    key: str
+    """Dotted; of a section whose signature does not fit, or that has none, the section."""
+    kind: Literal["changed", "new", "removed", "forged", "unsigned"]
+    now: str = ""
+    was: str = ""
+    """The confirmed value; empty where only its hash was kept."""
+    by: str = ""
+    date: str = ""
 
 
 ToolNumber = Annotated[int, Field(ge=1, le=99999)]

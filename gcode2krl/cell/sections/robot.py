@@ -98,8 +98,10 @@ class Robot(Section):
     """One robot model; without geometry its joint angles are unknown."""
 
     model: OneLine = ""
-    trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$")] = ""
-    """What ``$TRAFONAME[]`` of the controller must contain; empty: the guard does not check it."""
+    trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$", max_length=32)] = ""
+    """The robot's name in ``$TRAFONAME[]`` of the controller; empty: the guard does not check it."""
+    trafo_source: str = ""
+    trafo_sure: Sure = "memory"
     geometry: Geometry = Geometry()
     limits: Limits = Limits()
     speeds: Speeds = Speeds()
@@ -107,6 +109,14 @@ class Robot(Section):
     drives: Drives = Drives()
     body: RobotBody = RobotBody()
     note: str = ""
+
+    def is_named(self, shown: str) -> bool:
+        """Tell whether ``$TRAFONAME[]`` that reads ``shown`` is of this robot, as a program's guard does.
+
+        The name begins it, after ``#`` or not, and a blank or nothing follows: KR60 is not of a KR600.
+        """
+        name = shown.strip().removeprefix("#").upper() + " "
+        return bool(self.trafo_name) and name.startswith(f"{self.trafo_name.removeprefix('#').upper()} ")
 
 
 class Controller(Provenance):

@@ -27,9 +27,9 @@ _LONGEST_LINE = 110
 _HEAD = """#:schema {schema}
 # Cell file of gcode2krl: what the G-code cannot say. Written by `gcode2krl init`.
 #
-# NOT CONFIRMED. Each program begins with a HALT until a person has compared every value below with the
-# real cell (`gcode2krl models check` lists them) and has added, above the first table:
-#   verified = {{ by = "your name", date = "YYYY-MM-DD" }}
+# Each program begins with a HALT until a person has compared every value below with the real cell, and again
+# after each edit. This signs the file at its end, section by section:
+#   gcode2krl models confirm CELL.toml
 """
 _LOAD_KEYS = {
     "load_centre_mm": ("x_mm", "y_mm", "z_mm"),
@@ -86,10 +86,12 @@ class _Writer:
         yield "[robot]"
         if robot != OTHER:
             yield from self._key(Robot, "model", robot, "robot")
-        else:
-            name = controller.trafo_name.partition(" ")[0]
-            yield from _line(Robot, "trafo_name", name)
-            yield from _line(Robot, "note", f"not in the library; $TRAFONAME[] is {controller.trafo_name}")
+        if controller.trafo_name:
+            yield from _line(Robot, "trafo_name", controller.trafo_name)
+            yield from _line(Robot, "trafo_source", f"archive {controller.source}, $TRAFONAME[]")
+            yield from _line(Robot, "trafo_sure", "verified")
+        if robot == OTHER:
+            yield from _line(Robot, "note", "not in the library")
         if robot == OTHER and controller.lengths_mm is not None:
             yield from ("", "[robot.geometry]")
             keys = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")

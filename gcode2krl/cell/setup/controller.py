@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gcode2krl.cell import library
+from gcode2krl.cell.sections import Robot
 from gcode2krl.cell.setup.archive import read_archive
 from gcode2krl.cell.setup.krl_data import Value, krl_values
 
@@ -221,7 +222,7 @@ def _model(machine_name: str, trafo_name: str, lengths_mm: Numbers | None) -> st
     by_trafo = [
         name
         for name in fits
-        if trafo_name and _fold(str(robots[name].get("trafo_name", "?"))) in _fold(trafo_name)
+        if Robot(trafo_name=str(robots[name].get("trafo_name", ""))).is_named(trafo_name)
     ]
     named = by_name or by_trafo
     return named[0] if len(named) == 1 else ""
