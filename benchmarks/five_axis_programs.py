@@ -249,7 +249,9 @@ def _angles(machine: dict[str, Any], axis: Vector) -> dict[str, float]:
 def _turned(pairs: list[tuple[str, int]], deg: dict[str, float]) -> Rotation:
     made = Rotation.identity()
     for letter, sign in pairs:
-        made = made * Rotation.from_euler(letter.lower().translate(str.maketrans("abc", "xyz")), sign * deg[letter], degrees=True)
+        made = made * Rotation.from_euler(
+            letter.lower().translate(str.maketrans("abc", "xyz")), sign * deg[letter], degrees=True
+        )
     return made
 
 
@@ -264,7 +266,12 @@ def _position(machine: dict[str, Any], tip: Vector, deg: dict[str, float]) -> Ve
 
 
 def posted(
-    name: str, machine: dict[str, Any], *, tip: str = "G43.4 H1", per_block_time: bool = False, radians: bool = False
+    name: str,
+    machine: dict[str, Any],
+    *,
+    tip: str = "G43.4 H1",
+    per_block_time: bool = False,
+    radians: bool = False,
 ) -> str:
     """Return the program of `SOUND` for a machine; ``tip`` is ``G43 H1`` for the machine's own axes."""
     lines = ["%", f"({name.upper()})", "G21 G90 G94 G17", "T1 M6", "S8000 M3", tip]
@@ -289,7 +296,21 @@ def posted(
             feed = f"F{1200.0 / max(float(np.linalg.norm(at - standing)), 1e-3):.3f}"
         lines.append(f"G0 {words}" if step.rapid else f"G1 {words} {feed}")
         standing = at
-    return "\n".join([*lines, "G49", "G94", "G91 G28 Z0", "G90 G28 A0 B0 C0".replace(next(x for x in ("A0 ", "B0 ", "C0") if x[0] not in machine["axes"]), "").rstrip(), "M5", "M30", "%", ""])
+    return "\n".join(
+        [
+            *lines,
+            "G49",
+            "G94",
+            "G91 G28 Z0",
+            "G90 G28 A0 B0 C0".replace(
+                next(x for x in ("A0 ", "B0 ", "C0") if x[0] not in machine["axes"]), ""
+            ).rstrip(),
+            "M5",
+            "M30",
+            "%",
+            "",
+        ]
+    )
 
 
 def cell_text(machine: dict[str, Any], *, tcpm: bool = False, stock: str = STOCK) -> str:

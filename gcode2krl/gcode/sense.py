@@ -157,7 +157,9 @@ def machine_issues(columns: dict[str, NDArray[Any]], cell: "Cell", head: bytes) 
     stock = None if cell.stock is None else cell.stock.box_mm
     box = None
     if stock is not None:
-        used = [cell.tool[number].diameter_mm for number in np.unique(moves.tool).tolist() if number in cell.tool]
+        used = [
+            cell.tool[number].diameter_mm for number in np.unique(moves.tool).tolist() if number in cell.tool
+        ]
         beside_mm = max(used, default=0.0) / 2.0 + _BESIDE_MM
         box = np.array(stock) + [[-beside_mm], [beside_mm]]
     declared = _sense_of(_Reading(machine), moves, box)
@@ -236,7 +238,10 @@ def _neighbours(machine: "Machine", moves: _Moves) -> Iterator[_Reading]:
         centre = tuple(round(MM_PER_M * value, 6) for value in machine.centre_mm)
         yield _changed(machine, 1, centre_mm=centre)
     if by_machine and machine.head_axes and machine.pivot_mm is not None:
-        for pivot_mm in (*np.arange(0.0, _MOST_PIVOT_MM, _PIVOT_STEP_MM).tolist(), *_even_pivot_mm(machine, moves)):
+        for pivot_mm in (
+            *np.arange(0.0, _MOST_PIVOT_MM, _PIVOT_STEP_MM).tolist(),
+            *_even_pivot_mm(machine, moves),
+        ):
             if abs(pivot_mm - machine.pivot_mm) > 5.0:
                 yield _changed(machine, 1, pivot_mm=pivot_mm)
     factor = _unit_of_angles(machine, moves)
@@ -257,9 +262,7 @@ def _other_chains(machine: "Machine", by_machine: bool) -> Iterator[_Reading]:
 
 
 def _changed(machine: "Machine", cost: int, **values: Any) -> _Reading:
-    changes = tuple(
-        (key, _toml(value)) for key, value in values.items() if value != getattr(machine, key)
-    )
+    changes = tuple((key, _toml(value)) for key, value in values.items() if value != getattr(machine, key))
     return _Reading(machine.model_copy(update=values), changes, cost)
 
 
@@ -277,8 +280,7 @@ def _even_pivot_mm(machine: "Machine", moves: _Moves) -> Iterator[float]:
     if np.count_nonzero(timed) < _FEWEST_ANGLES:
         return
     way, per_mm = (
-        tip[1][timed] - tip[0][timed]
-        for tip in (_ends(machine, moves, 0.0), _ends(machine, moves, 1.0))
+        tip[1][timed] - tip[0][timed] for tip in (_ends(machine, moves, 0.0), _ends(machine, moves, 1.0))
     )
     per_mm = per_mm - way  # the tip is linear in the length of the lever: eq. 2
     pivots_mm = np.arange(0.0, _MOST_PIVOT_MM, 1.0)
@@ -432,7 +434,9 @@ def _comments(machine: "Machine", moves: _Moves, head: bytes) -> Iterator[Issue]
             continue
         is_on = tip[1] in (b"ON", b"YES")
         if is_on and moves.by_machine.any():
-            words = "a comment says that the tip is programmed, but machine.tcpm is false and no G43.4 in force"
+            words = (
+                "a comment says that the tip is programmed, but machine.tcpm is false and no G43.4 in force"
+            )
             yield _doubt(line, words, "tcpm")
         if not is_on and machine.tcpm:
             yield _doubt(line, "a comment says that TCP is off, but machine.tcpm is true", "tcpm")
