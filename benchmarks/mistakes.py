@@ -1,9 +1,9 @@
 """Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
-``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py``,
-``mistake_cases_hidden.py`` and ``mistake_cases_five_axes.py`` through the command line's own entry, in a temporary folder, then clean programs
-that must be translated. What passes in silence is named. The exit code is always 0: figures are printed, not
-judged.
+``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py``, ``mistake_cases_hidden.py``
+and ``mistake_cases_five_axes.py`` through the command line's own entry, in a temporary folder, then clean
+programs that must be translated. What passes in silence is named. The exit code is always 0: figures are
+printed, not judged.
 """
 
 import argparse

@@ -21,7 +21,7 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.rotary import posed
-from gcode2krl.units import DEG_PER_RAD, MM_PER_M, RAD_PER_DEG
+from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
@@ -150,9 +150,10 @@ def machine_issues(columns: dict[str, NDArray[Any]], cell: "Cell", head: bytes) 
     machine = cell.machine
     if machine is None or not columns["turn"].any():
         return
+    said = list(_metres(machine))
     moves = _looked_at(columns)
-    yield from _metres(machine)
     if not len(moves.line):
+        yield from said
         return
     stock = None if cell.stock is None else cell.stock.box_mm
     box = None
@@ -161,7 +162,7 @@ def machine_issues(columns: dict[str, NDArray[Any]], cell: "Cell", head: bytes) 
             cell.tool[number].diameter_mm for number in np.unique(moves.tool).tolist() if number in cell.tool
         ]
         beside_mm = max(used, default=0.0) / 2.0 + _BESIDE_MM
-        box = np.array(stock) + [[-beside_mm], [beside_mm]]
+        box = np.array(stock) + np.array([[-beside_mm], [beside_mm]])
     declared = _sense_of(_Reading(machine), moves, box)
     ballots = []
     for reading in _neighbours(machine, moves):
@@ -169,11 +170,8 @@ def machine_issues(columns: dict[str, NDArray[Any]], cell: "Cell", head: bytes) 
         if not _same(declared, sense):
             ballots.append(_Ballot(reading, sense, *_votes(declared, sense, moves, reading)))
     floor_mm = cell.table.z_mm if cell.table is not None else -np.inf if stock is None else stock[0][2]
-    said = [*_comments(machine, moves, head), *_from_below(declared, ballots, moves, floor_mm)]
-    said += [] if said else _doubted(machine, ballots, moves)
-    yield from said
-    if not said:
-        yield from _untold(machine, ballots)
+    said += [*_comments(machine, moves, head), *_from_below(declared, ballots, moves, floor_mm)]
+    yield from said or [*_doubted(machine, ballots, moves)] or _untold(machine, ballots)
 
 
 # --- the program ------------------------------------------------------------------------------------------
@@ -184,10 +182,10 @@ def _looked_at(columns: dict[str, NDArray[Any]]) -> _Moves:
     deg, offset = columns["turn"], np.nan_to_num(columns["length_offset_mm"], nan=0.0)
     mode, feed = columns["turn_mode"], ~columns["rapid"]
     usable = columns["known"].all(axis=1) & ~columns["machine"] & (mode != v.TURN_VECTOR)
-    turned = deg.any(axis=1)
+    turned: Bools = deg.any(axis=1)
     both = usable[1:] & usable[:-1] & (offset[1:] == offset[:-1]) & (mode[1:] == mode[:-1])
     both &= turned[1:] | turned[:-1]
-    turning = (deg[1:] != deg[:-1]).any(axis=1)
+    turning = np.asarray((deg[1:] != deg[:-1]).any(axis=1))
     beside_feed = feed[:-1] | np.append(feed[2:], False)
     kinds = (~feed[1:] & beside_feed & ~turning, feed[1:] & ~turning, feed[1:] & turning)
     row = np.sort(np.concatenate([_spread(np.flatnonzero(both & kind)) + 1 for kind in kinds]))
@@ -234,9 +232,6 @@ def _neighbours(machine: "Machine", moves: _Moves) -> Iterator[_Reading]:
         yield _Reading(machine, (("tcpm", "true"),), 1, tip=True)
     elif machine.tcpm and _has_lengths(machine):
         yield _Reading(machine, (("tcpm", "false"),), 1, tip=False)
-    if by_machine and machine.centre_mm is not None and _in_metres(machine.centre_mm):
-        centre = tuple(round(MM_PER_M * value, 6) for value in machine.centre_mm)
-        yield _changed(machine, 1, centre_mm=centre)
     if by_machine and machine.head_axes and machine.pivot_mm is not None:
         for pivot_mm in (
             *np.arange(0.0, _MOST_PIVOT_MM, _PIVOT_STEP_MM).tolist(),
@@ -328,7 +323,7 @@ def _unit_of_angles(machine: "Machine", moves: _Moves) -> float:
 
 
 def _sense_of(reading: _Reading, moves: _Moves, box: Any) -> _Sense:
-    """Return what a reading makes of the moves; ``box`` (2, 3) is where tips cut stock, None if not stated."""
+    """Return what a reading makes of the moves; ``box`` (2, 3) is where tips cut, if it is known."""
     machine = reading.machine
     lift_mm = moves.offset_mm + (machine.pivot_mm or 0.0)
     up = np.outer(lift_mm, [0.0, 0.0, 1.0])
@@ -386,7 +381,7 @@ def _same(sense: _Sense, other: _Sense) -> bool:
 
 
 def _votes(sense: _Sense, other: _Sense, moves: _Moves, reading: _Reading) -> tuple[int, int, int]:
-    """Return how many moves fit the other reading alone, and the declared alone, and the first of the former."""
+    """Return how many moves fit the other reading alone, how many the declared, the first of the former."""
     pro, con = (np.zeros(len(moves.line), dtype=np.int64) for _ in range(2))
     same_way = np.abs(sense.tip_mm - other.tip_mm).max(axis=(0, 2)) < 0.01
     for kind, fits in sense.fits.items():
@@ -405,7 +400,8 @@ def _votes(sense: _Sense, other: _Sense, moves: _Moves, reading: _Reading) -> tu
         way = np.abs(sense.tip_mm[1] - sense.tip_mm[0])
         level = way[:, 2] < _LEANS * way.max(axis=1)
         pro[level] = con[level] = 0
-    return np.count_nonzero(pro > con), np.count_nonzero(con > pro), int(np.argmax(pro > con))
+    better = pro > con
+    return int(np.count_nonzero(better)), int(np.count_nonzero(con > pro)), int(np.argmax(better))
 
 
 # --- what is said of it -----------------------------------------------------------------------------------
@@ -495,7 +491,7 @@ def _doubted(machine: "Machine", ballots: list[_Ballot], moves: _Moves) -> Itera
 
 
 def _other_unit(ballot: _Ballot, moves: _Moves) -> bool:
-    """Tell whether angles have another unit, also where the moves do not say so: a tool that hardly tilts fits."""
+    """Tell whether angles have another unit, also where no move says so: a tool that hardly tilts fits."""
     if ballot.lost or not ballot.open:
         return ballot.lost
     angles = np.unique(np.abs([moves.from_deg, moves.to_deg]))
@@ -511,7 +507,8 @@ def _of_best(machine: "Machine", best: list[_Ballot], moves: _Moves, severity: S
     about = "about " if ballot.reading.only("pivot_mm") else ""
     words = (
         f"{declared} makes less sense than {about}{_named(best)}: {ballot.pro} of {len(moves.line)} moves go "
-        f"square to the tool, along it, evenly or in the stock only with the latter, {ballot.con} only as declared"
+        f"square to the tool, along it, evenly or in the stock only with the latter, "
+        f"{ballot.con} only as declared"
     )
     key = f"machine.{ballot.reading.changes[0][0]}"
     return Issue(severity, "machine-doubtful", int(moves.line[ballot.first]), words, _SEE, key=key)
@@ -533,7 +530,7 @@ def _of_unit(machine: "Machine", reading: _Reading, moves: _Moves) -> Issue:
 
 
 def _against_iso(machine: "Machine") -> int:
-    """Return how many signs are not those of ISO 841: a positive angle turns a head right-handed, a table left."""
+    """Return how many signs are not those of ISO 841, by which a head turns right-handed and a table left."""
     wrong = [sign != -1 for _, sign in machine.table_axes] + [sign != 1 for _, sign in machine.head_axes]
     return sum(wrong)
 

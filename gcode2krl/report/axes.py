@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from gcode2krl.arrays import Bools, Floats
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, look, title
 from gcode2krl.tables import Toolpath
 
@@ -57,7 +57,7 @@ def axes_figure(toolpath: Toolpath, stock_mm: Box | None, table_mm: float | None
     return figure
 
 
-def _evenly(tips: Floats, shown: Bools) -> Floats:
+def _evenly(tips: Floats, shown: Bools) -> Ints:
     """Return rows that are evenly spread along the way of those that are shown."""
     rows = np.flatnonzero(shown)
     if len(rows) <= _TOOLS:

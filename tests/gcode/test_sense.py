@@ -1,4 +1,4 @@
-"""A declared five-axis machine has a sense: sound programs are silent, and what doubts a machine names the key.
+"""A declared five-axis machine has a sense: sound programs are silent, a doubt names its key.
 
 Wrong declarations through the command line are in ``benchmarks/mistake_cases_five_axes.py``, run by
 ``tests/test_mistakes.py``.
@@ -55,7 +55,7 @@ def posted(program, name, tip=TIP, **options):
 
 @pytest.mark.parametrize("program", programs.SOUND)
 def test_sound_programs_are_not_doubted(program):
-    """Twelve programs on seven machines, by tip and by axes; a warning only where signs are against ISO 841."""
+    """On seven machines, by tip and by axes; a warning only where signs are against ISO 841."""
     for name in programs.MACHINES:
         for tip in (TIP, AXES):
             toolpath = read(posted(program, name, tip), declared(name))
