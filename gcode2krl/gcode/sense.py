@@ -182,7 +182,7 @@ def _looked_at(columns: dict[str, NDArray[Any]]) -> _Moves:
     deg, offset = columns["turn"], np.nan_to_num(columns["length_offset_mm"], nan=0.0)
     mode, feed = columns["turn_mode"], ~columns["rapid"]
     usable = columns["known"].all(axis=1) & ~columns["machine"] & (mode != v.TURN_VECTOR)
-    turned: Bools = deg.any(axis=1)
+    turned = np.asarray(deg.any(axis=1))
     both = usable[1:] & usable[:-1] & (offset[1:] == offset[:-1]) & (mode[1:] == mode[:-1])
     both &= turned[1:] | turned[:-1]
     turning = np.asarray((deg[1:] != deg[:-1]).any(axis=1))
