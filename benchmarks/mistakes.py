@@ -1,9 +1,9 @@
 """Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
-``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py`` and of
-``mistake_cases_hidden.py`` through the command line's own entry, in a temporary folder, then clean programs
-that must be translated. What passes in silence is named. The exit code is always 0: figures are printed, not
-judged.
+``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py``, ``mistake_cases_hidden.py``
+and ``mistake_cases_five_axes.py`` through the command line's own entry, in a temporary folder, then clean
+programs that must be translated. What passes in silence is named. The exit code is always 0: figures are
+printed, not judged.
 """
 
 import argparse
@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from mistake_cases import CELL_HEAD, CELL_TOOLS, CLEAN, LATER, MISTAKES, PROGRAMS, Clean, Mistake
+from mistake_cases_five_axes import FIVE_AXES
 from mistake_cases_hidden import FURTHER, REPORTED
 
 from gcode2krl.cli.main import _run
@@ -232,7 +233,7 @@ def main() -> None:
     options = parser.parse_args()
     started = time.perf_counter()
     verdicts, outcomes = [], []
-    for mistake in (*MISTAKES, *REPORTED, *FURTHER):
+    for mistake in (*MISTAKES, *REPORTED, *FURTHER, *FIVE_AXES):
         with tempfile.TemporaryDirectory() as folder:
             verdicts.append(judge(mistake, Path(folder)))
     for clean in CLEAN:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _NEEDS = {
     "path": ("motion",),
+    "axes": ("motion",),
     "kinematics": ("motion",),
     "joints": ("motion", "joints"),
     "spin": ("motion", "joints"),
@@ -40,6 +41,7 @@ def figure_of(prediction: Prediction, name: str) -> "Figure":
         raise input_error("prediction-empty", sentence, _REMEDIES.get(stage, "predict the part again"))
     draw = {
         "path": _path,
+        "axes": _axes,
         "kinematics": _kinematics,
         "joints": _joints,
         "spin": _spin,
@@ -67,6 +69,14 @@ def _path(prediction: Prediction) -> "Figure":
 
     assert prediction.motion is not None
     return path_figure(prediction.toolpath, prediction.targets, prediction.motion)
+
+
+def _axes(prediction: Prediction) -> "Figure":
+    from gcode2krl.report.axes import axes_figure
+
+    cell = prediction.cell
+    stock_mm = None if cell.stock is None else cell.stock.box_mm
+    return axes_figure(prediction.toolpath, stock_mm, None if cell.table is None else cell.table.z_mm)
 
 
 def _kinematics(prediction: Prediction) -> "Figure":

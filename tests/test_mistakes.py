@@ -18,6 +18,12 @@ def test_mistake_is_refused(case, tmp_path):
     assert verdict.remedy, verdict.printed
 
 
+@pytest.mark.parametrize("case", mistakes.FIVE_AXES, ids=lambda case: case.title)
+def test_wrong_five_axis_machine_is_told(case, tmp_path):
+    verdict = mistakes.judge(case, tmp_path)
+    assert verdict.passed, verdict.printed
+
+
 @pytest.mark.parametrize("case", mistakes.CLEAN, ids=lambda case: case.title)
 def test_clean_program_is_translated(case, tmp_path):
     outcome = mistakes.judge_clean(case, tmp_path)

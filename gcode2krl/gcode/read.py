@@ -26,6 +26,7 @@ from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
+from gcode2krl.gcode.sense import machine_issues
 from gcode2krl.gcode.state import (
     DOUBT_OF_G,
     DOUBT_OF_GROUP,
@@ -404,18 +405,19 @@ class _Interpreter:
             head=head,
             programs=self.spoken.programs,
         )
-        return self._toolpath((*found, *map(self._placed, whole)), cell)
+        return self._toolpath((*found, *map(self._placed, whole)), cell, head)
 
     def _placed(self, issue: Issue) -> Issue:
         """Return a finding whose lines are named with their file, where that is not the main program's."""
         return issue if self.program is None else self.program.placed(issue)
 
-    def _toolpath(self, issues: tuple[Issue, ...], cell: "Cell | None") -> Toolpath:
+    def _toolpath(self, issues: tuple[Issue, ...], cell: "Cell | None", head: bytes) -> Toolpath:
         rows = self._count("rows")
         columns = self.columns.finished(rows)
         events = (*self._events(), *self._stopped_by_end())
         axis: Floats = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (rows, 3))
         if cell is not None and cell.machine is not None:
+            issues = (*issues, *machine_issues(columns, cell, head))
             vel_ori_deg_s = cell.controller.vel_ori_deg_s
             part = in_part(columns, events, cell.machine, self.chord_tolerance_mm, vel_ori_deg_s, self.name)
             columns, axis, events, issues = part.columns, part.axis, part.events, (*issues, *part.issues)

@@ -102,6 +102,22 @@ def in_part(
     return Part(rest, axis, moved, issues)
 
 
+def posed(machine: "Machine", stand: Floats, deg: Floats, lift_mm: Floats) -> tuple[Floats, Floats]:
+    """Return tip and axis (n, 3) in the part where the pivot stands at (n, 3) mm: eq. 1 and 2.
+
+    ``deg`` are A, B, C (n, 3), ``lift_mm`` (n,) is p + l, from the pivot to the tip.
+    """
+    centre = np.array(machine.centre_mm or (0.0, 0.0, 0.0))
+    axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), stand.shape)
+    for letter, sign in reversed(machine.head_axes):
+        axis = _turned(axis, letter, sign * deg[:, ord(letter) - ord("A")])
+    tip = stand - lift_mm[:, None] * axis - centre
+    for letter, sign in machine.table_axes:
+        angle = -sign * deg[:, ord(letter) - ord("A")]
+        tip, axis = _turned(tip, letter, angle), _turned(axis, letter, angle)
+    return tip + centre, axis
+
+
 def _feeds(columns: dict[str, NDArray[Any]], tip: Floats, time_s: Floats, on_spot: Bools) -> Floats:
     """Return the speeds of the tip (n,): the programmed ones, or such that chords take their time."""
     way_mm = np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1)
@@ -182,7 +198,7 @@ class _Way:
         """Find where each row ends, and where it begins in its own terms."""
         position, lift = self._columns["position_mm"], self._length_mm
         stand = position + np.outer(lift, [0.0, 0.0, 1.0])  # of the pivot
-        tip, axis = self._posed(stand, self._to_deg, lift)
+        tip, axis = posed(self._machine, stand, self._to_deg, lift)
         axis[by_vector] = turn[by_vector] / np.linalg.norm(turn[by_vector], axis=1, keepdims=True)
         self._to_tip = np.where(self._by_machine[:, None], tip, position)
         self._to_axis = axis
@@ -193,18 +209,6 @@ class _Way:
         other = np.append(False, ~self._by_machine[:-1])
         before[other] = self._standing(self._from_tip[other], self._from_deg[other], lift[other])
         self._from_stand = before
-
-    def _posed(self, stand: Floats, deg: Floats, lift_mm: Floats) -> tuple[Floats, Floats]:
-        """Return tip and axis (n, 3) in the part where the pivot stands at (n, 3): eq. 1 and 2."""
-        centre = np.array(self._machine.centre_mm or (0.0, 0.0, 0.0))
-        axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), stand.shape)
-        for letter, sign in reversed(self._machine.head_axes):
-            axis = _turned(axis, letter, sign * deg[:, ord(letter) - ord("A")])
-        tip = stand - lift_mm[:, None] * axis - centre
-        for letter, sign in self._machine.table_axes:
-            angle = -sign * deg[:, ord(letter) - ord("A")]
-            tip, axis = _turned(tip, letter, angle), _turned(axis, letter, angle)
-        return tip + centre, axis
 
     def _standing(self, tip: Floats, deg: Floats, lift_mm: Floats) -> Floats:
         """Return where the pivot stands (n, 3) with the tip there: eq. 2 solved for it."""
@@ -222,7 +226,7 @@ class _Way:
         share = part[:, None]
         deg = _between(self._from_deg[row], self._to_deg[row], share)
         stand = _between(self._from_stand[row], self._to_stand[row], share)
-        tip, axis = self._posed(stand, deg, self._length_mm[row])
+        tip, axis = posed(self._machine, stand, deg, self._length_mm[row])
         straight = ~self._by_machine[row] | self._in_plane[row]
         tip[straight] = _between(self._from_tip[row], self._to_tip[row], share)[straight]
         flat = self._in_plane[row]

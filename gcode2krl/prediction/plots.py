@@ -29,6 +29,14 @@ class Plots:
         """
         return self._draw("path")
 
+    def axes(self) -> "Figure":
+        """Draw the tips from above and from two sides, each with its tool as a short line.
+
+        >>> from gcode2krl import Prediction
+        >>> Prediction.load("prediction").plot.axes().savefig("axes.png")
+        """
+        return self._draw("axes")
+
     def kinematics(self) -> "Figure":
         """Draw speed, acceleration and jerk over time.
 
@@ -96,6 +104,7 @@ class Plots:
 
 FIGURES = (
     "path",
+    "axes",
     "kinematics",
     "joints",
     "spin",
