@@ -25,6 +25,7 @@ from gcode2krl.krl.pilot_text import PilotText, checksum
 from gcode2krl.krl.provenance import provenance_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
+from gcode2krl.krl.versions import version_lines
 from gcode2krl.program.arcs import Arc
 from gcode2krl.program.splines import Chain
 from gcode2krl.tables import Joints, Targets
@@ -378,7 +379,7 @@ class _Composer:
             declarations.append(RSI_DECLARATIONS)
         arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
         template = st.environment().get_template("head.src.j2")
-        text = template.render(
+        values = dict(
             source=self.source,
             name=self.name,
             version=__version__,
@@ -408,7 +409,24 @@ class _Composer:
             external_axes=max((int(name[1]) for name in self.cell.external), default=0),
             tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
+        texts = [template.render(**values, versions=[]), *self._statement_texts()]
+        text = template.render(**values, versions=version_lines(self.cell, self.rsi is not None, texts))
         return _text(text) + _text(st.render(self.cell, "program.prologue"))
+
+    def _statement_texts(self) -> Iterator[str]:
+        """Yield each kind of statement behind the head, once: for what the header says of them."""
+        for key in ("program.prologue", "program.epilogue"):
+            yield st.render(self.cell, key)
+        yield from (text for events in self.events.values() for _, text in events)
+        away = int(np.argmin(self.targets.home))
+        yield self._ptp(away)
+        if any(isinstance(curve, Chain) for curve in self.curves):
+            yield w.SPLINE
+        if self.pilot is not None and self.pilot.triggers is not None and len(self.pilot.triggers.row):
+            first = int(self.pilot.triggers.row[0])
+            yield bytes(self.pilot.before(first, first + 1)[0]).decode("ascii")
+        if self.rsi is not None:
+            yield from (self.rsi.start, self.rsi.lost, *self.rsi.files.values())
 
     def _collision_lines(self) -> list[str]:
         scope = self.layout.collisions
