@@ -11,35 +11,36 @@ from gcode2krl.krl.constructs import Construct, constructs, sources
 PAGE = Path(__file__).with_name("krl_truth.md")
 _HEAD = """# The truth about each KRL construct
 
-Made by `docs/make_krl_truth.py` from `gcode2krl/krl/constructs.toml`: each construct of KRL and RSI that a program
-or a file beside it may have, what we rely on, and what public source says so. No controller has run a program of
-ours yet.
+Made by `docs/make_krl_truth.py` from `gcode2krl/krl/constructs.toml`: each construct of KRL and RSI that a
+program or a file beside it may have, what we rely on, and what public source says so. No controller has run
+a program of ours yet.
 
 - *right*: a manual, a file that KUKA's RSI Visual made, or a program that ran on a controller says so.
 - *probable*: a public program or page has the same form; nobody is known to have checked what we rely on.
-- *assumed*: nothing public was found, or only something similar. The header of a program and the check list of
-  `runkit` name those that this program uses, under "ASSUMED, look at this in T1".
+- *assumed*: nothing public was found, or only something similar. The header of a program and the check list
+  of `runkit` name those that this program uses, under "ASSUMED, look at this in T1".
 
 """
 _VERSIONS = """## Versions
 
-`[controller] kss` and `rsi` of the cell say what the controller runs (*Help > Info*). Without them a program is
-written for KSS 8.x and RSI 3, and its header says that this is assumed.
+`[controller] kss` and `rsi` of the cell say what the controller runs (*Help > Info*). Without them a
+program is written for KSS 8.x and RSI 3, and its header says that this is assumed.
 
 | KSS | RSI | signal flow | `RSI_CREATE` | written |
 | --- | --- | --- | --- | --- |
-| 8.3 | 3 (3.2, 3.3) | `NAME.rsi.xml`, counts from 1 | `"NAME.rsi"` | everything; above `program.warn_size_mb` (4 MB) refused, `program-memory` |
+| 8.3 | 3 (3.2, 3.3) | `NAME.rsi.xml`, counts from 1 | `"NAME.rsi"` | everything; `program-memory` refuses above 4 MB |
 | 8.5 | 4 (4.0) | `NAME.rsix`, counts from 0 | `"NAME"` | everything |
 | 8.6 | 4 (4.1) | `NAME.rsix` | `"NAME"` | everything |
 | 8.7 | 5 (5.0) | `NAME.rsix` | `"NAME"` | everything |
 | iiQKA | 6 | `.rsix`, imported by iiQWorks | `RSI_LOAD`, `RSI_ACTIVATE`, `RSI_PROCESS_ON` | nothing, `kss-iiqka` |
 
-A pair that does not belong together, such as `kss = "8.3"` with `rsi = "5"`, is refused when the cell is read. The
-pairs are those of the headers that RSI Visual writes into its files, and of the tables of ROS drivers. The lists of
-all objects in the files for RSI 4.1 (B567) and 5.0 (B485) agree in every object, number and parameter that we write;
-a file for RSI 4.0 (B3083) has the same form. Files of RSI 3 were compared with signal flows that have run on a KR
-16-2. That KSS 8.3 holds about 4 MB of programs (another report says 8 MB) is what users write in robot-forum.com
-thread 49620 and on industrialmonitordirect.com; splitting into files does not help there, as all lie in R1 at once.
+A pair that does not belong together, such as `kss = "8.3"` with `rsi = "5"`, is refused when the cell is
+read. The pairs are those of the headers that RSI Visual writes into its files, and of the tables of ROS
+drivers. The lists of all objects in the files for RSI 4.1 (B567) and 5.0 (B485) agree in every object,
+number and parameter that we write; a file for RSI 4.0 (B3083) has the same form. Files of RSI 3 were
+compared with signal flows that have run on a KR 16-2. That KSS 8.3 holds about 4 MB of programs (another
+report says 8 MB) is what users write in robot-forum.com thread 49620 and on industrialmonitordirect.com;
+splitting into files does not help there, as all lie in R1 at once.
 
 """
 

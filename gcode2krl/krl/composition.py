@@ -4,6 +4,7 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -378,8 +379,8 @@ class _Composer:
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
         arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
-        template = st.environment().get_template("head.src.j2")
-        values = dict(
+        render = partial(
+            st.environment().get_template("head.src.j2").render,
             source=self.source,
             name=self.name,
             version=__version__,
@@ -409,8 +410,8 @@ class _Composer:
             external_axes=max((int(name[1]) for name in self.cell.external), default=0),
             tool=st.tool_statements(self.cell, int(self.targets.tool[0])),
         )
-        texts = [template.render(**values, versions=[]), *self._statement_texts()]
-        text = template.render(**values, versions=version_lines(self.cell, self.rsi is not None, texts))
+        texts = [render(versions=[]), *self._statement_texts()]
+        text = render(versions=version_lines(self.cell, self.rsi is not None, texts))
         return _text(text) + _text(st.render(self.cell, "program.prologue"))
 
     def _statement_texts(self) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Which constructs of KRL and RSI our files have, and how far each is known: the table ``constructs.toml``."""
+"""Which KRL and RSI our files have, and how far each construct is known: the table ``constructs.toml``."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 _FILE = Path(__file__).with_name("constructs.toml")
 
@@ -31,7 +32,8 @@ class Construct:
 @cache
 def constructs() -> tuple[Construct, ...]:
     """Return the table."""
-    return tuple(Construct(**{**row, "source": tuple(row["source"])}) for row in _table()["construct"])
+    rows = _table()["construct"]
+    return tuple(Construct(**{**row, "source": tuple(row["source"])}) for row in rows)
 
 
 @cache
@@ -48,7 +50,7 @@ def assumed_in(texts: Iterable[str]) -> list[str]:
 
 
 @cache
-def _table() -> Mapping[str, Mapping[str, str] | list[dict[str, str]]]:
+def _table() -> dict[str, Any]:
     import tomllib
 
     with _FILE.open("rb") as stream:

@@ -69,7 +69,7 @@ class ProgramFiles:
 
 
 def output_files(file: Path, online: str | None, rsi: RsiVersion = "3") -> list[Path]:
-    """Return the files that a program may consist of, but for its parts; ``rsi`` counts where it is online."""
+    """Return the files that a program may consist of, but for its parts; ``rsi`` counts if it is online."""
     of_rsi = [file.with_name(name) for name in file_names(online, rsi)] if online is not None else []
     return [file, file.with_suffix(w.DATA_SUFFIX), file.with_suffix(w.SIDECAR_SUFFIX), *of_rsi]
 

@@ -1,10 +1,10 @@
 """What the controller needs for RSI beside the program: the Ethernet file and the signal flow.
 
-RSI 3 reads a ``.rsi.xml`` whose inputs, outputs and parameters count from 1; RSI 4 and 5 read a ``.rsix`` that
-counts from 0, spells some kinds differently and has one numbering for the axes of the robot alone. Numbers and
-names are those of files that RSI Visual has made (docs/krl_truth.md); nobody has loaded ours into a controller
-yet. Both files belong together: the numbers of the channels are those of both. The tags are those that the
-online side parses.
+RSI 3 reads a ``.rsi.xml`` whose inputs, outputs and parameters count from 1; RSI 4 and 5 read a ``.rsix``
+that counts from 0, spells some kinds differently and has one numbering for the axes of the robot alone.
+Numbers and names are those of files that RSI Visual has made (docs/krl_truth.md); nobody has loaded ours
+into a controller yet. Both files belong together: the numbers of the channels are those of both. The tags
+are those that the online side parses.
 """
 
 import re

@@ -14,8 +14,8 @@ def version_issues(cell: Cell) -> Iterator[Issue]:
     """Yield what forbids any program for the stated controller."""
     if cell.controller.kss == "iiqka":
         sentence = (
-            "[controller] kss is iiqka: nothing public says which of our KRL it runs, and its RSI is switched "
-            "by other calls (RSI_LOAD, RSI_ACTIVATE, RSI_PROCESS_ON)"
+            "[controller] kss is iiqka: nothing public says which of our KRL it runs, and its RSI is "
+            "switched by other calls (RSI_LOAD, RSI_ACTIVATE, RSI_PROCESS_ON)"
         )
         yield Issue("error", "kss-iiqka", 0, sentence, "use a controller that runs KSS 8, a KRC4 or KR C5")
 

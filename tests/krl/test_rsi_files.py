@@ -61,8 +61,9 @@ OF_RSI_VISUAL = {
         "OV_PRO": (63, {}),
     },
 }
-"""Kind of object → its number, and the number of each parameter, as read in files that RSI Visual made for RSI 3
-(kuka_experimental, RSIPI) and for 4.1 and 5.0 (kuka-external-control-sdk, kuka_rsi_driver), where both agree."""
+"""Kind of object → its number, and the number of each parameter, as read in files that RSI Visual made:
+for RSI 3 kuka_experimental and RSIPI, for 4.1 and 5.0, which agree, kuka-external-control-sdk and
+kuka_rsi_driver."""
 OF_RSI_VISUAL["5"] = OF_RSI_VISUAL["4"]
 
 

@@ -75,7 +75,9 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
 )
 def test_the_system_software_is_that_of_the_archive_unless_it_is_answered(stated, answer, written):
     controller = Controller(source="", kss=stated)
-    text = text_of_cell(completed({} if answer is None else {"kss": answer}, controller), controller, "s.json")
+    text = text_of_cell(
+        completed({} if answer is None else {"kss": answer}, controller), controller, "s.json"
+    )
     assert tomllib.loads(text).get("controller", {}).get("kss", "") == written
 
 
