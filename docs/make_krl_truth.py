@@ -28,11 +28,11 @@ program is written for KSS 8.x and RSI 3, and its header says that this is assum
 
 | KSS | RSI | signal flow | `RSI_CREATE` | written |
 | --- | --- | --- | --- | --- |
-| 8.3 | 3 (3.2, 3.3) | `NAME.rsi.xml`, counts from 1 | `"NAME.rsi"` | everything; `program-memory` refuses above 4 MB |
+| 8.3 | 3 (3.2, 3.3) | `NAME.rsi.xml`, counts from 1 | `"NAME.rsi"` | up to 4 MB (`program-memory`) |
 | 8.5 | 4 (4.0) | `NAME.rsix`, counts from 0 | `"NAME"` | everything |
 | 8.6 | 4 (4.1) | `NAME.rsix` | `"NAME"` | everything |
 | 8.7 | 5 (5.0) | `NAME.rsix` | `"NAME"` | everything |
-| iiQKA | 6 | `.rsix`, imported by iiQWorks | `RSI_LOAD`, `RSI_ACTIVATE`, `RSI_PROCESS_ON` | nothing, `kss-iiqka` |
+| iiQKA | 6 | `.rsix`, by iiQWorks | none: `RSI_LOAD`, `RSI_ACTIVATE` … | nothing (`kss-iiqka`) |
 
 A pair that does not belong together, such as `kss = "8.3"` with `rsi = "5"`, is refused when the cell is
 read. The pairs are those of the headers that RSI Visual writes into its files, and of the tables of ROS
@@ -52,7 +52,8 @@ def page() -> str:
     named = "".join(f"- *{short}*: {text}\n" for short, text in sources().items())
     table = "".join(_row(each) for each in constructs())
     head = "| construct | what we rely on | source | sure | from |\n| --- | --- | --- | --- | --- |\n"
-    return f"{_HEAD}{len(constructs())} constructs: {counted}.\n\n{head}{table}\n{_VERSIONS}## Sources\n\n{named}"
+    rows = f"{len(constructs())} constructs: {counted}.\n\n{head}{table}"
+    return f"{_HEAD}{rows}\n{_VERSIONS}## Sources\n\n{named}"
 
 
 def _row(each: Construct) -> str:

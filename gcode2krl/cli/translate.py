@@ -70,7 +70,7 @@ if TYPE_CHECKING:
 @click.option(
     "--online",
     metavar="NAME",
-    help="Correct online by RSI: switch it in the program, write its files (NAME.rsi.xml or .rsix …) beside it.",
+    help="Correct online by RSI: switch it in the program, write NAME.rsi.xml or .rsix and more beside.",
 )
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."

@@ -21,7 +21,7 @@ def version_issues(cell: Cell) -> Iterator[Issue]:
 
 
 def version_lines(cell: Cell, is_online: bool, texts: Iterable[str]) -> list[str]:
-    """Return lines of a header: the versions that it was written for, and what is assumed of its ``texts``."""
+    """Return lines of a header: the versions it was written for, and what is assumed of its ``texts``."""
     kss, rsi = cell.controller.kss, cell.controller.rsi
     words = f"for KSS {kss}" if kss else "for KSS 8.x, assumed: the cell does not state [controller] kss"
     if is_online:
