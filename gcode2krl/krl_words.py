@@ -88,7 +88,9 @@ DWELL = "dwell"
 NO_GUARD = "(--no-guard)"
 """In the header of a program without a guard."""
 SOURCE_SUFFIX, DATA_SUFFIX, SIDECAR_SUFFIX = ".src", ".dat", ".pilot.csv"
-SIGNAL_FLOW_SUFFIX, ETHERNET_SUFFIX = ".rsi.xml", "_ETH.xml"
+SIGNAL_FLOW_SUFFIXES = {"3": ".rsi.xml", "4": ".rsix", "5": ".rsix"}
+"""Of the signal flow that a controller reads, by the version of RSI."""
+ETHERNET_SUFFIX = "_ETH.xml"
 LONGEST_LINE = 471
 """Characters in a line of KRL, as KUKA's documentation is remembered."""
 

@@ -508,11 +508,14 @@ def _controller_files(cell: "Cell", form: Any, name: str, folder: Path, inputs: 
     """Write the files for the controller's folder ``SensorInterface``."""
     from gcode2krl.files import make_folder, write_together
     from gcode2krl.krl.rsi_files import rsi_texts
+    from gcode2krl.krl.versions import version_issues
 
     if cell.online.link.address == "0.0.0.0":
         words = "the controller cannot look for the server at 0.0.0.0"
         raise input_error("online-address", words, "give --address, that of the PC in the robot's network")
-    texts = rsi_texts(name, cell.online, cell.pilot, form)
+    for issue in version_issues(cell):
+        raise input_error(issue.code, issue.message, issue.remedy)
+    texts = rsi_texts(name, cell.online, cell.pilot, form, cell.controller.rsi_version)
     make_folder(folder)
     files = {folder / key: text.replace("\n", "\r\n").encode("ascii") for key, text in texts.items()}
     write_together(files, inputs)

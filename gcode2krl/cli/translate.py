@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gcode2krl import krl_words as w
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, job_option, simplify_option
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
 @click.option(
     "--online",
     metavar="NAME",
-    help="Correct online by RSI: switch it in the program, write NAME.rsi.xml and NAME_ETH.xml beside it.",
+    help="Correct online by RSI: switch it in the program, write NAME.rsi.xml or .rsix and more beside.",
 )
 @click.option(
     "--both", is_flag=True, help="--online on top of --compensate offline: the server knows of the offset."
@@ -141,7 +142,8 @@ def _tell(attempt: Attempt, console: Console) -> None:
 
 def _online_lines(written: "WrittenProgram") -> Iterator[str]:
     """Yield what to do with the RSI files."""
-    files = " and ".join(file.name for file in written.files if file.suffix == ".xml")
+    endings = (w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
+    files = " and ".join(file.name for file in written.files if file.name.endswith(endings))
     yield f"  online     {files} belong into SensorInterface; docs/online.md lists what to confirm there"
     pilot = "".join(f" --pilot {file}" for file in written.files if file.suffix == ".csv")
     tool = int(written.targets.tool[~written.targets.home][-1])

@@ -4,6 +4,7 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from gcode2krl.krl.pilot_text import PilotText, checksum
 from gcode2krl.krl.provenance import provenance_lines, unconfirmed_lines
 from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
+from gcode2krl.krl.versions import version_lines
 from gcode2krl.program.arcs import Arc
 from gcode2krl.program.splines import Chain
 from gcode2krl.tables import Joints, Targets
@@ -437,8 +439,8 @@ class _Composer:
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
         arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
-        template = st.environment().get_template("head.src.j2")
-        text = template.render(
+        render = partial(
+            st.environment().get_template("head.src.j2").render,
             source=self.source,
             name=self.name,
             version=__version__,
@@ -471,10 +473,27 @@ class _Composer:
             external_lines=external_lines(self.targets, self.cell),
             external_axes=max((int(name[1]) for name in self.cell.external), default=0),
         )
+        texts = [render(versions=[]), *self._statement_texts()]
+        text = render(versions=version_lines(self.cell, self.rsi is not None, texts))
         prologue = st.render(self.cell, "program.prologue")
         if cs.may_disturb(prologue):
             prologue = f"{prologue}\n{cs.settings_again(self._settings(int(self.targets.tool[0])))}"
         return _text(text) + _text(prologue)
+
+    def _statement_texts(self) -> Iterator[str]:
+        """Yield each kind of statement behind the head, once: for what the header says of them."""
+        for key in ("program.prologue", "program.epilogue"):
+            yield st.render(self.cell, key)
+        yield from (text for events in self.events.values() for _, text in events)
+        away = int(np.argmin(self.targets.home))
+        yield self._ptp(away)
+        if any(isinstance(curve, Chain) for curve in self.curves):
+            yield w.SPLINE
+        if self.pilot is not None and self.pilot.triggers is not None and len(self.pilot.triggers.row):
+            first = int(self.pilot.triggers.row[0])
+            yield bytes(self.pilot.before(first, first + 1)[0]).decode("ascii")
+        if self.rsi is not None:
+            yield from (self.rsi.start, self.rsi.lost, *self.rsi.files.values())
 
     def _collision_lines(self) -> list[str]:
         scope = self.layout.collisions

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from gcode2krl import krl_words as w
+from gcode2krl.cell.sections.robot import RsiVersion
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files import Staging, refuse_inputs
 from gcode2krl.files.program_names import program_stem
@@ -67,10 +68,10 @@ class ProgramFiles:
         return list(places.values())
 
 
-def output_files(file: Path, online: str | None) -> list[Path]:
-    """Return the files that a program may consist of, but for its parts."""
-    rsi = [file.with_name(name) for name in file_names(online)] if online is not None else []
-    return [file, file.with_suffix(w.DATA_SUFFIX), file.with_suffix(w.SIDECAR_SUFFIX), *rsi]
+def output_files(file: Path, online: str | None, rsi: RsiVersion = "3") -> list[Path]:
+    """Return the files that a program may consist of, but for its parts; ``rsi`` counts if it is online."""
+    of_rsi = [file.with_name(name) for name in file_names(online, rsi)] if online is not None else []
+    return [file, file.with_suffix(w.DATA_SUFFIX), file.with_suffix(w.SIDECAR_SUFFIX), *of_rsi]
 
 
 def _place(file: Path, part: str, program_name: str) -> Path:

@@ -41,6 +41,7 @@ NEVER_RELEASED = frozenset(
         "online-nothing",
         "online-tool",
         "online-home",
+        "kss-iiqka",
     }
 )
 """Without these a program would have no meaning, or the robot would break something."""

@@ -1,17 +1,21 @@
 """What the controller needs for RSI beside the program: the Ethernet file and the signal flow.
 
-Written after KUKA's examples for KSS 8.3 and RSI 3, object numbers and all; nobody has loaded these files
-into a controller yet. Both belong together: the numbers of the channels are those of both. The tags are
-those that the online side parses.
+RSI 3 reads a ``.rsi.xml`` whose inputs, outputs and parameters count from 1; RSI 4 and 5 read a ``.rsix``
+that counts from 0, spells some kinds differently and has one numbering for the axes of the robot alone.
+Numbers and names are those of files that RSI Visual has made (docs/krl_truth.md); nobody has loaded ours
+into a controller yet. Both files belong together: the numbers of the channels are those of both. The tags
+are those that the online side parses.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell.sections import Pilot
 from gcode2krl.cell.sections.online import Online
+from gcode2krl.cell.sections.robot import RsiVersion
 from gcode2krl.errors import Issue, RefusedError, input_error
 
 Form = Literal["index", "values", "none"]
@@ -23,6 +27,21 @@ _IN_BASE = 1
 """``RefCorrSys``: the corrections are along ``$BASE``."""
 _INTEGER, _REAL = r"\$SEN_PINT\[(\d{1,2})\]", r"\$SEN_PREA"
 """What the objects SEN_PINT and SEN_PREA of a signal flow can read."""
+_RSIX_KIND = {
+    "ETHERNET": "Ethernet",
+    "POSCORR": "PosCorr",
+    "POSCORRMON": "PosCorrMon",
+    "AXISCORR": "AxisCorr",
+    "AXISCORRMON": "AxisCorrMon",
+    "DIGOUT": "DigOut",
+    "MAP2DIGOUT": "Map2DigOut",
+    "SEN_PINT": "Sen_PInt",
+    "SEN_PREA": "Sen_PRea",
+    "OV_PRO": "OV_PRO",
+}
+"""How a ``.rsix`` spells the kinds of objects; the numbers ``ObjTypeID`` are the same."""
+_HIGHEST_INDEX = {"3": (20, 4096), "4": (128, 8192), "5": (128, 8192)}
+"""Largest index of ``$SEN_PINT`` and ``$SEN_PREA``, and of an output, in an object of each version."""
 
 
 @dataclass(frozen=True)
@@ -56,20 +75,32 @@ def is_file_name(name: str) -> bool:
     )
 
 
-def file_names(name: str) -> tuple[str, str]:
-    """Return the names of the Ethernet file and the signal flow; raises where the name is none for KUKA."""
+def refuse_file_name(name: str) -> None:
+    """Raise where the RSI files cannot have that name."""
     if not is_file_name(name):
         allowed = f"1 to {w.LONGEST_RSI_NAME} letters, digits and _, and no name of a device"
         raise input_error("option-value", f"name of the RSI files: found {name!r}, allowed: {allowed}")
-    return f"{name}{w.ETHERNET_SUFFIX}", f"{name}{w.SIGNAL_FLOW_SUFFIX}"
 
 
-def rsi_texts(name: str, settings: Online, pilot: Pilot, form: Form) -> dict[str, str]:
+def file_names(name: str, rsi: RsiVersion) -> tuple[str, str]:
+    """Return the names of the Ethernet file and the signal flow; raises where the name is none for KUKA."""
+    refuse_file_name(name)
+    return f"{name}{w.ETHERNET_SUFFIX}", f"{name}{w.SIGNAL_FLOW_SUFFIXES[rsi]}"
+
+
+def created_name(name: str, rsi: RsiVersion) -> str:
+    """Return what RSI_CREATE is given: RSI 3 takes the name with ``.rsi``, later ones without."""
+    return f"{name}.rsi" if rsi == "3" else name
+
+
+def rsi_texts(name: str, settings: Online, pilot: Pilot, form: Form, rsi: RsiVersion) -> dict[str, str]:
     """Return file name → text of both files of ``name``."""
-    ethernet, flow = file_names(name)
+    ethernet, flow = file_names(name, rsi)
+    objects = _objects(settings, pilot, form, ethernet)
+    _refuse_index(objects, rsi)
     return {
         ethernet: ethernet_xml(settings, form),
-        flow: signal_flow_xml(settings, pilot, form, ethernet),
+        flow: _signal_flow_xml(objects) if rsi == "3" else _signal_flow_rsix(objects),
     }
 
 
@@ -104,16 +135,20 @@ def ethernet_xml(settings: Online, form: Form) -> str:
     return "\n".join(lines) + "\n"
 
 
-def signal_flow_xml(settings: Online, pilot: Pilot, form: Form, ethernet_file: str) -> str:
-    """Return the signal flow (``.rsi.xml``) with the limits of the settings on the controller's side.
+def _refuse_index(objects: Iterable[_Object], rsi: RsiVersion) -> None:
+    """Raise where an object has an index that this version of RSI does not know."""
+    variables, outputs = _HIGHEST_INDEX[rsi]
+    for each in objects:
+        index = next((value for name, _, value, _ in each.parameters if name == "Index"), 0)
+        most = variables if each.kind.startswith("SEN_") else outputs
+        if isinstance(index, int) and index > most:
+            sentence = f"{each.kind} of RSI {rsi} has an index up to {most}, the cell asks for {index}"
+            remedy = "choose a lower number in [pilot] or [online.link]"
+            raise RefusedError(Issue("error", "rsi-index", 0, sentence, remedy))
 
-    Raises `RefusedError` where RSI cannot read the variables of the pilot force.
-    """
-    objects = [
-        *_sources(settings, pilot, form),
-        *_corrections(settings),
-        _ethernet(settings, form, ethernet_file),
-    ]
+
+def _signal_flow_xml(objects: Iterable[_Object]) -> str:
+    """Return the signal flow of RSI 3 (``.rsi.xml``), with the limits on the controller's side."""
     schema = "/Roboter/Config/System/Common/Schemes/RSIContext.xsd"
     lines = [
         '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>',
@@ -129,6 +164,66 @@ def signal_flow_xml(settings: Online, pilot: Pilot, form: Form, ethernet_file: s
             lines += ["<Parameters>", *(_parameter(*each) for each in one.parameters), "</Parameters>"]
         lines.append("</RSIObject>")
     return "\n".join([*lines, "</RSIObjects>"]) + "\n"
+
+
+def _signal_flow_rsix(objects: Iterable[_Object]) -> str:
+    """Return the same signal flow as a ``.rsix`` of RSI 4 and 5."""
+    schema = 'xsi:schemaLocation="RsiContext RsiContext.xsd" SchemaVersion="2.0.0"'
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        f'<RsiContext {schema} xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xmlns="RsiContext">',
+        '<RsiObjects xmlns="RsiDriver">',
+    ]
+    for each in objects:
+        kind = _RSIX_KIND[each.kind]
+        lines.append(f'<RsiObject ObjTypeId="{each.number}" ObjType="{kind}" ObjId="{each.name}">')
+        if each.inputs:
+            wires = (f'<Input InIdx="{i - 1}" OutObjId="{o}" OutIdx="{k - 1}"/>' for i, o, k in each.inputs)
+            lines += ["<Inputs>", *wires, "</Inputs>"]
+        if each.parameters:
+            parameters = (_rsix_parameter(each.kind, *parameter) for parameter in each.parameters)
+            lines += ["<Parameters>", *parameters, "</Parameters>"]
+        lines.append("</RsiObject>")
+    return "\n".join([*lines, "</RsiObjects>", "</RsiContext>"]) + "\n"
+
+
+def numbers_to_compare(settings: Online, pilot: Pilot, form: Form, rsi: RsiVersion) -> list[tuple[str, str]]:
+    """Return each kind of object with its number, and the numbers of its parameters, as our file has them."""
+    rows = {}
+    for each in _objects(settings, pilot, form, ""):
+        numbers = ((name, number) for name, number, _, _ in each.parameters)
+        if rsi != "3":
+            numbers = ((_RSIX_NAME.get(name, name), _rsix_number(each.kind, name, k)) for name, k in numbers)
+        kind = each.kind if rsi == "3" else _RSIX_KIND[each.kind]
+        rows[f"{kind} {each.number}"] = ", ".join(f"{name} {number}" for name, number in numbers)
+    return list(rows.items())
+
+
+_RSIX_NAME = {"DataSize": "DataType"}
+"""Parameters that a ``.rsix`` names otherwise; 0 is a single bit in both."""
+
+
+def _rsix_number(kind: str, name: str, number: int) -> int:
+    """Return the ``ParamId`` of a ``.rsix``: from 0, and without room for external axes in AxisCorr."""
+    return number - 7 if kind == "AXISCORR" and name.startswith("UpperLim") else number - 1
+
+
+def _rsix_parameter(kind: str, name: str, number: int, value: float | int | str, at_runtime: bool) -> str:
+    fixed = "" if at_runtime else 'IsRuntime="false" '
+    named = f'Name="{_RSIX_NAME.get(name, name)}" ParamId="{_rsix_number(kind, name, number)}"'
+    return f'<Parameter {fixed}{named} ParamValue="{_value(value)}"/>'
+
+
+def _objects(settings: Online, pilot: Pilot, form: Form, ethernet_file: str) -> list[_Object]:
+    """Return the objects of the signal flow, numbered as in RSI 3.
+
+    Raises `RefusedError` where RSI cannot read the variables of the pilot force.
+    """
+    return [
+        *_sources(settings, pilot, form),
+        *_corrections(settings),
+        _ethernet(settings, form, ethernet_file),
+    ]
 
 
 def _correction_tags(settings: Online) -> list[str]:
@@ -215,6 +310,9 @@ def _ethernet(settings: Online, form: Form, ethernet_file: str) -> _Object:
 
 
 def _parameter(name: str, number: int, value: float | int | str, at_runtime: bool) -> str:
-    text = f"{value:g}" if isinstance(value, float) else str(value)
     fixed = "" if at_runtime else ' IsRuntime="false"'
-    return f'<Parameter Name="{name}" ParamID="{number}" ParamValue="{text}"{fixed}/>'
+    return f'<Parameter Name="{name}" ParamID="{number}" ParamValue="{_value(value)}"{fixed}/>'
+
+
+def _value(value: float | int | str) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -10,10 +10,10 @@ from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.krl.read import KrlProgram, Statement
-from gcode2krl.krl.rsi_files import file_names, is_file_name
+from gcode2krl.krl.rsi_files import created_name, is_file_name
 
 _CALL = re.compile(r"\bRSI_(\w+)\(")
-_NAME = re.compile(r'RSI_CREATE\(\s*"(\w+)\.rsi"', re.IGNORECASE)
+_NAME = re.compile(r'RSI_CREATE\(\s*"(\w+)(\.rsi)?"', re.IGNORECASE)
 _ORDER = list(w.RSI_CALLS)
 _SAME_HEIGHT_MM = 0.002
 _REMEDY = "translate again"
@@ -26,7 +26,9 @@ def rsi_name(program: KrlProgram, folder: Path) -> str:
     """
     found = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
     name = next((match[1] for match in found if match and is_file_name(match[1])), "")
-    spelled = _beside(folder).get(f"{name}{w.SIGNAL_FLOW_SUFFIX}".casefold())
+    beside = _beside(folder)
+    flows = (beside.get(f"{name}{suffix}".casefold()) for suffix in w.SIGNAL_FLOW_SUFFIXES.values())
+    spelled = next((flow for flow in flows if flow is not None), None)
     return spelled.name[: len(name)] if spelled is not None else name
 
 
@@ -48,14 +50,20 @@ def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
     cycle = w.RSI_FAST if cell.online.cycle_s < w.RSI_SLOW_CYCLE_S else w.RSI_SLOW
     if calls[1][2] != f"{w.RSI_RESULT}=RSI_ON(#ABSOLUTE,{cycle})":
         yield _issue("rsi-mode", on.line, f"{on.text!r}; allowed: RSI_ON(#ABSOLUTE,{cycle}) only")
+    named = _NAME.search(create.text)
+    wanted = created_name("NAME", cell.controller.rsi_version)
+    if named is None or (named[2] is not None) != wanted.endswith(".rsi"):
+        text = f"{create.text!r}; RSI {cell.controller.rsi_version} takes RSI_CREATE({wanted!r}, …)"
+        yield _issue("rsi-version", create.line, text.replace("…", "..."))
     yield from _place_issues(program, cell, create, on, off)
     yield from _ready_issues(program, cell, create, on, off)
 
 
-def rsi_file_issues(path: Path, name: str, expected: Mapping[str, bytes]) -> Iterator[Issue]:
+def rsi_file_issues(path: Path, expected: Mapping[str, bytes]) -> Iterator[Issue]:
     """Yield where the RSI files beside a program are not those that program and cell ask for."""
     beside = _beside(path.parent)
-    for file_name in file_names(name):
+    flows = tuple(w.SIGNAL_FLOW_SUFFIXES.values())
+    for file_name in (each for each in expected if each.endswith((w.ETHERNET_SUFFIX, *flows))):
         file = beside.get(file_name.casefold())
         if file is None:
             yield _issue("rsi-file", 0, f"{file_name} is missing beside the program")

@@ -1,8 +1,8 @@
 """What stands in a program that is corrected online: RSI on above the first cut, off above the last.
 
 Corrections are absolute only. The program waits, standing, until the server has proven that the robot takes
-them so, and an interrupt stops it where the server is not there any more. Signatures of RSI_CREATE, RSI_ON,
-RSI_OFF and RSI_DELETE as remembered of RSI 3; no controller has run them yet.
+them so, and an interrupt stops it where the server is not there any more. RSI_CREATE, RSI_ON, RSI_OFF and
+RSI_DELETE are called as public programs for RSI 3, 4 and 5 call them (docs/krl_truth.md).
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,8 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.krl.rsi_files import Form, file_names, rsi_texts
+from gcode2krl.cell.sections.robot import RsiVersion
+from gcode2krl.krl.rsi_files import Form, created_name, file_names, rsi_texts
 from gcode2krl.tables import Targets
 
 DECLARATIONS = f"{w.DECL} INT {w.RSI_RESULT},{w.RSI_ID}"
@@ -36,7 +37,7 @@ class RsiText:
     @property
     def start(self) -> str:
         """The statements at the end of row `on`."""
-        return start_statements(self.name, self.cell.online)
+        return start_statements(self.name, self.cell.online, self.cell.controller.rsi_version)
 
     @property
     def end(self) -> str:
@@ -51,13 +52,14 @@ class RsiText:
     @property
     def notes(self) -> list[str]:
         """Lines of the header."""
-        files = " and ".join(file_names(self.name))
+        files = " and ".join(file_names(self.name, self.cell.controller.rsi_version))
         return [f"corrected online by RSI: {files}", *used_variables(self.cell, self.form)]
 
     @property
     def files(self) -> dict[str, str]:
         """File name → text of what belongs beside the program."""
-        return rsi_texts(self.name, self.cell.online, self.cell.pilot, self.form)
+        version = self.cell.controller.rsi_version
+        return rsi_texts(self.name, self.cell.online, self.cell.pilot, self.form, version)
 
 
 def rsi_rows(targets: Targets) -> tuple[int, int]:
@@ -66,7 +68,7 @@ def rsi_rows(targets: Targets) -> tuple[int, int]:
     return int(away[0]), int(away[-1])
 
 
-def start_statements(name: str, settings: Online) -> str:
+def start_statements(name: str, settings: Online, rsi: RsiVersion) -> str:
     """Return the KRL that switches RSI on, where the robot stands in air.
 
     The output that shows readiness keeps its value when RSI ends, so it is put out first. An interrupt sees
@@ -79,7 +81,7 @@ def start_statements(name: str, settings: Online) -> str:
             f"{w.FOLD} RSI on: gcode2krl online serve must listen before",
             f"{w.WAIT} {w.SEC} 0.0",
             f"{ready}=FALSE",
-            f'{w.RSI_RESULT}=RSI_CREATE("{name}.rsi",{w.RSI_ID},TRUE)',
+            f'{w.RSI_RESULT}=RSI_CREATE("{created_name(name, rsi)}",{w.RSI_ID},TRUE)',
             *_until_ok("RSI_CREATE failed"),
             f"{w.RSI_RESULT}=RSI_ON(#ABSOLUTE,{cycle})",
             *_until_ok("RSI_ON failed"),

@@ -162,7 +162,7 @@ def verify_krl(
     if not alone:
         issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"].read())
     if online:
-        issues += rsi_file_issues(Path(path), online, Texts(expected))
+        issues += rsi_file_issues(Path(path), Texts(expected))
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
     return compare(program, targets, joints, cell, intended, issues, case, toolpath)
 

@@ -23,10 +23,11 @@ from gcode2krl.krl.pilot_check import PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.places import ProgramFiles, program_file, require_name
 from gcode2krl.krl.release import header_words, released
-from gcode2krl.krl.rsi_files import file_names
+from gcode2krl.krl.rsi_files import refuse_file_name
 from gcode2krl.krl.rsi_refusals import online_issues
 from gcode2krl.krl.rsi_text import rsi_rows
 from gcode2krl.krl.verify import VerifyReport
+from gcode2krl.krl.versions import version_issues
 from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
@@ -162,6 +163,7 @@ def write_krl(
         sentence = "the targets leave out corners, which only their Toolpath tells"
         raise input_error("option-value", sentence, "give write_krl the toolpath too")
     file, of_name = _named(path, name, targets.source, cell)
+    of_name += version_issues(cell)
     if online is not None:
         _refuse_name(online, file)
         of_name += [*online_issues(targets, cell), *_retracts(targets, cell)]
@@ -317,7 +319,7 @@ def _retracts(targets: Targets, cell: Cell) -> Sequence[Issue]:
 
 def _refuse_name(online: str, file: Path | None) -> None:
     """Raise where RSI files of that name cannot be written."""
-    file_names(online)
+    refuse_file_name(online)
     if file is None:
         sentence = "--online needs the RSI files, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src")
@@ -331,9 +333,17 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
 
 
 def _size_issues(contents: Mapping[str, Stored], targets: Targets, cell: Cell) -> list[Issue]:
-    program = (text for name, text in contents.items() if not name.endswith((w.SIDECAR_SUFFIX, ".xml")))
+    beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
+    program = (text for name, text in contents.items() if not name.endswith(beside))
     size_mb = sum(text.size_bytes for text in program) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
+    if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:
+        sentence = (
+            f"{size_mb:.1f} MB: KSS 8.3 holds about {cell.program.warn_size_mb:g} MB of all programs "
+            "together, as users report; parts in files of their own count too"
+        )
+        remedy = "use a larger arc chord tolerance or --simplify, split the job, or state warn_size_mb"
+        return [Issue("error", "program-memory", 0, sentence, remedy)]
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []
     return [

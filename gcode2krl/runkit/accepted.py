@@ -5,7 +5,7 @@ be those of the cell, or the variant in air would stand elsewhere than the progr
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +19,10 @@ from gcode2krl.cell.carried import require_still
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.arcs import in_chords
+from gcode2krl.krl.constructs import assumed_in
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG
 from gcode2krl.krl.read import KrlProgram, read_krl
+from gcode2krl.krl.rsi_files import Form, numbers_to_compare, rsi_texts
 from gcode2krl.krl.splines import in_points
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
@@ -60,6 +62,10 @@ class Accepted:
     corrected_online: bool
     restart_line: int
     """G-code line at which a restart begins, 0 where the program runs from its start."""
+    assumed: tuple[str, ...] = ()
+    """What to look at in T1: nothing public confirms what the program relies on."""
+    rsi_numbers: tuple[tuple[str, str], ...] = ()
+    """Kinds of objects and numbers of parameters in the signal flow of a program that is corrected online."""
 
 
 def read_program(path: Path, cell: Cell) -> Accepted:
@@ -81,13 +87,17 @@ def read_program(path: Path, cell: Cell) -> Accepted:
     require_still(cell, "a run kit")
     _refuse_other_cell(path, program, cell)
     restart = _RESTART.search(text)
+    corrected = any("RSI_ON" in s.text.upper() for s in program.statements)
+    assumed, numbers = _assumed(program, cell, corrected)
     return Accepted(
         name=program.name,
         source=made[1],
         targets=_targets(program, path, cell),
         switches=tuple(_switches(program)),
         restart_line=int(restart[1]) if restart is not None else 0,
-        corrected_online=any("RSI_ON" in s.text.upper() for s in program.statements),
+        corrected_online=corrected,
+        assumed=assumed,
+        rsi_numbers=numbers,
     )
 
 
@@ -117,6 +127,24 @@ def toolpath_of(targets: Targets, cell: Cell) -> Toolpath:
         length_offset_tool=np.full(len(start), -1),
         source=targets.source,
     )
+
+
+def _assumed(
+    program: KrlProgram, cell: Cell, corrected: bool
+) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """Return what a program and its RSI files rely on unconfirmed, and the numbers in its signal flow."""
+    texts = [text.decode("ascii", "replace") for text in program.texts.values()]
+    if not corrected:
+        return tuple(assumed_in(texts)), ()
+    flow = (cell.online, cell.pilot, _form(texts, cell), cell.controller.rsi_version)
+    return tuple(assumed_in([*texts, *rsi_texts("RSI", *flow).values()])), tuple(numbers_to_compare(*flow))
+
+
+def _form(texts: Sequence[str], cell: Cell) -> Form:
+    """Return how a program carries the pilot force."""
+    if any(f"{cell.pilot.index_variable}=" in text for text in texts):
+        return "index"
+    return "values" if any(f"{cell.pilot.value_variable}[1]=" in text for text in texts) else "none"
 
 
 # --- motions ----------------------------------------------------------------------------------------------

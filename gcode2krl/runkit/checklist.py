@@ -17,6 +17,11 @@ from gcode2krl.version import __version__
 _MOST_SWITCH_LINES, _MOST_TOOLS, _MOST_INPUTS = 10, 4, 3
 """What fits on one page."""
 _LINE_CHARACTERS = 80
+_FLOW_WORDS = {
+    True: {"object": "RSIObject", "kind": "ObjTypeID", "number": "ParamID"},
+    False: {"object": "RsiObject", "kind": "ObjTypeId", "number": "ParamId"},
+}
+"""How a signal flow of RSI 3, and of later ones, spells what a person compares."""
 
 
 def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, lift_mm: float) -> str:
@@ -57,6 +62,8 @@ def page(accepted: Accepted, prediction: Prediction, cell: Cell, air_name: str, 
             rapid=f"{rapid_mm_s * S_PER_MIN:.0f}",
             joint_speeds=_joint_speeds(joints.qd_rad_s, cell),
             limit_deg=f"{np.nanmin(joints.limit_margin_rad) * DEG_PER_RAD:.1f}",
+            flow_suffix=w.SIGNAL_FLOW_SUFFIXES[cell.controller.rsi_version],
+            flow_words=_FLOW_WORDS[cell.controller.rsi_version == "3"],
             low=position_text(low),
             high=position_text(high),
         )

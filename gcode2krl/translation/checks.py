@@ -34,9 +34,9 @@ def refuse_online(order: Order, place: Path | None) -> None:
         raise input_error("option-value", sentence, "give --online NAME and --compensate offline too")
     if order.online is None:
         return
-    from gcode2krl.krl.rsi_files import file_names
+    from gcode2krl.krl.rsi_files import refuse_file_name
 
-    file_names(order.online)
+    refuse_file_name(order.online)
     if place is None:
         sentence = "--online writes RSI files, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src")
@@ -53,7 +53,7 @@ def outputs_of(order: Order, place: Path | None, name: str | None, cell: "Cell")
     outputs = [Path(file) for file in (order.compensate_plot, order.report) if file is not None]
     if place is not None:
         file, _ = program_file(place, name, str(order.part), cell.program.externals)
-        outputs += output_files(file, order.online)
+        outputs += output_files(file, order.online, cell.controller.rsi_version)
     return outputs
 
 
@@ -61,8 +61,9 @@ def refuse_early(targets: "Targets", cell: "Cell", order: Order) -> None:
     """Refuse targets that cannot move, or not be corrected online, before their motion is planned."""
     from gcode2krl.krl.release import matching, released
     from gcode2krl.krl.rsi_refusals import online_issues
+    from gcode2krl.krl.versions import version_issues
 
     online = order.online is not None
-    issues = [*targets.issues, *(online_issues(targets, cell) if online else ())]
+    issues = [*targets.issues, *version_issues(cell), *(online_issues(targets, cell) if online else ())]
     if any(issue.severity == "error" for issue in issues):
         released(issues, matching(issues, order.allow))

@@ -246,6 +246,11 @@ def without_provenance(cell):
     return plain(cell.model_dump())
 
 
+def stated(cell, **keys):
+    """Return a cell whose ``[controller]`` states more."""
+    return cell.model_copy(update={"controller": cell.controller.model_copy(update=keys)})
+
+
 OF_ARCHIVE = (
     "robot",
     "mounting",
@@ -274,7 +279,8 @@ def test_an_archive_is_read_back_to_the_same_cell(run, tmp_path, name):
     named = ours.model_copy(
         update={"robot": ours.robot.model_copy(update={"trafo_name": theirs.robot.trafo_name})}
     )
-    assert without_provenance(named) == without_provenance(theirs)
+    assert (ours.controller.kss, theirs.controller.kss) == ("8.3", None)  # the answers do not state it
+    assert without_provenance(named) == without_provenance(stated(theirs, kss="8.3"))
     assert ours.robot.limits.source == "archive archive.zip, $SOFTN_END and $SOFTP_END"
 
 
@@ -283,7 +289,7 @@ def test_an_archive_is_read_back_to_the_same_cell(run, tmp_path, name):
 def test_enter_accepts_what_the_archive_states(tmp_path, name):
     controller = read_controller(archive_of(tmp_path / "archive.zip", name))
     words = keys(answers_of(name), controller)
-    assert words[1:4] == [ENTER] * 3  # robot, mounting, HOME
+    assert words[1:5] == [ENTER] * 4  # robot, KSS, mounting, HOME
     answers = completed(typed(words, controller), controller)
     assert answers["robot"] == controller.model
     assert answers["home"] == list(controller.home_deg)

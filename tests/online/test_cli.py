@@ -140,6 +140,22 @@ def test_every_command_reads_the_section_of_the_cell(online, tmp_path):
     assert "<PORT>50200</PORT>" in (tmp_path / "sensor" / "B_ETH.xml").read_text()
 
 
+@pytest.mark.parametrize(("controller", "flow"), [('kss = "8.7"', "A.rsix"), ('rsi = "4"', "A.rsix")])
+def test_the_signal_flow_is_that_of_the_cells_controller(online, tmp_path, controller, flow):
+    (tmp_path / "cell.toml").write_text(f"{STOCK}[controller]\n{controller}\n")
+    outcome = online("serve", "--cell", "cell.toml", "--files", "sensor", "--name", "A")
+    assert outcome.code == 0, outcome.err
+    assert {file.name for file in (tmp_path / "sensor").iterdir()} == {"A_ETH.xml", flow}
+
+
+def test_no_files_for_iiqka(online, tmp_path):
+    (tmp_path / "cell.toml").write_text(f'{STOCK}[controller]\nkss = "iiqka"\n')
+    outcome = online("serve", "--cell", "cell.toml", "--files", "sensor", "--name", "A")
+    assert outcome.code == 2
+    assert "kss-iiqka" in outcome.err
+    assert not (tmp_path / "sensor").exists()
+
+
 def test_the_sensors_calibration_is_that_of_the_cell(online, tmp_path):
     """The file is named in the section, and found beside the cell file."""
     (tmp_path / "cell.toml").write_text(STOCK + '[online]\ncalibration = "sensor.toml"\n')

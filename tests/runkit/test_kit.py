@@ -2,20 +2,24 @@
 
 import re
 import tomllib
+import xml.etree.ElementTree as ET
 from itertools import pairwise
 
 import numpy as np
 import polars as pl
 import pytest
+from markupsafe import escape
 
 from gcode2krl import load_cell, load_run, read_gcode, set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl.arcs import in_chords
+from gcode2krl.krl.constructs import constructs
 from gcode2krl.krl.read import read_krl
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit import make_kit
 from gcode2krl.runkit.accepted import read_program
 from tests.cells import over_demonstration
+from tests.cli.test_translate import CLEAN
 
 PART = (
     "G21 G90 G17\nT1 M6\nS12000 M3\nM8\nG0 X0 Y0\nG0 G43 H1 Z50\nG0 Z5\nG1 Z-2 F600\nG1 X50 F1500\n"
@@ -23,6 +27,7 @@ PART = (
     "G1 X30\nG0 Z50\nM5\nM30\n"
 )
 LIFT_MM = 100.0
+ASSUMED = re.compile(r"^; ASSUMED, look at this in T1: (.*)$", re.MULTILINE)
 
 
 @pytest.fixture
@@ -106,6 +111,55 @@ def test_the_check_list_has_this_programs_values(program, tmp_path):
     assert "feed up to 1500, rapid 12000 mm/min" in page
     assert "A1 0.0°  A2 -90.0°  A3 90.0°" in page
     assert "http" not in page.replace("http-equiv", "")  # one file, no network
+
+
+def test_the_check_list_says_what_to_look_at_in_this_program_alone(program, tmp_path):
+    make_kit(program, tmp_path / "kit", load_cell())
+    page = text_of(tmp_path / "kit" / "checklist.html")
+    header = ASSUMED.findall(text_of(program))
+    looks = {each.look for each in constructs() if each.look}
+    assert {look for look in looks if str(escape(look)) in page} == set(header) > set()
+    assert "RSI Visual" not in page
+
+
+@pytest.mark.parametrize(
+    ("kss", "some"),
+    [
+        (
+            "8.3",
+            {"POSCORR 27": "LowerLimX 1", "MAP2DIGOUT 14": "DataSize 2"},
+        ),
+        (
+            "8.7",
+            {"PosCorr 27": "LowerLimX 0", "Map2DigOut 14": "DataType 1"},
+        ),
+    ],
+)
+def test_a_program_with_rsi_has_a_table_to_compare_with_rsi_visual(run, tmp_path, kss, some):
+    (tmp_path / "part.nc").write_text(CLEAN, encoding="ascii")
+    (tmp_path / "cell.toml").write_text(f'based_on = "demonstration"\n[controller]\nkss = "{kss}"\n')
+    done = run("part.nc", "-o", "PART.src", "--cell", "cell.toml", "--online", "FLOW")
+    assert done.code == 0, done.err
+    suffix = {"8.3": ".rsi.xml", "8.7": ".rsix"}[kss]
+    assert f"FLOW{suffix}" in done.out
+    done = run("runkit", "PART.src", "--cell", "cell.toml")
+    assert done.code == 0, done.err
+    page = text_of(tmp_path / "PART_runkit" / "checklist.html")
+    header = re.findall(
+        r"^; ASSUMED, look at this in T1: (.*)$", text_of(tmp_path / "PART.src"), re.MULTILINE
+    )
+    assert len(header) > 4
+    assert all(str(escape(look)) in page for look in header)
+    flow = ET.fromstring((tmp_path / f"FLOW{suffix}").read_bytes())
+    objects = [e for e in flow.iter() if e.tag.endswith("}RsiObject") or e.tag == "RSIObject"]
+    for element in objects:
+        kind = f"{element.attrib['ObjType']} {element.get('ObjTypeID') or element.get('ObjTypeId')}"
+        own = [p for p in element.iter() if p.tag.endswith("Parameter")]
+        stated = ", ".join(f"{p.get('Name')} {p.get('ParamID') or p.get('ParamId')}" for p in own)
+        assert f"<th>{kind}</th><td>{stated}</td>" in page
+    for kind, start in some.items():
+        assert re.search(rf"<th>{kind}</th><td>.*\b{start}\b", page)
+    assert ("ParamID</code>" in page) == (kss == "8.3")
 
 
 def test_switches_are_counted_with_their_first_line(program):

@@ -46,8 +46,8 @@ class RobotLink(Section):
     decimals: Annotated[int, Field(strict=True, ge=3, le=9)] = 4
     """``Precision`` of the ETHERNET object: decimals of what the robot sends; KUKA's default is 1."""
     t1_output: SignalNumber = 993
-    """``$OUT`` that is on in T1 (``SIGNAL $T1``); 993 in KUKA's Automatic External interface, from memory:
-    to be confirmed on the controller."""
+    """``$OUT`` that is on in T1 (``SIGNAL $T1`` in ``STEU/Mada/$machine.dat``); 993 in a public archive of
+    KSS 8.3: to be confirmed on the controller."""
     ready_output: SignalNumber = 1020
     """``$OUT`` that RSI keeps on while corrections are made, and that falls with the first answer missing;
     the program waits for it and stops without it. The number is our choice: the output must be free."""

@@ -119,6 +119,11 @@ class Robot(Section):
         return bool(self.trafo_name) and name.startswith(f"{self.trafo_name.removeprefix('#').upper()} ")
 
 
+RsiVersion = Literal["3", "4", "5"]
+_RSI_OF_KSS: dict[str, RsiVersion] = {"8.3": "3", "8.5": "4", "8.6": "4", "8.7": "5"}
+"""RSI 3.3, 4.0, 4.1 and 5.0: the headers that RSI Visual writes into its files, and ROS drivers' tables."""
+
+
 class Controller(Provenance):
     """Settings of the controller's planner; the defaults are those of the KRC4."""
 
@@ -140,6 +145,25 @@ class Controller(Provenance):
     """Arcs of the G-code become CIRC."""
     spline: bool = False
     """Chains of short moves become SPLINE blocks, which KSS has from 8.3 on."""
+    kss: Literal["8.3", "8.5", "8.6", "8.7", "iiqka"] | None = None
+    """KUKA System Software; None: not known, 8.x is assumed."""
+    rsi: Literal["3", "4", "5"] | None = None
+    """KUKA.RobotSensorInterface; None: that of ``kss``, or 3 where both are unknown."""
+
+    @model_validator(mode="after")
+    def _versions_fit(self) -> Self:
+        of_kss = _RSI_OF_KSS.get(self.kss or "")
+        if self.rsi is not None and of_kss is not None and self.rsi != of_kss:
+            raise ValueError(
+                f"rsi {self.rsi} does not belong to KSS {self.kss}, whose RSI is {of_kss}: "
+                "state what Help > Info shows"
+            )
+        return self
+
+    @property
+    def rsi_version(self) -> RsiVersion:
+        """Return the RSI whose files are written."""
+        return self.rsi or _RSI_OF_KSS.get(self.kss or "", "3")
 
 
 class Frames(Provenance):

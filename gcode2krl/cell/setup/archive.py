@@ -15,6 +15,8 @@ from gcode2krl.errors import Gcode2KrlError, input_error
 
 WANTED = ("$config.dat", "$machine.dat")
 """TOOL_DATA, BASE_DATA, LOAD_DATA and XHOME; the robot's name, limits, lengths and mounting."""
+VERSION = "am.ini"
+"""Of the archive itself, at its top: which KSS wrote it."""
 MOST_FILES = 50_000
 """An archive of everything has some thousand files."""
 MOST_ARCHIVE_BYTES = 2_000_000_000
@@ -37,7 +39,7 @@ class DataList:
 
 
 def read_archive(path: Path) -> dict[str, DataList]:
-    """Return name → data list of those in `WANTED` that a folder or zip has.
+    """Return name → data list of those in `WANTED` that a folder or zip has, and its `VERSION` beside them.
 
     Raises `NotUnderstoodError` where there is none, where those of several robots differ, and where the
     archive is damaged or too large.
@@ -51,7 +53,9 @@ def read_archive(path: Path) -> dict[str, DataList]:
     if not lists:
         sentence = f"no {' and no '.join(WANTED)} in it"
         raise _refused(path, sentence, "archive with File > Archive > USB (KUKA) > All, and name that zip")
-    return lists
+    own = [one for one in entries if PurePosixPath(one.path).name.lower() == VERSION]
+    top = min(own, key=lambda one: one.path.count("/"), default=None)
+    return lists if top is None else {**lists, VERSION: top}
 
 
 def _only_one(name: str, entries: Iterable[DataList], path: Path) -> DataList | None:
@@ -69,7 +73,7 @@ def _of_folder(folder: Path) -> list[DataList]:
     for count, file in enumerate(_files(folder)):
         if count >= MOST_FILES:
             raise _refused(folder, f"more than {MOST_FILES:,} files", "name the folder of the archive alone")
-        if file.name.lower() in WANTED:
+        if file.name.lower() in (*WANTED, VERSION):
             with file.open("rb") as stream:
                 lists.append(
                     _data_list(file.relative_to(folder).as_posix(), stream.read(MOST_BYTES + 1), folder)
@@ -90,9 +94,9 @@ def _of_zip(path: Path) -> list[DataList]:
             members = archive.infolist()
             if len(members) > MOST_FILES:
                 raise _refused(path, f"more than {MOST_FILES:,} files", "archive the controller anew")
-            wanted = [one for one in members if _name_in_zip(one).lower() in WANTED]
+            wanted = [one for one in members if _name_in_zip(one).lower() in (*WANTED, VERSION)]
             lists = []
-            for member in wanted[: 2 * MOST_LISTS]:
+            for member in wanted[: 3 * MOST_LISTS]:
                 with archive.open(member) as stream:
                     lists.append(_data_list(_path_in_zip(member), stream.read(MOST_BYTES + 1), path))
             return lists

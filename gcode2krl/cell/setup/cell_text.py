@@ -17,9 +17,10 @@ from gcode2krl.cell import controller_axes
 from gcode2krl.cell.definition import Cell
 from gcode2krl.cell.descriptions import Description, descriptions_of
 from gcode2krl.cell.sections import Clearance, Frame, Frames, Home, Load, Robot, Spindle
+from gcode2krl.cell.sections import Controller as ControllerSection
 from gcode2krl.cell.setup.answers import frame_table
 from gcode2krl.cell.setup.controller import Controller, ExternalData
-from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, Answers
+from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, UNKNOWN, Answers
 from gcode2krl.units import DEG_PER_RAD
 
 _COMMENT_COLUMN = 30
@@ -54,6 +55,7 @@ class _Writer:
             (_HEAD.format(schema=schema).rstrip("\n"),),
             self._top(),
             self._robot(),
+            self._controller(),
             self._frames(),
             self._home(),
             *(self._external(axis) for axis in self.controller.externals),
@@ -102,6 +104,12 @@ class _Writer:
             yield from ("", "[robot.speeds]")
             yield f"qd_deg_s = {toml_value(list(controller.speeds_deg_s))}"
             yield from self._said("$VEL_AXIS_MA over $RAT_MOT_AX", True)
+
+    def _controller(self) -> Iterator[str]:
+        kss = self.answers.get("kss", UNKNOWN)
+        if kss != UNKNOWN:
+            yield "[controller]"
+            yield from _line(ControllerSection, "kss", kss)
 
     def _limits(self) -> Iterator[str]:
         """Write the limits that were typed, else those of the archive; the library's need not be written."""

@@ -4,13 +4,14 @@ Lengths and speeds come from ``$machine.dat`` as the planner there uses them; bo
 library's KR 210 R2700-2, whose values were read elsewhere: the lengths are equal, the speeds to 0.1 deg/s.
 """
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gcode2krl.cell import library
 from gcode2krl.cell.sections import Robot
-from gcode2krl.cell.setup.archive import read_archive
+from gcode2krl.cell.setup.archive import VERSION, read_archive
 from gcode2krl.cell.setup.krl_data import Value, krl_values
 
 Numbers = tuple[float, ...]
@@ -22,6 +23,7 @@ _MOST_NUMBER = 32
 _SAME_MM = 0.5
 """Two arms whose lengths differ by no more are the same model."""
 _DEG_S_PER_RPM = 6.0
+_KSS = re.compile(r"^\[Version\]\s*^Version=V(8\.[3567])\b", re.MULTILINE)
 _LINEAR = 1
 """``$AXIS_TYPE`` of a linear axis; 3 to 5 turn."""
 
@@ -82,15 +84,19 @@ class Controller:
     bases: tuple[NamedFrame, ...] = ()
     loads: Mapping[int, Payload] | None = None
     externals: tuple[ExternalData, ...] = ()
+    kss: str = ""
+    """``8.3``, as the archive's own ``am.ini`` has it (``Version=V8.3.29``)."""
 
 
 def read_controller(path: Path) -> Controller:
     """Read the archive of a controller, a folder or a zip; raises `NotUnderstoodError` where it cannot."""
     lists = read_archive(path)
+    version = lists.pop(VERSION, None)
     values: dict[str, Value] = {}
     for one in lists.values():
         values |= krl_values(one.text)
-    return controller_of(values, path.name or str(path))
+    stated = _KSS.search(version.text) if version is not None else None
+    return replace(controller_of(values, path.name or str(path)), kss=stated[1] if stated else "")
 
 
 def controller_of(values: Mapping[str, Value], source: str) -> Controller:

@@ -19,6 +19,7 @@ Choice = tuple[str, str]
 """A value, and the words beside it in a list."""
 Kind = Literal["choice", "text", "name", "number", "whole", "numbers"]
 OTHER = "other"
+UNKNOWN = "unknown"
 _TOOL_MENU = "Start-up > Calibrate > Tool > Numeric input"
 _OUTPUTS = "Display > Inputs/outputs > Digital I/O"
 _FRAME = "X Y Z in mm, A B C in degrees"
@@ -166,6 +167,19 @@ PLACE_QUESTIONS = (
         12,
         when=_lacks_limits,
         proposal=_limits,
+    ),
+    Question(
+        "kss",
+        "Which KUKA System Software does the controller run?",
+        "Help > Info",
+        "choice",
+        "8.6",
+        choices=_choices(
+            (UNKNOWN, "KSS 8.x is assumed, and each program says so"),
+            *((kss, "") for kss in ("8.3", "8.5", "8.6", "8.7")),
+            ("iiqka", "no program is written for it"),
+        ),
+        proposal=lambda controller, _: controller.kss or UNKNOWN,
     ),
     Question(
         "mounting",

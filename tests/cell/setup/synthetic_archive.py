@@ -84,7 +84,9 @@ def write_folder(folder, config, machine):
 def write_zip(path, config, machine):
     """Write an archive as a zip."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("am.ini", "[Archive]\r\nName=robot\r\n")
+        archive.writestr(
+            "am.ini", "[Archive]\r\nName=robot\r\n[Version]\r\nVersion=V8.3.29\r\n[TechPacks]\r\n"
+        )
         archive.writestr("KRC/R1/System/$config.dat", config.encode("latin-1"))
         archive.writestr("KRC/R1/Mada/$machine.dat", machine.encode("latin-1"))
         archive.writestr("KRC/STEU/Mada/$machine.dat", b"DEFDAT  $MACHINE PUBLIC\r\nENDDAT")

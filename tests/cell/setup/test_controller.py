@@ -9,8 +9,9 @@ import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cell.setup import archive
+from gcode2krl.cell.setup.answers import completed
 from gcode2krl.cell.setup.cell_text import text_of_cell
-from gcode2krl.cell.setup.controller import ExternalData, controller_of, read_controller
+from gcode2krl.cell.setup.controller import Controller, ExternalData, controller_of, read_controller
 from gcode2krl.cell.setup.krl_data import krl_values
 from gcode2krl.errors import NotUnderstoodError
 from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_folder, write_zip
@@ -48,6 +49,7 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
     config = config_dat(hanging, tools, bases, [(2, hanging.load)])
     found = read_controller(write(tmp_path / "archive", config, machine_dat(hanging, external_axes=1)))
     assert (found.model, found.trafo_name) == ("KR 60 HA", "KR60 C4 FLR ZH02")
+    assert found.kss == ("8.3" if write is write_zip else "")  # the folder has no am.ini
     geometry = hanging.robot.geometry
     assert found.lengths_mm == tuple(geometry.array())
     assert found.limits_deg == hanging.robot.limits.q_deg
@@ -65,6 +67,18 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
     assert [(one.number, one.is_linear, one.limits, one.home) for one in found.externals] == [
         (1, None, None, 0.0)
     ]
+
+
+@pytest.mark.parametrize(
+    ("stated", "answer", "written"),
+    [("8.6", None, "8.6"), ("", None, ""), ("8.6", "8.7", "8.7"), ("8.6", "unknown", ""), ("", "8.5", "8.5")],
+)
+def test_the_system_software_is_that_of_the_archive_unless_it_is_answered(stated, answer, written):
+    controller = Controller(source="", kss=stated)
+    text = text_of_cell(
+        completed({} if answer is None else {"kss": answer}, controller), controller, "s.json"
+    )
+    assert tomllib.loads(text).get("controller", {}).get("kss", "") == written
 
 
 def test_external_axes_are_those_behind_the_sixth(hanging):
