@@ -153,8 +153,11 @@ class Program:
 
     def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
         flow = Flow(self._lines, word_of_row, _Rows(self._labels))
-        kind = self._lines["kind"][first_row:]
-        for row in (first_row + np.flatnonzero(kind == tables.KIND_O_WORD)).tolist():
+        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != f.OK)
+        for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
+            if self._lines["fault"][row] != f.OK:
+                flow.add_refused(row)
+                continue
             start = int(self._lines["start"][row])
             line = parsed(self._text[start : self._text.index(b"\n", start)])
             if line.deleted and self._block_delete:

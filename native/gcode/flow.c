@@ -41,12 +41,11 @@ int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
 
 /* --- expressions of O-lines ----------------------------------------------------------------------------- */
 
-/* Tell whether nothing but a comment stands from i on; else that is wrong. */
+/* Tell whether nothing but comments stands from i on; else that is wrong. */
 bool line_ends(Evaluation *e, int64_t i) {
     const Bytes text = e->program->text;
-    i = after_blanks(text, i, e->end);
-    if (e->finding == F_OK && i < e->end && AT(text, i) != CH_PAREN_OPEN && AT(text, i) != CH_SEMICOLON)
-        wrong(e, F_EXPRESSION, PF_BEHIND_O_WORD, 0.0, i);
+    if (e->finding == F_OK && !is_rest_comment(text, i, e->end))
+        wrong(e, F_EXPRESSION, PF_BEHIND_O_WORD, 0.0, after_comments(text, i, e->end));
     return e->finding == F_OK;
 }
 
@@ -95,8 +94,15 @@ static int64_t branch(Run *run, const MarkedLine *marked, int64_t next) {
 
 /* elseif and else: behind a test that failed they are tried, behind a branch that ran they are passed over. */
 static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
-    if (!run->course->is_testing)
+    if (!run->course->is_testing) {
+        Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, true);
+        int64_t i = marked->expression;
+        if (marked->kind == P_KIND_ELSEIF)
+            bracket_value(&e, &i);
+        if (marked->kind == P_KIND_ELSEIF && !line_ends(&e, i))
+            return stop_wrong(run, &e, marked->start, next);
         return jump(run, marked->end);
+    }
     if (marked->kind == P_KIND_ELSEIF)
         return branch(run, marked, next);
     run->course->is_testing = 0;
@@ -237,7 +243,10 @@ static int64_t called_row(Run *run, Evaluation *e, const MarkedLine *marked, int
         return marked->subprogram;
     const double value = value_at(e, i);
     int64_t number;
-    *i = after_word(run->program->text, *i, e->end, "call");
+    const int64_t behind = after_word(run->program->text, *i, e->end, "call");
+    if (behind == *i) /* where the line says it, it is in a comment */
+        wrong(e, F_O_WORD, PF_FAULT_WORD, 0.0, *i);
+    *i = behind;
     if (e->finding != F_OK)
         return NOTHING_WANTED;
     if (whole_number(value, &number) && number >= 0)
@@ -252,8 +261,8 @@ static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next)
     int64_t i, count = 0;
     const int64_t row = called_row(run, &e, marked, &i);
     const Bytes text = run->program->text;
-    for (i = after_blanks(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
-         i = after_blanks(text, i, e.end)) {
+    for (i = after_comments(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+         i = after_comments(text, i, e.end)) {
         if (count == P_LOCAL_PARAMETERS)
             wrong(&e, F_O_WORD, PF_FAULT_ARGUMENTS, 0.0, i);
         else

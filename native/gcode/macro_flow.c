@@ -94,6 +94,8 @@ int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
     const double test = bracket_value(&e, &i);
+    if (e.finding == F_OK && after_word(run->program->text, i, e.end, "do") == i)
+        wrong(&e, F_EXPRESSION, PF_MACRO_BEHIND_WHILE, 0.0, least(i, e.end - 1));
     if (e.finding != F_OK)
         return stop_wrong(run, &e, marked->start, next);
     return test != 0.0 ? next : jump(run, marked->target);

@@ -194,6 +194,10 @@ int64_t name_at(Evaluation *e, int64_t *i) {
     for (; k < e->end && AT(text, k) != CH_GREATER; k++) {
         if (is_blank(AT(text, k)))
             continue;
+        if (AT(text, k) == CH_PAREN_OPEN || AT(text, k) == CH_SEMICOLON) { /* LinuxCNC takes it into the name */
+            wrong(e, F_EXPRESSION, PF_NAME_COMMENT, 0.0, k);
+            return NO_NAME;
+        }
         if (length == P_LONGEST_NAME) {
             wrong(e, F_EXPRESSION, PF_NAME_TOO_LONG, 0.0, *i);
             return NO_NAME;

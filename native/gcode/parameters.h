@@ -41,6 +41,21 @@ static inline int64_t after_blanks(Bytes text, int64_t i, int64_t end) {
     return i;
 }
 
+/* Return the place of the first character from i on that is no blank and in no comment ( ), at most the line's end; a
+   line whose comments do not close is never read so far. */
+static inline int64_t after_comments(Bytes text, int64_t i, int64_t end) {
+    for (i = after_blanks(text, i, end); i < end && AT(text, i) == CH_PAREN_OPEN; i = after_blanks(text, i, end))
+        while (i < end && AT(text, i++) != CH_PAREN_CLOSE)
+            ;
+    return i;
+}
+
+/* Tell whether nothing but comments stands in a line from i on. */
+static inline bool is_rest_comment(Bytes text, int64_t i, int64_t end) {
+    i = after_comments(text, i, end);
+    return i >= end || AT(text, i) == CH_SEMICOLON;
+}
+
 enum { NO_NAME = -1 };
 double numbered_parameter(const Evaluation *e, int64_t number);
 /* Tell whether a program is a Fanuc's, whose variables and operators are others. */

@@ -107,7 +107,7 @@ def test_a_caret_stands_before_the_culprit():
 
 
 def test_what_is_passed_over_may_be_anything():
-    assert ends("o1 if [0]\nX[1/0] $ (\no2 call [1/0]\no1 endif\nX1") == [1.0]
+    assert ends("o1 if [0]\nX[1/0] $ )\no2 call [1/0]\no1 endif\nX1") == [1.0]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,312 @@
+"""A comment is nothing, wherever it may stand; where it may not, its line is refused and never read without it."""
+
+import io
+import random
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcode2krl import Gcode2KrlError, load_cell
+from gcode2krl.gcode import read_stream
+
+ROOT = Path(__file__).parents[2]
+RS274, POSTS = ROOT / "tests" / "reference" / "rs274", ROOT / "tests" / "reference" / "posts"
+TABLE = tomllib.loads((POSTS / "posts.toml").read_text(encoding="utf-8"))["post"]
+DIALECTS = {post["file"]: post.get("dialect", "linuxcnc") for post in TABLE}
+COMMENT, TAIL = "(c [5] x9)", ";c (d [5] x9"
+BLANKS = " \t\r"
+LONGEST = 200  # characters of a line that a comment is put into: LinuxCNC reads 252
+COLUMNS = (
+    *("position_mm", "feed_mm_s", "rapid", "source_line", "arc", "tool", "dwell_s"),
+    *("known", "axis", "events"),
+)
+
+
+class Program:
+    """A reference program: its lines, and how it is read."""
+
+    def __init__(self, path):
+        self.path = path
+        self.dialect = DIALECTS.get(path.name, "linuxcnc") if path.parent == POSTS else "linuxcnc"
+        self.lines = path.read_text(encoding="latin-1").split("\n")
+        toml = path.with_suffix(".toml")
+        five_axes = path.parent.parent == ROOT / "examples" and (path.parent / "cell.toml").exists()
+        self.cell = load_cell(path.parent / "cell.toml" if five_axes else toml) if five_axes or toml.exists() else None
+        self.original = self.outcome(self.lines)
+
+    def outcome(self, lines):
+        """Return what is read, by name of its column; or the code and the line of the first error."""
+        text = "\n".join(lines).encode("latin-1")
+        tools = None if self.cell else RS274 / "tool.tbl"
+        folders = (self.path.parent,)
+        try:
+            toolpath = read_stream(
+                io.BytesIO(text), self.path.name, self.cell, dialect=self.dialect, tools=tools, folders=folders
+            )
+        except Gcode2KrlError as error:
+            return next((i.code, i.line) for i in error.issues if i.severity == "error")
+        return {name: getattr(toolpath, name) for name in COLUMNS}
+
+    def difference(self, lines):
+        """Return what is read otherwise than in the original program: a column, or the error."""
+        outcome = self.outcome(lines)
+        if isinstance(outcome, tuple) or isinstance(self.original, tuple):
+            return "" if outcome == self.original else outcome
+        return next((name for name in COLUMNS if not same(outcome[name], self.original[name])), "")
+
+    def with_line(self, number, line):
+        return [*self.lines[:number], line, *self.lines[number + 1 :]]
+
+
+def same(a, b):
+    return np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
+
+
+def programs():
+    """Return all reference programs that can be read."""
+    folders = ("programs", "programs_macro", "programs_offsets")
+    paths = [path for folder in folders for path in sorted((RS274 / folder).iterdir())]
+    paths += [POSTS / name for name in sorted(DIALECTS)]
+    paths += sorted((ROOT / "examples").glob("*.nc")) + sorted((ROOT / "examples").glob("*/*.nc"))
+    paths += sorted((ROOT / "tests" / "golden" / "programs").glob("*.nc"))
+    read = [Program(path) for path in paths]
+    return [program for program in read if not isinstance(program.original, tuple)]
+
+
+# --- where a comment may stand: the grammar of LinuxCNC ---------------------------------------------------
+
+
+class Line:
+    """A line of LinuxCNC's G-code, and the columns at which its interpreter takes a comment."""
+
+    def __init__(self, text):
+        self.text, self.at, self.places = text, 0, set()
+        self.skip()
+        if self.peek() == "/":
+            self.at += 1
+        before_number = self.at
+        self.skip()
+        if self.peek() == "n":
+            self.at += 1
+            self.number()
+            before_number = self.at
+        elif not text[:before_number].strip():
+            before_number = 0
+        self.skip()
+        if self.peek() == "o":
+            self.at += 1
+            self.o_word()
+        else:
+            self.at = before_number
+            self.block()
+
+    def peek(self):
+        return self.text[self.at].lower() if self.at < len(self.text) else ""
+
+    def skip(self):
+        while self.peek() and self.peek() in BLANKS:
+            self.at += 1
+
+    def gap(self):
+        """A comment may stand here, before the blanks or behind them; go behind them and a comment."""
+        start = self.at
+        self.skip()
+        self.places.update(range(start, self.at + 1))
+        while self.peek() == "(":
+            self.at = self.text.index(")", self.at) + 1
+            start = self.at
+            self.skip()
+            self.places.update(range(start, self.at + 1))
+
+    def number(self):
+        end = self.at
+        while self.peek() and self.peek() in "0123456789.+-" + BLANKS:
+            self.at += 1
+            end = end if self.text[self.at - 1] in BLANKS else self.at
+        self.at = end
+
+    def letters(self):
+        word, end = "", self.at
+        while self.peek().isalpha() or (self.peek() and self.peek() in BLANKS and word):
+            word += self.peek()
+            self.at += 1
+            end = end if self.text[self.at - 1] in BLANKS else self.at
+        self.at = end
+        return "".join(word.split())
+
+    def bracket(self):
+        depth = 0
+        while True:
+            depth += (self.peek() == "[") - (self.peek() == "]")
+            self.at += 1
+            if depth == 0:
+                return
+
+    def value(self):
+        while self.peek() and self.peek() in "+-" + BLANKS:
+            self.at += 1
+        if self.peek() == "#":
+            self.at += 1
+            self.value()
+        elif self.peek() == "<":
+            self.at = self.text.index(">", self.at) + 1
+        elif self.peek() == "[":
+            self.bracket()
+        elif self.peek().isalpha():
+            word = self.letters()
+            self.bracket()
+            if word == "atan":
+                self.at = self.text.index("[", self.at)
+                self.bracket()
+        else:
+            self.number()
+
+    def block(self):
+        self.gap()
+        while self.peek() not in ("", ";"):
+            letter = self.peek()
+            self.at += 1
+            if letter != "%":
+                self.value()
+            if letter == "#":
+                self.at = self.text.index("=", self.at) + 1
+                self.value()
+            self.gap()
+
+    def o_word(self):
+        self.skip()
+        self.value()
+        end = self.at
+        self.skip()
+        word = self.letters()
+        end = self.at if word else end
+        while True:
+            self.at = end
+            if word == "call":
+                self.gap()
+            self.skip()
+            if self.peek() != "[":
+                break
+            self.bracket()
+            end = self.at
+        self.at = end
+        self.gap()
+
+
+def outside_comments(line):
+    """Return the columns of a line that are in no comment."""
+    columns, inside = [], False
+    for column, character in enumerate(line):
+        if not inside:
+            columns.append(column)
+            if character == ";":
+                return columns
+        inside = character == "(" or (inside and character != ")")
+    return [*columns, len(line)] if not inside else columns
+
+
+def with_text(line, column, text):
+    return line[:column] + text + line[column:]
+
+
+def lines_of_code(program):
+    for number, line in enumerate(program.lines):
+        is_statement = program.dialect == "sinumerik" and ("(" in line or '"' in line)
+        if line.strip(BLANKS) and "%" not in line and len(line) < LONGEST and not is_statement:
+            yield number, line
+
+
+def is_o_line(line):
+    return line.lstrip("/0123456789nN" + BLANKS)[:1] in ("o", "O")
+
+
+def is_read_as_block(program):
+    """M98 and M99 are found only where no comment stands before them, in LinuxCNC; here they are found there too."""
+    return not any(word in "".join(program.lines).upper() for word in ("M98", "M99"))
+
+
+# --- the properties ---------------------------------------------------------------------------------------
+
+
+def check_all_lines_at_once(program):
+    """The k-th place of every line gets its comment in one program; so does every end its `;`."""
+    is_linuxcnc = program.dialect == "linuxcnc"
+    places = {number: sorted(Line(line).places) for number, line in lines_of_code(program) if is_linuxcnc}
+    count = 0
+    for k in range(max(map(len, places.values()), default=0)):
+        lines = list(program.lines)
+        for number, columns in places.items():
+            if k < len(columns):
+                lines[number] = with_text(lines[number], columns[k], COMMENT)
+                count += 1
+        assert program.difference(lines) == "", (program.path.name, k)
+    lines = list(program.lines)
+    for number, line in lines_of_code(program):
+        lines[number] = line.rstrip(BLANKS) + ("" if ";" in line else TAIL)
+        count += 1
+    assert program.difference(lines) == "", program.path.name
+    return count
+
+
+def check_each_place(program, number, line):
+    """Put a comment at every character of a line: it changes nothing, or its line is refused."""
+    count, is_run = 0, None
+    places = Line(line).places if program.dialect == "linuxcnc" else set()
+    for column in outside_comments(line):
+        changed = with_text(line, column, COMMENT)
+        difference = program.difference(program.with_line(number, changed))
+        where = (program.path.name, number + 1, changed, difference)
+        count += 1
+        if column in places:
+            assert difference == "", where
+            continue
+        if difference == "" and program.dialect == "linuxcnc":
+            if is_run is None:
+                wrong = line.partition("(")[0].partition(";")[0] + "]"
+                is_run = program.difference(program.with_line(number, wrong)) != ""
+            assert not is_run or not is_read_as_block(program), where
+        elif difference != "":
+            assert isinstance(difference, tuple), where
+            # an end that is none is missed where the loop begins
+            assert difference[1] == number + 1 or is_o_line(line), where
+    return count
+
+
+def check_blanks(program, number, line):
+    """A blank at every character of a line changes nothing."""
+    for column in outside_comments(line):
+        changed = with_text(line, column, " \t")
+        assert program.difference(program.with_line(number, changed)) == "", (program.path.name, changed)
+
+
+@pytest.fixture(scope="module")
+def reference_programs():
+    return programs()
+
+
+def test_comments_in_all_lines_of_all_programs_change_nothing(reference_programs):
+    assert sum(map(check_all_lines_at_once, reference_programs)) > 20_000
+
+
+def test_a_comment_anywhere_changes_nothing_or_is_refused_sampled(reference_programs):
+    rng = random.Random(5)
+    computing = [program for program in reference_programs if "#" in "".join(program.lines)]
+    for program in rng.sample(reference_programs, 25) + computing[::3]:
+        for number, line in rng.sample(list(lines_of_code(program)), 2):
+            check_each_place(program, number, line)
+
+
+@pytest.mark.slow
+def test_a_comment_anywhere_changes_nothing_or_is_refused(reference_programs, capsys):
+    count = sum(
+        check_each_place(program, number, line)
+        for program in reference_programs
+        for number, line in list(lines_of_code(program))[:300]
+    )
+    with capsys.disabled():
+        print(f"\n{count} comments in {len(reference_programs)} programs: 0 differences")
+    assert count > 40_000
