@@ -38,7 +38,9 @@ _STATEMENTS = {
         _HEAD + rb"[O:]" + _BLANKS + rb"(?P<number>\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
     ),
 }
-_DO = re.compile(rb"\]" + _BLANKS + _spaced("do") + _BLANKS + rb"(\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL)
+_DO = re.compile(
+    rb"\]" + _BLANKS + _spaced("do") + _BLANKS + rb"(\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
+)
 _NUMBERED = re.compile(rb"^[ \t\r]*(?:/\d?)?[ \t\r]*N[ \t]*(\d[\d \t]*)", re.MULTILINE | re.IGNORECASE)
 _MOST_NUMBER = 10**9
 _LOOP_NUMBERS = ("1", "2", "3")

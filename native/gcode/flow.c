@@ -62,6 +62,7 @@ double bracket_value(Evaluation *e, int64_t *i) {
 static bool only_value(Run *run, const MarkedLine *marked, double *value) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
+    e.is_condition = marked->kind == P_KIND_IF || marked->kind == P_KIND_ELSEIF;
     *value = bracket_value(&e, &i);
     if (line_ends(&e, i))
         return true;
@@ -196,10 +197,10 @@ static int locals_of(const Program *program) {
     return program->language == D_PROGRAMS_FANUC ? P_MACRO_LOCALS : P_LOCAL_PARAMETERS;
 }
 
-/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's. */
-int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
+/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's, and `given` their bits. */
+int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int64_t times, int64_t next) {
     Course *at = run->course;
-    const Subprogram *subprogram = &AT(run->program->subprograms, row);
+    Subprogram *subprogram = &AT(run->program->subprograms, row);
     if (!is_ready(run, row))
         return WAIT;
     if (run->program->language != D_PROGRAMS_FANUC && (subprogram->is_program != 0) != (arguments == NULL))
@@ -217,6 +218,13 @@ int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int6
     frame->is_program = subprogram->is_program;
     frame->has_arguments = arguments != NULL;
     frame->main_line = main_line;
+    frame->given = given;
+    frame->assigned = 0;
+    frame->subprogram = (int32_t)row;
+    frame->call_line = run->line;
+    if (given & ~subprogram->given)
+        subprogram->given_line = run->line;
+    subprogram->given |= given;
     frame->repeats = (int32_t)at->repeats;
     for (int k = 0; arguments != NULL && k < locals_of(run->program); k++) {
         frame->parameters[k] = AT(run->program->parameters, k + 1);
@@ -270,7 +278,7 @@ static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next)
     }
     if (!line_ends(&e, i))
         return stop_wrong(run, &e, marked->start, next);
-    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, 1, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, ((int64_t)2 << count) - 2, 1, next);
 }
 
 /* M98 P… L…: the words behind M98 are `from` to `to`. */
@@ -295,7 +303,7 @@ int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int
     if (times == 0)
         return next;
     const int64_t row = row_of_number(run, number);
-    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, times, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, 0, times, next);
 }
 
 /* Restore what M73 has saved in the subprogram that ends; return false where room is wanted, or with a finding. */

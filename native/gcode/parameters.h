@@ -20,6 +20,7 @@ typedef struct {
     bool is_null;  /* the value is that of a Fanuc's variable that is empty */
     bool is_open;  /* the expression at hand stands in no bracket and ends with its line */
     bool in_word;  /* it is the value of a word */
+    bool is_condition; /* of an if, which may ask whether an argument was given */
     int brackets;  /* that are open */
 } Evaluation;
 
@@ -62,6 +63,7 @@ double numbered_parameter(const Evaluation *e, int64_t number);
 static inline bool is_macro(const Evaluation *e) { return e->program->language == D_PROGRAMS_FANUC; }
 
 void note_unset(const Evaluation *e, int64_t number);
+void note_argument(const Evaluation *e, int64_t number);
 bool is_read_only(int64_t number);
 enum { KNOWN = -1 };
 int fault_of_number(const Machine *machine, int64_t number);
