@@ -1,8 +1,9 @@
 """Calls that give fewer arguments than their subprogram reads, or more.
 
 What is read and not given is noted while the program runs (``native/gcode/parameters.c:note_argument``), as a
-subprogram may ask first. What is given and never read is looked for in the text of the subprogram: a branch
-that this program does not take may read it.
+subprogram may ask first; not on a Fanuc, where an argument that is not passed leaves its word out, and macros
+are written for that. What is given and never read is looked for in the text of the subprogram: a branch that
+this program does not take may read it.
 """
 
 import re
@@ -25,17 +26,13 @@ _LETTERS = dict(
 """Letters of G65 by the variable that holds them."""
 
 
-def missing(called: Any, label: Label, *, of_fanuc: bool) -> Issue:
-    """Return the warning of a row of `program_tables.SUBPROGRAM` that reads an argument which is not given."""
+def missing(called: Any, label: Label) -> Issue:
+    """Return the warning of a row of `program_tables.SUBPROGRAM` that reads what is not given."""
     number, line = int(called["missing"]), int(called["missing_read"])
     count = int(called["missing_given"]).bit_count()
-    if of_fanuc:
-        what = f"G65 gives no {_LETTERS.get(number, f'#{number}')}, and line {line} reads #{number}, which is empty"
-        remedy = "pass it, or ask IF [#… EQ #0] before it is read"
-    else:
-        given = f"{count} argument{'' if count == 1 else 's'}"
-        what = f"{_name(label)} is called with {given}, and line {line} reads #{number}, which is 0"
-        remedy = f"give {number} arguments, each in [ ]; or set #{number} in the subprogram"
+    given = f"{count} argument{'' if count == 1 else 's'}"
+    what = f"{_name(label)} is called with {given}, and line {line} reads #{number}, which is 0"
+    remedy = f"give {number} arguments, each in [ ]; or set #{number} in the subprogram"
     return Issue("warning", "argument-count", int(called["missing_line"]), what, remedy)
 
 

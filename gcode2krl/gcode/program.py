@@ -313,11 +313,11 @@ class Program:
     # --- arguments --------------------------------------------------------------------------------------
 
     def argument_issues(self) -> Iterator[Issue]:
-        """Yield a warning for each subprogram that reads an argument which is not given, or the other way round."""
+        """Yield a warning for each subprogram that reads what is not given, or does not read what is."""
         for label, row in self._labels.items():
             called = self._subprograms[row]
             if called["missing"]:
-                yield arguments.missing(called, label, of_fanuc=self._is_macro)
+                yield arguments.missing(called, label)
             if called["given"]:
                 entry = int(called["entry"])
                 head_line, first_line = int(self._line[entry - 1]), int(self._line[entry])

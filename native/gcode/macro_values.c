@@ -60,8 +60,6 @@ double variable_at(Evaluation *e, int64_t *i) {
     const double value = AT(e->program->parameters, number);
     if (isnan(value))
         note_unset(e, number);
-    if (isinf(value) && e->in_word && number <= P_MACRO_LOCALS) /* elsewhere IF may ask whether it is there */
-        note_argument(e, number);
     e->is_null = isnan(value) || isinf(value);
     return e->is_null ? 0.0 : value;
 }

@@ -145,7 +145,7 @@ void note_unset(const Evaluation *e, int64_t number) {
 }
 
 /* Keep that the subprogram at hand reads an argument which its call does not give: the highest of its first such call. */
-void note_argument(const Evaluation *e, int64_t number) {
+static void note_argument(const Evaluation *e, int64_t number) {
     const Program *p = e->program;
     const Frame *frame = &AT(p->frames, p->course.at->frame);
     if (!frame->has_arguments || (frame->given | frame->assigned) >> number & 1)

@@ -57,13 +57,23 @@ static inline bool is_rest_comment(Bytes text, int64_t i, int64_t end) {
     return i >= end || AT(text, i) == CH_SEMICOLON;
 }
 
+/* Tell whether a word stands at i, such as X5 or X#1: behind ; it is the next block on a Fanuc, and prose is not. */
+static inline bool is_word_behind(Bytes text, int64_t i) {
+    const int64_t end = line_end(text, i);
+    i = after_comments(text, i, end);
+    if (i >= end || !is_letter(AT(text, i)))
+        return false;
+    i = after_blanks(text, i + 1, end);
+    return i < end && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || AT(text, i) == CH_POINT ||
+                       AT(text, i) == CH_HASH || AT(text, i) == CH_BRACKET_OPEN);
+}
+
 enum { NO_NAME = -1 };
 double numbered_parameter(const Evaluation *e, int64_t number);
 /* Tell whether a program is a Fanuc's, whose variables and operators are others. */
 static inline bool is_macro(const Evaluation *e) { return e->program->language == D_PROGRAMS_FANUC; }
 
 void note_unset(const Evaluation *e, int64_t number);
-void note_argument(const Evaluation *e, int64_t number);
 bool is_read_only(int64_t number);
 enum { KNOWN = -1 };
 int fault_of_number(const Machine *machine, int64_t number);

@@ -160,7 +160,7 @@ static void put_line(Scan *scan, int64_t start, int64_t line) {
 static int put_messages(Scan *scan, int64_t i, int64_t end) {
     for (; i < end; i++) {
         if (AT(scan->text, i) == CH_SEMICOLON)
-            break;
+            return scan->syntax & D_MACROS && is_word_behind(scan->text, i + 1) ? F_DIALECT_STATEMENT : F_OK;
         if (AT(scan->text, i) != CH_PAREN_OPEN)
             continue;
         const Item item = comment(scan->text, i);
