@@ -7,7 +7,7 @@ this program does not take may read it.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from gcode2krl.errors import Issue
@@ -50,7 +50,7 @@ def _name(label: Label) -> str:
     return f"O{label}" if label.isdigit() else f"O<{label}>"
 
 
-def unread(given: int, body: Sequence[bytes], *, of_fanuc: bool) -> int:
+def unread(given: int, body: Iterable[bytes], *, of_fanuc: bool) -> int:
     """Return the bits of ``given`` arguments that no line of a subprogram reads; ``body`` begins with it.
 
     A parameter that the body sets before it reads it, in no branch and no loop, is no argument.

@@ -27,7 +27,7 @@ _WORDS = (
 _WORD = b"|".join(_BLANKS.join(bytes([c]) for c in word.encode()) for word in _WORDS)
 _LINE = re.compile(
     _BLANKS
-    + rb"(?P<deleted>/)?"
+    + rb"/?"
     + _BLANKS
     + rb"(?:N[\d. \t\r]*)?O"
     + _BLANKS
@@ -56,7 +56,6 @@ class OLine(NamedTuple):
     comment stands before it."""
     behind: int
     """Bytes before its expressions; for a computed label, before the label."""
-    deleted: bool
     ends: bool = True
     """Nothing but a comment stands behind a word that has no expression."""
 
@@ -65,11 +64,10 @@ def parsed(line: bytes) -> OLine:
     """Return what an O-line says, without its expressions."""
     found = _LINE.match(line)
     if found is None:
-        return OLine("", "(" if _COMMENT_BEFORE.match(line) else "", 0, deleted=False)
-    deleted = found["deleted"] is not None
+        return OLine("", "(" if _COMMENT_BEFORE.match(line) else "", 0)
     if found["computed"] is not None:
         word = "call" if _CALL.search(line, found.end("computed")) else ""
-        return OLine("", word, found.end("computed"), deleted)
+        return OLine("", word, found.end("computed"))
     name, number, word_found = found["name"], found["number"], found["word"]
     label = (
         _SPACE.sub(b"", name).lower().decode("latin-1")
@@ -79,9 +77,9 @@ def parsed(line: bytes) -> OLine:
     if word_found is not None:
         word = _SPACE.sub(b"", word_found).lower().decode()
         ends = word not in _WITHOUT_EXPRESSION or _ALONE.match(line, found.end()) is not None
-        return OLine(label, word, found.end(), deleted, ends)
+        return OLine(label, word, found.end(), ends)
     alone = _ALONE.match(line, found.end()) is not None
-    return OLine(label, "program" if alone and number is not None else "", found.end(), deleted)
+    return OLine(label, "program" if alone and number is not None else "", found.end())
 
 
 class Definition(NamedTuple):

@@ -155,15 +155,14 @@ class Program:
         flow = Flow(self._lines, word_of_row, _Rows(self._labels))
         of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != f.OK)
         for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
-            if self._lines["fault"][row] != f.OK:
-                flow.add_refused(row)
-                continue
             start = int(self._lines["start"][row])
-            line = parsed(self._text[start : self._text.index(b"\n", start)])
-            if line.deleted and self._block_delete:
+            content = self._text[start : self._text.index(b"\n", start)]
+            if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
+            elif self._lines["fault"][row] != f.OK:
+                flow.add_refused(row)
             else:
-                flow.add(row, line)
+                flow.add(row, parsed(content))
         flow.finish()
         self._define(flow.definitions)
 
@@ -314,6 +313,7 @@ class Program:
 
     def argument_issues(self) -> Iterator[Issue]:
         """Yield a warning for each subprogram that reads what is not given, or does not read what is."""
+        lines: dict[str, list[bytes]] = {}
         for label, row in self._labels.items():
             called = self._subprograms[row]
             if called["missing"]:
@@ -322,7 +322,8 @@ class Program:
                 entry = int(called["entry"])
                 head_line, first_line = int(self._line[entry - 1]), int(self._line[entry])
                 file = self._file(first_line)
-                body = file.text.split(b"\n")[first_line - file.first_line :]
+                texts = lines[file.name] = lines.get(file.name) or file.text.split(b"\n")
+                body = (texts[k] for k in range(first_line - file.first_line, len(texts)))
                 unread = arguments.unread(int(called["given"]), body, of_fanuc=self._is_macro)
                 if unread:
                     begin = head_line if self._file(head_line) is file else first_line

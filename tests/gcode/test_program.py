@@ -211,6 +211,13 @@ def test_a_comment_hides_nothing_and_joins_nothing(text, found):
     assert refused(text) == found
 
 
+@pytest.mark.parametrize("line", ["/o1 else (c", "/(c) o1 else", "/X9 (c", "/o1 else (c) X9"])
+def test_a_line_that_is_left_out_may_be_anything(line):
+    text = f"o1 if [0]\nX1\n{line}\nX2\no1 endif\nX3"
+    assert ends(text, block_delete=True) == [3.0]
+    assert refused(text)[1] == 5
+
+
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
