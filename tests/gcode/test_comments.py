@@ -404,7 +404,7 @@ def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(gcode_beside_rs274, "LONGEST_S", 1.0)
     beside, difference = gcode_beside_rs274.Beside(tmp_path), gcode_beside_rs274.difference
     rng, tally = random.Random(7), {False: 0, True: 0}
-    for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::8]:
+    for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::40]:
         program = Program(path)
         theirs = beside.read("\n".join(program.lines).encode("latin-1"))
         if theirs.refused or isinstance(program.original, tuple):
@@ -412,11 +412,11 @@ def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
         assert difference(program.read(program.lines), theirs.moves) == ""
         for number, line in lines_of_code(program):
             columns = outside_comments(line)
-            changes = [(column, COMMENT) for column in columns if "#" in line or is_o_line(line)]
-            changes += [(rng.choice(columns), text) for text in (COMMENT, *OTHER_TEXTS)]
+            changes = [(column, COMMENT) for column in rng.sample(columns, min(4, len(columns)))]
+            changes += [(rng.choice(columns), text) for text in rng.sample(OTHER_TEXTS, 2)]
             for column, text in changes:
                 is_read = check_beside(program, number, with_text(line, column, text), beside, difference)
                 tally[is_read] += 1
     with capsys.disabled():
         print(f"\nas LinuxCNC does: {tally[True]} comments read, {tally[False]} refused")
-    assert min(tally.values()) > 1000
+    assert min(tally.values()) > 300
