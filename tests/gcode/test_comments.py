@@ -354,6 +354,26 @@ def test_a_comment_anywhere_in_the_programs_of_other_controls(dialect, text, tmp
         check_each_place(program, number, line)
 
 
+@pytest.mark.parametrize(
+    ("dialect", "line", "is_read"),
+    [
+        ("fanuc", "G0 X5.; Y6.", False),
+        ("fanuc", "G0 X5. ;(a) N20 Y6.", False),
+        ("fanuc", "G0 X5.; to the corner (a)", True),
+        ("fanuc", "; G0 Y6.\nG0 X5.", True),
+        ("grbl", "G0 X5 ; Y6", True),
+        ("sinumerik", "G0 X5 (a)", False),
+        ("sinumerik", "R1=5 (a)\nG0 X=R1", False),
+        ("sinumerik", "G0 X5 ; (a) Y6", True),
+    ],
+)
+def test_what_is_a_comment_says_the_control(dialect, line, is_read, tmp_path):
+    path = tmp_path / "part.nc"
+    path.write_text(f"G90 G17 G94\n{line}\nM30\n", encoding="ascii")
+    outcome = Program(path, dialect).original
+    assert outcome["position_mm"][-1].tolist() == [5.0, 0.0, 0.0] if is_read else outcome[1] == 2
+
+
 @pytest.mark.slow
 def test_a_comment_anywhere_changes_nothing_or_is_refused(reference_programs, capsys):
     count = sum(
