@@ -335,6 +335,16 @@ def test_comments_in_all_lines_of_all_programs_change_nothing(reference_programs
     assert sum(map(check_all_lines_at_once, reference_programs)) > 20_000
 
 
+def test_no_reference_program_is_told_of_arguments_that_fit(reference_programs):
+    told = [
+        program.path.name
+        for program in reference_programs
+        for issue in program.read(program.lines).issues
+        if issue.code == "argument-count"
+    ]
+    assert told == ["sub_in_file.nc", "subs.nc", "subs.nc"]  # LinuxCNC's zeros are tried out there
+
+
 def test_a_comment_anywhere_changes_nothing_or_is_refused_sampled(reference_programs):
     rng = random.Random(5)
     computing = [program for program in reference_programs if "#" in "".join(program.lines)]
