@@ -369,6 +369,38 @@ TYPING_MISTAKES = (
     Mistake("two decimal points", r"X|'\.'|number", {27: "@N240 X100.5.2 F900."}),
     Mistake("two signs", r"X|'-'|number", {27: "@N240 X--100. F900."}),
     Mistake("comment not closed", r"comment", {26: "@N230 (PLUNGE G1 Z-2. F400."}),
+    Mistake(
+        "comment within an expression",
+        r"expression",
+        {27: "#5=100 (LENGTH)\n@N240 X[#5 (PLATE) - 0.5] F900."},
+    ),
+    Mistake("comment within a number", r"'0'|number|character", {27: "@N240 X10(PLATE)0. F900."}),
+)
+SUB = {5: "o<pass> sub\nG1 X#1 Y#2 F900.\no<pass> endsub\nG54"}
+PROGRAM_MISTAKES = (
+    Mistake(
+        "words behind the comment of a call",
+        r"behind the O-word",
+        {**SUB, 27: "@o<pass> call [100] (LONG SIDE) G1 Y60."},
+    ),
+    Mistake(
+        "comment between a label and its word", r"O-word", {**SUB, 27: "@o<pass> (LONG SIDE) call [100] [20]"}
+    ),
+    Mistake(
+        "comment of a call not closed, its second argument within",
+        r"comment",
+        {**SUB, 27: "@o<pass> call [100] (LONG SIDE [20]"},
+    ),
+    Mistake(
+        "comment within the condition of an if",
+        r"expression",
+        {27: "@o1 if [#5 (LENGTH) GT 2]\nX100. F900.\no1 endif"},
+    ),
+    Mistake(
+        "comment before else, so that it is none",
+        r"O-word|comment",
+        {27: "o1 if [0]\nX20.\n@(LONG SIDE) o1 else\nX100. F900.\no1 endif"},
+    ),
 )
 
 FILE_MISTAKES = (
@@ -551,6 +583,7 @@ MISTAKES = (
     *CODE_MISTAKES,
     *ARC_MISTAKES,
     *TYPING_MISTAKES,
+    *PROGRAM_MISTAKES,
     *FILE_MISTAKES,
     *ROBOT_MISTAKES,
     *CELL_MISTAKES,
@@ -581,6 +614,10 @@ CLEAN = (
     Clean("comments with ; and remarks after the end", change={8: "M8 ; coolant", 32: "%\nend of file"}),
     Clean("next tool preselected with T alone", change={7: "S8000 M3\nT14", 21: "M6"}),
     Clean("typed by hand, neither M30 nor %", "no tool", change={10: None}),
+    Clean(
+        "comments between the arguments of a call",
+        change={**SUB, 27: "o<pass> call [100] (LONG SIDE) [20] (END; OF IT) ; [5]"},
+    ),
     Clean("G43 without H", change={10: "G43 Z25."}),
     Clean("dwell after the spindle start, G64 tolerance", change={8: "M8\nG4 P2.\nG64 P0.02"}),
     Clean("G41 named only in a comment", change={3: "(NO G41, NO G81, NO #100, UNITS MM)"}),

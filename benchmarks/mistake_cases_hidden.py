@@ -5,7 +5,7 @@ with earlier states of this program, `FURTHER` are others thought of for this be
 least that is right: ``warning`` where a person may mean it.
 """
 
-from mistake_cases import CELL_TOOLS, STOCK, Mistake
+from mistake_cases import CELL_HEAD, CELL_TOOLS, STOCK, SUB, Mistake
 
 FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
 AFTER_T7 = 6
@@ -175,6 +175,18 @@ REPORTED = (
 """Found by independent checks."""
 
 FURTHER = (
+    Mistake(
+        "call with an argument too few",
+        r"1 argument.*line 6 reads #2",
+        {**SUB, 27: "@o<pass> call [100]"},
+        severity="warning",
+    ),
+    Mistake(
+        "call with an argument too many",
+        r"#3",
+        {**SUB, 27: "@o<pass> call [100] [20] [-2]"},
+        severity="warning",
+    ),
     Mistake("G92 at the start", r"G92", {9: "@N55 G92 X0. Y0.\nN60 G0 X-10. Y-10."}, severity="warning"),
     Mistake("G10 sets an offset", r"G10", {5: "@N15 G10 L2 P1 X0. Y0. Z-20.\nN20 G54"}, severity="warning"),
     Mistake("F in mm/s", r"(?i)chip|feed|F", {13: "@N100 Y70. F20.", 12: "@", 15: "@"}, severity="warning"),

@@ -121,6 +121,7 @@
 #define W_ACT_TOOL "$ACT_TOOL"
 #define W_BASE_DATA "BASE_DATA"
 #define W_TOOL_DATA "TOOL_DATA"
+#define W_LOAD_DATA "LOAD_DATA"
 #define W_ROBROOT "$ROBROOT"
 #define W_ROBROOT_NOW "$ROBROOT_C"
 #define W_MACHINE_DEF "MACHINE_DEF"
@@ -138,7 +139,6 @@
 #define W_SOURCE_SUFFIX ".src"
 #define W_DATA_SUFFIX ".dat"
 #define W_SIDECAR_SUFFIX ".pilot.csv"
-#define W_SIGNAL_FLOW_SUFFIX ".rsi.xml"
 #define W_ETHERNET_SUFFIX "_ETH.xml"
 #define W_LONGEST_LINE 471
 #define W_LONGEST_NAME 24
@@ -408,6 +408,8 @@
 #define DR_REASON_SHIFT_AND_TIP 38
 #define DR_REASON_ZERO_AND_TIP 39
 #define DR_REASON_FEED_AXES 40
+#define DR_REASON_PARENTHESES 41
+#define DR_REASON_SEMICOLON 42
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -664,6 +666,7 @@
 #define PF_SIEMENS_COMPARISONS 23
 #define PF_SIEMENS_SAME_BLOCK 24
 #define PF_SIEMENS_GOTO 25
+#define PF_NAME_COMMENT 26
 #define PF_DIVISION_BY_ZERO 0
 #define PF_SQUARE_ROOT 1
 #define PF_LOGARITHM 2
@@ -1247,12 +1250,24 @@ typedef struct {
     int64_t entry;
     int32_t is_ready;
     int32_t is_program;
+    int64_t given;
+    int32_t given_line;
+    int32_t missing;
+    int32_t missing_line;
+    int32_t missing_read;
+    int64_t missing_given;
 } Subprogram;
 typedef char Subprogram_number_stands_at_0[offsetof(Subprogram, number) == 0 ? 1 : -1];
 typedef char Subprogram_entry_stands_at_8[offsetof(Subprogram, entry) == 8 ? 1 : -1];
 typedef char Subprogram_is_ready_stands_at_16[offsetof(Subprogram, is_ready) == 16 ? 1 : -1];
 typedef char Subprogram_is_program_stands_at_20[offsetof(Subprogram, is_program) == 20 ? 1 : -1];
-typedef char Subprogram_has_its_size[sizeof(Subprogram) == 24 ? 1 : -1];
+typedef char Subprogram_given_stands_at_24[offsetof(Subprogram, given) == 24 ? 1 : -1];
+typedef char Subprogram_given_line_stands_at_32[offsetof(Subprogram, given_line) == 32 ? 1 : -1];
+typedef char Subprogram_missing_stands_at_36[offsetof(Subprogram, missing) == 36 ? 1 : -1];
+typedef char Subprogram_missing_line_stands_at_40[offsetof(Subprogram, missing_line) == 40 ? 1 : -1];
+typedef char Subprogram_missing_read_stands_at_44[offsetof(Subprogram, missing_read) == 44 ? 1 : -1];
+typedef char Subprogram_missing_given_stands_at_48[offsetof(Subprogram, missing_given) == 48 ? 1 : -1];
+typedef char Subprogram_has_its_size[sizeof(Subprogram) == 56 ? 1 : -1];
 VIEW(SubprogramView, Subprogram);
 
 typedef struct {
@@ -1279,6 +1294,10 @@ typedef struct {
     int32_t has_arguments;
     int32_t main_line;
     int32_t repeats;
+    int64_t given;
+    int64_t assigned;
+    int32_t subprogram;
+    int32_t call_line;
     double parameters[33];
 } Frame;
 typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -1];
@@ -1289,8 +1308,12 @@ typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1
 typedef char Frame_has_arguments_stands_at_36[offsetof(Frame, has_arguments) == 36 ? 1 : -1];
 typedef char Frame_main_line_stands_at_40[offsetof(Frame, main_line) == 40 ? 1 : -1];
 typedef char Frame_repeats_stands_at_44[offsetof(Frame, repeats) == 44 ? 1 : -1];
-typedef char Frame_parameters_stands_at_48[offsetof(Frame, parameters) == 48 ? 1 : -1];
-typedef char Frame_has_its_size[sizeof(Frame) == 312 ? 1 : -1];
+typedef char Frame_given_stands_at_48[offsetof(Frame, given) == 48 ? 1 : -1];
+typedef char Frame_assigned_stands_at_56[offsetof(Frame, assigned) == 56 ? 1 : -1];
+typedef char Frame_subprogram_stands_at_64[offsetof(Frame, subprogram) == 64 ? 1 : -1];
+typedef char Frame_call_line_stands_at_68[offsetof(Frame, call_line) == 68 ? 1 : -1];
+typedef char Frame_parameters_stands_at_72[offsetof(Frame, parameters) == 72 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 336 ? 1 : -1];
 VIEW(FrameView, Frame);
 
 typedef struct {

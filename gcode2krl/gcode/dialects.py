@@ -87,6 +87,11 @@ REASONS: Final = (
         "write G54 to G57 again behind them, before the next motion",
     ),
     ("F would count rotary axes too", "let the post write FGROUP(X,Y,Z), or the feed by G93"),
+    ("parentheses are no comment on this control", "write the comment at the end of the line, behind ;"),
+    (
+        "; ends a block on this control, and a word stands behind it",
+        "write a comment in ( ), a block in a line of its own",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -98,6 +103,7 @@ _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23,
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
 REASON_NO_TIP, REASON_VECTOR_AND_ANGLE, REASON_VECTOR_ARC, REASON_OTHER_TIP = range(34, 38)
 REASON_SHIFT_AND_TIP, REASON_ZERO_AND_TIP, REASON_FEED_AXES = range(38, 41)
+REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED

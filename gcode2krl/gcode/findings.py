@@ -343,7 +343,10 @@ FINDINGS: dict[int, Finding] = {
         "add it to [work_offsets] of the cell",
     ),
     N_NOT_FIRST: Finding(
-        "error", "n-not-first", "a line number N inside a block", "N stands at the start of the line"
+        "error",
+        "n-not-first",
+        "a line number N inside a block",
+        "N stands at the start of the line, also before comments",
     ),
     DWELL_WITH_ARC: Finding(
         "error",

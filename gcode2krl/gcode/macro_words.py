@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.gcode import program_faults as faults
 from gcode2krl.gcode import program_tables as tables
-from gcode2krl.gcode.o_words import Definition
+from gcode2krl.gcode.o_words import COMMENTS_TO_END, Definition
 
 _BLANKS = rb"[ \t\r]*"
 _HEAD = _BLANKS + rb"(?P<deleted>/\d?)?" + _BLANKS + rb"(?:N[ \t]*\d[\d \t]*)?" + _BLANKS
-_ALONE = _BLANKS + rb"(?:[(;].*)?\x1a?\Z"
 
 
 def _spaced(word: str) -> bytes:
@@ -30,16 +29,18 @@ _STATEMENTS = {
     "if": re.compile(_HEAD + _spaced("if") + rb"(?=" + _BLANKS + rb"\[)", re.IGNORECASE),
     "while": re.compile(_HEAD + _spaced("while") + rb"(?=" + _BLANKS + rb"\[)", re.IGNORECASE),
     "do": re.compile(
-        _HEAD + _spaced("do") + _BLANKS + rb"(?P<number>\d+)" + _ALONE, re.IGNORECASE | re.DOTALL
+        _HEAD + _spaced("do") + _BLANKS + rb"(?P<number>\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
     ),
     "end": re.compile(
-        _HEAD + _spaced("end") + _BLANKS + rb"(?P<number>\d+)" + _ALONE, re.IGNORECASE | re.DOTALL
+        _HEAD + _spaced("end") + _BLANKS + rb"(?P<number>\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
     ),
     "program": re.compile(
-        _HEAD + rb"[O:]" + _BLANKS + rb"(?P<number>\d+)" + _ALONE, re.IGNORECASE | re.DOTALL
+        _HEAD + rb"[O:]" + _BLANKS + rb"(?P<number>\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
     ),
 }
-_DO = re.compile(rb"\]" + _BLANKS + _spaced("do") + _BLANKS + rb"(\d+)" + _ALONE, re.IGNORECASE | re.DOTALL)
+_DO = re.compile(
+    rb"\]" + _BLANKS + _spaced("do") + _BLANKS + rb"(\d+)" + COMMENTS_TO_END, re.IGNORECASE | re.DOTALL
+)
 _NUMBERED = re.compile(rb"^[ \t\r]*(?:/\d?)?[ \t\r]*N[ \t]*(\d[\d \t]*)", re.MULTILINE | re.IGNORECASE)
 _MOST_NUMBER = 10**9
 _LOOP_NUMBERS = ("1", "2", "3")

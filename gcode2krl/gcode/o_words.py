@@ -27,21 +27,22 @@ _WORDS = (
 _WORD = b"|".join(_BLANKS.join(bytes([c]) for c in word.encode()) for word in _WORDS)
 _LINE = re.compile(
     _BLANKS
-    + rb"(?P<deleted>/)?"
+    + rb"/?"
     + _BLANKS
     + rb"(?:N[\d. \t\r]*)?O"
     + _BLANKS
-    + rb"(?:<(?P<name>[^>\n]*)>|(?P<number>\d[\d \t]*)(?:\.[0 \t]*)?|(?P<computed>(?=[#\[])))"
+    + rb"(?:<(?P<name>[^>(;\n]*)>|(?P<number>\d[\d \t]*)(?:\.[0 \t]*)?|(?P<computed>(?=[#\[])))"
     + _BLANKS
-    + rb"(?:\([^()\n]*\)"
-    + _BLANKS
-    + rb")*(?P<word>"
+    + rb"(?P<word>"
     + _WORD
     + rb")?",
     re.IGNORECASE,
 )
+_COMMENT_BEFORE = re.compile(rb"[^OoNn(]*(?:N[\d. \t\r]*)?\(", re.IGNORECASE)
 _CALL = re.compile(_BLANKS.join((b"c", b"a", b"l", b"l")), re.IGNORECASE)
-_ALONE = re.compile(rb"[ \t\r\x1a]*(?:[(;].*)?\Z", re.DOTALL)
+COMMENTS_TO_END = rb"[ \t\r\x1a]*(?:\([^()]*\)[ \t\r\x1a]*)*(?:;.*)?\Z"
+"""Nothing but comments up to the end of a line, each closed."""
+_ALONE = re.compile(COMMENTS_TO_END, re.DOTALL)
 _WITHOUT_EXPRESSION = {"sub", "do", "else", "endif", "endwhile", "endrepeat", "break", "continue"}
 _SPACE = re.compile(rb"[ \t\r]")
 
@@ -51,10 +52,10 @@ class OLine(NamedTuple):
 
     label: Label
     word: str
-    """Small letters; ``program`` for a number that stands alone, empty for what is no O-word."""
+    """Small letters; ``program`` for a number that stands alone, empty for what is no O-word, ``(`` where a
+    comment stands before it."""
     behind: int
     """Bytes before its expressions; for a computed label, before the label."""
-    deleted: bool
     ends: bool = True
     """Nothing but a comment stands behind a word that has no expression."""
 
@@ -63,11 +64,10 @@ def parsed(line: bytes) -> OLine:
     """Return what an O-line says, without its expressions."""
     found = _LINE.match(line)
     if found is None:
-        return OLine("", "", 0, deleted=False)
-    deleted = found["deleted"] is not None
+        return OLine("", "(" if _COMMENT_BEFORE.match(line) else "", 0)
     if found["computed"] is not None:
         word = "call" if _CALL.search(line, found.end("computed")) else ""
-        return OLine("", word, found.end("computed"), deleted)
+        return OLine("", word, found.end("computed"))
     name, number, word_found = found["name"], found["number"], found["word"]
     label = (
         _SPACE.sub(b"", name).lower().decode("latin-1")
@@ -77,9 +77,9 @@ def parsed(line: bytes) -> OLine:
     if word_found is not None:
         word = _SPACE.sub(b"", word_found).lower().decode()
         ends = word not in _WITHOUT_EXPRESSION or _ALONE.match(line, found.end()) is not None
-        return OLine(label, word, found.end(), deleted, ends)
+        return OLine(label, word, found.end(), ends)
     alone = _ALONE.match(line, found.end()) is not None
-    return OLine(label, "program" if alone and number is not None else "", found.end(), deleted)
+    return OLine(label, "program" if alone and number is not None else "", found.end())
 
 
 class Definition(NamedTuple):
@@ -118,6 +118,10 @@ class Flow:
     def add(self, row: int, line: OLine) -> None:
         """Take the O-line of a row, in the order of the file."""
         self.lines["expression"][row] = self.lines["start"][row] + line.behind
+        if line.word == "(":
+            self._fault(row, faults.FAULT_NOT_FIRST)
+            self.add_refused(row)
+            return
         handler = getattr(self, f"_{line.word}", None) if line.word else None
         if handler is None:
             known = line.label or line.word
@@ -128,6 +132,11 @@ class Flow:
             self._unread(row, faults.FAULT_BEHIND)
         else:
             handler(row, line.label)
+
+    def add_refused(self, row: int) -> None:
+        """Take a line that is refused even where it is passed over: whatever it stands in leads there."""
+        for each in self._open:
+            each.unread = row if each.unread is None else each.unread
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
@@ -298,6 +307,7 @@ class Flow:
         self._labels.pop()
         self._set(row, tables.KIND_ENDSUB)
         self.lines["target"][found.row] = self._word(row) + 1
+        self._lead_to_unread(found)
 
     def _return(self, row: int, label: Label) -> None:
         found = self._sub_at_hand()

@@ -6,7 +6,7 @@ on the text is scanned as a whole, its O-lines are looked at once (`o_words`), a
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.gcode import arguments, macro_words
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings as f
-from gcode2krl.gcode import macro_words
 from gcode2krl.gcode import program_faults as faults
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.dialects import Dialect
@@ -153,14 +153,16 @@ class Program:
 
     def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
         flow = Flow(self._lines, word_of_row, _Rows(self._labels))
-        kind = self._lines["kind"][first_row:]
-        for row in (first_row + np.flatnonzero(kind == tables.KIND_O_WORD)).tolist():
+        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != f.OK)
+        for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
             start = int(self._lines["start"][row])
-            line = parsed(self._text[start : self._text.index(b"\n", start)])
-            if line.deleted and self._block_delete:
+            content = self._text[start : self._text.index(b"\n", start)]
+            if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
+            elif self._lines["fault"][row] != f.OK:
+                flow.add_refused(row)
             else:
-                flow.add(row, line)
+                flow.add(row, parsed(content))
         flow.finish()
         self._define(flow.definitions)
 
@@ -257,8 +259,9 @@ class Program:
             self._report(hands_over, word, f.O_WORD, faults.FAULT_SUB_TWICE)
             return
         self._tell_subprograms()
-        ready = (int(label) if label.isdigit() else -1, found.entry, 1, found.is_program)
-        self._subprograms[self._labels[label]] = ready
+        ready = self._subprograms[self._labels[label]]
+        ready["number"], ready["entry"] = int(label) if label.isdigit() else -1, found.entry
+        ready["is_ready"], ready["is_program"] = 1, found.is_program
 
     def _wanted_label(self) -> Label:
         row = int(self.course["wanted"][0])
@@ -305,6 +308,26 @@ class Program:
             counts["findings"] += 1
         counts["errors"] += 1
         self.course["is_stopped"] = 1
+
+    # --- arguments --------------------------------------------------------------------------------------
+
+    def argument_issues(self) -> Iterator[Issue]:
+        """Yield a warning for each subprogram that reads what is not given, or does not read what is."""
+        lines: dict[str, list[bytes]] = {}
+        for label, row in self._labels.items():
+            called = self._subprograms[row]
+            if called["missing"]:
+                yield arguments.missing(called, label)
+            if called["given"]:
+                entry = int(called["entry"])
+                head_line, first_line = int(self._line[entry - 1]), int(self._line[entry])
+                file = self._file(first_line)
+                texts = lines[file.name] = lines.get(file.name) or file.text.split(b"\n")
+                body = (texts[k] for k in range(first_line - file.first_line, len(texts)))
+                unread = arguments.unread(int(called["given"]), body, of_fanuc=self._is_macro)
+                if unread:
+                    begin = head_line if self._file(head_line) is file else first_line
+                    yield arguments.too_many(called, unread, label, begin, of_fanuc=self._is_macro)
 
     # --- places -----------------------------------------------------------------------------------------
 

@@ -27,7 +27,8 @@
     SIEMENS_COMPARISONS,
     SIEMENS_SAME_BLOCK,
     SIEMENS_GOTO,
-) = range(26)
+    NAME_COMMENT,
+) = range(27)
 
 EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     NO_VALUE: (
@@ -47,6 +48,10 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     NO_SLASH: ("ATAN takes two arguments", "write ATAN[y]/[x]"),
     NO_EQUALS: ("a parameter stands alone, without =", "write #1 = value, or a letter before it"),
     NAME_UNCLOSED: ("the name of the parameter is not closed", "add >"),
+    NAME_COMMENT: (
+        "a comment stands in the name of a parameter, and would be a part of the name",
+        "write the comment at the end of the line",
+    ),
     NAME_TOO_LONG: ("the name is longer than 255 characters", "shorten it"),
     TOO_MANY_NAMES: ("the program has more than 10000 names of parameters", "use numbered parameters"),
     TOO_DEEP: ("the expression has too many brackets within each other", "write it in several lines"),
@@ -210,8 +215,8 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_CALL_NUMBER: ("the computed number of the subprogram is not whole", "check the expression"),
     FAULT_ARGUMENTS: ("a call takes at most 30 arguments", "pass the others in parameters"),
     FAULT_NOT_FIRST: (
-        "an O-word, M98 or M99 stands behind other words",
-        "write it on a line of its own",
+        "an O-word, M98 or M99 stands behind other words, or behind a comment",
+        "write it on a line of its own, and a comment behind it",
     ),
     FAULT_STATEMENT: (
         "this is no statement of a macro that is read",

@@ -86,6 +86,12 @@ SUBPROGRAM = np.dtype(
         ("entry", "i8"),  # word of its first line, -1 = not known
         ("is_ready", "i4"),  # not 0 once a call may go to the entry
         ("is_program", "i4"),  # not 0 for O1000 … M99, called by M98
+        ("given", "i8"),  # bits of the arguments that its calls give: bit 1 is #1
+        ("given_line", "i4"),  # of the call that gives the last of them
+        ("missing", "i4"),  # number of an argument that is read and not given, 0 = none
+        ("missing_line", "i4"),  # of its first call that does not give one
+        ("missing_read", "i4"),  # line that reads it
+        ("missing_given", "i8"),  # bits of the arguments of that call
     ],
     align=True,
 )
@@ -100,6 +106,10 @@ FRAME = np.dtype(
         ("has_arguments", "i4"),  # its parameters are its own
         ("main_line", "i4"),  # of the main program's file: the line of the call, 0 = this is that file
         ("repeats", "i4"),  # loops that were begun before the call
+        ("given", "i8"),  # bits of its arguments
+        ("assigned", "i8"),  # bits of the arguments that it has set itself
+        ("subprogram", "i4"),  # its row of SUBPROGRAM
+        ("call_line", "i4"),
         ("parameters", "f8", MACRO_LOCALS),  # of the caller
     ],
     align=True,

@@ -405,7 +405,8 @@ class _Interpreter:
             head=head,
             programs=self.spoken.programs,
         )
-        return self._toolpath((*found, *map(self._placed, whole)), cell, head)
+        of_calls = self.program.argument_issues() if self.program is not None else ()
+        return self._toolpath((*found, *map(self._placed, (*whole, *of_calls))), cell, head)
 
     def _placed(self, issue: Issue) -> Issue:
         """Return a finding whose lines are named with their file, where that is not the main program's."""

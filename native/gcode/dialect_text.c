@@ -347,6 +347,10 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
             put(scan, D_NEXT_POINTLESS, 0.0, line);
         return syntax & D_STATEMENTS ? statement_item(scan, e, i, line) : i;
     }
+    if (syntax & D_MACROS && c == CH_SEMICOLON && !first && is_word_behind(text, i + 1))
+        return refuse(scan, e, i, line, DR_REASON_SEMICOLON);
+    if (syntax & D_STATEMENTS && c == CH_PAREN_OPEN) /* behind no name: a comment elsewhere, an alarm on this control */
+        return refuse(scan, e, i, line, DR_REASON_PARENTHESES);
     if (syntax & D_SKIP_LEVEL && c == CH_SLASH && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {
         put(scan, CH_SLASH, 0.0, line);
         return i + 2;

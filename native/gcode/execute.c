@@ -45,7 +45,11 @@ static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t t
 static int64_t computed_block(Run *run, const MarkedLine *marked, int64_t next) {
     Program *program = run->program;
     Evaluation e = evaluation_of(run->machine, program, marked->start, run->line, false);
-    read_line(&e, marked->start, marked->first_message);
+    if (marked->fault != F_OK) /* of a comment */
+        wrong(&e, marked->fault, marked->fault == F_DIALECT_STATEMENT ? DR_REASON_SEMICOLON : CH_PAREN_OPEN, 0.0,
+              marked->start);
+    else
+        read_line(&e, marked->start, marked->first_message);
     if (e.finding != F_OK) { /* plain blocks behind it are still looked at, O-words are not */
         report_unless_caused(run, &e, marked->start);
         run->machine->state.at->doubt |= S_DOUBT_ALL;

@@ -41,12 +41,11 @@ int64_t stop_wrong(Run *run, const Evaluation *e, int64_t start, int64_t next) {
 
 /* --- expressions of O-lines ----------------------------------------------------------------------------- */
 
-/* Tell whether nothing but a comment stands from i on; else that is wrong. */
+/* Tell whether nothing but comments stands from i on; else that is wrong. */
 bool line_ends(Evaluation *e, int64_t i) {
     const Bytes text = e->program->text;
-    i = after_blanks(text, i, e->end);
-    if (e->finding == F_OK && i < e->end && AT(text, i) != CH_PAREN_OPEN && AT(text, i) != CH_SEMICOLON)
-        wrong(e, F_EXPRESSION, PF_BEHIND_O_WORD, 0.0, i);
+    if (e->finding == F_OK && !is_rest_comment(text, i, e->end))
+        wrong(e, F_EXPRESSION, PF_BEHIND_O_WORD, 0.0, after_comments(text, i, e->end));
     return e->finding == F_OK;
 }
 
@@ -63,6 +62,7 @@ double bracket_value(Evaluation *e, int64_t *i) {
 static bool only_value(Run *run, const MarkedLine *marked, double *value) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
+    e.is_condition = marked->kind == P_KIND_IF || marked->kind == P_KIND_ELSEIF;
     *value = bracket_value(&e, &i);
     if (line_ends(&e, i))
         return true;
@@ -95,8 +95,15 @@ static int64_t branch(Run *run, const MarkedLine *marked, int64_t next) {
 
 /* elseif and else: behind a test that failed they are tried, behind a branch that ran they are passed over. */
 static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
-    if (!run->course->is_testing)
+    if (!run->course->is_testing) {
+        Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, true);
+        int64_t i = marked->expression;
+        if (marked->kind == P_KIND_ELSEIF)
+            bracket_value(&e, &i);
+        if (marked->kind == P_KIND_ELSEIF && !line_ends(&e, i))
+            return stop_wrong(run, &e, marked->start, next);
         return jump(run, marked->end);
+    }
     if (marked->kind == P_KIND_ELSEIF)
         return branch(run, marked, next);
     run->course->is_testing = 0;
@@ -190,10 +197,10 @@ static int locals_of(const Program *program) {
     return program->language == D_PROGRAMS_FANUC ? P_MACRO_LOCALS : P_LOCAL_PARAMETERS;
 }
 
-/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's. */
-int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int64_t next) {
+/* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's, and `given` their bits. */
+int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int64_t times, int64_t next) {
     Course *at = run->course;
-    const Subprogram *subprogram = &AT(run->program->subprograms, row);
+    Subprogram *subprogram = &AT(run->program->subprograms, row);
     if (!is_ready(run, row))
         return WAIT;
     if (run->program->language != D_PROGRAMS_FANUC && (subprogram->is_program != 0) != (arguments == NULL))
@@ -211,6 +218,13 @@ int64_t call(Run *run, int64_t row, const double *arguments, int64_t times, int6
     frame->is_program = subprogram->is_program;
     frame->has_arguments = arguments != NULL;
     frame->main_line = main_line;
+    frame->given = given;
+    frame->assigned = 0;
+    frame->subprogram = (int32_t)row;
+    frame->call_line = run->line;
+    if (given & ~subprogram->given)
+        subprogram->given_line = run->line;
+    subprogram->given |= given;
     frame->repeats = (int32_t)at->repeats;
     for (int k = 0; arguments != NULL && k < locals_of(run->program); k++) {
         frame->parameters[k] = AT(run->program->parameters, k + 1);
@@ -237,7 +251,10 @@ static int64_t called_row(Run *run, Evaluation *e, const MarkedLine *marked, int
         return marked->subprogram;
     const double value = value_at(e, i);
     int64_t number;
-    *i = after_word(run->program->text, *i, e->end, "call");
+    const int64_t behind = after_word(run->program->text, *i, e->end, "call");
+    if (behind == *i) /* where the line says it, it is in a comment */
+        wrong(e, F_O_WORD, PF_FAULT_WORD, 0.0, *i);
+    *i = behind;
     if (e->finding != F_OK)
         return NOTHING_WANTED;
     if (whole_number(value, &number) && number >= 0)
@@ -252,8 +269,8 @@ static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next)
     int64_t i, count = 0;
     const int64_t row = called_row(run, &e, marked, &i);
     const Bytes text = run->program->text;
-    for (i = after_blanks(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
-         i = after_blanks(text, i, e.end)) {
+    for (i = after_comments(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+         i = after_comments(text, i, e.end)) {
         if (count == P_LOCAL_PARAMETERS)
             wrong(&e, F_O_WORD, PF_FAULT_ARGUMENTS, 0.0, i);
         else
@@ -261,7 +278,7 @@ static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next)
     }
     if (!line_ends(&e, i))
         return stop_wrong(run, &e, marked->start, next);
-    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, 1, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, ((int64_t)2 << count) - 2, 1, next);
 }
 
 /* M98 P… L…: the words behind M98 are `from` to `to`. */
@@ -286,7 +303,7 @@ int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int
     if (times == 0)
         return next;
     const int64_t row = row_of_number(run, number);
-    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, times, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, NULL, 0, times, next);
 }
 
 /* Restore what M73 has saved in the subprogram that ends; return false where room is wanted, or with a finding. */

@@ -94,6 +94,8 @@ int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
     const double test = bracket_value(&e, &i);
+    if (e.finding == F_OK && after_word(run->program->text, i, e.end, "do") == i)
+        wrong(&e, F_EXPRESSION, PF_MACRO_BEHIND_WHILE, 0.0, least(i, e.end - 1));
     if (e.finding != F_OK)
         return stop_wrong(run, &e, marked->start, next);
     return test != 0.0 ? next : jump(run, marked->target);
@@ -131,7 +133,7 @@ static int take_argument(uint8_t letter, double value, double *p, double argumen
 /* G65 P and arguments; the words behind G65 are `from` to `to`. */
 static int64_t call_macro(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
     double arguments[P_MACRO_LOCALS], p = NAN;
-    int64_t number;
+    int64_t number, given = 0;
     for (int k = 0; k < P_MACRO_LOCALS; k++)
         arguments[k] = VACANT;
     for (int64_t k = from; k < to; k++) {
@@ -141,8 +143,10 @@ static int64_t call_macro(Run *run, const Words *words, int64_t from, int64_t to
     }
     if (!whole_number(p, &number) || number < 1)
         return stop_at_fault(run, PF_FAULT_MACRO_WORDS, next);
+    for (int k = 0; k < P_MACRO_LOCALS; k++)
+        given |= (int64_t)(arguments[k] != VACANT) << (k + 1);
     const int64_t row = row_of_number(run, number);
-    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, 1, next);
+    return row == WANTED_BY_NUMBER ? WAIT : call(run, row, arguments, given, 1, next);
 }
 
 /* --- M98 and M99 ---------------------------------------------------------------------------------------- */
@@ -188,7 +192,7 @@ static int64_t call_behind(Run *run, const Words *words, int64_t from, int64_t a
         return WAIT;
     if (run->machine->counts.at->errors > 0 || run->machine->state.at->ended || run->course->is_stopped || times == 0)
         return next;
-    return call(run, row, NULL, times, next);
+    return call(run, row, NULL, 0, times, next);
 }
 
 /* M99, behind the words `from` to `at`, which are carried out before. */

@@ -144,10 +144,27 @@ void note_unset(const Evaluation *e, int64_t number) {
     s->unset_parameter = (int32_t)number;
 }
 
+/* Keep that the subprogram at hand reads an argument which its call does not give: the highest of its first such call. */
+static void note_argument(const Evaluation *e, int64_t number) {
+    const Program *p = e->program;
+    const Frame *frame = &AT(p->frames, p->course.at->frame);
+    if (!frame->has_arguments || (frame->given | frame->assigned) >> number & 1)
+        return;
+    Subprogram *called = &AT(p->subprograms, frame->subprogram);
+    if (number <= called->missing || (called->missing != 0 && called->missing_line != frame->call_line))
+        return;
+    called->missing = (int32_t)number;
+    called->missing_line = frame->call_line;
+    called->missing_read = e->line;
+    called->missing_given = frame->given;
+}
+
 /* Return a parameter's value: 0 where nothing has set it, as in LinuxCNC. */
 double numbered_parameter(const Evaluation *e, int64_t number) {
     if (is_read_only(number))
         return of_state(e->machine, number);
+    if (number <= P_LOCAL_PARAMETERS && !e->is_condition)
+        note_argument(e, number);
     const double value = AT(e->program->parameters, number);
     if (!isnan(value))
         return value;
@@ -194,6 +211,10 @@ int64_t name_at(Evaluation *e, int64_t *i) {
     for (; k < e->end && AT(text, k) != CH_GREATER; k++) {
         if (is_blank(AT(text, k)))
             continue;
+        if (AT(text, k) == CH_PAREN_OPEN || AT(text, k) == CH_SEMICOLON) { /* LinuxCNC takes it into the name */
+            wrong(e, F_EXPRESSION, PF_NAME_COMMENT, 0.0, k);
+            return NO_NAME;
+        }
         if (length == P_LONGEST_NAME) {
             wrong(e, F_EXPRESSION, PF_NAME_TOO_LONG, 0.0, *i);
             return NO_NAME;
@@ -306,6 +327,8 @@ void assign(Program *program) {
         if (each->name == NO_NAME) {
             at->changes += AT(program->parameters, each->number) != each->value;
             AT(program->parameters, each->number) = each->value;
+            if (each->number <= P_MACRO_LOCALS)
+                AT(program->frames, at->frame).assigned |= (int64_t)1 << each->number;
         } else if (is_global(program, each->name)) {
             ParameterName *name = &AT(program->names, each->name);
             at->changes += !name->is_set || name->value != each->value;

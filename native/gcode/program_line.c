@@ -76,10 +76,7 @@ static int64_t calculation_at(Evaluation *e, int64_t i) {
     const bool is_alone = at->words == 0 || (at->words == 1 && AT(e->program->letter, 0) == CH_SLASH);
     if (is_alone)
         assignment_at(e, &i);
-    const int64_t behind = after_blanks(e->program->text, i, e->end);
-    const bool ends = behind >= e->end || AT(e->program->text, behind) == CH_PAREN_OPEN ||
-                      AT(e->program->text, behind) == CH_SEMICOLON;
-    if (!is_alone || (e->finding == F_OK && !ends))
+    if (!is_alone || (e->finding == F_OK && !is_rest_comment(e->program->text, i, e->end)))
         wrong(e, F_EXPRESSION, PF_MACRO_ALONE, 0.0, place);
     return i;
 }
@@ -162,7 +159,8 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);
         put_item(e, &item, &first_message);
-        first = first && c != CH_HASH && item.kind != V_MARK && item.kind != LINE_NUMBER && !begins_word(c);
+        first = first && c != CH_HASH && c != CH_PAREN_OPEN && item.kind != V_MARK && item.kind != LINE_NUMBER &&
+                !begins_word(c);
     }
 }
 

@@ -69,11 +69,7 @@ static Item without_number(Bytes text, int64_t i, int64_t start, int letter) {
 
 /* Return the item of O and its number, which ends at i: alone in its line it says nothing. */
 static Item program_number(Bytes text, int64_t i, bool may_be_one) {
-    while (i < text.rows && is_blank(AT(text, i)))
-        i++;
-    const bool alone = i >= text.rows || AT(text, i) == CH_NEWLINE || AT(text, i) == CH_PAREN_OPEN ||
-                       AT(text, i) == CH_SEMICOLON;
-    if (may_be_one && alone)
+    if (may_be_one && is_rest_comment(text, i, line_end(text, i)))
         return (Item){LINE_NUMBER, F_OK, 0.0, 0, i};
     return whole_line(text, i);
 }
@@ -136,6 +132,8 @@ static int32_t kind_of_line(const Scan *scan, int64_t i) {
         i = after_blanks(text, scan->syntax & D_MACROS ? after_skip_level(text, i + 1) : i + 1, end);
     if (i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_N)
         i = after_blanks(text, number(text, i + 1).end, end);
+    if (scan->syntax == 0) /* an O-word behind a comment is refused, but it is none of those that may be passed over */
+        i = after_comments(text, i, end);
     if (scan->syntax & D_MACROS && (begins_statement(text, i, end) || (i < end && AT(text, i) == CH_COLON)))
         return P_KIND_O_WORD;
     return i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_O ? P_KIND_O_WORD : P_KIND_BLOCK;
@@ -158,14 +156,16 @@ static void put_line(Scan *scan, int64_t start, int64_t line) {
     put(scan, V_PROGRAM_LINE, (double)scan->program_lines++, line);
 }
 
-/* Keep the spans of the message comments from i to the end of the line. */
-static void put_messages(Scan *scan, int64_t i, int64_t end) {
+/* Keep the spans of the message comments from i to the end of the line; return what is wrong with a comment. */
+static int put_messages(Scan *scan, int64_t i, int64_t end) {
     for (; i < end; i++) {
         if (AT(scan->text, i) == CH_SEMICOLON)
-            return;
+            return scan->syntax & D_MACROS && is_word_behind(scan->text, i + 1) ? F_DIALECT_STATEMENT : F_OK;
         if (AT(scan->text, i) != CH_PAREN_OPEN)
             continue;
         const Item item = comment(scan->text, i);
+        if (item.kind == V_MARK)
+            return item.finding;
         if (item.kind == CH_PAREN_OPEN) {
             CELL(scan->message_span, scan->messages, 0) = i + 1;
             CELL(scan->message_span, scan->messages, 1) = item.end - 1;
@@ -173,6 +173,18 @@ static void put_messages(Scan *scan, int64_t i, int64_t end) {
         }
         i = item.end - 1;
     }
+    return F_OK;
+}
+
+/* Keep the messages of the line that was put last, from i to its end. Where a comment does not end in it, nothing else
+   of the line is read: each reader of it may take comments as closed. */
+static void put_comments(Scan *scan, int64_t i, int64_t end) {
+    const int finding = put_messages(scan, i, end);
+    const int64_t row = scan->program_lines - 1;
+    if (finding == F_OK || scan->syntax & D_STATEMENTS || row >= scan->lines.rows) /* a Sinumerik calculates in ( ) */
+        return;
+    AT(scan->lines, row).kind = P_KIND_BLOCK;
+    AT(scan->lines, row).fault = finding;
 }
 
 /* Write what an item from `start` on makes; a line has one mark of its characters at most. */
@@ -203,6 +215,8 @@ EXPORT void gcode_scan(Scan *scan) {
     const Bytes text = scan->text;
     int64_t line = scan->first_line, line_start = 0, marked_line = 0, most_decimals = 0;
     bool first = true; /* no word before in this line */
+    /* For LinuxCNC, N and / stand behind a comment no more; in a program that jumps, no control's line is found so. */
+    const bool comments_count = scan->syntax == 0 || scan->whole_program;
     for (int64_t i = 0; i < text.rows;) {
         const uint8_t c = AT(text, i);
         if (c == CH_NEWLINE) {
@@ -249,7 +263,7 @@ EXPORT void gcode_scan(Scan *scan) {
         if (belongs_to_program(scan, &item, c)) {
             put_line(scan, line_start, line);
             item.end = line_end(text, i);
-            put_messages(scan, i, item.end);
+            put_comments(scan, i, item.end);
         } else {
             put_item(scan, &item, i, line, marked_line == line);
             if (scan->syntax & D_MACROS && item.kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == CH_LETTER_O)
@@ -257,7 +271,7 @@ EXPORT void gcode_scan(Scan *scan) {
         }
         if (item.kind == V_MARK)
             marked_line = line;
-        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER;
+        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !(c == CH_PAREN_OPEN && comments_count);
         i = item.end;
     }
     scan->most_decimals = most_decimals;

@@ -385,3 +385,30 @@ def test_loops_run_as_those_of_linuxcnc_do(start, step, shift, inner):
     wanted = read_stream(io.BytesIO((head + o_words).encode()), "part.ngc")
     assert found.position_mm.tolist() == wanted.position_mm.tolist()
     assert found.rapid.tolist() == wanted.rapid.tolist()
+
+
+def test_a_call_that_gives_what_the_macro_never_reads_is_told():
+    text = "G65 P9010 X5. Z-1. Q3.\nM30\nO9010\nIF [#26 EQ #0] GOTO 5\nG0 X#24 Z#26\nN5 M99"
+    (issue,) = (issue for issue in read(text).issues if issue.code == "argument-count")
+    assert issue.line == FIRST
+    assert "gives Q, which" in issue.message
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "#1=5 (a) #2=6",
+        "#1=5 (a) G0 X5.",
+        "#1=5 (a) +3",
+        "IF [1 EQ 1] THEN #1=5 (a) #2=6",
+        "GOTO 5 (a) + 3",
+        "WHILE [1 LT 0] DO1 (a) G0 X5.\nEND1",
+        "WHILE [1 LT 0] (a) DO1\nEND1",
+        "WHILE [1 LT 0] ;] DO1\nEND1",
+        "#1=5; X3.",
+        "#1=5\nG0 X1.; Y#1",
+        "#1=5\n(a) N5 G0 X1.",
+    ],
+)
+def test_nothing_is_hidden_behind_a_comment(text):
+    assert refused(text)[1] == text.count("#1=5\n") + 1

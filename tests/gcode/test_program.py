@@ -107,7 +107,7 @@ def test_a_caret_stands_before_the_culprit():
 
 
 def test_what_is_passed_over_may_be_anything():
-    assert ends("o1 if [0]\nX[1/0] $ (\no2 call [1/0]\no1 endif\nX1") == [1.0]
+    assert ends("o1 if [0]\nX[1/0] $ )\no2 call [1/0]\no1 endif\nX1") == [1.0]
 
 
 @pytest.mark.parametrize(
@@ -163,6 +163,86 @@ def test_a_loop_that_changes_nothing_is_seen_at_once(text, monkeypatch):
 def test_behind_an_o_word_a_comment_may_stand():
     text = "o1 if [0] (a)\nX1\no1 else ; b\nX2\no1 endif (c)\no2 repeat [2]\nX3\no2 endrepeat\t(d)"
     assert ends(text) == [2.0, 3.0, 3.0]
+
+
+SUB = "o<p> sub\nG1 X#1 Y#2\no<p> endsub\n"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "o<p> call [60] (end of the pass) [-40]",
+        "o<p> call (a)[60](b)(c;d) [-40](e);[3]",
+        "O<P>CALL[60]\t(\t)[-40]",
+    ],
+)
+def test_a_comment_between_the_arguments_of_a_call_is_nothing(call):
+    assert read(SUB + call).position_mm[-1].tolist() == [60.0, -40.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (SUB + "o<p> call [60] (c) G1 X3", ("expression", 6)),
+        (SUB + "o<p> (c) call [60] [-40]", ("o-word", 6)),
+        (SUB + "o<p (c)> call [60] [-40]", ("o-word", 6)),
+        (SUB + "o<p> call [60 (c)] [-40]", ("expression", 6)),
+        (SUB + "o<p> call [60] (c [-40]", ("comment-open", 6)),
+        (SUB + "o<p> call [60] (c (d) [-40])", ("comment-nested", 6)),
+        ("o10 sub\nX#1\no10 endsub\n#1=10\no#1 (c) call [60]", ("o-word", 7)),
+        ("o10 sub\nX#1\no10 endsub\n#1=10\no#1 ; call [60]", ("o-word", 7)),
+        ("o1 sub\nX5\no1 return (c) [5]\no1 endsub\no1 call", ("expression", 5)),
+        ("o1 sub (c) X5\nX5\no1 endsub", ("o-word", 3)),
+        ("o1 if [1] (c) [0]\nX5\no1 endif", ("expression", 3)),
+        ("o1 if [1]\nX5\no1 elseif [1] (c) [0]\nX6\no1 endif", ("expression", 5)),
+        ("o1 if [0]\nX5\no1 else (c) X7\nX6\no1 endif", ("o-word", 5)),
+        ("o1 if [0]\nX5\n(c) o1 else\nX6\no1 endif", ("o-word", 5)),
+        ("o1 if [0]\nX5\no1 else (c\nX6\no1 endif", ("comment-open", 5)),
+        ("o1 if [0]\nX5 (c\no1 endif", ("comment-open", 4)),
+        ("o1 sub\nX5 (a(b)\no1 endsub", ("comment-nested", 4)),
+        ("#<a(c)>=5\nX#<a(c)>", ("expression", 3)),
+        ("#<a;c>=5\nX#<a;c>", ("expression", 3)),
+        ("(c)N5 X3", ("n-not-first", 3)),
+        ("(c)/X3", ("bad-character", 3)),
+        ("O1000 (c) X5", ("o-word", 3)),
+    ],
+)
+def test_a_comment_hides_nothing_and_joins_nothing(text, found):
+    assert refused(text) == found
+
+
+@pytest.mark.parametrize("line", ["/o1 else (c", "/(c) o1 else", "/X9 (c", "/o1 else (c) X9"])
+def test_a_line_that_is_left_out_may_be_anything(line):
+    text = f"o1 if [0]\nX1\n{line}\nX2\no1 endif\nX3"
+    assert ends(text, block_delete=True) == [3.0]
+    assert refused(text)[1] == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        (SUB + "o<p> call [1] [2]", []),
+        (SUB + "o<p> call [1] [2]\no<p> call [1]\no<p> call", [7]),
+        (SUB + "o<p> call [1] (c) [2] [3]", [6]),
+        ("o1 sub\no2 if [#2 EQ 0]\n#2=7\no2 endif\nX#1 Y#2\no1 endsub\no1 call [1]", []),
+        ("o1 sub\n#2=[#1+1]\nX#2\no1 endsub\no1 call [1]\no1 call [1] [2]", [8]),
+        ("o1 sub\no2 if [#1 EQ 1]\nX#2\no2 endif\no1 endsub\no1 call [2] [3]", []),
+        ("o1 sub\no2 if [#1 EQ 1]\n#2=5\no2 endif\nX#2\no1 endsub\no1 call [1] [3]", []),
+        ("o1 sub\nX##1\no1 endsub\no1 call [2] [3]", []),
+        ("o1 sub\nX#1 (and #2)\no1 endsub\no1 call [2] [3]", [6]),
+        ("o1 sub\no2 call [#1] [#2]\no1 endsub\no2 sub\nX#1 Y#2\no2 endsub\no1 call [5]", [9]),
+    ],
+)
+def test_a_call_with_fewer_or_more_arguments_than_its_subprogram_reads_is_told(text, lines):
+    issues = [issue for issue in read(text).issues if issue.code == "argument-count"]
+    assert [issue.line for issue in issues] == lines
+
+
+def test_a_call_with_too_few_arguments_names_the_line_that_reads_the_missing_one():
+    (issue,) = (issue for issue in read(SUB + "o<p> call [60]").issues if issue.code == "argument-count")
+    assert (issue.severity, issue.line) == ("warning", 6)
+    assert issue.message == "O<p> is called with 1 argument, and line 4 reads #2, which is 0"
+    assert "2 arguments" in issue.remedy
 
 
 def test_a_subprogram_of_another_file_names_its_caller(tmp_path):
