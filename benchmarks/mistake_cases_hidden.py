@@ -5,7 +5,7 @@ with earlier states of this program, `FURTHER` are others thought of for this be
 least that is right: ``warning`` where a person may mean it.
 """
 
-from mistake_cases import CELL_HEAD, CELL_TOOLS, STOCK, SUB, Mistake
+from mistake_cases import CELL_TOOLS, STOCK, SUB, Mistake
 
 FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
 AFTER_T7 = 6
