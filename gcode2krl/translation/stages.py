@@ -142,17 +142,14 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
     """Set the targets, and refuse those that a robot cannot run; tables that wait are kept on disk."""
-    from gcode2krl.cell.confirmation import future_confirmation
     from gcode2krl.compiled.memory import give_back
     from gcode2krl.files.spool import on_disk
-    from gcode2krl.pipeline import corner_errors, targets_and_joints
+    from gcode2krl.pipeline import judged_targets
 
     toolpath = _done(known.toolpath)
-    targets, joints = targets_and_joints(toolpath, cell, order.tolerance_mm, order.simplify_mm)
-    errors_mm, corner_issues = corner_errors(toolpath, targets, cell, order.tolerance_mm)
-    known.corner_mm = float(errors_mm.max(initial=0.0))
-    del errors_mm
-    known.targets = replace(targets, issues=(*targets.issues, *corner_issues, *future_confirmation(cell)))
+    known.targets, joints, known.corner_mm = judged_targets(
+        toolpath, cell, order.tolerance_mm, order.simplify_mm
+    )
     refuse_early(known.targets, cell, order)
     known.toolpath, known.joints = on_disk(toolpath), on_disk(joints)
     del toolpath, joints
