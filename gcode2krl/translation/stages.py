@@ -66,6 +66,8 @@ class _Ready:
     name: str | None
     inputs: list[Path]
     """Files that must not be overwritten."""
+    outputs: list[Path]
+    """Files to write, without the parts of a long program."""
     of_job: tuple[Issue, ...]
 
 
@@ -88,7 +90,15 @@ def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
 
 def _translate(order: Order, known: _Known, begin: Begin) -> None:
     """Run the stages in their order; each leaves in ``known`` what it has found."""
+    from gcode2krl.files import watched
+
     ready = _ready(order, known)
+    with watched(ready.outputs):
+        _carry_on(order, ready, known, begin)
+
+
+def _carry_on(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
+    """Run the stages behind what an order names."""
     _read(order, ready, known, begin)
     begin("planning")
     _plan(order, ready.cell, known)
@@ -118,8 +128,9 @@ def _ready(order: Order, known: _Known) -> _Ready:
     inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path))
     require_figure(order.compensate_plot)
     require_report(order.report, inputs)
-    require_outputs(outputs_of(order, place, name, cell), *inputs)
-    return _Ready(cell, place, name, inputs, of_job)
+    outputs = outputs_of(order, place, name, cell)
+    require_outputs(outputs, *inputs)
+    return _Ready(cell, place, name, inputs, outputs, of_job)
 
 
 def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
