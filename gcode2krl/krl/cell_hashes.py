@@ -33,9 +33,7 @@ _END, _LONGEST = b";ENDFOLD", 1_000_000
 """Where the header ends, and how many bytes of a file are searched for that."""
 _OPTIONS = "options"
 """The entry for the lines of options and released findings, which `verify` takes from the header."""
-_RELEASED = re.compile(
-    r"([a-z0-9-]+(?::(?:[^:]+:)?[0-9]{1,9})?)(?: \(whole file, ([0-9]{1,9})\))?(?:, |$)"
-)
+_RELEASED = re.compile(r"([a-z0-9-]+(?::(?:[^:]+:)?[0-9]{1,9})?)(?: \(whole file, ([0-9]{1,9})\))?(?:, |$)")
 """A release in the header, and for how many findings it was."""
 _REMEDY = "look at what it would do with the cell as it is, and translate again"
 
@@ -62,9 +60,7 @@ def hash_lines(
         if has.get(section, True)
     ]
     entries.append(f"{_OPTIONS} {_options_hash(options, released)}")
-    return [
-        _HEAD + ", ".join(entries[k : k + _ALONG_A_LINE]) for k in range(0, len(entries), _ALONG_A_LINE)
-    ]
+    return [_HEAD + ", ".join(entries[k : k + _ALONG_A_LINE]) for k in range(0, len(entries), _ALONG_A_LINE)]
 
 
 class StatedCell:
@@ -105,7 +101,9 @@ class StatedCell:
     def changes(self, cell: Cell, tools: Iterable[int] = ()) -> Iterator[Issue]:
         """Yield the sections that are not as when the program was written: of its tools, and of these."""
         if not self.hashes and not self.is_malformed:
-            sentence = "its header has no cell hash: what has changed in the cell since it was written is not known"
+            sentence = (
+                "its header has no cell hash: what has changed in the cell since it was written is not known"
+            )
             yield Issue("warning", "verify-cell-unknown", 0, sentence)
             return
         if self.is_malformed or self.hashes.get(_OPTIONS) != self._said_hash:
@@ -117,7 +115,13 @@ class StatedCell:
             before, after = self.hashes.get(section), now.get(section)
             if before == after or (before is None and section in _WITH_PILOT_OR_RSI):
                 continue
-            how = "not as" if before and after else "stated, as it was not" if after else "not stated any more, as"
+            how = (
+                "not as"
+                if before and after
+                else "stated, as it was not"
+                if after
+                else "not stated any more, as"
+            )
             sentence = f"{section}: {how} when the program was written"
             yield Issue("error", "verify-cell-changed", self.line, sentence, _REMEDY, key=section)
 

@@ -104,7 +104,11 @@ def released_again(issues: Iterable[Issue], releases: Mapping[str, int | None]) 
         for k in matches:
             if found[k].code in NEVER_RELEASED:
                 continue
-            words = f"released by hand were {count}, now there are {len(matches)}" if too_many else "released by hand"
+            words = (
+                f"released by hand were {count}, now there are {len(matches)}"
+                if too_many
+                else "released by hand"
+            )
             severity: Severity = "error" if too_many else "warning"
             findings[k] = replace(found[k], severity=severity, message=f"{found[k].message} ({words})")
     return findings

@@ -117,9 +117,8 @@ CASES = {
     "five axes": ("five_axis/five_axis.nc", "five_axis/cell.toml", [], []),
     "rail": ("external/long_part.nc", "external/robot_on_rail.toml", [], []),
     "simplified": ("test_piece.nc", None, ["--simplify", "0.02"], ["--simplify", "0.02"]),
-    "compensated": ("test_piece.nc", None, ["--compensate", "offline"], ["--compensate", "offline"]),
     "files": ("test_piece.nc", None, ["--split", "files", "--max-lines", "100"], []),
-    "online": ("test_piece.nc", None, ["--online", "HZ", "--allow", "online-address"], []),
+    "online": ("test_piece.nc", None, ["--online", "HZ"], []),
     "no forces": ("test_piece.nc", None, ["--no-forces"], []),
     "restart": ("test_piece.nc", None, ["--from-line", "30"], ["--from-line", "30"]),
 }
@@ -136,3 +135,32 @@ def test_an_example_with_its_own_cell_agrees(run, tmp_path, name):
     checked = run("verify", src, nc, *named, *stated)
     assert checked.code == 0, checked.err
     assert "agrees with" in checked.out and "cell hash" not in checked.err
+
+
+def test_a_compensated_program_agrees(run, tmp_path):
+    nc, cell = tmp_path / "part.nc", tmp_path / "cell.toml"
+    nc.write_text(SLOT.replace("G0 X60\n", "").replace("Z-2", "Z-0.5"))
+    cell.write_text(CELL)
+    options = ("--cell", cell, "--compensate", "offline")
+    made = run(nc, "-o", tmp_path / "made.src", *options)
+    assert made.code == 0, made.err
+    checked = run("verify", tmp_path / "made.src", nc, *options)
+    assert checked.code == 0, checked.err
+
+
+G43, LONGER = "G0 G43 H1 Z20", "[tool.1]\ndiameter_mm = 10.0\nteeth = 2\nlength_mm = 104.0\n"
+
+
+@pytest.mark.parametrize("call", [G43, "G0 Z20"])
+def test_a_longer_cutter_is_told_with_and_without_g43(run, verified, tmp_path, call):
+    part, cell, src = tmp_path / "slot.nc", tmp_path / "cell.toml", tmp_path / "slot.src"
+    part.write_text(SLOT.replace(G43, call).replace("G0 X60\n", ""))
+    head, _, stock = CELL.partition("[stock]")
+    program = '[program]\ntool_length = "from_table"\n' if call != G43 else ""
+    cell.write_text(f"{head}{program}[stock]{stock}{LONGER.replace('104', '100')}")
+    assert run(part, "--cell", cell, "-o", src).code == 0
+    assert verified(part, cell, src)["exit_code"] == 0
+    cell.write_text(f"{head}{program}[stock]{stock}{LONGER}")
+    record = verified(part, cell, src)
+    sentences = [i["message"] for i in record["issues"] if i["code"] == "verify-cell-changed"]
+    assert sentences == ["tool.1: not as when the program was written"]

@@ -47,7 +47,9 @@ def test_of_many_writers_at_the_same_time_exactly_the_first_wins(tmp_path, befor
     for process in processes.values():  # all at once
         process.stdin.write("\n")
         process.stdin.flush()
-    ended = {word: (process.communicate()[1].strip(), process.returncode) for word, process in processes.items()}
+    ended = {
+        word: (process.communicate()[1].strip(), process.returncode) for word, process in processes.items()
+    }
     winners = [word for word, (_, code) in ended.items() if code == 0]
     assert len(winners) == 1, ended
     assert {text for text, code in ended.values() if code} == {"output-changed 2"}
@@ -99,3 +101,19 @@ def _host(folder: Path) -> str:
     names = []
     write_together({folder / "a.src": lambda path: names.append(path.name) or path.write_bytes(b"")})
     return names[0].split(".")[3].split("-")[0]
+
+
+def test_two_translations_to_one_program(tmp_path):
+    """The first begins, the second ends: the first must not replace what it has written."""
+    part = "G21 G90\nT1 M6\nS8000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG1 Z-1 F600\nG1 X40\nG0 Z20\nM5\nM30\n"
+    comment = "(" + 60 * "x" + ")\n"
+    words = [sys.executable, "-m", "gcode2krl", "-", "-o", str(tmp_path / "part.src")]
+    first = subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    first.stdin.write(comment * 8000)  # more than a pipe holds: the part is being read when this returns
+    first.stdin.flush()
+    second = subprocess.run(words, input=part, capture_output=True, text=True)
+    assert second.returncode == 0, second.stderr
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    told = first.communicate(part.replace("X40", "X50"))[1]
+    assert first.returncode == 2 and "[output-changed]" in told, told
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -31,6 +31,7 @@ DATA = {
     ],
     "verified": {"by": "A. Miller", "date": "2026-01-15"},
 }
+CAPSULE = {"from_mm": [0, 0, 0], "to_mm": [0, 0, 50], "radius_mm": 60}
 BASE = {"x_mm": 1500, "y_mm": 10, "z_mm": 500, "a_deg": 0, "b_deg": 0, "c_deg": 0}
 LIMITS = [(-100, 100), (-140, -5), (-120, 155), (-350, 350), (-122.5, 122.5), (-350, 350)]
 OFF = "$OUT[1]=FALSE\n$OUT[2]=FALSE\n$ANOUT[1]=0.0\nWAIT SEC 9.0"
@@ -43,6 +44,8 @@ CHANGES = {
     ),
     "no obstacle left": ("obstacle", {"obstacle": []}),
     "cutter of 12 for 10 mm": ("tool.1", {"tool.1.diameter_mm": 12.0}),
+    "a weaker cutter": ("tool.1", {"tool.1.max_force_N": 5.0}),
+    "a body of the spindle": ("spindle", {"spindle.body": {"capsules": [CAPSULE]}}),
     "cutter 5 mm longer": ("tool.1", {"tool.1.length_mm": 105.0}),
     "cutter with round corners": ("tool.1", {"tool.1.corner_radius_mm": 1.0}),
     "one tooth more": ("tool.1", {"tool.1.teeth": 3}),

@@ -33,7 +33,9 @@ def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     codes = sorted({code for *_, code, _ in kept})
     run = {
         "tool": {"driver": _driver(codes)},
-        "invocations": [{"executionSuccessful": True} | _notified(demonstration(parts), len(found) - len(kept))],
+        "invocations": [
+            {"executionSuccessful": True} | _notified(demonstration(parts), len(found) - len(kept))
+        ],
         "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
         "columnKind": "unicodeCodePoints",
         "results": [_result(one, codes.index(one[4])) for one in kept],
