@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+
 from tests.conftest import ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -60,7 +61,8 @@ def test_a_released_finding_is_listed_and_does_not_differ(verified, slot):
     assert record["exit_code"] == 0, record["issues"]
     released = [issue for issue in record["issues"] if issue["code"] == "rapid-in-stock"]
     assert [issue["line"] for issue in released] == [12]
-    assert released[0]["file"].endswith("slot.nc") and "(released by hand)" in released[0]["message"]
+    assert released[0]["file"].endswith("slot.nc")
+    assert "(released by hand)" in released[0]["message"]
 
 
 def test_more_findings_than_were_released_differ(verified, slot):
@@ -88,7 +90,8 @@ def test_a_header_changed_by_hand_differs(verified, slot, before, after, expecte
     at = text.rindex(before.encode()) if before.startswith("stock") else text.index(before.encode())
     src.write_bytes(text[:at] + after.encode() + text[at + len(before) :])
     record = verified(part, cell, src)
-    assert record["exit_code"] == 1 and found(record) == expected
+    assert record["exit_code"] == 1
+    assert found(record) == expected
 
 
 def test_a_program_without_hashes_is_judged_all_the_same(verified, slot):
@@ -96,7 +99,8 @@ def test_a_program_without_hashes_is_judged_all_the_same(verified, slot):
     lines = src.read_bytes().splitlines(keepends=True)
     src.write_bytes(b"".join(line for line in lines if not line.startswith(b"; cell hash")))
     record = verified(part, cell, src)
-    assert record["exit_code"] == 0 and "verify-cell-unknown" in found(record, "warning")
+    assert record["exit_code"] == 0
+    assert "verify-cell-unknown" in found(record, "warning")
     assert "rapid-in-stock" in found(record, "warning")
     cell.write_text(CELL.replace("50, 0]", "50, 5]"))
     assert verified(part, cell, src)["exit_code"] == 1, "two findings, one was released"
@@ -134,7 +138,8 @@ def test_an_example_with_its_own_cell_agrees(run, tmp_path, name):
     assert made.code == 0, made.err
     checked = run("verify", src, nc, *named, *stated)
     assert checked.code == 0, checked.err
-    assert "agrees with" in checked.out and "cell hash" not in checked.err
+    assert "agrees with" in checked.out
+    assert "cell hash" not in checked.err
 
 
 def test_a_compensated_program_agrees(run, tmp_path):
