@@ -343,7 +343,7 @@ def targets_and_joints(
 def judged_targets(
     toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None, simplify_mm: float | None = None
 ) -> tuple[Targets, Joints, float]:
-    """Return targets with all that is found before their motion is planned, joints, the largest corner error (mm)."""
+    """Return targets with all findings before their motion, joints, and the largest corner error (mm)."""
     targets, joints = targets_and_joints(toolpath, cell, tolerance_mm, simplify_mm)
     errors_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance_mm)
     judged = replace(targets, issues=(*targets.issues, *corner_issues, *future_confirmation(cell)))

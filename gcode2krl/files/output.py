@@ -64,7 +64,7 @@ class _Begun:
 
 @contextlib.contextmanager
 def watched(places: Iterable[Path] = (), folder: Path | None = None) -> Iterator[None]:
-    """Refuse to write these places, or any in a folder, within, if another process has written it since now."""
+    """Refuse to write these places, or any in a folder, where another process writes them from now on."""
     inside = () if folder is None else folder.rglob("*")
     begun = _BEGUN_WITH.set(_Begun((*places, *inside), folder))
     try:
@@ -101,7 +101,7 @@ class Staging:
         return self._temporary[place]
 
     def expect(self, place: Path) -> None:
-        """Take what stands at a place as what may be overwritten, as `watched` has seen it or as it is now."""
+        """Take what stands at a place now, or when `watched` looked, as what may be overwritten."""
         name = _full_name(place)
         if name not in self._begun_with:
             run = _BEGUN_WITH.get()

@@ -1,8 +1,8 @@
-"""The hashes with which the header of a program remembers its cell, a section each, and what has changed since."""
+"""The hashes with which a program's header remembers its cell, a section each, and what has changed since."""
 
 import hashlib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +101,7 @@ class StatedCell:
     def changes(self, cell: Cell, tools: Iterable[int] = ()) -> Iterator[Issue]:
         """Yield the sections that are not as when the program was written: of its tools, and of these."""
         if not self.hashes and not self.is_malformed:
-            sentence = (
-                "its header has no cell hash: what has changed in the cell since it was written is not known"
-            )
+            sentence = "no cell hash in its header: what has changed in the cell since then is not known"
             yield Issue("warning", "verify-cell-unknown", 0, sentence)
             return
         if self.is_malformed or self.hashes.get(_OPTIONS) != self._said_hash:
@@ -115,13 +113,7 @@ class StatedCell:
             before, after = self.hashes.get(section), now.get(section)
             if before == after or (before is None and section in _WITH_PILOT_OR_RSI):
                 continue
-            how = (
-                "not as"
-                if before and after
-                else "stated, as it was not"
-                if after
-                else "not stated any more, as"
-            )
+            how = "not as" if before and after else "not yet there" if after else "not there any more, as"
             sentence = f"{section}: {how} when the program was written"
             yield Issue("error", "verify-cell-changed", self.line, sentence, _REMEDY, key=section)
 

@@ -102,7 +102,7 @@ def _rule(code: Code) -> dict[str, Any]:
 
 
 def _notified(warning: str, left_out: int) -> dict[str, Any]:
-    """Return what is to be said of the whole run: whose cell it was, that not all findings are in the file."""
+    """Return what is to be said of the run: whose cell it was, and that findings are left out."""
     notified = [("warning", warning)] if warning else []
     if left_out:
         text = f"{left_out:,} more findings are in results.jsonl and not here, the least severe ones."
