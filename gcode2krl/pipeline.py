@@ -17,6 +17,7 @@ from gcode2krl import cutting, gcode, krc4, program, robot
 from gcode2krl.arrays import Floats
 from gcode2krl.blockwise import Loads, Outcome, PilotSamples, blocks_with, blocks_with_joints, plan_course
 from gcode2krl.cell import Cell, load_cell
+from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.clearance import Beside, collisions_beside, ways_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
@@ -337,6 +338,16 @@ def targets_and_joints(
     warnings = program.doubtful(toolpath, cell, tolerance_mm)
     tilts = program.tilt_issues(planned, toolpath, cell)
     return checked(replace(planned, issues=(*planned.issues, *warnings, *tilts)), cell)
+
+
+def judged_targets(
+    toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None, simplify_mm: float | None = None
+) -> tuple[Targets, Joints, float]:
+    """Return targets with all findings before their motion, joints, and the largest corner error (mm)."""
+    targets, joints = targets_and_joints(toolpath, cell, tolerance_mm, simplify_mm)
+    errors_mm, corner_issues = corner_errors(toolpath, targets, cell, tolerance_mm)
+    judged = replace(targets, issues=(*targets.issues, *corner_issues, *future_confirmation(cell)))
+    return judged, joints, float(errors_mm.max(initial=0.0))
 
 
 def _simplified(

@@ -106,7 +106,7 @@ def command(
     from gcode2krl.batch.planning import plan
     from gcode2krl.batch.results import earlier_files, read_results, remove_outdated, write_results
     from gcode2krl.batch.run import cluster_at, crew_for, run_batch
-    from gcode2krl.files import make_folder
+    from gcode2krl.files import make_folder, watched
     from gcode2krl.translation import Order
 
     console = Console(quiet, as_json)
@@ -117,6 +117,7 @@ def command(
     out = Path(output)
     make_folder(out)
     workers = crew_for(processes) if scheduler is None else cluster_at(scheduler)
+    click.get_current_context().with_resource(watched(folder=out))
     earlier, batch, stopped = earlier_files(out), Told(len(planned)), False
     with _Stops() as stops:
         try:

@@ -1,13 +1,20 @@
 """``gcode2krl verify part.src part.nc``."""
 
 import math
+from dataclasses import replace
 from typing import Literal
 
 import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import common_options, gcode_options, read_cell, simplify_option
+from gcode2krl.cli.inputs import (
+    common_options,
+    gcode_options,
+    job_option,
+    read_cell_under_job,
+    simplify_option,
+)
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.translation.from_line import read_from_line, restart_record
@@ -27,6 +34,14 @@ from gcode2krl.translation.from_line import read_from_line, restart_record
 @click.option(
     "--compensate", type=click.Choice(["offline"]), help="The program was made with --compensate offline."
 )
+@click.option("--no-forces", is_flag=True, help="Leave out material removal and its findings.")
+@click.option(
+    "--allow",
+    multiple=True,
+    metavar="CODE[:[FILE:]LINE]",
+    help="Findings that are accepted beside those released in the header; may be repeated.",
+)
+@job_option
 @from_line_option
 def command(
     program: str,
@@ -42,11 +57,15 @@ def command(
     block_delete: bool,
     simplify_mm: float | None,
     compensate: Literal["offline"] | None,
+    no_forces: bool,
+    allow: tuple[str, ...],
+    job_path: str | None,
     from_line: int | None,
 ) -> int:
-    """Read a KRL program back and compare it with its G-code.
+    """Read a KRL program back, compare it with its G-code, and judge its hazards anew.
 
-    Use the cell and the tolerances the program was made with. Exit code 1 where it differs.
+    Use the options the program was made with (its header names them), and the cell that it is to run in.
+    Exit code 1 where it differs, where the cell has changed since it was written, or where a hazard is seen.
     """
     console = Console(quiet, as_json)
     try:
@@ -56,7 +75,7 @@ def command(
         click.get_current_context().with_resource(long_columns_on_disk())
         console.heading.reads(program, part)
         refuse_other_start(program, from_line)
-        cell = read_cell(cell_path)
+        cell, of_job = read_cell_under_job(cell_path, job_path)
         with console.stages() as begin:
             toolpath = read_from_line(
                 part,
@@ -69,15 +88,24 @@ def command(
                 dialect=dialect,
                 search=search,
             )
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         prediction = None
         if compensate == "offline":
-            from gcode2krl.pipeline import predict_toolpath
+            from gcode2krl.pipeline import judged_targets, predict_toolpath
             from gcode2krl.translation.compensation import compensated
 
-            whole = predict_toolpath(toolpath, cell, tolerance_mm=tolerance_mm, simplify_mm=simplify_mm)
+            targets, _, _ = judged_targets(toolpath, cell, tolerance_mm, simplify_mm)
+            whole = predict_toolpath(toolpath, cell, targets=targets)
             prediction = compensated(whole, None)
         report = verify_krl(
-            program, toolpath, cell, tolerance_mm, simplify_mm=simplify_mm, prediction=prediction
+            program,
+            toolpath,
+            cell,
+            tolerance_mm,
+            simplify_mm=simplify_mm,
+            prediction=prediction,
+            forces=not no_forces,
+            allow=allow,
         )
     except Gcode2KrlError as error:
         if not as_json:
@@ -87,7 +115,8 @@ def command(
         figures = {"verify": report.as_dict(), **restart_record(toolpath)}
         console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:
-        console.findings(report.issues, program)
+        console.findings((issue for issue in report.issues if not issue.file), program)
+        console.findings((issue for issue in report.issues if issue.file), part)
         state = "agrees with" if report.ok else "DIFFERS from"
         console.say(f"{program} {state} {part}: {report.motions} motions of {report.intended}")
         if math.isnan(report.max_deviation_mm + report.max_rotation_deg + report.max_speed_difference_mm_min):

@@ -8,6 +8,7 @@ from gcode2krl.files.output import (
     make_folder,
     refuse_inputs,
     unwritable,
+    watched,
     write_together,
 )
 
@@ -19,5 +20,6 @@ __all__ = [
     "make_folder",
     "refuse_inputs",
     "unwritable",
+    "watched",
     "write_together",
 ]

@@ -5,6 +5,7 @@ next run that writes the same files: their names state host and process.
 """
 
 import contextlib
+import contextvars
 import os
 import platform
 import re
@@ -22,6 +23,14 @@ Content = bytes | Iterable[bytes] | Callable[[Path], object]
 """The content of a file, its pieces, or a function that writes it to a path."""
 SURELY_LEFT_S = 86400.0
 """No run takes a day to write a file: an older temporary file is a leftover of whatever process."""
+_MOST_WAIT_S = 20.0
+"""Renaming takes milliseconds: a marker that is older was left by a run that was killed in them."""
+_MARKER = ".gcode2krl.taking"
+_Stamp = tuple[int, int] | None
+"""When a file was last written (ns) and its size in bytes; None where there is none."""
+_BEGUN_WITH: contextvars.ContextVar["_Begun | None"] = contextvars.ContextVar(
+    "outputs when a run began", default=None
+)
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"
 _MOST_INPUTS = 10_000
 """Most files of an input folder that outputs are compared with."""
@@ -35,9 +44,33 @@ def write_together(files: Mapping[Path, Content], inputs: Iterable[str | Path] =
     """
     refuse_inputs(files, inputs)
     with Staging() as staging:
+        for place in files:
+            staging.expect(place)
         for place, content in files.items():
             staging.write(place, content)
         staging.take_places()
+
+
+class _Begun:
+    """What stood at places, or anywhere in a folder, when a run began; what it writes itself is kept up."""
+
+    def __init__(self, places: Iterable[Path], folder: Path | None) -> None:
+        self.folder = None if folder is None else _full_name(folder) + os.sep
+        self.stamps = {_full_name(place): _stamp(place) for place in places}
+
+    def knows(self, name: str) -> bool:
+        return name in self.stamps or (self.folder is not None and name.startswith(self.folder))
+
+
+@contextlib.contextmanager
+def watched(places: Iterable[Path] = (), folder: Path | None = None) -> Iterator[None]:
+    """Refuse to write these places, or any in a folder, where another process writes them from now on."""
+    inside = () if folder is None else folder.rglob("*")
+    begun = _BEGUN_WITH.set(_Begun((*places, *inside), folder))
+    try:
+        yield
+    finally:
+        _BEGUN_WITH.reset(begun)
 
 
 class Staging:
@@ -46,6 +79,7 @@ class Staging:
     def __init__(self) -> None:
         """Begin without a file."""
         self._temporary: dict[Path, Path] = {}
+        self._begun_with: dict[str, _Stamp] = {}
 
     def __enter__(self) -> "Staging":
         return self
@@ -59,14 +93,41 @@ class Staging:
         Raises `NotUnderstoodError` where folder or disk refuse.
         """
         _remove(leftovers(place))
+        self.expect(place)
         try:
             self._temporary[place] = _write_beside(place, content)
         except OSError as error:
             raise unwritable(place, error.strerror or str(error)) from None
         return self._temporary[place]
 
+    def expect(self, place: Path) -> None:
+        """Take what stands at a place now, or when `watched` looked, as what may be overwritten."""
+        name = _full_name(place)
+        if name not in self._begun_with:
+            run = _BEGUN_WITH.get()
+            known = run is not None and run.knows(name)
+            self._begun_with[name] = run.stamps.get(name) if run is not None and known else _stamp(place)
+
     def take_places(self) -> None:
-        """Put all files in their places, or none: raises `NotUnderstoodError` where the disk refuses."""
+        """Put all files in their places, or none.
+
+        Raises `NotUnderstoodError` where the disk refuses, or another process has written one of them since.
+        """
+        with contextlib.ExitStack() as stack:
+            for folder in sorted({place.parent.resolve() for place in self._temporary}):
+                stack.enter_context(_alone_in(folder))
+            for place in self._temporary:
+                now = _stamp(place)
+                if now is not None and now != self._begun_with[_full_name(place)]:
+                    raise written_meanwhile(place)
+            self._replace()
+            run = _BEGUN_WITH.get()
+            if run is not None:
+                names = {_full_name(place): place for place in self._temporary}
+                run.stamps |= {name: _stamp(place) for name, place in names.items() if run.knows(name)}
+        self._begun_with.clear()
+
+    def _replace(self) -> None:
         kept: dict[Path, Path] = {}
         place = next(iter(self._temporary))
         try:
@@ -152,6 +213,14 @@ def unwritable(target: Path, why: str) -> NotUnderstoodError:
     )
 
 
+def written_meanwhile(place: Path) -> NotUnderstoodError:
+    """Return the error for an output that another process has written since this one began."""
+    sentence = f"another process has written {place.name} meanwhile; nothing of this run was written"
+    return input_error(
+        "output-changed", sentence, "run it again, or choose another name with -o", source=str(place)
+    )
+
+
 @contextlib.contextmanager
 def naming_temporary_folder() -> Iterator[None]:
     """Raise `NotUnderstoodError` that names the temporary folder where the disk refuses a file in it."""
@@ -207,6 +276,57 @@ def _lives(process: int) -> bool:
     except (OSError, OverflowError):
         return True
     return True
+
+
+# --- two processes that write the same files --------------------------------------------------------------
+
+
+def _full_name(place: Path) -> str:
+    return os.path.normcase(place.parent.resolve() / place.name)
+
+
+def _stamp(place: Path) -> _Stamp:
+    try:
+        found = place.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size  # no inode: network shares make them up
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Hold a folder's marker for the moment of looking and renaming; raises where it does not come free."""
+    marker, begun_s = folder / _MARKER, time.monotonic()
+    while True:
+        try:
+            descriptor = os.open(marker, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+            break
+        except FileExistsError:
+            if _is_left_marker(marker, time.monotonic() - begun_s):
+                _remove([marker])
+            else:
+                time.sleep(0.01)
+        except PermissionError as error:  # Windows: it is just being removed
+            if time.monotonic() - begun_s > 1.0:
+                raise unwritable(folder, error.strerror or str(error)) from None
+            time.sleep(0.01)
+        except OSError as error:
+            raise unwritable(folder, error.strerror or str(error)) from None
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(f"{_HOST}-{os.getpid()}".encode("ascii"))
+        yield
+    finally:
+        _remove([marker])
+
+
+def _is_left_marker(marker: Path, waited_s: float) -> bool:
+    """Tell whether a marker is that of a killed run: its process is dead, or it has stood far too long."""
+    with contextlib.suppress(OSError, ValueError):
+        host, _, process = marker.read_text("ascii").partition("-")
+        if host == _HOST and process and not _lives(int(process)):
+            return True
+    return waited_s > _MOST_WAIT_S
 
 
 # --- one file ---------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import controller_state as cs
 from gcode2krl.krl import statements as st
+from gcode2krl.krl.cell_hashes import hash_lines
 from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.external_words import external_lines
 from gcode2krl.krl.names import part_name
@@ -439,6 +440,8 @@ class _Composer:
         if self.rsi is not None:
             declarations.append(RSI_DECLARATIONS)
         arcs = [curve for curve in self.curves if isinstance(curve, Arc)]
+        options = st.ascii_text(self.layout.options, 200) or "none"
+        allowed = ", ".join(st.ascii_text(word, 120) for word in self.layout.allowed) or "none"
         render = partial(
             st.environment().get_template("head.src.j2").render,
             source=self.source,
@@ -448,8 +451,16 @@ class _Composer:
             motions=len(self.targets) - sum(arc.end - arc.first for arc in arcs),
             arcs=len(arcs),
             splines=sum(isinstance(curve, Chain) for curve in self.curves),
-            options=st.ascii_text(self.layout.options, 200),
-            allowed=tuple(st.ascii_text(word, 120) for word in self.layout.allowed),
+            options=options,
+            allowed=allowed,
+            cell_hashes=hash_lines(
+                self.cell,
+                tools,
+                options,
+                allowed,
+                pilot=self.pilot is not None,
+                online=self.rsi is not None,
+            ),
             guard=self.layout.guard,
             forces=self.layout.forces,
             collisions=self._collision_lines(),

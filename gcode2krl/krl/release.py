@@ -1,11 +1,11 @@
 """Which findings keep a program from being written, and what a person may release by hand."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
-from gcode2krl.errors import Issue, RefusedError, input_error
+from gcode2krl.errors import Issue, RefusedError, Severity, input_error
 
 STRICTER_HERE = frozenset(
     {
@@ -82,6 +82,37 @@ def matching(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:
     """Return the releases that match an error so far; later stages may find what the others mean."""
     found = _as_written(issues)
     return tuple(word for word in allow if _matches(found, word))
+
+
+def is_refusing(issues: Iterable[Issue], allow: Iterable[str]) -> bool:
+    """Tell whether an error stays that no release means."""
+    findings = list(issues)
+    meant = {k for word in allow for k in _matches(findings, word)}
+    return any(issue.severity == "error" and k not in meant for k, issue in enumerate(findings))
+
+
+def released_again(issues: Iterable[Issue], releases: Mapping[str, int | None]) -> list[Issue]:
+    """Return the findings as they count for a program, with those of earlier releases turned into warnings.
+
+    ``releases`` says for how many findings each was given, None for any number: where there are more now, a
+    person has not seen them all, and none is released.
+    """
+    found = _as_written(issues)
+    findings = list(found)
+    for word, count in releases.items():
+        matches = _matches(found, word)
+        too_many = count is not None and len(matches) > count
+        for k in matches:
+            if found[k].code in NEVER_RELEASED:
+                continue
+            words = (
+                f"released by hand were {count}, now there are {len(matches)}"
+                if too_many
+                else "released by hand"
+            )
+            severity: Severity = "error" if too_many else "warning"
+            findings[k] = replace(found[k], severity=severity, message=f"{found[k].message} ({words})")
+    return findings
 
 
 def header_words(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:

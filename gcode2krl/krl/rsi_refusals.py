@@ -1,7 +1,7 @@
 """Which programs must not be corrected online, or only after a person has read a warning."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from ipaddress import IPv4Address
 
 import numpy as np
@@ -10,6 +10,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carriers import tables_of
 from gcode2krl.cell.sections.external import EXTERNAL_NAMES
+from gcode2krl.clearance import collisions_on_retracts
 from gcode2krl.errors import Issue
 from gcode2krl.krl.rsi_text import rsi_rows
 from gcode2krl.krl.statements import event_statements
@@ -45,6 +46,12 @@ def online_issues(targets: Targets, cell: Cell) -> Iterator[Issue]:
     if address.is_loopback:
         sentence = f"the controller will look for the server at itself, {cell.online.link.address}"
         yield Issue("warning", "online-address", 0, sentence, "give [online.link] address of the PC")
+
+
+def retract_issues(targets: Targets, cell: Cell) -> Sequence[Issue]:
+    """Return what the retract of a lost link would hit, wherever RSI is on."""
+    on, off = rsi_rows(targets)
+    return collisions_on_retracts(targets, on, off, cell.online.link.retract_mm, cell) if off > on else ()
 
 
 def _tables(targets: Targets, cell: Cell) -> Iterator[Issue]:

@@ -11,14 +11,17 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.compiled.inputs import distinct
+from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
 from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.arcs import unrolled
+from gcode2krl.krl.cell_hashes import StatedCell
 from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
+from gcode2krl.krl.hazards import judged
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
@@ -29,7 +32,7 @@ from gcode2krl.krl.rules import in_file, rule_issues, state_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.krl.splines import at_rest_behind, passing
 from gcode2krl.pilot import knot_rows, read_pilot
-from gcode2krl.pipeline import plan_motion, set_targets, solve_ptp_joints
+from gcode2krl.pipeline import judged_targets, plan_motion, solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.program.arcs import arcs_of
 from gcode2krl.program.splines import splines_of
@@ -105,15 +108,25 @@ def verify_krl(
     *,
     simplify_mm: float | None = None,
     prediction: Prediction | None = None,
+    forces: bool = True,
+    allow: Sequence[str] = (),
 ) -> VerifyReport:
-    """Read a program back and compare it with what the G-code and the cell ask for.
+    """Read a program back, compare it with what the G-code and the cell ask for, and judge its hazards anew.
 
     ``tolerance_mm`` and ``simplify_mm`` must be those the program was made with; a program that leaves out
     corners is compared with every move of ``toolpath`` too (`krl.original_path`). A pilot force is compared
     with the sidecar beside the program and carried out along the Motion of ``prediction``, or along one
     planned here; with ``prediction`` its targets (which may be compensated) are what is intended, and the
     knots are compared with its forces. The RSI files beside a program that is corrected online must be as the
-    cell asks for. Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion.
+    cell asks for.
+
+    Whatever would refuse or warn in a translation is found again, with the cell as it is now; without
+    ``forces`` no material is cut. Those findings have the G-code as their ``file``; what the header of the
+    program or ``allow`` releases is a warning. A section of the cell that is not as when the program was
+    written is an error.
+
+    Raises `NotUnderstoodError` where a file cannot be read or the G-code has no motion, and `RefusedError`
+    where no program can be made of it.
 
     >>> from gcode2krl import load_cell, predict, verify_krl, write_krl
     >>> prediction = predict("part.nc")
@@ -126,16 +139,25 @@ def verify_krl(
         simplified = prediction.targets.simplified
         simplify_mm = simplified.tolerance_mm if simplified is not None else None
     require_stated(program, simplify_mm)
-    targets = (
-        prediction.targets
-        if prediction is not None
-        else set_targets(toolpath, cell, tolerance_mm, simplify_mm)
-    )
+    stated = StatedCell(program)
+    try:
+        targets = (
+            prediction.targets
+            if prediction is not None
+            else judged_targets(toolpath, cell, tolerance_mm, simplify_mm)[0]
+        )
+    except RefusedError as refused:
+        raise RefusedError([*refused.issues, *stated.changes(cell)], refused.source) from None
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
     joints = solve_ptp_joints(targets, cell)
-    issues: list[Issue] = []
+    online = rsi_name(program, Path(path).parent)
+    issues = [*stated.changes(cell, distinct(targets.tool).tolist())]
+    releases = {**stated.releases(), **dict.fromkeys(allow)}
+    source = prediction if prediction is not None else targets
+    hazards = judged(source, toolpath, cell, releases, online=bool(online), forces=forces)
+    issues += hazards
     pilot, announced = _pilot_of(program, Path(path), cell)
     case: PilotCase | None = None
     if pilot is not None:
@@ -153,7 +175,6 @@ def verify_krl(
         issues.append(_no_sidecar(program, Path(path)))
         program = _without_pilot(program, cell)
     alone = declares_itself(program)
-    online = rsi_name(program, Path(path).parent)
     arcs = tuple(arcs_of(targets)) if len(program.circ_rows) else ()
     splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
     layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)

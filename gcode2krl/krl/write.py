@@ -10,7 +10,6 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import CollisionScope, collision_scope
-from gcode2krl.clearance import collisions_on_retracts
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
@@ -24,8 +23,7 @@ from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.places import ProgramFiles, program_file, require_name
 from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import refuse_file_name
-from gcode2krl.krl.rsi_refusals import online_issues
-from gcode2krl.krl.rsi_text import rsi_rows
+from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
 from gcode2krl.krl.verify import VerifyReport
 from gcode2krl.krl.versions import version_issues
 from gcode2krl.pipeline import solve_ptp_joints
@@ -166,7 +164,7 @@ def write_krl(
     of_name += version_issues(cell)
     if online is not None:
         _refuse_name(online, file)
-        of_name += [*online_issues(targets, cell), *_retracts(targets, cell)]
+        of_name += [*online_issues(targets, cell), *retract_issues(targets, cell)]
     joints = solve_ptp_joints(targets, cell) if joints is None else joints
 
     arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
@@ -309,12 +307,6 @@ def _pilot_failure(report: VerifyReport) -> Issue | None:
     failed = [issue for issue in report.issues if issue.severity == "error"]
     alone = all(issue.code.startswith("pilot-") for issue in failed)
     return failed[0] if failed and alone else None
-
-
-def _retracts(targets: Targets, cell: Cell) -> Sequence[Issue]:
-    """Return what the retract of a lost link would hit, wherever RSI is on."""
-    on, off = rsi_rows(targets)
-    return collisions_on_retracts(targets, on, off, cell.online.link.retract_mm, cell) if off > on else ()
 
 
 def _refuse_name(online: str, file: Path | None) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.exchange import Columns, Findings, Table
 from gcode2krl.exchange.views import view
 from gcode2krl.files import make_folder, refuse_inputs, write_together
@@ -149,7 +149,9 @@ class Prediction:
         write_together({record: UNFINISHED})
         try:
             write_together(files)
-        except BaseException:
+        except BaseException as error:
+            if isinstance(error, NotUnderstoodError) and error.issues[0].code == "output-changed":
+                raise  # the record is that of another process by now
             if before is None:
                 record.unlink(missing_ok=True)
             else:

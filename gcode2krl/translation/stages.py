@@ -66,6 +66,8 @@ class _Ready:
     name: str | None
     inputs: list[Path]
     """Files that must not be overwritten."""
+    outputs: list[Path]
+    """Files to write, without the parts of a long program."""
     of_job: tuple[Issue, ...]
 
 
@@ -88,7 +90,15 @@ def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
 
 def _translate(order: Order, known: _Known, begin: Begin) -> None:
     """Run the stages in their order; each leaves in ``known`` what it has found."""
+    from gcode2krl.files import watched
+
     ready = _ready(order, known)
+    with watched(ready.outputs):
+        _carry_on(order, ready, known, begin)
+
+
+def _carry_on(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
+    """Run the stages behind what an order names."""
     _read(order, ready, known, begin)
     begin("planning")
     _plan(order, ready.cell, known)
@@ -118,8 +128,9 @@ def _ready(order: Order, known: _Known) -> _Ready:
     inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path))
     require_figure(order.compensate_plot)
     require_report(order.report, inputs)
-    require_outputs(outputs_of(order, place, name, cell), *inputs)
-    return _Ready(cell, place, name, inputs, of_job)
+    outputs = outputs_of(order, place, name, cell)
+    require_outputs(outputs, *inputs)
+    return _Ready(cell, place, name, inputs, outputs, of_job)
 
 
 def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
@@ -142,17 +153,14 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
     """Set the targets, and refuse those that a robot cannot run; tables that wait are kept on disk."""
-    from gcode2krl.cell.confirmation import future_confirmation
     from gcode2krl.compiled.memory import give_back
     from gcode2krl.files.spool import on_disk
-    from gcode2krl.pipeline import corner_errors, targets_and_joints
+    from gcode2krl.pipeline import judged_targets
 
     toolpath = _done(known.toolpath)
-    targets, joints = targets_and_joints(toolpath, cell, order.tolerance_mm, order.simplify_mm)
-    errors_mm, corner_issues = corner_errors(toolpath, targets, cell, order.tolerance_mm)
-    known.corner_mm = float(errors_mm.max(initial=0.0))
-    del errors_mm
-    known.targets = replace(targets, issues=(*targets.issues, *corner_issues, *future_confirmation(cell)))
+    known.targets, joints, known.corner_mm = judged_targets(
+        toolpath, cell, order.tolerance_mm, order.simplify_mm
+    )
     refuse_early(known.targets, cell, order)
     known.toolpath, known.joints = on_disk(toolpath), on_disk(joints)
     del toolpath, joints

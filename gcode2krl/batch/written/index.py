@@ -14,6 +14,7 @@ from gcode2krl.batch.written.text import one_line, printable
 from gcode2krl.batch.written.thumbnail import HEIGHT, WIDTH, svg_path
 from gcode2krl.batch.written.words import (
     deflection,
+    demonstration,
     difference_rows,
     difference_sentence,
     facts,
@@ -94,6 +95,7 @@ def index_html(records: Iterable[Record], before: Iterable[Record] | None = None
         .from_string(_text("index.html.j2"))
         .render(
             headline=headline(parts),
+            demonstration=demonstration(parts),
             facts=facts(parts),
             sentence=difference_sentence(found) if found is not None else "",
             changes=list(difference_rows(found))[:_MOST_CHANGES] if found is not None else [],

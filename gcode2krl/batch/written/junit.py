@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from gcode2krl.batch.verdicts import VERDICTS
 from gcode2krl.batch.written.part import Finding, Part, Record, lines_of, parts_of
 from gcode2krl.batch.written.text import one_line, printable
+from gcode2krl.batch.written.words import demonstration
 
 _MOST_MESSAGE = 500
 
@@ -23,6 +24,9 @@ def junit_xml(records: Iterable[Record]) -> bytes:
     for folder in folders:
         own = [part for part in parts if part.folder == folder]
         suite = ElementTree.SubElement(root, "testsuite", {"name": printable(folder), **_totals(own)})
+        if warning := demonstration(own):
+            properties = ElementTree.SubElement(suite, "properties")
+            ElementTree.SubElement(properties, "property", name="cell", value=warning)
         suite.extend(_case(part) for part in own)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")

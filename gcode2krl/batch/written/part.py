@@ -46,6 +46,8 @@ class Part:
     findings: tuple[Finding, ...] = ()
     thumbnail: tuple[tuple[float, float], ...] = ()
     """Feed moves seen from above (mm)."""
+    is_demonstration: bool = False
+    """Whether it was translated for the demonstration cell, as no cell was named."""
     page: str = ""
     """Its report, relative to the output folder; empty where there is none."""
 
@@ -98,6 +100,7 @@ def part_of(record: Record) -> Part:
         deflection_mm=_number(record.get("max_deflection_mm")),
         findings=tuple(_finding(one) for one in _list(record.get("issues")) if isinstance(one, Mapping)),
         thumbnail=_points(record.get("thumbnail")),
+        is_demonstration=_is_demonstration(record.get("cell")),
         page=next((str(file) for file in _list(record.get("files")) if str(file).endswith(_PAGE)), ""),
     )
 
@@ -111,6 +114,10 @@ def _source(record: Record) -> str:
     read = record.get("input")
     named = read.get("file") if isinstance(read, Mapping) else None
     return str(named).replace("\\", "/") if named else name_of(record)
+
+
+def _is_demonstration(cell: Any) -> bool:
+    return isinstance(cell, Mapping) and cell.get("file") is None
 
 
 def told_of(findings: Iterable[Finding]) -> list[tuple[str, Told]]:

@@ -10,6 +10,7 @@ from typing import Any
 from gcode2krl.batch.written.part import Part, Record, parts_of
 from gcode2krl.batch.written.places import below_root, is_absolute, uri
 from gcode2krl.batch.written.text import printable
+from gcode2krl.batch.written.words import demonstration
 from gcode2krl.codes import Code, all_codes
 from gcode2krl.errors import Issue
 from gcode2krl.version import __version__
@@ -26,12 +27,15 @@ same as another."""
 
 def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     """Return the file; ``root`` is the absolute folder in which the run began."""
-    found = sorted(set(_results(parts_of(records), root)))
+    parts = parts_of(records)
+    found = sorted(set(_results(parts, root)))
     kept = found[:MOST_RESULTS]
     codes = sorted({code for *_, code, _ in kept})
     run = {
         "tool": {"driver": _driver(codes)},
-        "invocations": [{"executionSuccessful": True} | _left_out(len(found) - len(kept))],
+        "invocations": [
+            {"executionSuccessful": True} | _notified(demonstration(parts), len(found) - len(kept))
+        ],
         "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
         "columnKind": "unicodeCodePoints",
         "results": [_result(one, codes.index(one[4])) for one in kept],
@@ -97,9 +101,13 @@ def _rule(code: Code) -> dict[str, Any]:
     }
 
 
-def _left_out(count: int) -> dict[str, Any]:
-    """Return what says that not all findings are in the file."""
-    if count == 0:
+def _notified(warning: str, left_out: int) -> dict[str, Any]:
+    """Return what is to be said of the run: whose cell it was, and that findings are left out."""
+    notified = [("warning", warning)] if warning else []
+    if left_out:
+        text = f"{left_out:,} more findings are in results.jsonl and not here, the least severe ones."
+        notified.append(("note", text))
+    if not notified:
         return {}
-    text = f"{count:,} more findings are in results.jsonl and not here, the least severe ones."
-    return {"toolExecutionNotifications": [{"level": "note", "message": {"text": text}}]}
+    notes = [{"level": level, "message": {"text": text}} for level, text in notified]
+    return {"toolExecutionNotifications": notes}

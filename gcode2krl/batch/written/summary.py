@@ -11,6 +11,7 @@ from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
 from gcode2krl.batch.written.text import markdown, one_line
 from gcode2krl.batch.written.words import (
     deflection,
+    demonstration,
     difference_rows,
     difference_sentence,
     facts,
@@ -33,6 +34,8 @@ def summary_md(records: Iterable[Record], before: Iterable[Record] | None = None
     records = list(records)
     parts = parts_of(records)
     lines = [f"# {headline(parts)}", ""]
+    if warning := demonstration(parts):
+        lines += [f"> **{markdown(warning)}**", ""]
     told = [(fact, f" ({_name(fact.part)})" if fact.part else "") for fact in facts(parts)]
     lines += [f"- {fact.name}: {fact.value}{where}" for fact, where in told]
     lines += _refused([part for part in parts if not part.is_written])

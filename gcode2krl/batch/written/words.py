@@ -61,6 +61,18 @@ def headline(parts: Sequence[Part]) -> str:
     return f"{written[0]:,} of {_counted(len(parts), 'part')} written, {named}"
 
 
+def demonstration(parts: Sequence[Part]) -> str:
+    """Return the warning that parts were translated for the demonstration cell, empty where none was."""
+    count = sum(part.is_demonstration for part in parts)
+    if not count:
+        return ""
+    which = "Every part" if count == len(parts) else f"{count:,} of {_counted(len(parts), 'part')}"
+    return (
+        f"{which} was translated for the demonstration cell, as no cell was named: its robot, frames, "
+        "tools and outputs are not yours. Name yours with --cell."
+    )
+
+
 def facts(parts: Sequence[Part]) -> list[Fact]:
     """Return the figures of a whole run."""
     written = [part for part in parts if part.is_written]

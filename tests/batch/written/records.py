@@ -53,7 +53,7 @@ def record(part, exit_code=0, issues=(), **more):
         "command": "translate",
         "version": "0.1.0",
         "input": {"file": f"parts/{part}", "sha256": "0" * 64, "size_bytes": 1000},
-        "cell": {"name": "demonstration", "file": None, "sha256": "1" * 64},
+        "cell": {"name": "demonstration", "file": "cell.toml", "sha256": "1" * 64},
         "options": {},
         "exit_code": exit_code,
         "counts": counts,

@@ -4,7 +4,7 @@ import pytest
 from lxml import html
 from markdown_it import MarkdownIt
 
-from gcode2krl.batch.written import summary_md
+from gcode2krl.batch.written import contents, summary_md
 from gcode2krl.batch.written.summary import MOST_BYTES
 from gcode2krl.batch.written.text import markdown, printable
 from tests.batch.written.records import ERROR, NASTY, OF_CELL, WARNING, many, record
@@ -112,3 +112,15 @@ def test_it_is_never_too_large():
     before = [record(one["part"]) for one in records]
     assert len(summary_md(records, before).encode()) < MOST_BYTES
     assert "and 200 more" in summary_md(records, before)
+
+
+def test_every_file_says_that_parts_were_made_for_the_demonstration_cell():
+    theirs, ours = record("a.nc"), record("b.nc") | {"cell": {"name": "demo", "file": None, "sha256": "0"}}
+    names = ("summary.md", "index.html", "junit.xml", "findings.sarif")
+    for records, sentence in (([ours], "Every part"), ([theirs, ours], "1 of 2 parts")):
+        made = contents(records)
+        for name in names:
+            assert f"{sentence} was translated for the demonstration cell" in made[name].decode("utf-8") or (
+                name == "junit.xml" and b"translated for the demonstration cell" in made[name]
+            ), name
+    assert not any(b"demonstration" in contents([theirs])[name] for name in names)
