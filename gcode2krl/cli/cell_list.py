@@ -6,6 +6,7 @@ from typing import Any
 
 from gcode2krl.cell import Cell, plain_view, switching
 from gcode2krl.cell.confirmation import future_confirmation
+from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.ranges import range_issues
 from gcode2krl.cell.sections import Frame, Obstacle
 from gcode2krl.errors import Issue
@@ -83,7 +84,7 @@ def findings(cell: Cell) -> list[Issue]:
     templates = cell.templates()
     wrong = switching.template_issues(templates, _template_values(cell), cell.program.externals)
     pairs = switching.pair_issues(templates, _template_values(cell))
-    return [*wrong, *pairs, *range_issues(cell), *future_confirmation(cell)]
+    return [*wrong, *pairs, *range_issues(cell), *contradictory(cell), *future_confirmation(cell)]
 
 
 def _tools(cell: Cell) -> Iterator[Row]:

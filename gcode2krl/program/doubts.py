@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools
 from gcode2krl.cell import Cell
+from gcode2krl.cell.layout import obstacle_box, stock_box
 from gcode2krl.cell.sections import Material, Tool
 from gcode2krl.errors import Issue
 from gcode2krl.program.source_text import line_with
@@ -38,6 +39,8 @@ def doubtful(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) 
     yield from _dwells(toolpath)
     yield from _blends(toolpath, cell, tolerance_mm, feed)
     yield from _stops_in_cut(toolpath, cell, feed)
+    yield from _stock_elsewhere(toolpath, cell, feed)
+    yield from _clamps_above_plane(toolpath, cell)
 
 
 def _dwells(toolpath: Toolpath) -> Iterator[Issue]:
@@ -128,6 +131,58 @@ def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue
                 f"M{event.values['m']} stops the program with the tool in the cut, {depth_mm:.2f} mm below "
                 f"where it went in, and {turning}",
                 "retract before the stop and go back in behind it",
+            )
+
+
+def _stock_elsewhere(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
+    """Yield a stated stock that no feed move touches: it is an error where it lies beside all of them."""
+    box = stock_box(cell)
+    rows = np.flatnonzero(feed)
+    if box is None or not len(rows):
+        return
+    ends = toolpath.position_mm[rows], toolpath.position_mm[rows - 1]
+    radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
+    around = np.array([radius_mm, radius_mm, radius_mm if (toolpath.axis[rows, 2] < 1.0 - 1e-9).any() else 0.0])
+    low, high = np.minimum(*ends) - around, np.maximum(*ends) + around
+    high[:, 2] = np.inf  # the tool stands above its tip
+    if ((low < box[1]) & (box[0] < high)).all(axis=1).any():
+        return
+    beside = np.maximum(low.min(axis=0) - box[1], box[0] - high.max(axis=0))[:2]
+    is_far = bool((beside > (box[1] - box[0])[:2]).any())
+    above_mm = float(low[:, 2].min() - box[1][2])
+    where = f"{beside.max():.1f} mm beside" if beside.max() > 0.0 else f"{max(above_mm, 0.0):.1f} mm above"
+    yield Issue(
+        "error" if is_far else "warning",
+        "stock-elsewhere",
+        int(toolpath.source_line[rows[0]]),
+        f"no feed move touches the stock of the cell: all of them are {where} it",
+        "correct stock.box_mm of the cell, the work offset, or the zero point of the program",
+        key="stock.box_mm",
+    )
+
+
+def _clamps_above_plane(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the obstacles that stand higher than the clearance plane where the program goes."""
+    z_mm = cell.clearance_z_mm
+    known = toolpath.is_position() & ~toolpath.machine
+    if z_mm is None or not cell.obstacle or not known.any():
+        return
+    radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
+    places = toolpath.position_mm[known][:, :2]
+    low, high = places.min(axis=0) - radius_mm, places.max(axis=0) + radius_mm
+    for obstacle in cell.obstacle:
+        box = obstacle_box(cell, obstacle)
+        if box is None or not box[0][2] < z_mm < box[1][2]:
+            continue
+        if (low < box[1][:2]).all() and (box[0][:2] < high).all():
+            yield Issue(
+                "warning",
+                "cell-contradiction",
+                0,
+                f"clearance.z_mm = {z_mm:g} is below the top of obstacle {obstacle.name}, {box[1][2]:g}, where "
+                "the program goes",
+                "raise clearance.z_mm of the cell above all clamps",
+                key="clearance.z_mm",
             )
 
 
