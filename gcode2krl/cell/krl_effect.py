@@ -279,9 +279,10 @@ class _Run:
             return self._wait(state, line)
         elif pulse := PULSE_FORM.match(line):
             self._set(state, pulse[1], Signal(frozenset((pulse[2] != "TRUE",)), sure=True, pulsed=True))
-        elif (assigned := _SET.match(line)) and (value := _value(assigned[2])) is not _TEXT:
+        elif assigned := _SET.match(line):
+            value = _value(assigned[2])
             if assigned[1].startswith("$") or isinstance(value, bool):
-                self._set(state, assigned[1], Signal(frozenset((value,)), sure=True))  # type: ignore[arg-type]  # not text
+                self._set(state, assigned[1], Signal(frozenset((value,)), sure=True))
         return state
 
     def _set(self, state: _State, name: str, signal: Signal) -> None:
@@ -311,7 +312,6 @@ class _Run:
 
 
 _OPENED = frozenset(("IF", "SWITCH", "LOOP", "WHILE", "FOR", "REPEAT"))
-_TEXT = object()
 
 
 def _copied(state: _State | None) -> _State | None:
@@ -323,11 +323,9 @@ def _first(statement: str) -> str:
     return match[0] if match else ""
 
 
-def _value(text: str) -> object:
-    """Return TRUE, FALSE or a number; None where the value is not literal, ``_TEXT`` where it is text."""
+def _value(text: str) -> Value:
+    """Return TRUE, FALSE or a number; None where the value is not literal."""
     text = text.strip()
-    if text.startswith(('"', "'")):
-        return _TEXT
     if _NUMBERS.fullmatch(text) and len(text) < 200:
         try:
             return _number(ast.parse(text.replace(" ", ""), mode="eval").body)

@@ -49,14 +49,14 @@ def m_code_issues(cell: Cell) -> Iterator[Issue]:
     codes = _Codes(cell, templates)
     for key in codes.cases:
         yield from codes.always(key)
-    for code in _RUNS:
-        yield from codes.runs(code)
-        yield from codes.speed(code)
-        yield from codes.run_up(code)
+    for m_code in _RUNS:
+        yield from codes.runs(m_code)
+        yield from codes.speed(m_code)
+        yield from codes.run_up(m_code)
     yield from codes.directions()
     yield from codes.stop()
-    for code in _COOLANTS:
-        yield from codes.coolant(code)
+    for m_code in _COOLANTS:
+        yield from codes.coolant(m_code)
     yield from codes.program_stop()
     yield from codes.intruders()
     yield from codes.tool_changes()
@@ -116,8 +116,8 @@ class _Codes:
             )
             self.cases[key] = [case for case in cases if case is not None]
 
-    def of(self, code: str) -> list[_Case]:
-        return self.cases.get(f"m_code.{code}", [])
+    def of(self, m_code: str) -> list[_Case]:
+        return self.cases.get(f"m_code.{m_code}", [])
 
     def out(self, key: str) -> str | None:
         number = getattr(self.spindle, key)
@@ -155,11 +155,11 @@ class _Codes:
                     yield _issue("error", key, f"sets {name} to {beyond[0]:g}{at}, allowed: -1 to 1")
                     return
 
-    def runs(self, code: str) -> Iterator[Issue]:
+    def runs(self, m_code: str) -> Iterator[Issue]:
         """Yield what M3 or M4 switches on that is not its direction, or does not switch on."""
-        own_key, other_key = _RUNS[code]
+        own_key, other_key = _RUNS[m_code]
         own, other = self.out(own_key), self.out(other_key)
-        key, cases = f"m_code.{code}", self.of(code)
+        key, cases = f"m_code.{m_code}", self.of(m_code)
         for case in cases:
             effect = case.effect
             if other is not None and other != own and other in effect.driven():
@@ -185,9 +185,9 @@ class _Codes:
                 yield _issue("error" if named else "warning", key, text)
                 return
 
-    def speed(self, code: str) -> Iterator[Issue]:
+    def speed(self, m_code: str) -> Iterator[Issue]:
         """Yield where the speed output does not follow S from 0 to 1."""
-        name, key, cases = self.speed_output, f"m_code.{code}", self.of(code)
+        name, key, cases = self.speed_output, f"m_code.{m_code}", self.of(m_code)
         if name is None or not cases or any(case.effect.calls for case in cases):
             return
         signals = [case.effect.signals.get(name) for case in cases]
@@ -205,11 +205,14 @@ class _Codes:
             text = f"sets {name} to 0 at S{speeds[values.index(0.0)]:g}: the spindle stands still"
             yield _issue("error", key, f"{text}, {_SPEED_KEY}")
         elif len(values) == 1 or any(abs(b) <= abs(a) for a, b in pairwise(values)):
-            text = f"sets {name} to {', '.join(f'{v:g}' for v in values)} at S{', '.join(f'{s:g}' for s in speeds)}"
+            levels_text = ", ".join(
+                f"{value:g} at S{rpm:g}" for value, rpm in zip(values, speeds, strict=True)
+            )
+            text = f"sets {name} to {levels_text}"
             yield _issue("error", key, f"{text}: it does not grow with S, {_SPEED_KEY}")
         elif max(map(abs, values)) > 1.0:
             return  # found in `always`
-        elif code == "M3" and values[-1] < 0.0:
+        elif m_code == "M3" and values[-1] < 0.0:
             yield _issue("warning", key, f"sets {name} below 0: M3 turns clockwise, {_SPEED_KEY}")
         elif abs(values[0] / speeds[0] / (values[-1] / speeds[-1]) - 1.0) > _UNEVEN:
             text = f"sets {name} to {values[0]:g} at S{speeds[0]:g} and {values[-1]:g} at S{speeds[-1]:g}"
@@ -218,11 +221,11 @@ class _Codes:
             text = f"sets {name} to {values[-1]:g} at spindle.max_rpm = {speeds[-1]:g}, where it is 1"
             yield _issue("warning", key, f"{text}, {_SPEED_KEY}")
 
-    def run_up(self, code: str) -> Iterator[Issue]:
+    def run_up(self, m_code: str) -> Iterator[Issue]:
         """Yield where M3 or M4 does not wait for the speed behind switching on."""
-        key, spindle = f"m_code.{code}", self.spindle
-        own = self.out(_RUNS[code][0])
-        for case in self.of(code)[-1:]:
+        key, spindle = f"m_code.{m_code}", self.spindle
+        own = self.out(_RUNS[m_code][0])
+        for case in self.of(m_code)[-1:]:
             effect = case.effect
             driven = [name for name in effect.signals if effect.signals[name].driven]
             name = own if own in driven else next(iter(driven), None)
@@ -251,7 +254,9 @@ class _Codes:
         if (number, False) in effect.waited_for(name):
             return _issue("error", key, f"waits until {signal}, is off: until the spindle is not at speed")
         if (number, True) in effect.levels:
-            return _issue("error", key, f"waits for {signal}, before it switches on {name}: it waits for ever")
+            return _issue(
+                "error", key, f"waits for {signal}, before it switches on {name}: it waits for ever"
+            )
         text = f"does not wait for {signal}"
         waits = waited_s >= _ENOUGH * self.spindle.start_s or effect.waits_for
         return _issue(self.severity(key, "at_speed_input", is_doubt=waits), key, text)
@@ -274,11 +279,14 @@ class _Codes:
         if effect.calls or effect.stops:
             return
         started = on[-1].effect if on else None
-        if started is not None and not started.driven() and not started.calls:
+        is_analogue = started is not None and not started.driven() and not started.calls
+        if started is not None and is_analogue and self.spindle.run_cw_output is None:
             for name, signal in started.signals.items():
                 end = effect.signals.get(name)
                 if signal.may_be_on and (end is None or not end.sure or end.may_be_on):
-                    yield _issue("error", "m_code.M5", f"does not set {name} to 0, which alone runs the spindle")
+                    yield _issue(
+                        "error", "m_code.M5", f"does not set {name} to 0, which alone runs the spindle"
+                    )
                     return
         switched = [name for name in effect.signals if effect.signals[name].sure]
         if not switched:
@@ -286,17 +294,19 @@ class _Codes:
         levels = frozenset().union(*(effect.waited_for(name) for name in switched))
         waited_s = max(effect.waited_s(name) for name in switched)
         if at_speed is not None and (at_speed, True) in levels:
-            text = f"waits for $IN[{at_speed}], spindle.at_speed_input, with the spindle off: it waits for ever"
+            text = (
+                f"waits for $IN[{at_speed}], spindle.at_speed_input, with the spindle off: it waits for ever"
+            )
             yield _issue("error", "m_code.M5", text)
         elif not levels and waited_s < _ENOUGH * self.spindle.stop_s:
             text = f"waits {waited_s:g} s behind switching off; spindle.stop_s = {self.spindle.stop_s:g}"
             yield _issue("warning", "m_code.M5", text)
 
-    def coolant(self, code: str) -> Iterator[Issue]:
+    def coolant(self, m_code: str) -> Iterator[Issue]:
         """Yield M7 and M8 that do not switch on the output that ``[spindle]`` names."""
-        own_key, other_key = _COOLANTS[code]
+        own_key, other_key = _COOLANTS[m_code]
         own, other = self.out(own_key), self.out(other_key)
-        for case in self.of(code):
+        for case in self.of(m_code):
             effect = case.effect
             signal = effect.signals.get(own or "")
             if own is None or effect.calls or (signal is not None and signal.surely_on):
@@ -305,7 +315,7 @@ class _Codes:
             text = f"does not {'always ' if perhaps else ''}switch on {own}, spindle.{own_key}"
             text += f", but {other}, spindle.{other_key}" if other in effect.driven() else ""
             is_doubt = bool(effect.stops) or perhaps
-            key = f"m_code.{code}"
+            key = f"m_code.{m_code}"
             yield _issue(self.severity(key, own_key, is_doubt=is_doubt), key, text)
             return
 
@@ -320,10 +330,12 @@ class _Codes:
 
     def intruders(self) -> Iterator[Issue]:
         """Yield what else starts or stops the spindle, or leaves something on at the end."""
-        spindle = frozenset().union(*(case.effect.driven() for code in _RUNS for case in self.of(code)))
-        coolant = frozenset().union(*(case.effect.driven() for code in _COOLANTS for case in self.of(code)))
+        spindle = frozenset().union(*(case.effect.driven() for m_code in _RUNS for case in self.of(m_code)))
+        coolant = frozenset().union(
+            *(case.effect.driven() for m_code in _COOLANTS for case in self.of(m_code))
+        )
         for key, cases in self.cases.items():
-            code = key.removeprefix("m_code.")
+            m_code = key.removeprefix("m_code.")
             for case in cases[-1:]:
                 effect = case.effect
                 left = effect.on() & (spindle | coolant if key in _END else spindle)
@@ -332,12 +344,12 @@ class _Codes:
                     yield _issue(severity, key, f"switches on {_listed(left)}, which M3, M7 or M8 switch on")
                 spindle_alone = spindle - coolant
                 ends = {name for name in effect.signals if not effect.signals[name].driven}
-                if key.startswith("m_code.") and code not in _MAY_STOP_SPINDLE and spindle_alone & ends:
+                if key.startswith("m_code.") and m_code not in _MAY_STOP_SPINDLE and spindle_alone & ends:
                     severity = "warning" if effect.stops else "error"
-                    text = f"switches off {_listed(spindle_alone & ends)}: the spindle stops, and the cut goes on"
+                    text = f"switches off {_listed(spindle_alone & ends)}: the spindle stops in the cut"
                     yield _issue(severity, key, text)
                 name = self.speed_output
-                if name in effect.signals and code not in _RUNS and effect.signals[name or ""].may_be_on:
+                if name in effect.signals and m_code not in _RUNS and effect.signals[name or ""].may_be_on:
                     text = f"sets {name}, the speed of the spindle, {_SPEED_KEY}"
                     yield _issue("error", key, text)
 

@@ -1,4 +1,4 @@
-"""Numbers of a cell that contradict each other: of cutters, spindle, arm, controller, pilot and online side."""
+"""Numbers of a cell that contradict each other: of cutters, spindle, arm, controller and pilot."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from gcode2krl.cell.definition import Cell
 from gcode2krl.cell.layout import reach_mm
 from gcode2krl.cell.sections import Tool
 from gcode2krl.errors import Issue, Severity
-from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
+from gcode2krl.units import RAD_PER_REV, S_PER_MIN
 
 _FASTEST_EDGE_M_MIN = 12_000.0
 """High-speed milling of aluminium: 2,000 to 8,000 m/min."""
@@ -42,7 +42,11 @@ def _cutter(key: str, tool: Tool, cell: Cell) -> Iterator[Issue]:
     diameter_mm, flute_mm, out_mm = tool.diameter_mm, tool.flute_length_mm, tool.stick_out_mm
     holder_mm = tool.holder_diameter_mm
     shank_mm = tool.shank_diameter_mm or diameter_mm
-    if holder_mm is not None and holder_mm < shank_mm and (tool.shank_diameter_mm or diameter_mm <= _END_MILL_MM):
+    if (
+        holder_mm is not None
+        and holder_mm < shank_mm
+        and (tool.shank_diameter_mm or diameter_mm <= _END_MILL_MM)
+    ):
         text = f"= {holder_mm:g} is less than the shank in it, {shank_mm:g}"
         yield _wrong("error", f"{key}.holder_diameter_mm", text)
     if flute_mm is not None and out_mm is not None and flute_mm > out_mm + 1.0:
@@ -78,10 +82,19 @@ def _spindle(cell: Cell) -> Iterator[Issue]:
     if spindle.max_power_W is not None and spindle.max_torque_Nm is not None and spindle.max_rpm is not None:
         most_W = spindle.max_torque_Nm * spindle.max_rpm * RAD_PER_REV / S_PER_MIN
         if spindle.max_power_W > 1.2 * most_W:
-            text = f"= {spindle.max_torque_Nm:g} makes {most_W:.0f} W at most, max_power_W is {spindle.max_power_W:g}"
+            text = f"= {spindle.max_torque_Nm:g} makes {most_W:.0f} W at most, not {spindle.max_power_W:g}"
             yield _wrong("warning", "spindle.max_torque_Nm", text)
-    for key, code in (("run_cw_output", "M3"), ("run_ccw_output", "M4"), ("flood_output", "M8"), ("mist_output", "M7")):
-        if key in ("flood_output", "mist_output") and getattr(spindle, key) is not None and code not in cell.m_code:
+    for key, code in (
+        ("run_cw_output", "M3"),
+        ("run_ccw_output", "M4"),
+        ("flood_output", "M8"),
+        ("mist_output", "M7"),
+    ):
+        if (
+            key in ("flood_output", "mist_output")
+            and getattr(spindle, key) is not None
+            and code not in cell.m_code
+        ):
             other = "M8" if code == "M7" else "M7"
             if other not in cell.m_code:
                 yield _wrong("warning", f"spindle.{key}", f"is stated, and no {code} switches it")
@@ -119,23 +132,31 @@ def _external(cell: Cell) -> Iterator[Issue]:
         low, high = axis.limits
         if axis.is_rail and high - low < _SHORT_RAIL_MM and axis.moves:
             yield _wrong("warning", f"external.{name}.limits", f"are {high - low:g} mm of travel: metres?")
-        elif axis.speed is not None and min(high - low, 20_000.0) / axis.speed > _LONG_TRAVEL_S and axis.is_rail:
-            text = f"= {axis.speed:g} mm/s needs {(high - low) / axis.speed / S_PER_MIN:.0f} min from end to end: m/s?"
+        elif (
+            axis.speed is not None
+            and min(high - low, 20_000.0) / axis.speed > _LONG_TRAVEL_S
+            and axis.is_rail
+        ):
+            needed_min = (high - low) / axis.speed / S_PER_MIN
+            text = f"= {axis.speed:g} mm/s needs {needed_min:.0f} min from end to end: m/s?"
             yield _wrong("warning", f"external.{name}.speed", text)
         elif not axis.is_rail and axis.moves and max(abs(low), abs(high)) < _RADIANS:
-            yield _wrong("warning", f"external.{name}.limits", "are below 2 pi: radians, where degrees are meant")
+            yield _wrong(
+                "warning", f"external.{name}.limits", "are below 2 pi: radians, where degrees are meant"
+            )
 
 
 def _controller(cell: Cell) -> Iterator[Issue]:
     controller = cell.controller
     if controller.rapid_m_s > controller.vel_cp_m_s * 1.0001:
-        text = f"= {controller.rapid_m_s:g} is more than vel_cp_m_s, the largest path speed, {controller.vel_cp_m_s:g}"
+        most_m_s = controller.vel_cp_m_s
+        text = f"= {controller.rapid_m_s:g} is more than vel_cp_m_s, the largest path speed, {most_m_s:g}"
         yield _wrong("error", "controller.rapid_m_s", text)
     if controller.rapid_m_s / controller.acc_cp_m_s2 > _START_S / 6.0:
         start_s = controller.rapid_m_s / controller.acc_cp_m_s2
         yield _wrong("warning", "controller.acc_cp_m_s2", f": rapid moves take {start_s:.0f} s to start")
     if controller.vel_ori_deg_s < RAD_PER_REV:
-        text = f"= {controller.vel_ori_deg_s:g} turns the tool about in {180 / controller.vel_ori_deg_s:.0f} s: radians?"
+        text = f"= {controller.vel_ori_deg_s:g}: turning about takes {180 / controller.vel_ori_deg_s:.0f} s"
         yield _wrong("warning", "controller.vel_ori_deg_s", text)
     elif controller.vel_ori_deg_s / controller.acc_ori_deg_s2 > 10.0:
         start_s = controller.vel_ori_deg_s / controller.acc_ori_deg_s2
@@ -167,15 +188,40 @@ def _variables(cell: Cell) -> Iterator[Issue]:
 def _online(cell: Cell) -> Iterator[Issue]:
     online = cell.online
     rows: tuple[tuple[str, bool, Severity, str], ...] = (
-        ("threshold_N", online.threshold_N >= online.most_force_N, "error", "is not below most_force_N: nothing is ever corrected"),
+        (
+            "threshold_N",
+            online.threshold_N >= online.most_force_N,
+            "error",
+            "is not below most_force_N: nothing is ever corrected",
+        ),
         ("step_mm", online.step_mm > online.most_mm, "error", "is more than most_mm, the largest correction"),
-        ("step_mm", online.step_mm * 10.0 < online.rate_mm_s * online.cycle_s, "warning", "allows less than a tenth of rate_mm_s in a cycle"),
-        ("lowpass_hz", online.lowpass_hz > 0.5 / online.cycle_s, "error", "is above half the rate of the cycles"),
+        (
+            "step_mm",
+            online.step_mm * 10.0 < online.rate_mm_s * online.cycle_s,
+            "warning",
+            "allows less than a tenth of rate_mm_s in a cycle",
+        ),
+        (
+            "lowpass_hz",
+            online.lowpass_hz > 0.5 / online.cycle_s,
+            "error",
+            "is above half the rate of the cycles",
+        ),
         ("blend_s", online.blend_s < online.cycle_s, "error", "is less than a cycle"),
-        ("probe.rest_mm", online.probe.rest_mm >= online.probe.amplitude_mm, "error", "is not less than probe.amplitude_mm: no movement is seen"),
+        (
+            "probe.rest_mm",
+            online.probe.rest_mm >= online.probe.amplitude_mm,
+            "error",
+            "is not less than probe.amplitude_mm: no movement is seen",
+        ),
         ("most_mm", online.probe.amplitude_mm > online.most_mm, "error", "is less than probe.amplitude_mm"),
-        ("most_force_N", online.most_force_N < 0.05 * cell.limits.force_N, "warning", "is a small part of limits.force_N: each cut is held"),
-    )  # fmt: skip  # a table
+        (
+            "most_force_N",
+            online.most_force_N < 0.05 * cell.limits.force_N,
+            "warning",
+            "is a small part of limits.force_N: each cut is held",
+        ),
+    )
     for key, is_wrong, severity, text in rows:
         if is_wrong:
             yield _wrong(severity, f"online.{key}", text)

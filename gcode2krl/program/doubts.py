@@ -135,30 +135,27 @@ def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue
 
 
 def _stock_elsewhere(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    """Yield a stated stock that no feed move touches: it is an error where it lies beside all of them."""
+    """Yield a stated stock that lies beside all feed moves, by more than its own size.
+
+    What is nearer the simulation of the cut finds, if there is one.
+    """
     box = stock_box(cell)
     rows = np.flatnonzero(feed)
     if box is None or not len(rows):
         return
-    ends = toolpath.position_mm[rows], toolpath.position_mm[rows - 1]
     radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
-    around = np.array([radius_mm, radius_mm, radius_mm if (toolpath.axis[rows, 2] < 1.0 - 1e-9).any() else 0.0])
-    low, high = np.minimum(*ends) - around, np.maximum(*ends) + around
-    high[:, 2] = np.inf  # the tool stands above its tip
-    if ((low < box[1]) & (box[0] < high)).all(axis=1).any():
-        return
-    beside = np.maximum(low.min(axis=0) - box[1], box[0] - high.max(axis=0))[:2]
-    is_far = bool((beside > (box[1] - box[0])[:2]).any())
-    above_mm = float(low[:, 2].min() - box[1][2])
-    where = f"{beside.max():.1f} mm beside" if beside.max() > 0.0 else f"{max(above_mm, 0.0):.1f} mm above"
-    yield Issue(
-        "error" if is_far else "warning",
-        "stock-elsewhere",
-        int(toolpath.source_line[rows[0]]),
-        f"no feed move touches the stock of the cell: all of them are {where} it",
-        "correct stock.box_mm of the cell, the work offset, or the zero point of the program",
-        key="stock.box_mm",
-    )
+    places = toolpath.position_mm[np.union1d(rows, rows - 1)][:, :2]
+    low, high = places.min(axis=0) - radius_mm, places.max(axis=0) + radius_mm
+    beside_mm = np.maximum(low - box[1][:2], box[0][:2] - high)
+    if (beside_mm > (box[1] - box[0])[:2]).any():
+        yield Issue(
+            "error",
+            "stock-untouched",
+            int(toolpath.source_line[rows[0]]),
+            f"no feed move touches the stock that the cell states: all are {beside_mm.max():.1f} mm away",
+            "correct stock.box_mm of the cell, the work offset, or the zero point of the program",
+            key="stock.box_mm",
+        )
 
 
 def _clamps_above_plane(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
@@ -179,8 +176,8 @@ def _clamps_above_plane(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
                 "warning",
                 "cell-contradiction",
                 0,
-                f"clearance.z_mm = {z_mm:g} is below the top of obstacle {obstacle.name}, {box[1][2]:g}, where "
-                "the program goes",
+                f"clearance.z_mm = {z_mm:g} is below the top of obstacle {obstacle.name}, {box[1][2]:g}, "
+                "where the program goes",
                 "raise clearance.z_mm of the cell above all clamps",
                 key="clearance.z_mm",
             )

@@ -1,4 +1,4 @@
-"""Sound cells of many kinds: arms of 6 to 600 kg, spindles on outputs, drives and people, rails, a hanging arm."""
+"""Sound cells of many kinds: arms of 6 to 600 kg, spindles on outputs and by hand, a rail, a hanging arm."""
 
 OUTPUT = "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
 CW, CCW = "$OUT[{{ spindle.run_cw_output }}]=TRUE\n", "$OUT[{{ spindle.run_ccw_output }}]=TRUE\n"
@@ -176,7 +176,11 @@ SOUND = {
         {
             "1": tool(16.0, 100.0, tool_data=1, axis="+x", frame=frame(250.0, 0.0, 250.0, a=180.0)),
             "2": tool(
-                12.0, 130.0, tool_data=2, axis="+x", frame=frame(280.0, 0.0, 250.0, a=180.0),
+                12.0,
+                130.0,
+                tool_data=2,
+                axis="+x",
+                frame=frame(280.0, 0.0, 250.0, a=180.0),
                 load={"mass_kg": 118.0, "x_mm": 99.0, "y_mm": 0.0, "z_mm": 180.0},
             ),
         },
@@ -190,7 +194,13 @@ SOUND = {
         100.0,
         (24.0, 0.0, 0.0, 140.0),
         {"1": tool(8.0, 104.0)},
-        {"max_rpm": 24000.0, "speed_analog_output": 1, "run_cw_output": 5, "at_speed_input": 6, "stop_s": 6.0},
+        {
+            "max_rpm": 24000.0,
+            "speed_analog_output": 1,
+            "run_cw_output": 5,
+            "at_speed_input": 6,
+            "stop_s": 6.0,
+        },
         {"M3": OUTPUT + CW + AT_SPEED, "M5": STOP},
         home={"q_deg": [0.0, -60.0, 75.0, 0.0, -105.0, 0.0]},
         clearance={"z_mm": 100.0},
@@ -203,8 +213,17 @@ SOUND = {
         (120.0, 100.0, 0.0, 180.0),
         {"1": tool(16.0, 100.0)},
         DIGITAL | {"speed_analog_output": 3},
-        {"M3": OUTPUT + "IF $IN[8] THEN\n" + CW + WAITED + "\nELSE\nHALT ; close the door\n" + CW + WAITED
-         + "\nENDIF", "M5": STOP},
+        {
+            "M3": OUTPUT
+            + "IF $IN[8] THEN\n"
+            + CW
+            + WAITED
+            + "\nELSE\nHALT ; close the door\n"
+            + CW
+            + WAITED
+            + "\nENDIF",
+            "M5": STOP,
+        },
         external={"E1": {"kind": "rail", "axis": "y", "limits": [-4000.0, 4000.0], "speed": 1500.0}},
         stock={"box_mm": [[-100.0, -3000.0, -40.0], [400.0, 3000.0, 0.0]]},
         table={"z_mm": -45.0},
@@ -216,12 +235,21 @@ SOUND = {
         140.0,
         (260.0, 140.0, 10.0, 200.0),
         {"1": tool(40.0, 160.0, teeth=5), "12": tool(8.0, 120.0, kind="drill", teeth=2, point_deg=140.0)},
-        {"max_rpm": 18000.0, "run_cw_output": 4, "speed_analog_output": 1, "at_speed_input": 4, "stop_s": 10.0},
-        {"M3": "$ANOUT[1]={{ rpm }}/24000\n$OUT[4]=TRUE\nWAIT FOR ($IN[4]==TRUE) AND ($IN[5]==TRUE)", "M5": STOP},
+        {
+            "max_rpm": 18000.0,
+            "run_cw_output": 4,
+            "speed_analog_output": 1,
+            "at_speed_input": 4,
+            "stop_s": 10.0,
+        },
+        {
+            "M3": "$ANOUT[1]={{ rpm }}/24000\n$OUT[4]=TRUE\nWAIT FOR ($IN[4]==TRUE) AND ($IN[5]==TRUE)",
+            "M5": STOP,
+        },
         tool_change="$OUT[80]=TRUE\nWAIT FOR $IN[80]\nHALT ; tool {{ tool }}",
         stock={"box_mm": [[0.0, -300.0, -100.0], [600.0, 300.0, 20.0]], "through_mm": 2.0},
         table={"z_mm": -120.0},
     ),
-}  # fmt: skip  # a table
+}
 """Name → cell file as tables: none of them has a finding."""
 SOUND["upside down"]["frames"]["robroot"] = frame(0.0, 0.0, 2600.0, c=180.0)

@@ -59,7 +59,8 @@ def cells(draw):
         "m_code": {
             "M3": "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
             "$OUT[{{ spindle.run_cw_output }}]=TRUE",
-            "M5": "$OUT[{{ spindle.run_cw_output }}]=FALSE\n$OUT[{{ spindle.run_ccw_output }}]=FALSE\nWAIT SEC {{ spindle.stop_s }}",
+            "M5": "$OUT[{{ spindle.run_cw_output }}]=FALSE\n$OUT[{{ spindle.run_ccw_output }}]=FALSE\n"
+            "WAIT SEC {{ spindle.stop_s }}",
             "M4": "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
             "$OUT[{{ spindle.run_ccw_output }}]=TRUE",
             "M7": "$OUT[{{ spindle.flood_output }}]=TRUE",
