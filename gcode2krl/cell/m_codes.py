@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from gcode2krl.cell.definition import Cell, plain_view
 from gcode2krl.cell.krl_effect import Effect, effect_of
-from gcode2krl.cell.switching import SAMPLE
+from gcode2krl.cell.switching import SAMPLE, texts_without_words
 from gcode2krl.cell.template_rules import problem, statements
 from gcode2krl.cell.templates import TemplateError, render
 from gcode2krl.errors import Issue, Severity
@@ -25,11 +25,15 @@ _LEAST_FULL = 0.5
 """Output at ``spindle.max_rpm``, documented as 1; a drive whose full value is twice as fast is usual."""
 _LONG_WAIT_S, _ENDLESS_WAIT_S = 120.0, 600.0
 """Spindles start in 1 to 30 s (`ranges.toml`); a longer wait has its seconds as milliseconds."""
+_SHORT_WAIT_S = 0.5
+"""A stated wait below this is a finding of its own, `spindle-wait`."""
 _ENOUGH = 0.99
 _RUNS = {"M3": ("run_cw_output", "run_ccw_output"), "M4": ("run_ccw_output", "run_cw_output")}
 _COOLANTS = {"M8": ("flood_output", "mist_output"), "M7": ("mist_output", "flood_output")}
 _END = ("m_code.M2", "m_code.M30", "program.epilogue")
 _MAY_STOP_SPINDLE = ("M3", "M4", "M5", "M2", "M30", "M6", "M19", "M60")
+_WORD = re.compile(r"\b[pqe]\b")
+"""A word of the block, which names an output: a program says which (`output_words`)."""
 _NUMBER_OF_TOOL = re.compile(r"(?i)\btool[ #:_]{0,3}(\d+)\b")
 
 
@@ -115,6 +119,8 @@ class _Codes:
                 for share in shares
             )
             self.cases[key] = [case for case in cases if case is not None]
+        steady = texts_without_words(templates, view) if any(map(_WORD.search, templates.values())) else None
+        self.by_words = set() if steady is None else templates.keys() - steady.keys()
 
     def of(self, m_code: str) -> list[_Case]:
         return self.cases.get(f"m_code.{m_code}", [])
@@ -235,7 +241,12 @@ class _Codes:
             at_speed = spindle.at_speed_input
             if at_speed is not None and (at_speed, True) not in levels:
                 yield self._at_speed(key, effect, name, waited_s)
-            elif at_speed is None and not levels and waited_s < _ENOUGH * spindle.start_s:
+            elif (
+                at_speed is None
+                and not levels
+                and spindle.start_s >= _SHORT_WAIT_S
+                and waited_s < _ENOUGH * spindle.start_s
+            ):
                 before = effect.wait_s >= _ENOUGH * spindle.start_s
                 stated = "start_s" in spindle.model_fields_set and waited_s < 0.5 * spindle.start_s
                 text = f"waits {waited_s:g} s behind switching on {name}"
@@ -335,6 +346,8 @@ class _Codes:
             *(case.effect.driven() for m_code in _COOLANTS for case in self.of(m_code))
         )
         for key, cases in self.cases.items():
+            if key in self.by_words:
+                continue
             m_code = key.removeprefix("m_code.")
             for case in cases[-1:]:
                 effect = case.effect

@@ -151,7 +151,7 @@ def _controller(cell: Cell) -> Iterator[Issue]:
     if controller.rapid_m_s > controller.vel_cp_m_s * 1.0001:
         most_m_s = controller.vel_cp_m_s
         text = f"= {controller.rapid_m_s:g} is more than vel_cp_m_s, the largest path speed, {most_m_s:g}"
-        yield _wrong("error", "controller.rapid_m_s", text)
+        yield _wrong("warning", "controller.rapid_m_s", text)
     if controller.rapid_m_s / controller.acc_cp_m_s2 > _START_S / 6.0:
         start_s = controller.rapid_m_s / controller.acc_cp_m_s2
         yield _wrong("warning", "controller.acc_cp_m_s2", f": rapid moves take {start_s:.0f} s to start")
