@@ -477,7 +477,7 @@ ROBOT_MISTAKES = (
     ),
     Mistake(
         "base in metres",
-        r"reach|A\d",
+        r"reach|A\d|metres",
         {9: "@", 10: "@", 12: "@"},
         cell="[frames.base]\nx_mm = 1.5\ny_mm = 0.0\nz_mm = 0.8\n" + NO_TURN,
         or_whole=True,

@@ -27,7 +27,7 @@ PLACE = dict(
 
 
 IN_KN = {"Ktc": 0.8, "Krc": 0.17, "Kte": 0.03, "Kre": 0.03}
-SWITCHES = {"M3": "$OUT[1]=TRUE", "M4": "$OUT[1]=TRUE", "M5": "$OUT[1]=FALSE"}
+SWITCHES = {"M3": "$OUT[1]=TRUE", "M4": "$OUT[2]=TRUE", "M5": "$OUT[1]=FALSE\n$OUT[2]=FALSE"}
 
 
 def cell_with(**more):

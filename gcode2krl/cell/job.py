@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 from pydantic import Field, ValidationError
 
 from gcode2krl.cell import library
+from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.definition import Cell
 from gcode2krl.cell.ranges import range_issues
 from gcode2krl.cell.sections import Section, Stock, Tool, ToolNumber
@@ -95,7 +96,8 @@ def lay_job_over(cell: Cell, path: Path) -> UnderJob:
             tools[number] = _tool_with(tools[number], cutter, number, source)
     stock, doubts = _stock_of(job, cell, path.parent, source)
     under = cell.under(tool=tools, stock=stock)
-    wrong = [issue for issue in range_issues(under, set(job.tool)) if issue.severity == "error"]
+    judged = (*range_issues(under, set(job.tool)), *contradictory(under, set(job.tool)))
+    wrong = [issue for issue in judged if issue.severity == "error"]
     if wrong:
         raise NotUnderstoodError(wrong, source)
     return UnderJob(under, (*issues, *doubts))

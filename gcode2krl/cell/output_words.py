@@ -6,7 +6,8 @@ Which they are only a program says, so they are compared with those of the spind
 from typing import Any
 
 from gcode2krl.cell.definition import Cell, plain_view
-from gcode2krl.cell.switching import SAMPLE, WORDS, outputs_set, rendered_widely
+from gcode2krl.cell.krl_effect import effect_of
+from gcode2krl.cell.switching import SAMPLE, WORDS, rendered_widely
 from gcode2krl.cell.templates import TemplateError, render
 from gcode2krl.tables import Event
 
@@ -29,7 +30,7 @@ def reserved_outputs(cell: Cell) -> dict[str, str]:
     }
     templates = {key: text for key, text in cell.templates().items() if key in _SPINDLE}
     for texts in rendered_widely(templates, _view(cell)).values():
-        found |= {name: "the spindle" for text in texts for name in outputs_set(text)}
+        found |= {name: "the spindle" for text in texts for name in effect_of(text).signals}
     return found
 
 
@@ -43,7 +44,7 @@ def switched_by_words(event: Event, cell: Cell) -> frozenset[str]:
         text = render(template, {**SAMPLE, **_view(cell), "m": event.values["m"], **words})
     except TemplateError:  # reported where it is written
         return frozenset()
-    return frozenset(outputs_set(text))
+    return frozenset(effect_of(text).signals)
 
 
 def _view(cell: Cell) -> dict[str, Any]:

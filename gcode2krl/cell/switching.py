@@ -1,10 +1,10 @@
 """What the M-codes of a cell switch, read back from its rendered templates: pairs, and double meanings."""
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from gcode2krl.cell import template_rules as rules
+from gcode2krl.cell.krl_effect import Effect, effect_of
+from gcode2krl.cell.template_rules import problem, statements
 from gcode2krl.cell.templates import MissingValueError, TemplateError, render
 from gcode2krl.errors import Issue, Severity
 
@@ -13,7 +13,6 @@ _OTHER_SPEEDS = (0.0, 1.0, 100.0, 5000.0, 20000.0, 1e6)
 SAMPLE = {"rpm": 1000.0, "p": 1.0, "q": 1.0, "e": 1.0, "text": "text", "line": 1, "tool": 1, "m": 0}
 WORDS = ("p", "q", "e")
 """What a template gets of the words of a block that only a program has."""
-_ANALOGUE = re.compile(r"(\$ANOUT ?\[ ?\d+ ?\]) ?=")
 _OFF = {"M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """Which M-code switches off what another switches on."""
 _SPINDLE, _COOLANT = ("M3", "M4"), ("M7", "M8")
@@ -36,19 +35,13 @@ def rendered(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str,
     return texts
 
 
-def outputs_set(text: str) -> frozenset[str]:
-    """Return the digital and analogue outputs that KRL text sets."""
-    analogue = (
-        found[1].replace(" ", "") for line in rules.statements(text) if (found := _ANALOGUE.match(line))
-    )
-    return frozenset((*(one.name for one in rules.switched(text)), *analogue))
-
-
 def texts_without_words(templates: Mapping[str, str], view: Mapping[str, Any]) -> dict[str, str]:
     """Return key → KRL of the templates whose outputs do not depend on the words of a block."""
     texts, others = rendered(templates, view), rendered(templates, {**view, **dict.fromkeys(WORDS, 7919.0)})
     return {
-        key: text for key, text in texts.items() if outputs_set(text) == outputs_set(others.get(key, text))
+        key: text
+        for key, text in texts.items()
+        if effect_of(text).signals.keys() == effect_of(others.get(key, text)).signals.keys()
     }
 
 
@@ -75,7 +68,7 @@ def template_issues(
     """Yield what is wrong with each template, rendered with sample values."""
     for key, template in templates.items():
         try:
-            what = rules.problem(render(template, {**SAMPLE, **view}), externals)
+            what = problem(render(template, {**SAMPLE, **view}), externals)
         except MissingValueError:
             continue  # missing, not wrong: reported where the program needs it
         except TemplateError as error:
@@ -97,13 +90,14 @@ def pair_issues(templates: Mapping[str, str], view: Mapping[str, Any]) -> Iterat
             continue
         if off_key not in templates:
             yield _pair(off_key, f"{on_key} without {off_key}: nothing switches off what {on} switches on")
-        elif off_key in texts and not all(map(rules.statements, texts[off_key])):
+        elif off_key in texts and not all(map(statements, texts[off_key])):
             yield _pair(off_key, f"{off_key} is empty: nothing switches off what {on} switches on")
         elif on_key in texts and off_key in texts:
-            switched_on = frozenset().union(*map(rules.may_be_on, texts[on_key]))
-            left = switched_on - frozenset.intersection(*map(rules.surely_off, texts[off_key]))
+            ends = [effect_of(text) for text in texts[off_key]]
+            switched_on = frozenset().union(*(effect_of(text).on() for text in texts[on_key]))
+            left = switched_on - frozenset.intersection(*(end.off() for end in ends))
             if left:
-                names, called = ", ".join(sorted(left)), rules.calls(texts[off_key][0])
+                names, called = ", ".join(sorted(left)), ends[0].calls
                 text = f"{on_key} switches on {names}, which {off_key} does not switch off"
                 if called:
                     text += f", unless {called[0]} does"
@@ -136,7 +130,7 @@ def _meanings(
 
 def _of_spindle_or_coolant(texts: Mapping[str, str]) -> Iterator[Issue]:
     """Yield the signals of spindle or coolant that something else switches on as well."""
-    on = {key: rules.may_be_on(text) | frozenset(rules.pulses(text)) for key, text in texts.items()}
+    on = {key: effect_of(text).driven() for key, text in texts.items()}
     spindle = _union(on, _SPINDLE)
     coolant = _union(on, _COOLANT)
     for signal in sorted(spindle | coolant):
@@ -160,24 +154,26 @@ def _of_online(texts: Mapping[str, str], named: Mapping[str, int | None]) -> Ite
             continue
         signal = f"$OUT[{number}]"
         for user, text in texts.items():
-            if signal in {one.name for one in rules.switched(text)}:
+            if signal in effect_of(text).signals:
                 yield _two_meanings(signal, key, user)
 
 
 def signals_text(texts: Mapping[str, str], key: str) -> str:
     """Return what a template switches as a person reads it: ``$OUT[1] on, $OUT[2] off``."""
-    signals = {signal.name: signal for signal in rules.switched(texts.get(key, ""))}
     text = texts.get(key, "")
-    pulsed = rules.pulses(text)
-    words = [
-        f"{signal.name} {'on' if signal.value else 'off'}{'' if signal.sure else ' (perhaps)'}"
-        for signal in signals.values()
-        if signal.name not in pulsed
-    ]
-    words += [f"{name} pulsed" for name in pulsed]
-    words += [line for line in rules.statements(text) if line.startswith("$ANOUT")]
-    words += [f"calls {name}" for name in rules.calls(text)]
+    effect = effect_of(text)
+    words = [_signal_text(effect, name) for name in effect.digital()]
+    words += [line for line in statements(text) if line.startswith("$ANOUT")]
+    words += [f"calls {name}" for name in effect.calls]
     return ", ".join(words)
+
+
+def _signal_text(effect: Effect, name: str) -> str:
+    signal = effect.signals[name]
+    if signal.pulsed:
+        return f"{name} pulsed"
+    is_certain = signal.sure and len(signal.values) == 1 and None not in signal.values
+    return f"{name} {'on' if signal.may_be_on else 'off'}{'' if is_certain else ' (perhaps)'}"
 
 
 def _is_of(key: str, *groups: tuple[str, ...]) -> bool:

@@ -6,7 +6,6 @@ The list is of what is allowed: an unknown statement is refused.
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 
 from gcode2krl import krl_words as w
 
@@ -19,8 +18,7 @@ _PLANNER_DATA = re.compile(
 _CLOSE = {close: begin for begin, close in w.BLOCKS.items()}
 _ASSIGNED = re.compile(r"(\$?)([A-Z_][A-Z0-9_]*)((?:\.[A-Z0-9_]+|\[[^\]=]*\])*) ?=(?!=)")
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*) ?\(")
-_PULSE = re.compile(r"PULSE ?\( ?(\$OUT\[ ?\d+ ?\]) ?, ?(TRUE|FALSE) ?,[^()]*\)$")
-_OUTPUT = re.compile(r"(\$OUT\[ ?\d+ ?\]|[A-Z_][A-Z0-9_]*(?:\[\d+\])?) ?= ?(.+)$")
+PULSE_FORM = re.compile(r"PULSE ?\( ?(\$OUT\[ ?\d+ ?\]) ?, ?(TRUE|FALSE) ?,[^()]*\)$")
 _INTERRUPT = re.compile(
     r"(?:GLOBAL )?INTERRUPT (?:DECL (\d+) WHEN .+ DO ([A-Z_][A-Z0-9_]*) ?\(.*\)"
     r"|(?:ON|OFF|DISABLE|ENABLE) (\d+))$"
@@ -38,18 +36,6 @@ _ALONE = frozenset(
 _COUNTS = re.compile(r"FOR (?!\$)([A-Z_][A-Z0-9_]*) ?= ?[^=]+ TO ")
 _HIGHEST_OUTPUT = 8192
 _CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
-
-
-@dataclass(frozen=True)
-class Switched:
-    """A signal that a template sets: ``$OUT[3]``, or the integrator's name for one.
-
-    ``sure`` is False inside a condition or a loop, and where the value is not read as TRUE or FALSE.
-    """
-
-    name: str
-    value: bool
-    sure: bool
 
 
 def statements(text: str) -> list[str]:
@@ -87,54 +73,9 @@ def external_problem(external: str) -> str:
     return ""
 
 
-def switched(text: str) -> list[Switched]:
-    """Return the digital outputs that KRL text sets, in order."""
-    depth, outputs = 0, []
-    for statement in statements(text):
-        word = _first(statement)
-        depth += (word in w.BLOCKS) - (word in _CLOSE)
-        match = _OUTPUT.match(statement)
-        pulse = _PULSE.match(statement)
-        if pulse:  # a pulse ends by itself in the other state
-            outputs.append(Switched(pulse[1].replace(" ", ""), pulse[2] != "TRUE", depth == 0))
-        elif match:
-            known = match[2] in ("TRUE", "FALSE")
-            if known or match[1].startswith("$"):
-                name = match[1].replace(" ", "")
-                outputs.append(Switched(name, match[2] != "FALSE", known and depth == 0))
-    return outputs
-
-
-def pulses(text: str) -> list[str]:
-    """Return the outputs that KRL text pulses."""
-    return [match[1].replace(" ", "") for match in map(_PULSE.match, statements(text)) if match]
-
-
 def calls(text: str) -> list[str]:
     """Return the subprograms that KRL text calls: what they switch cannot be read."""
     return [name for statement in statements(text) for name in _called(statement) if name not in _FUNCTIONS]
-
-
-def may_be_on(text: str) -> frozenset[str]:
-    """Return the signals that are on, or may be, after the text."""
-    on: set[str] = set()
-    for signal in switched(text):
-        if signal.value:
-            on.add(signal.name)
-        elif signal.sure:
-            on.discard(signal.name)
-    return frozenset(on)
-
-
-def surely_off(text: str) -> frozenset[str]:
-    """Return the signals that are off after the text, whatever its conditions."""
-    off: set[str] = set()
-    for signal in switched(text):
-        if signal.value:
-            off.discard(signal.name)
-        elif signal.sure:
-            off.add(signal.name)
-    return frozenset(off)
 
 
 def _statement(line: str) -> str:
@@ -190,7 +131,7 @@ def _wrong_form(word: str, statement: str, callable_names: set[str]) -> str:
 
 
 def _wrong_pulse(statement: str) -> str:
-    return "" if _PULSE.match(statement) else "does not pulse an output given by its number"
+    return "" if PULSE_FORM.match(statement) else "does not pulse an output given by its number"
 
 
 def _wrong_for(statement: str) -> str:

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from gcode2krl.cell import carriers, ranges, switching
 from gcode2krl.cell.base import StatedCell, split_pairs
+from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.definition import Cell, plain_view
 from gcode2krl.cell.keys import meant_key
 from gcode2krl.errors import Issue
@@ -38,7 +39,8 @@ def validation_issues(error: ValidationError) -> Iterator[Issue]:
 
 def contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     """Yield errors that only several keys together show: impossible sizes, half pairs, double meanings."""
-    yield from (issue for issue in ranges.range_issues(cell) if issue.severity == "error")
+    impossible = [issue for issue in ranges.range_issues(cell) if issue.severity == "error"]
+    yield from impossible
     if cell.mounted_tool is not None and cell.mounted_tool not in cell.tool:
         number = cell.mounted_tool
         yield key_issue("mounted_tool", f"found {number}, and the cell has no [tool.{number}]")
@@ -52,6 +54,8 @@ def contradictions(cell: Cell, stated: frozenset[str]) -> Iterator[Issue]:
     texts = switching.texts_without_words(templates, view)
     yield from (issue for issue in switching.pair_issues(templates, view) if issue.severity == "error")
     yield from switching.meaning_issues(texts, _named_outputs(cell, stated), _named_inputs(cell))
+    if not impossible:  # such a value contradicts others as well
+        yield from (issue for issue in contradictory(cell) if issue.severity == "error")
 
 
 def split_pair_issues(stated: StatedCell) -> Iterator[Issue]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from gcode2krl.cell import Cell, plain_view, switching
 from gcode2krl.cell.confirmation import confirmation_issues, future_confirmation
+from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.ranges import range_issues
 from gcode2krl.cell.sections import Frame, Obstacle, Robot
 from gcode2krl.errors import Issue
@@ -94,7 +95,8 @@ def findings(cell: Cell) -> list[Issue]:
     wrong = switching.template_issues(templates, _template_values(cell), cell.program.externals)
     pairs = switching.pair_issues(templates, _template_values(cell))
     unconfirmed = [issue for issue in confirmation_issues(cell) if issue.severity == "warning"]
-    return [*wrong, *pairs, *range_issues(cell), *unconfirmed, *future_confirmation(cell)]
+    judged = (*range_issues(cell), *contradictory(cell))
+    return [*wrong, *pairs, *judged, *unconfirmed, *future_confirmation(cell)]
 
 
 def origin_of(cell: Cell, key: str, lines: Mapping[str, int]) -> str:

@@ -29,6 +29,7 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     findings += missing_issues(toolpath, cell)
     findings += doubtful_issues(toolpath, cell)
     findings += list(_events(toolpath, cell))
+    findings += list(_silent_changes(toolpath, cell))
     findings += list(_outputs_of_words(toolpath, cell))
     return tuple(findings)
 
@@ -328,6 +329,33 @@ def _events(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
                 if code == "M6"
                 else f'add {code} = "…" to [m_code] of the cell',
             )
+
+
+def _silent_changes(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the changes to another tool at which nobody changes it: the tip is taken for that of the new."""
+    changes = [event for event in toolpath.events if event.kind == "tool"]
+    if not changes or not cell.tool_change.strip():
+        return
+    from gcode2krl.cell.m_codes import silent_changes
+
+    silent = set(silent_changes(cell, sorted({event.values["tool"] for event in changes})))
+    in_spindle = cell.mounted_tool
+    for event in changes:
+        number = event.values["tool"]
+        if number not in silent:
+            in_spindle = number or None
+            continue
+        if number and in_spindle and number != in_spindle:
+            yield Issue(
+                "error",
+                "tool-change-silent",
+                int(event.values["line"]),
+                f"T{number} is called with T{in_spindle} in the spindle, and tool_change of the cell neither "
+                "stops, waits nor calls anything",
+                "let tool_change stop or call the magazine, or use one tool in a program",
+                key="tool_change",
+            )
+        in_spindle = in_spindle or number or None
 
 
 def _outputs_of_words(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools
 from gcode2krl.cell import Cell
+from gcode2krl.cell.layout import obstacle_box, stock_box
 from gcode2krl.cell.sections import Material, Tool
 from gcode2krl.errors import Issue
 from gcode2krl.program.source_text import line_with
@@ -38,6 +39,8 @@ def doubtful(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None = None) 
     yield from _dwells(toolpath)
     yield from _blends(toolpath, cell, tolerance_mm, feed)
     yield from _stops_in_cut(toolpath, cell, feed)
+    yield from _stock_elsewhere(toolpath, cell, feed)
+    yield from _clamps_above_plane(toolpath, cell)
 
 
 def _dwells(toolpath: Toolpath) -> Iterator[Issue]:
@@ -128,6 +131,55 @@ def _stops_in_cut(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue
                 f"M{event.values['m']} stops the program with the tool in the cut, {depth_mm:.2f} mm below "
                 f"where it went in, and {turning}",
                 "retract before the stop and go back in behind it",
+            )
+
+
+def _stock_elsewhere(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
+    """Yield a stated stock that lies beside all feed moves, by more than its own size.
+
+    What is nearer the simulation of the cut finds, if there is one.
+    """
+    box = stock_box(cell)
+    rows = np.flatnonzero(feed)
+    if box is None or not len(rows):
+        return
+    radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
+    places = toolpath.position_mm[np.union1d(rows, rows - 1)][:, :2]
+    low, high = places.min(axis=0) - radius_mm, places.max(axis=0) + radius_mm
+    beside_mm = np.maximum(low - box[1][:2], box[0][:2] - high)
+    if (beside_mm > (box[1] - box[0])[:2]).any():
+        yield Issue(
+            "error",
+            "stock-untouched",
+            int(toolpath.source_line[rows[0]]),
+            f"no feed move touches the stock that the cell states: all are {beside_mm.max():.1f} mm away",
+            "correct stock.box_mm of the cell, the work offset, or the zero point of the program",
+            key="stock.box_mm",
+        )
+
+
+def _clamps_above_plane(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    """Yield the obstacles that stand higher than the clearance plane where the program goes."""
+    z_mm = cell.clearance_z_mm
+    known = toolpath.is_position() & ~toolpath.machine
+    if z_mm is None or not cell.obstacle or not known.any():
+        return
+    radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
+    places = toolpath.position_mm[known][:, :2]
+    low, high = places.min(axis=0) - radius_mm, places.max(axis=0) + radius_mm
+    for obstacle in cell.obstacle:
+        box = obstacle_box(cell, obstacle)
+        if box is None or not box[0][2] < z_mm < box[1][2]:
+            continue
+        if (low < box[1][:2]).all() and (box[0][:2] < high).all():
+            yield Issue(
+                "warning",
+                "cell-contradiction",
+                0,
+                f"clearance.z_mm = {z_mm:g} is below the top of obstacle {obstacle.name}, {box[1][2]:g}, "
+                "where the program goes",
+                "raise clearance.z_mm of the cell above all clamps",
+                key="clearance.z_mm",
             )
 
 

@@ -29,8 +29,11 @@ def missing_issues(toolpath: Toolpath, cell: Cell) -> list[Issue]:
 
 def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     """Yield warnings on stated values: beyond their usual range, or left at a default that matters."""
+    from gcode2krl.cell.contradictions import contradictory
+
     used = set(used_tools(toolpath))
     yield from ranges.range_issues(cell, used)
+    yield from contradictory(cell, used)
     yield from _doubtful_cutters(used, cell)
     yield from _short_waits(toolpath, cell)
     yield from _unread_pairs(toolpath, cell)

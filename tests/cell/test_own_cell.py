@@ -171,7 +171,7 @@ def test_a_changed_model_says_so():
 
 
 def test_another_robot_keeps_nothing_of_the_base_arm():
-    base = {"robot": {"model": "KR 300 R2500 ultra", "limits": {"q_deg": [[-1, 1]] * 6}}}
+    base = {"robot": {"model": "KR 300 R2500 ultra", "limits": {"q_deg": [[-100, 100]] * 6}}}
     cell = over_demonstration({"robot": {"model": "KR 120 R2500 pro"}})
     assert cell.robot.limits.q_deg != over_demonstration(base).robot.limits.q_deg
     assert set(cell.compliance.virtual_joints) == {"sensor", "spindle"}

@@ -25,7 +25,7 @@ def frame(x, y, z, b=0.0):
 def cells(draw):
     """Return a complete cell without some of its keys, the keys left out, and its tool."""
     one = st.integers
-    outputs = draw(st.lists(one(40, 4000), min_size=3, max_size=3, unique=True))
+    outputs = draw(st.lists(one(40, 4000), min_size=4, max_size=4, unique=True))
     number = draw(one(1, 30))
     data = {
         "robot": {"model": "KR 210 R2700 prime"},
@@ -49,17 +49,20 @@ def cells(draw):
         "spindle": {
             "max_rpm": 18500,
             "run_cw_output": outputs[0],
+            "run_ccw_output": outputs[3],
             "speed_analog_output": 7,
             "flood_output": outputs[1],
             "stop_s": 6.5,
         },
         "controller": {"acc_cp_m_s2": 1.375, "rapid_m_s": 0.135, "ptp_percent": 13, "cdis_mm": 0.15},
-        "tool_change": f"$OUT[{outputs[2]}]=FALSE",
+        "tool_change": f"$OUT[{outputs[2]}]=FALSE\nHALT",
         "m_code": {
             "M3": "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
             "$OUT[{{ spindle.run_cw_output }}]=TRUE",
-            "M5": "$OUT[{{ spindle.run_cw_output }}]=FALSE\nWAIT SEC {{ spindle.stop_s }}",
-            "M4": "$OUT[{{ spindle.run_cw_output }}]=TRUE",
+            "M5": "$OUT[{{ spindle.run_cw_output }}]=FALSE\n$OUT[{{ spindle.run_ccw_output }}]=FALSE\n"
+            "WAIT SEC {{ spindle.stop_s }}",
+            "M4": "$ANOUT[{{ spindle.speed_analog_output }}]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n"
+            "$OUT[{{ spindle.run_ccw_output }}]=TRUE",
             "M7": "$OUT[{{ spindle.flood_output }}]=TRUE",
             "M8": "$OUT[{{ spindle.flood_output }}]=TRUE",
             "M9": "$OUT[{{ spindle.flood_output }}]=FALSE",

@@ -5,7 +5,8 @@ import time
 import pytest
 
 from gcode2krl import load_cell, predict
-from gcode2krl.cell.template_rules import may_be_on, problem, surely_off
+from gcode2krl.cell.krl_effect import effect_of
+from gcode2krl.cell.template_rules import problem
 from gcode2krl.cell.templates import TemplateError, render
 from gcode2krl.errors import Gcode2KrlError, RefusedError
 from gcode2krl.prediction import Prediction
@@ -71,7 +72,7 @@ KRL = [
 ]  # fmt: skip  # list of statements, kept compact
 GOOD = [
     "$OUT[5]=TRUE",
-    "$ANOUT[1]=0.5",
+    "$ANOUT[2]=0.5",
     "PULSE ($OUT[5],TRUE,0.5)",
     "WAIT SEC 1.0",
     "WAIT FOR $IN[5]",
@@ -214,8 +215,8 @@ def test_the_default_cell_says_nothing_forbidden():
 def test_outputs_are_read_back():
     text = "$OUT[1]=TRUE\n$OUT[2]=TRUE\n$OUT[2]=FALSE\n"
     text += "IF $IN[1] THEN\n$OUT[1]=FALSE\n$OUT[3]=TRUE\nENDIF\nX=FALSE"
-    assert may_be_on(text) == {"$OUT[1]", "$OUT[3]"}
-    assert surely_off(text) == {"$OUT[2]", "X"}
+    assert effect_of(text).on() == {"$OUT[1]", "$OUT[3]"}
+    assert effect_of(text).off() == {"$OUT[2]", "X"}
 
 
 def test_the_comment_of_a_g_code_line_is_only_text(tmp_path):

@@ -383,7 +383,7 @@ def test_template_with_an_error_is_refused(make, tmp_path, template):
 )
 def test_template_of_any_form_verifies(make, template):
     """A template may begin with a wait: that is no dwell of the G-code."""
-    made = make(PART.replace("G1 X40 F1500", "G1 X40 F1500\nM8"), data={"m_code": {"M8": template}})
+    made = make(PART.replace("G1 X40 F1500", "G1 X40 F1500\nM10"), data={"m_code": {"M10": template}})
     assert verify_krl(made.src, made.toolpath, made.cell).ok
 
 

@@ -6,6 +6,7 @@ from gcode2krl import load_cell, read_gcode
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.pipeline import predict_toolpath, set_targets
+from gcode2krl.program.doubts import doubtful
 
 HEAD = ["G21 G90 G17", "T1 M6", "S9000 M3", "G0 G43 H1 Z30", "G0 X0 Y0", "G0 Z2", "G1 Z-5 F600"]
 TAIL = ["G0 Z30", "M5", "M30"]
@@ -117,3 +118,27 @@ def test_a_wide_chord_tolerance(tmp_path):
     assert not read_gcode(path, cell, chord_tolerance_mm=0.5).issues
     with pytest.raises(NotUnderstoodError, match="500 mm is more than 10 mm"):
         read_gcode(path, chord_tolerance_mm=500.0)
+
+
+@pytest.mark.parametrize(
+    ("low_x", "code"),
+    [(0.0, []), (60.0, []), (200.0, [("error", "stock.box_mm")]), (-260.0, [("error", "stock.box_mm")])],
+)
+def test_a_stock_beside_the_program(plan, low_x, code):
+    body = "\n".join([*HEAD, "X50", *TAIL]) + "\n"
+    box = [[low_x, -20.0, -10.0], [low_x + 60.0, 20.0, 0.0]]
+    toolpath = plan(body, {"stock": {"box_mm": box}})
+    issues = [i for i in doubtful(toolpath.toolpath, toolpath.cell) if i.code == "stock-untouched"]
+    assert [(i.severity, i.key) for i in issues] == code
+
+
+@pytest.mark.parametrize(
+    ("at", "top", "found"), [(20.0, 130.0, True), (20.0, 90.0, False), (400.0, 130.0, False)]
+)
+def test_a_clamp_above_the_plane_where_the_program_goes(plan, at, top, found):
+    """The clearance plane of the demonstration cell is at 100."""
+    body = "\n".join([*HEAD, "X50", *TAIL]) + "\n"
+    clamp = {"name": "clamp", "box_mm": [[at, -10.0, -20.0], [at + 10.0, 10.0, top]]}
+    made = plan(body, {"obstacle": [clamp]})
+    keys = [i.key for i in doubtful(made.toolpath, made.cell) if i.code == "cell-contradiction"]
+    assert keys == ["clearance.z_mm"] * found

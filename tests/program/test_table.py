@@ -74,7 +74,9 @@ def test_the_lowest_point_of_a_tool_that_leans(plan, tool, lean_deg):
 def test_home_below_the_table_is_said(plan):
     found = plan(HEAD + "G0 X0 Y0\nG1 Z-10 F600\nG0 Z30\nM5\nM30\n", {"based_on": "demonstration"})
     height = found.targets.position_mm[0, 2]
-    cell = resolve_cell({"based_on": "demonstration", "table": {"z_mm": height + 1.0}})
+    cell = resolve_cell(
+        {"based_on": "demonstration", "table": {"z_mm": height + 1.0}, "clearance": {"z_mm": height + 2.0}}
+    )
     assert next(i.line for i in below_table(found.targets, cell)) == 0
 
 
