@@ -1,8 +1,8 @@
 """Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
 ``python benchmarks/mistakes.py [--json] [--contradictions]`` runs the cases of ``mistake_cases.py``,
-``mistake_cases_hidden.py``, ``mistake_cases_five_axes.py`` and ``mistake_cases_contradictory.py`` (the last alone
-on demand) through the command line's own entry, in a temporary folder, then clean programs that must be
+``mistake_cases_hidden.py``, ``mistake_cases_five_axes.py`` and ``mistake_cases_contradictory.py`` (the last
+alone on demand) through the command line's own entry, in a temporary folder, then clean programs that must be
 translated. What passes in silence is named. The exit code is always 0: figures are printed, not judged.
 """
 

@@ -788,6 +788,11 @@ def _blend(rest: list[Any]) -> str:
     return " ".join(part[1] for part in rest if isinstance(part, tuple) and part[0] == "approximation")
 
 
+def _strcomp(one: str, other: str, case: str) -> bool:
+    """Whether two texts are the same."""
+    return one == other if case == "#CASE_SENS" else one.upper() == other.upper()
+
+
 def _strfind(start: int, text: str, part: str, case: str) -> int:
     if case == "#NOT_CASE_SENS":
         text, part = text.upper(), part.upper()
@@ -803,6 +808,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "ACOS": lambda x: degrees(acos(x)),
     "ATAN2": lambda y, x: degrees(atan2(y, x)),
     "STRFIND": _strfind,
+    "STRCOMP": _strcomp,
     "STRLEN": len,
     "INV_POS": lambda frame: frame_of(inverted(matrix_of(frame))),
 }

@@ -77,12 +77,20 @@ def environment_of(cell: Cell, tools=(1,), standing=None, **more) -> Environment
             },
             "base_data": base,
             "tool_data": {number: frame_of(written_tool(cell, n)) for number, n in numbered.items()},
-            "load_data": {number: {"M": 100.0 + number} for number in numbered},
+            "load_data": {number: load_of(cell, n) for number, n in numbered.items()},
             "inputs": inputs,
             "q_deg": tuple(cell.home.q_deg),
             **more,
         }
     )
+
+
+def load_of(cell: Cell, tool: int) -> dict:
+    """Return LOAD_DATA of a tool as the cell states it."""
+    load = cell.load_of(tool)
+    centre = {"X": load.x_mm, "Y": load.y_mm, "Z": load.z_mm}
+    inertia = {"X": load.jx_kgm2, "Y": load.jy_kgm2, "Z": load.jz_kgm2}
+    return {"M": load.mass_kg, "CM": centre, "J": inertia}
 
 
 def expected_flange(cell: Cell, targets, row: int) -> np.ndarray:
